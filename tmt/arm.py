@@ -1,0 +1,47 @@
+"""The assignment's arm: its numbers, and the Tree that they make.
+
+Inertial frame at the shoulder: x north (where the person looks), y west, z up. With all angles zero the
+upper arm points along -z and the forearm along +x. The same numbers stand in mjcf/arm.xml on purpose:
+the two models share nothing, and a test ties them.
+"""
+
+from .method import hinge_frames
+from .space import Vector
+from .tree import Tree
+
+G = 9.81  # m/s2, along -z
+D = 0.3  # m, upper arm, shoulder to elbow
+E = 0.375  # m, forearm and hand, elbow to finger tips
+M1 = 1.9  # kg, upper arm
+M2 = 1.5  # kg, forearm and hand
+COM1 = 0.15  # m, shoulder to CoM of the upper arm: d/2
+COM2 = 0.15  # m, elbow to CoM of the forearm: 0.4 e, written out because 0.4 * 0.375 rounds to another double
+I1 = (0.015, 0.014, 0.002)  # kg m2, about the CoM, principal axes = body axes
+I2 = (0.001, 0.019, 0.019)  # kg m2
+
+
+def _diagonal(moments):
+    x, y, z = moments
+    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
+
+
+ARM = Tree(
+    hinge_names=("alpha", "beta", "gamma"),  # shoulder, shoulder, elbow
+    parent=(-1, 0, 1),
+    offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -D)),
+    axis=((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),  # y, x, y
+    damping=(0.0, 0.0, 0.0),
+    body_names=("upper arm", "forearm"),
+    body_hinge=(1, 2),
+    mass=(M1, M2),
+    com=((0.0, 0.0, -COM1), (COM2, 0.0, 0.0)),
+    inertia=(_diagonal(I1), _diagonal(I2)),
+    gravity=(0.0, 0.0, -G),
+)
+
+
+def points(q, model: Tree = ARM) -> list:
+    """Shoulder, elbow and finger tips in the world, three Vectors in m, at hinge angles q (3 scalars, rad)."""
+    frames = hinge_frames(model, q)
+    elbow, turn = frames[2].origin, frames[2].turn
+    return [frames[0].origin, elbow, elbow + turn @ Vector(E, 0.0, 0.0)]

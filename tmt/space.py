@@ -1,0 +1,132 @@
+"""Vectors and rotations over any scalar: float, array, mpf, traced or symbolic.
+
+A scalar is anything with + - * / that `sin` and `cos` know. A new scalar type registers itself with
+`sin.register` and `cos.register`; nothing else has to change.
+"""
+
+from functools import singledispatch
+
+import mpmath
+import numpy as np
+
+
+@singledispatch
+def sin(angle):
+    """Sine of a scalar of any registered type, angle in rad."""
+    return np.sin(angle)
+
+
+@singledispatch
+def cos(angle):
+    """Cosine of a scalar of any registered type, angle in rad."""
+    return np.cos(angle)
+
+
+sin.register(mpmath.mpf, mpmath.sin)
+cos.register(mpmath.mpf, mpmath.cos)
+
+
+class Vector:
+    """Three scalars, the components of a vector in one frame."""
+
+    __slots__ = ("x", "y", "z")
+    __array_ufunc__ = None  # else ndarray * Vector would be taken apart by NumPy
+
+    def __init__(self, x, y, z):
+        self.x, self.y, self.z = x, y, z
+
+    def __iter__(self):
+        return iter((self.x, self.y, self.z))
+
+    def __add__(self, other):
+        return Vector(self.x + other.x, self.y + other.y, self.z + other.z)
+
+    def __sub__(self, other):
+        return Vector(self.x - other.x, self.y - other.y, self.z - other.z)
+
+    def __mul__(self, scalar):
+        return Vector(self.x * scalar, self.y * scalar, self.z * scalar)
+
+    __rmul__ = __mul__
+
+    def dot(self, other):
+        return self.x * other.x + self.y * other.y + self.z * other.z
+
+    def cross(self, other):
+        return Vector(
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
+        )
+
+
+ZERO = Vector(0.0, 0.0, 0.0)
+
+
+class Matrix:
+    """A 3 x 3 matrix by rows, each a Vector; `matrix @ vector` and `matrix @ matrix`."""
+
+    __slots__ = ("rows",)
+
+    def __init__(self, rows):
+        self.rows = tuple(row if isinstance(row, Vector) else Vector(*row) for row in rows)
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __matmul__(self, other):
+        if isinstance(other, Vector):
+            return Vector(*(row.dot(other) for row in self.rows))
+        columns = other.T.rows
+        return Matrix([[row.dot(column) for column in columns] for row in self.rows])
+
+    @property
+    def T(self):
+        return Matrix(zip(*self.rows))
+
+
+IDENTITY = Matrix([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation(axis, angle):
+    """Matrix that turns by `angle` (rad, right-handed) about the unit vector `axis`.
+
+    R = a a' + cos (1 - a a') + sin [a]x, grouped so that a coordinate axis leaves exact zeros and ones.
+    """
+    x, y, z = axis
+    s, c = sin(angle), cos(angle)
+    return Matrix(
+        [
+            [x * x + c * (1 - x * x), x * y - c * (x * y) - s * z, x * z - c * (x * z) + s * y],
+            [x * y - c * (x * y) + s * z, y * y + c * (1 - y * y), y * z - c * (y * z) - s * x],
+            [x * z - c * (x * z) - s * y, y * z - c * (y * z) + s * x, z * z + c * (1 - z * z)],
+        ]
+    )
+
+
+def solve(matrix, right):
+    """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows.
+
+    Factorised as L D L' without square roots or pivots (none are needed: it is positive definite).
+    """
+    n = len(right)
+    lower = [[None] * n for _ in range(n)]
+    diagonal = [None] * n
+    for j in range(n):
+        scaled = [lower[j][k] * diagonal[k] for k in range(j)]
+        diagonal[j] = matrix[j][j] - total(lower[j][k] * scaled[k] for k in range(j))
+        for i in range(j + 1, n):
+            lower[i][j] = (matrix[i][j] - total(lower[i][k] * scaled[k] for k in range(j))) / diagonal[j]
+    x = list(right)
+    for i in range(n):
+        x[i] = x[i] - total(lower[i][k] * x[k] for k in range(i))
+    for i in range(n):
+        x[i] = x[i] / diagonal[i]
+    for i in reversed(range(n)):
+        x[i] = x[i] - total(lower[k][i] * x[k] for k in range(i + 1, n))
+    return x
+
+
+def total(terms):
+    """Sum of scalars of any type, 0.0 if there are none."""
+    return sum(terms, 0.0)

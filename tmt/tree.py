@@ -1,0 +1,100 @@
+"""A kinematic tree of hinges that carry rigid bodies, as plain numbers."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A tree of n hinges and m rigid bodies; at q = 0 every frame is parallel to the inertial frame.
+
+    Each hinge has a frame that turns with it, with its origin on the hinge axis. Several hinges in one
+    body are hinges in a row with no body between them. All fields are nested tuples; arrays and lists
+    are converted. `dataclasses.replace(tree, mass=(2.0, 1.5))` makes another model.
+    Raises ValueError where the numbers cannot be a tree or a rigid body.
+    """
+
+    hinge_names: tuple  # (n,)
+    parent: tuple  # (n,) index of the hinge before this one, always a smaller one; -1: fixed to the world
+    offset: tuple  # (n, 3) m, from the origin of the parent's frame to this hinge, in the parent's frame
+    axis: tuple  # (n, 3) direction of the hinge, right-handed; scaled to length 1
+    damping: tuple  # (n,) N m s/rad, torque -damping * qd
+    body_names: tuple  # (m,)
+    body_hinge: tuple  # (m,) index of the last hinge that moves the body; -1: fixed to the world
+    mass: tuple  # (m,) kg
+    com: tuple  # (m, 3) m, centre of mass in the frame of its hinge
+    inertia: tuple  # (m, 3, 3) kg m2, about the centre of mass, in the frame of its hinge
+    gravity: tuple  # (3,) m/s2, inertial frame
+
+    def __post_init__(self):
+        n, m = len(self.hinge_names), len(self.body_names)
+        shapes = {
+            "parent": (n,), "offset": (n, 3), "axis": (n, 3), "damping": (n,),
+            "body_hinge": (m,), "mass": (m,), "com": (m, 3), "inertia": (m, 3, 3), "gravity": (3,),
+        }  # fmt: skip
+        for name in ("hinge_names", "body_names"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, _numbers(name, getattr(self, name), shape))
+        if n == 0 or m == 0:
+            raise ValueError("a Tree needs at least one hinge and one body")
+        for name, hinges, before in (("parent", self.parent, range(n)), ("body_hinge", self.body_hinge, [n] * m)):
+            for i, (hinge, end) in enumerate(zip(hinges, before)):
+                if hinge != int(hinge) or not -1 <= hinge < end:
+                    raise ValueError(f"Tree.{name}[{i}] is {hinge:g}; a whole number from -1 to {end - 1} is expected")
+            object.__setattr__(self, name, tuple(int(hinge) for hinge in hinges))
+        lengths = [float(np.linalg.norm(axis)) for axis in self.axis]
+        if min(lengths) == 0.0:
+            raise ValueError(f"Tree.axis[{lengths.index(0.0)}] is zero; a direction is expected")
+        object.__setattr__(
+            self, "axis", tuple(tuple(a / length for a in axis) for axis, length in zip(self.axis, lengths))
+        )
+        if min(self.mass) < 0.0:
+            raise ValueError(f"Tree.mass is {self.mass}; masses of at least 0 kg are expected")
+        if min(self.damping) < 0.0:
+            raise ValueError(f"Tree.damping is {self.damping}; values of at least 0 N m s/rad are expected")
+        for name, inertia in zip(self.body_names, self.inertia):
+            _check_inertia(name, np.array(inertia))
+
+    def __repr__(self):
+        return f"Tree({', '.join(f'{field.name}={getattr(self, field.name)}' for field in fields(self))})"
+
+    def moves(self, body: int) -> list[bool]:
+        """Which of the n hinges move the body: those on its path to the world."""
+        on_path = [False] * len(self.parent)
+        hinge = self.body_hinge[body]
+        while hinge >= 0:
+            on_path[hinge] = True
+            hinge = self.parent[hinge]
+        return on_path
+
+
+def _numbers(name, values, shape):
+    """The values as nested tuples of float, after a check of their shape."""
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"Tree.{name} is {values!r}; numbers of shape {shape} are expected") from None
+    if array.shape != shape:
+        raise ValueError(f"Tree.{name} has shape {array.shape}; {shape} is expected")
+    if not np.isfinite(array).all():
+        raise ValueError(f"Tree.{name} is {values!r}; finite numbers are expected")
+
+    def nested(item):
+        return tuple(map(nested, item)) if isinstance(item, list) else item
+
+    return nested(array.tolist())
+
+
+def _check_inertia(name, inertia):
+    """Raise ValueError unless the 3 x 3 tensor can belong to a rigid body."""
+    scale = np.abs(inertia).max()
+    if np.abs(inertia - inertia.T).max() > 1e-12 * scale:
+        raise ValueError(f"the inertia of {name!r} is not symmetric: {inertia.tolist()}")
+    a, b, c = np.linalg.eigvalsh(inertia)
+    if a < -1e-12 * scale or a + b < c - 1e-12 * scale:
+        raise ValueError(
+            f"the inertia of {name!r} has principal values {a:g}, {b:g}, {c:g}; "
+            "each must be at least 0 and none larger than the other two together"
+        )
