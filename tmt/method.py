@@ -121,12 +121,16 @@ def bias(parts, gravity) -> list:
     return [total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in zip(parts, newton, euler)) for i in range(n)]
 
 
+def reduced_force(tree, parts, qd, tau) -> list:
+    """Qbar = tau - D qd - h (n, N m) of the bodies."""
+    h = bias(parts, tree.gravity)
+    return [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
+
+
 def acceleration(tree, q, qd, tau) -> list:
     """qdd (n, rad/s2) from Mbar qdd = Qbar = tau - D qd - h."""
     parts = bodies(tree, q, qd)
-    h = bias(parts, tree.gravity)
-    Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
-    return solve(mass_matrix(parts), Qbar)
+    return solve(mass_matrix(parts), reduced_force(tree, parts, qd, tau))
 
 
 def potential(parts, gravity):

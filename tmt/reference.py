@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 
 from . import method
+from .space import ZERO, solve
 
 DIGITS = 50
 
@@ -36,7 +37,8 @@ def exact(tree, q, qd, tau) -> Truth:
     with mpmath.workdps(DIGITS):
         q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd, tau))
         parts = method.bodies(tree, q, qd)
-        at_rest = method.bodies(tree, q)
+        at_rest = [b._replace(omega=ZERO, v_conv=ZERO, w_conv=ZERO) for b in parts]
+        mass_matrix = method.mass_matrix(parts)
         potential = method.potential(parts, tree.gravity)
         return Truth(
             com_positions=_array(b.x for b in parts),
@@ -45,10 +47,10 @@ def exact(tree, q, qd, tau) -> Truth:
             B=_array(zip(*b.B) for b in parts),
             v_conv=_array(b.v_conv for b in parts),
             w_conv=_array(b.w_conv for b in parts),
-            mass_matrix=_array(method.mass_matrix(parts)),
+            mass_matrix=_array(mass_matrix),
             bias=_array(method.bias(parts, tree.gravity)),
             gravity_balance=_array(method.bias(at_rest, tree.gravity)),
-            acceleration=_array(method.acceleration(tree, q, qd, tau)),
+            acceleration=_array(solve(mass_matrix, method.reduced_force(tree, parts, qd, tau))),
             potential_energy=_array(potential),
             energy=_array(potential + method.kinetic(parts, qd)),
         )

@@ -1,0 +1,143 @@
+"""python -m compare: hold the two models against each other and write a report.
+
+Every experiment is the module of its name: `rows(setup)` computes, `figures(result)` draws.
+"""
+
+import argparse
+import importlib
+import os
+import shlex
+import sys
+import time
+
+from rich.console import Console
+from rich.markup import escape
+
+EXPERIMENTS = {
+    "parameters": "MuJoCo's compiled model read back beside the stated numbers",
+    "published": "every number that the assignment prints",
+    "kinematics": "positions, angular velocities, Jacobians, convective terms",
+    "mass": "the mass matrix",
+    "gravity": "the torque that holds the arm",
+    "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
+    "trajectory": "five seconds of motion by the same method on both sides",
+}
+EXAMPLES = """examples:
+  python -m compare all                          every experiment, report in reports/latest
+  python -m compare all --quick                  the same with fewer states, in seconds
+  python -m compare mass --out /tmp/mass         one experiment, report elsewhere
+  python -m compare all --mjcf my_arm.xml        your MJCF against the stated arm
+
+exit status: 0 all checks pass; 1 a check failed; 2 the request could not be carried out
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        self.exit(2, f"{self.prog}: {message}\n")
+
+
+class Terminal(Console):
+    """Prints as rich does; if the reader has gone (| head -1) the work goes on in silence."""
+
+    def on_broken_pipe(self):
+        self.quiet = True
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+    def line(self, text, style=""):
+        self.print(escape(text), style=style, highlight=False, soft_wrap=True)
+
+
+def main(arguments=None) -> int:
+    """Run the command line; the exit status."""
+    parser = Parser(
+        prog="python -m compare",
+        description="Hold the TMT method and MuJoCo against each other on a human arm, and write a report.",
+        epilog="experiments:\n" + "".join(f"  {k:<13} {v}\n" for k, v in EXPERIMENTS.items()) + "\n" + EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "experiment", choices=[*EXPERIMENTS, "all"], metavar="EXPERIMENT", help="one of those below, or all"
+    )
+    parser.add_argument(
+        "--out", default="reports/latest", metavar="DIR", help="where the report goes (default: %(default)s)"
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer states: under 10 seconds")
+    parser.add_argument(
+        "--mjcf", metavar="FILE", help="another model of the same three hinges, held against the stated arm"
+    )
+    options = parser.parse_args(arguments)
+    command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
+    terminal = Terminal()
+    try:
+        return run(options, command, terminal)
+    except KeyboardInterrupt:
+        print("interrupted; a report that was there is unchanged", file=sys.stderr)
+    except Refused as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+    return 2
+
+
+class Refused(ValueError):
+    """A request that cannot be carried out; the message is one line."""
+
+
+def run(options, command, terminal) -> int:
+    """Compute, draw, write; the exit status."""
+    started = time.perf_counter()
+    from . import report  # here, so that --help and a wrong word answer at once
+    from .agreement import Setup
+    from .engine import ARM_XML, ModelError, load
+    from .folder import FolderError, new_report
+
+    names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
+    try:
+        setup = Setup(load(options.mjcf or ARM_XML), options.quick)
+        with new_report(options.out) as folder:
+            (folder / "figures").mkdir()
+            sections = []
+            for name in names:
+                with terminal.status(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})"):
+                    sections.append(examine(name, setup, folder))
+                tell(terminal, sections[-1])
+            report.write(folder, sections, report.provenance(command, time.perf_counter() - started))
+    except (ModelError, FolderError) as error:
+        raise Refused(error) from None
+    terminal.line("")
+    terminal.line(report.verdict(sections), "bold green" if report.passed(sections) else "bold red")
+    terminal.line(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
+    return 0 if report.passed(sections) else 1
+
+
+def examine(name, setup, folder):
+    """One experiment: its rows, its figures on disk, its section of the report."""
+    from .report import Section
+
+    started = time.perf_counter()
+    module = importlib.import_module(f".{name}", __package__)
+    result = module.rows(setup)
+    section = Section(name, module.TITLE, module.CLAIM, module.BAR, result)
+    for file_name, figure, caption in module.figures(result):
+        figure.savefig(folder / "figures" / f"{file_name}.png", bbox_inches="tight")
+        section.figures.append((file_name, caption))
+    section.seconds = time.perf_counter() - started
+    return section
+
+
+def tell(terminal, section):
+    """One line for an experiment, one more for each check that failed."""
+    checks = section.result.checks
+    failed = [check for check in checks if not check.passed]
+    used = [check.over_bar for check in checks if check.over_bar is not None]
+    most = f"worst {max(used):.2g} of its bar" if used else ""
+    word = f"{len(failed)} FAILED" if failed else "ok"
+    terminal.line(
+        f"{section.name:<13} {word:<10} {len(checks):>3} checks  {most:<26} {section.seconds:5.1f} s",
+        "red" if failed else "",
+    )
+    for check in failed:
+        terminal.line(f"  FAIL {check}", "red")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,226 @@
+"""Two parties held against each other: states, scales, bars, checks.
+
+A difference is judged against `factor` x eps x scale. The scale of a quantity is the sum of the absolute
+values of the terms that are added up in it, taken per state, never the quantity itself (which may be
+zero); the factor is 64, times the condition number of Mbar where a linear system is solved.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+import tmt
+from tmt.reference import distance, exact
+
+from .engine import Engine
+from .scenes import POSTURES, posture
+
+EPS = float(np.finfo(float).eps)
+FACTOR = 64
+SEED = 10  # of every random number in a report
+SHOWN = ["scene", "quantity", "states", "worst_difference", "bar", "difference_over_bar",
+         "tmt_from_exact_eps", "mujoco_from_exact_eps", "unit"]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Check:
+    """One verdict: passed if value <= tolerance; value None where a run diverged."""
+
+    experiment: str
+    scene: str
+    quantity: str
+    value: float | None
+    tolerance: float
+    unit: str
+    note: str = ""
+
+    @property
+    def passed(self) -> bool:
+        return self.value is not None and bool(self.value <= self.tolerance)
+
+    @property
+    def over_bar(self) -> float | None:
+        """How much of its tolerance is used; None if the tolerance is zero or there is no value."""
+        return self.value / self.tolerance if self.tolerance and self.value is not None else None
+
+    def record(self) -> dict:
+        names = ("experiment", "scene", "quantity", "value", "tolerance", "unit", "passed", "note")
+        return {name: getattr(self, name) for name in names}
+
+    def __str__(self):
+        if self.tolerance == 0.0 and self.value is not None:
+            found = f"{self.value:.6g} {self.unit}, none allowed"
+        else:
+            value = "diverged" if self.value is None else f"off by {self.value:.3g} {self.unit}"
+            found = f"{value}, bar {self.tolerance:.3g} {self.unit}"
+        return f"{self.experiment}: {self.quantity}, {self.scene}: {found}" + (f" ({self.note})" if self.note else "")
+
+
+@dataclass
+class Result:
+    """What an experiment found: rows of its table, checks, and the numbers that its figures draw."""
+
+    experiment: str
+    rows: list = field(default_factory=list)
+    checks: list = field(default_factory=list)
+    curves: dict = field(default_factory=dict)
+    notes: list = field(default_factory=list)  # sentences for the report
+    shown: list | None = None  # columns of the table in the report, if not all
+
+    @property
+    def table(self) -> pd.DataFrame:
+        return pd.DataFrame(self.rows)
+
+    def check(self, scene, quantity, value, tolerance, unit, note="") -> Check:
+        value = float(value) if np.isfinite(value) else None
+        self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note))
+        return self.checks[-1]
+
+    def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, factor=FACTOR, truth=None) -> None:
+        """A row and a check: the worst difference of two parties over the states of a sample.
+
+        tmt_values, mujoco_values: (states, ...); scale, factor: numbers or (states,); truth: the name of a
+        field of tmt.reference.Truth, for the distance of each party from the exact value in eps x scale.
+        """
+        states = len(sample.q)
+        scale = np.broadcast_to(scale, states)
+        bar = factor * EPS * scale
+        apart = {"TMT to MuJoCo": largest(np.subtract(tmt_values, mujoco_values))}
+        if truth:
+            known = sample.truth(truth)
+            for party, values in (("TMT", tmt_values), ("MuJoCo", mujoco_values)):
+                apart[f"{party} to exact"] = largest(distance(values[: len(known)], known))
+        in_eps = {name: d / (EPS * scale[: len(d)]) for name, d in apart.items()}
+        difference = apart["TMT to MuJoCo"]
+        worst = int(np.argmax(np.where(np.isfinite(difference), difference / bar, np.inf)))
+        check = self.check(sample.name, quantity, difference[worst], bar[worst], unit, sample.describe(worst))
+        self.rows.append(
+            {
+                "scene": sample.name,
+                "quantity": quantity,
+                "unit": unit,
+                "states": states,
+                "worst_difference": check.value,
+                "bar": check.tolerance,
+                "difference_over_bar": check.over_bar,
+                "scale": scale[worst],
+                "difference_eps": in_eps["TMT to MuJoCo"].max(),
+                "tmt_from_exact_eps": in_eps["TMT to exact"].max() if truth else None,
+                "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if truth else None,
+                "exact_states": len(known) if truth else None,
+                "worst_state": check.note,
+                "passed": check.passed,
+            }
+        )
+        self.curves.setdefault(sample.name, {})[quantity] = {
+            name: np.sort(values) for name, values in in_eps.items()
+        } | {"bar": np.max(factor)}
+        self.shown = SHOWN
+
+
+def largest(values) -> np.ndarray:
+    """The largest absolute value of each state, (states, ...) -> (states,)."""
+    values = np.abs(np.asarray(values, dtype=float))
+    return values.reshape(len(values), -1).max(axis=1)
+
+
+class Sample:
+    """States at which the parties are compared, with the exact values of the first `exact_states`."""
+
+    def __init__(self, name, q, qd, tau, exact_states, states=()):
+        self.name, self.q, self.qd, self.tau = name, q, qd, tau
+        self.exact_states, self.states = exact_states, states
+
+    @cached_property
+    def truths(self) -> list:
+        known = slice(self.exact_states)
+        return [exact(tmt.ARM, *state) for state in zip(self.q[known], self.qd[known], self.tau[known])]
+
+    def truth(self, quantity) -> np.ndarray:
+        return np.array([getattr(truth, quantity) for truth in self.truths])
+
+    def describe(self, i) -> str:
+        """Where state i is, for a reader who wants to see it again."""
+        if self.states:
+            return self.states[i]
+        return f"state {i}: q = ({', '.join(f'{a:.4f}' for a in self.q[i])}) rad"
+
+    def each(self) -> list["Sample"]:
+        """One sample for each state, by its own name."""
+        singles = []
+        for i, name in enumerate(self.states):
+            single = Sample(name, *(a[i : i + 1] for a in (self.q, self.qd, self.tau)), 1, (name,))
+            single.truths = self.truths[i : i + 1]
+            singles.append(single)
+        return singles
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an experiment needs: the engine under judgement, the states, how many of them."""
+
+    engine: Engine
+    quick: bool = False
+
+    @cached_property
+    def named(self) -> Sample:
+        """The named postures, with random rates and torques where those are asked for."""
+        rng = np.random.default_rng([SEED, 1])
+        rates, torques = rng.uniform(-10.0, 10.0, (2, len(POSTURES), 3))
+        q = np.array([posture(name) for name in POSTURES])
+        return Sample("named postures", q, rates, torques, len(q), tuple(POSTURES))
+
+    @cached_property
+    def random(self) -> Sample:
+        """Random states: q in [-pi, pi] rad, qd in [-10, 10] rad/s, tau in [-10, 10] N m."""
+        rng = np.random.default_rng(SEED)
+        count, exact_states = (1000, 20) if self.quick else (10_000, 200)
+        q = rng.uniform(-np.pi, np.pi, (count, 3))
+        rates, torques = rng.uniform(-10.0, 10.0, (2, count, 3))
+        return Sample("random states", q, rates, torques, exact_states)
+
+
+# scales: from the stated numbers and TMT's own terms, per state
+
+
+def reaches(model=tmt.ARM) -> np.ndarray:
+    """Largest distance of each centre of mass from the origin, m: lengths added along the tree, shape (m,)."""
+    to_hinge = []
+    for parent, offset in zip(model.parent, model.offset):
+        to_hinge.append((to_hinge[parent] if parent >= 0 else 0.0) + np.linalg.norm(offset))
+    return np.array([to_hinge[hinge] + np.linalg.norm(com) for hinge, com in zip(model.body_hinge, model.com)])
+
+
+def gravity_scale(model=tmt.ARM) -> float:
+    """Sum of m g reach, N m or J: 9.42 for the arm."""
+    return float(np.linalg.norm(model.gravity) * np.dot(model.mass, reaches(model)))
+
+
+def bias_scale(q, qd, model=tmt.ARM) -> np.ndarray:
+    """Convective + Euler + gravity terms of the bias, each by its absolute value, N m, (states,)."""
+    T, B = tmt.jacobians(q, model)
+    v_conv, w_conv = tmt.convective_terms(q, qd, model)
+    omega = tmt.angular_velocities(q, qd, model)
+    inertia = np.array(model.inertia)
+    moments = np.abs(np.einsum("bij,sbj->sbi", inertia, w_conv))
+    moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
+    newton = np.einsum("sbci,b,sbc->si", np.abs(T), model.mass, np.abs(v_conv))
+    euler = np.einsum("sbci,sbc->si", np.abs(B), moments)
+    return (newton + euler).max(axis=1) + gravity_scale(model)
+
+
+def mass_scale(q) -> np.ndarray:
+    """Largest entry of Mbar, kg m2, (states,)."""
+    return np.abs(tmt.mass_matrix(q)).max(axis=(1, 2))
+
+
+def condition(q) -> np.ndarray:
+    """Condition number of Mbar in the 2-norm, (states,)."""
+    return np.linalg.cond(tmt.mass_matrix(q))
+
+
+def acceleration_scale(q, force) -> np.ndarray:
+    """|Mbar^-1| times the scale of the forces, rad/s2, (states,): a bound of the acceleration."""
+    return force / np.linalg.eigvalsh(tmt.mass_matrix(q))[:, 0]

@@ -1,0 +1,192 @@
+"""Figures from results. Nothing is computed here but positions on paper.
+
+Every function returns (file name, figure, caption). Colours are Okabe and Ito's, which the colour-blind
+can tell apart; lines differ in dash and markers too.
+"""
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+import tmt
+from tmt import arm, method
+
+from .scenes import posture
+
+BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
+HINGES = (("alpha", BLUE, "-"), ("beta", RED, "--"), ("gamma", GREEN, "-."))
+GREEK = {"alpha": "α", "beta": "β", "gamma": "γ"}
+STYLE = {
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "savefig.dpi": 150,
+}
+WIDTH = 7.5  # inches, a page
+FLOOR = 1e-3  # eps: where differences of exactly zero are drawn
+matplotlib.rcParams.update(STYLE)
+
+
+def sketch():
+    """The arm with its hinge axes, from the method's own frames."""
+    fig = Figure(figsize=(WIDTH, 3.9), layout="constrained")
+    for k, name in enumerate(("zero", "ball catch")):
+        ax = fig.add_subplot(1, 2, k + 1, projection="3d")
+        q = posture(name).tolist()
+        joints = np.array([list(p) for p in arm.points(q)], dtype=float)
+        ax.plot(*joints.T, color=GREY, linewidth=6, solid_capstyle="round", alpha=0.6)
+        for frame, (hinge, colour, _) in zip(method.hinge_frames(tmt.ARM, q), HINGES):
+            origin, axis = np.array(list(frame.origin)), 0.22 * np.array(list(frame.axis))
+            ax.quiver(*origin, *axis, color=colour, linewidth=2, arrow_length_ratio=0.2)
+            ax.text(*(origin + 1.25 * axis), GREEK[hinge], color=colour, fontsize=13, ha="center", va="center")
+        for com, body in zip(tmt.com_positions(q), ("1", "2")):
+            ax.scatter(*com, color="black", s=25, depthshade=False)
+            ax.text(*(com + [0.03, 0.03, 0.03]), body, fontsize=9)
+        for point, text in zip(joints, ("shoulder", "elbow", "hand")):
+            ax.text(*(point - [0.0, 0.0, 0.07]), text, color=GREY, ha="center", fontsize=8)
+        ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(q))})°")
+        ax.set(xlabel="x north, m", ylabel="y west, m", zlabel="z up, m")
+        ax.set(xlim=(-0.3, 0.4), ylim=(-0.35, 0.35), zlim=(-0.45, 0.25), box_aspect=(1, 1, 1))
+        for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+            axis.set_major_locator(matplotlib.ticker.MultipleLocator(0.2))
+        ax.view_init(elev=18, azim=-60)
+    caption = (
+        "The arm and its hinges, drawn from the method's own kinematics: α about y, then β about x, at the shoulder; "
+        "γ about y at the elbow. Dots: centres of mass of the upper arm (1) and the forearm (2)."
+    )
+    return "arm", fig, caption
+
+
+def distances(result, sample, quantities=None):
+    """How far apart the parties are over all states, and how far each is from the exact value."""
+    curves = result.curves[sample]
+    quantities = quantities or [name for name, c in curves.items() if "TMT to exact" in c]
+    columns = min(3, len(quantities))
+    lines = -(-len(quantities) // columns)
+    fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
+    axes = fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    styles = (("TMT to MuJoCo", "black", "-"), ("TMT to exact", BLUE, "--"), ("MuJoCo to exact", ORANGE, "-."))
+    for ax, quantity in zip(axes.flat, quantities):
+        for name, colour, dash in styles:
+            values = np.maximum(curves[quantity][name], FLOOR)
+            share = np.arange(1, len(values) + 1) / len(values)
+            ax.step(values, share, where="post", color=colour, linestyle=dash, label=name)
+        bar = curves[quantity]["bar"]
+        ax.axvline(bar, color=RED, linewidth=2, label="bar" if np.isclose(bar, 64) else "bar: 64 cond(Mbar)")
+        ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
+    for ax in axes.flat[len(quantities) :]:
+        ax.set_visible(False)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("share of states")
+    fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    worst = max((curves[q]["TMT to MuJoCo"][-1], q) for q in quantities)
+    ours, theirs = (max(curves[q][f"{p} to exact"][-1] for q in quantities) for p in ("TMT", "MuJoCo"))
+    caption = (
+        f"Share of the {sample} whose difference is at most so many eps. The parties are at most {worst[0]:.1f} eps apart "
+        f"({worst[1]}); TMT is at most {ours:.1f} eps and MuJoCo at most {theirs:.1f} eps from the exact value. "
+        f"Differences of exactly zero are drawn at {FLOOR:g}."
+    )
+    return f"{result.experiment}_distances", fig, caption
+
+
+def condition_map(result):
+    """The condition number of Mbar over beta and gamma."""
+    c = result.curves["condition"]
+    fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    ax = fig.subplots()
+    beta, gamma = np.degrees(c["beta"]), np.degrees(c["gamma"])
+    image = ax.pcolormesh(beta, gamma, c["values"], cmap="viridis", shading="nearest", rasterized=True)
+    lines = ax.contour(beta, gamma, c["values"], levels=[10, 20, 40, 80], colors="white", linewidths=0.7)
+    ax.clabel(lines, fontsize=7)
+    ax.plot(*np.degrees(c["worst"]), marker="o", color=RED, markersize=8, markeredgecolor="white")
+    ax.set(xlabel="β, deg", ylabel="γ, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
+    fig.colorbar(image, label="condition number of Mbar")
+    worst = np.degrees(c["worst"])
+    caption = (
+        f"Condition number of Mbar over β and γ (α has no part in it). Its maximum, {c['TMT']:.2f} from TMT and "
+        f"{c['MuJoCo']:.2f} from MuJoCo, is at β = {worst[0]:.1f}°, γ = {worst[1]:.1f}° (dot) and, by symmetry, at -β."
+    )
+    return "mass_condition", fig, caption
+
+
+def holding_torques(result):
+    """Holding torques at the named postures."""
+    postures = result.curves["postures"]
+    fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
+    ax = fig.subplots()
+    places = np.arange(len(postures))
+    for i, (hinge, colour, _) in enumerate(HINGES):
+        ours, theirs = (np.array([pair[k][i] for pair in postures.values()]) for k in (0, 1))
+        x = places + 0.26 * (i - 1)
+        ax.bar(x, ours, width=0.24, color=colour, alpha=0.75, label=f"{GREEK[hinge]}, TMT")
+        ax.plot(x, theirs, "_", color="black", markersize=13, markeredgewidth=2, label="MuJoCo" if i == 0 else None)
+    ax.axhline(0.0, color="black", linewidth=0.8)
+    ax.set_xticks(places, postures)
+    ax.set(ylabel="holding torque, N m")
+    fig.legend(loc="outside upper center", ncols=4)
+    apart = max(np.abs(ours - theirs).max() for ours, theirs in postures.values())
+    caption = (
+        f"Torque that holds each named posture: TMT (bars) and MuJoCo (black marks), at most {apart:.1e} N m apart. "
+        "Hanging and upright need none."
+    )
+    return "gravity_postures", fig, caption
+
+
+def held(result, scene_name, name):
+    """The assignment's figure of a held posture: hinge angles against time."""
+    (scene, curve) = next((s, c) for (s, n), c in result.curves.items() if s.name == scene_name and n == 64)
+    fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
+    ax = fig.subplots()
+    for i, (hinge, colour, dash) in enumerate(HINGES):
+        ax.plot(curve["t"], np.degrees(curve["tmt"][0][:, i]), dash, color=colour, label=f"{GREEK[hinge]}, TMT")
+        ax.plot(curve["t"], np.degrees(curve["mujoco"][0][:, i]), "o", color=colour, mfc="none", markersize=3.5)
+    ax.plot([], [], "o", color="black", mfc="none", markersize=3.5, label="MuJoCo")
+    ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, scene.duration))
+    fig.legend(loc="outside upper center", ncols=4)
+    left = [f"leaves (0.1 rad) at {x:.2f} s" if x else "does not leave" for x in curve["left"]]
+    number = {"assignment_figure_2": 2, "assignment_figure_3": 3}[name]
+    caption = (
+        f"The assignment's Figure {number} redrawn: {scene_name} with TMT's torque in both engines, RK4, dt = 5/64 s. "
+        f"In five seconds the arm of TMT {left[0]}, that of MuJoCo {left[1]}."
+    )
+    return name, fig, caption
+
+
+def run(result, scene):
+    """One scene with both step sizes: angles, rates, and the difference under its band."""
+    curves = {n: c for (s, n), c in result.curves.items() if s is scene}
+    fig = Figure(figsize=(WIDTH, 6.2), layout="constrained")
+    axes = fig.subplots(3, len(curves), sharex=True, sharey="row")
+    ratios = []
+    for column, (steps, c) in zip(axes.T, curves.items()):
+        every = max(1, steps // 64)
+        for row, ax in enumerate(column[:2]):
+            for i, (hinge, colour, dash) in enumerate(HINGES):
+                ax.plot(c["t"], c["tmt"][row][:, i], dash, color=colour, label=f"{GREEK[hinge]}, TMT")
+                ax.plot(c["t"][::every], c["mujoco"][row][::every, i], "o", color=colour, mfc="none", markersize=3)
+        column[0].plot([], [], "o", color="black", mfc="none", markersize=3, label="MuJoCo")
+        column[0].set_title(f"dt = 5/{steps} s")
+        difference, width = c["differences"][0].max(axis=1), c["band"][:, :3].max(axis=1)
+        judged = c["t"] <= c["judged_until_s"]
+        column[2].semilogy(
+            c["t"][1:], np.maximum(difference[1:], 1e-18), color="black", linewidth=1, label="difference"
+        )
+        column[2].semilogy(c["t"][1:], np.minimum(width[1:], 1e3), "--", color=ORANGE, label="band of rounding")
+        if not judged.all():
+            column[2].axvspan(c["judged_until_s"], c["t"][-1], color=GREY, alpha=0.15, label="not judged")
+        column[2].set(xlabel="time, s", xlim=(0, scene.duration))
+        ratios.append(np.max(difference[1:][judged[1:]] / width[1:][judged[1:]]))
+    for ax, label in zip(axes[:, 0], ("angle, rad", "rate, rad/s", "angle: |TMT - MuJoCo|, rad")):
+        ax.set_ylabel(label)
+    handles = [axes[0, 0].get_legend_handles_labels(), axes[2, 0].get_legend_handles_labels()]
+    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="outside upper center", ncols=4)
+    until = min(c["judged_until_s"] for c in curves.values())
+    caption = (
+        f"{scene.name[0].upper()}{scene.name[1:]}: while judged (to {until:.2f} s) the angles stay within "
+        f"{max(ratios):.1e} of the band of rounding. Differences of exactly zero are drawn at 1e-18."
+    )
+    return "trajectory_" + scene.name.replace(", ", "_").replace(" ", "_"), fig, caption

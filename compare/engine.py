@@ -1,0 +1,269 @@
+"""MuJoCo, spoken to in the project's symbols. The only module that imports it.
+
+    q, qd, qdd <-> qpos, qvel, qacc      h <-> qfrc_bias      tau <-> qfrc_applied
+    M qdd + h = tau - D qd
+
+MuJoCo's derived fields belong to the state of the last mj_forward, not to that of the last step: every
+quantity here is evaluated with mj_forward at the state that is asked for.
+"""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco.rollout import rollout
+
+ARM_XML = Path(__file__).resolve().parent.parent / "mjcf" / "arm.xml"
+VERSION = mujoco.__version__
+
+# a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
+_log = mujoco.MjLogConfig.get()
+_log.logto_file = _log.logto_console = False
+_log.set()
+
+INTEGRATORS = {"rk4": mujoco.mjtIntegrator.mjINT_RK4}
+FLAGS = {
+    "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
+    "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY,
+    "autoreset": mujoco.mjtDisableBit.mjDSBL_AUTORESET,
+}
+
+
+class ModelError(ValueError):
+    """A file that cannot be held against the stated arm; the message is one line."""
+
+
+class Engine:
+    """MuJoCo with one model of given hinges; quantities at any states q, qd, tau of shape (..., n).
+
+    Columns follow the names in `hinges`, whatever the order in the file. A body is the one that moves
+    with the hinge named in `carriers`; its axes are those that coincide with the world's at q = 0.
+    """
+
+    def __init__(self, model, hinges, carriers):
+        self.model, self.data = model, mujoco.MjData(model)
+        self.hinges = list(hinges)
+        joints = [model.joint(name) for name in hinges]
+        self.joints = np.array([joint.id for joint in joints])
+        self.qpos = np.array([joint.qposadr[0] for joint in joints])
+        self.dofs = np.array([joint.dofadr[0] for joint in joints])
+        self.bodies = [int(model.jnt_bodyid[self.joints[self.hinges.index(name)]]) for name in carriers]
+        self._at(np.zeros(len(joints)))
+        self.zero_axes = self._turns(self.data.xmat)
+
+    # where the compiled model differs from its file: read back in project symbols
+
+    def parameters(self) -> dict:
+        """What the compiler made of the file: arrays per hinge and per body, at q = 0, in world axes."""
+        m, d = self.model, self.data
+        self._at(np.zeros(len(self.hinges)))
+        anchors = d.xanchor[self.joints].copy()
+        carrier = [int(m.jnt_bodyid[j]) for j in self.joints]
+        last = [max(i for i, owner in enumerate(carrier) if owner == body) for body in self.bodies]
+        turns = self._turns(d.ximat)
+        return {
+            "axis": d.xaxis[self.joints].copy(),
+            "anchor": anchors,
+            "damping": m.dof_damping.reshape(m.nv, -1)[self.dofs, 0],
+            "armature": m.dof_armature[self.dofs],
+            "frictionloss": m.dof_frictionloss[self.dofs],
+            "stiffness": m.jnt_stiffness.reshape(m.njnt, -1)[self.joints, 0],
+            "limited": m.jnt_limited[self.joints].astype(float),
+            "order": np.argsort(np.argsort(self.joints)).astype(float),
+            "mass": m.body_mass[self.bodies],
+            "com": d.xipos[self.bodies] - anchors[last],
+            "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[self.bodies])]),
+            "gravcomp": m.body_gravcomp[self.bodies],
+            "gravity": m.opt.gravity * self.enabled("gravity"),
+            "other mass": m.body_subtreemass[0] - m.body_mass[self.bodies].sum(),
+        }
+
+    def options(self) -> dict:
+        """Flags, integrator and counts that say what else the file asks of MuJoCo."""
+        m = self.model
+        flags = {f"flag {name}": "enable" if self.enabled(name) else "disable" for name in FLAGS}
+        counts = ("ngeom", "nu", "nsensor", "neq", "ntendon")
+        integrator = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
+        return flags | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}
+
+    def enabled(self, flag) -> bool:
+        return not self.model.opt.disableflags & int(FLAGS[flag])
+
+    def without_gravity(self) -> "Engine":
+        """The same model in a world without gravity."""
+        other = mujoco.MjModel.__copy__(self.model)
+        other.opt.gravity[:] = 0.0
+        return Engine(other, self.hinges, [self._last_hinge(body) for body in self.bodies])
+
+    # quantities at states
+
+    def com_positions(self, q) -> np.ndarray:
+        """CoM positions in the world, m, (..., m, 3): xipos."""
+        return self._each(lambda d: d.xipos[self.bodies], q)
+
+    def angular_velocities(self, q, qd) -> np.ndarray:
+        """Angular velocities in body axes, rad/s, (..., m, 3): R' times the angular part of cvel."""
+        return self._each(lambda d: self._to_body(d.cvel[self.bodies, :3]), q, qd)
+
+    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
+        """T_b and B_b, (..., m, 3, n): mj_jacBodyCom, its rotational part turned into body axes."""
+
+        def both(d):
+            jacobians = np.zeros((2, len(self.bodies), 3, self.model.nv))
+            for T, B, body in zip(*jacobians, self.bodies):
+                mujoco.mj_jacBodyCom(self.model, d, T, B, body)
+            return self._reduced(jacobians)
+
+        result = self._each(both, q)
+        return result[..., 0, :, :, :], result[..., 1, :, :, :]
+
+    def convective_terms(self, q, qd) -> tuple[np.ndarray, np.ndarray]:
+        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
+
+        def both(d):
+            rates = np.zeros((2, len(self.bodies), 3, self.model.nv))
+            for T, B, body in zip(*rates, self.bodies):
+                mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body)
+            return self._reduced(rates) @ d.qvel[self.dofs]
+
+        result = self._each(both, q, qd)
+        return result[..., 0, :, :], result[..., 1, :, :]
+
+    def mass_matrix(self, q) -> np.ndarray:
+        """M, kg m2, (..., n, n): mj_fullM."""
+        full = np.zeros((self.model.nv, self.model.nv))
+
+        def dense(d):
+            mujoco.mj_fullM(self.model, d, full)
+            return full[np.ix_(self.dofs, self.dofs)]
+
+        return self._each(dense, q)
+
+    def bias(self, q, qd) -> np.ndarray:
+        """h, N m, (..., n): qfrc_bias."""
+        return self._each(lambda d: d.qfrc_bias[self.dofs], q, qd)
+
+    def gravity_balance(self, q) -> np.ndarray:
+        """The torque that holds the model, N m, (..., n): qfrc_bias at rest."""
+        return self.bias(q, np.zeros_like(q))
+
+    def acceleration(self, q, qd, tau) -> np.ndarray:
+        """qdd, rad/s2, (..., n): qacc."""
+        return self._each(lambda d: d.qacc[self.dofs], q, qd, tau)
+
+    def inverse(self, q, qd, qdd) -> np.ndarray:
+        """The torque for which qdd is the acceleration, N m, (..., n): mj_inverse."""
+
+        def torque(d):
+            d.qacc[self.dofs] = d.qfrc_applied[self.dofs]
+            mujoco.mj_inverse(self.model, d)
+            return d.qfrc_inverse[self.dofs]
+
+        return self._each(torque, q, qd, qdd)  # qdd travels in the place of tau
+
+    def potential_energy(self, q) -> np.ndarray:
+        """V, J, (...): mj_energyPos."""
+        return self._each(lambda d: self._energies(d)[0], q)
+
+    def energy(self, q, qd) -> np.ndarray:
+        """Potential and kinetic energy together, J, (...): mj_energyPos and mj_energyVel."""
+        return self._each(lambda d: self._energies(d).sum(), q, qd)
+
+    # motion
+
+    def trajectory(self, q, qd, tau, dt, steps, integrator="rk4") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Motion under constant torque like tmt.simulate: t (steps+1,), q and qd (steps+1, n).
+
+        From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
+        """
+        model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
+        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+        model.opt.disableflags |= int(FLAGS["autoreset"])  # a reset would hide the divergence
+        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, qd, tau
+        spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        start = np.zeros((1, mujoco.mj_stateSize(model, spec)))
+        mujoco.mj_getState(model, data, start[0], spec)
+        # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
+        torque = data.qfrc_applied.reshape(1, 1, -1).copy()
+        applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+        states, _ = rollout(model, data, start, torque, control_spec=applied, nstep=steps)
+        states = np.concatenate([start, states[0]])
+        ran = np.isfinite(states).all(axis=1) & (np.diff(states[:, 0], prepend=-dt) > 0.0)
+        states[np.cumsum(~ran) > 0] = np.nan
+        return dt * np.arange(steps + 1), states[:, 1 + self.qpos], states[:, 1 + model.nq + self.dofs]
+
+    # how the fields are read
+
+    def _each(self, read, q, qd=None, tau=None) -> np.ndarray:
+        """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
+        q = np.asarray(q, dtype=float)
+        states = [np.broadcast_to(0.0 if a is None else a, q.shape).reshape(-1, q.shape[-1]) for a in (q, qd, tau)]
+        values = [np.array(read(self._at(*state))) for state in zip(*states)]
+        return np.array(values).reshape(*q.shape[:-1], *values[0].shape)
+
+    def _at(self, q, qd=0.0, tau=0.0):
+        d = self.data
+        d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, qd, tau
+        mujoco.mj_forward(self.model, d)
+        return d
+
+    def _energies(self, d):
+        mujoco.mj_energyPos(self.model, d)
+        mujoco.mj_energyVel(self.model, d)
+        return d.energy
+
+    def _turns(self, xmat):
+        return xmat[self.bodies].reshape(-1, 3, 3).copy()
+
+    def _to_body(self, vectors):
+        """World components to body axes, the axes of the world at q = 0."""
+        turns = self._turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
+        return np.einsum("bji,bj...->bi...", turns, vectors)
+
+    def _reduced(self, pair):
+        """(translation, rotation) rows of Jacobians: hinges in our order, rotation in body axes."""
+        T, B = pair[..., self.dofs]
+        return np.stack([T, self._to_body(B)])
+
+    def _last_hinge(self, body):
+        return [name for name, j in zip(self.hinges, self.joints) if self.model.jnt_bodyid[j] == body][-1]
+
+
+HINGES = ("alpha", "beta", "gamma")
+CARRIERS = ("beta", "gamma")  # upper arm, forearm
+
+
+def load(path=ARM_XML, hinges=HINGES, carriers=CARRIERS) -> Engine:
+    """The Engine for an MJCF file; ModelError if it cannot be read or does not have these hinges."""
+    try:
+        text = Path(path).read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise ModelError(f"cannot read {path}: {reason}; an MJCF file is expected") from None
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        if "<mujoco" not in text:
+            raise ModelError(f"{path} is not MJCF: MuJoCo says {_one_line(error)}") from None
+        raise ModelError(f"MuJoCo cannot compile {path}: {_one_line(error)}") from None
+    return check_hinges(model, path, hinges, carriers)
+
+
+def parse(text, hinges=HINGES, carriers=CARRIERS) -> Engine:
+    """The Engine for MJCF text."""
+    return check_hinges(mujoco.MjModel.from_xml_string(text), "the text", hinges, carriers)
+
+
+def check_hinges(model, path, hinges, carriers) -> Engine:
+    """The Engine, if the model moves by exactly these hinges."""
+    names = [model.joint(j).name for j in range(model.njnt)]
+    kinds = [mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower() for j in range(model.njnt)]
+    if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
+        found = ", ".join(f"{name or 'unnamed'} ({kind})" for name, kind in zip(names, kinds)) or "none"
+        raise ModelError(f"{path} has the joints {found}; hinges {', '.join(hinges)} and no others are expected")
+    return Engine(model, hinges, carriers)
+
+
+def _one_line(error):
+    return " ".join(str(error).split())

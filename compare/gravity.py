@@ -1,0 +1,58 @@
+"""The torque that holds the arm against gravity."""
+
+import numpy as np
+
+import tmt
+
+from . import draw
+from .agreement import FACTOR, Result, acceleration_scale, condition, gravity_scale
+
+TITLE = "Gravity balance: do both hold the arm with the same torque?"
+CLAIM = (
+    "TMT's holding torque is MuJoCo's qfrc_bias at rest; in both it is the gradient of the party's own potential "
+    "energy; and the torque of one, given to the other, leaves the arm at rest."
+)
+BAR = (
+    "Torques: 64 eps x 9.42 N m, the sum of m g reach. Accelerations left: 64 eps x cond(Mbar) x |Mbar^-1| x 9.42 N m. "
+    "The gradient is exact, not a small difference: V is a + b cos q_i + c sin q_i in each hinge angle, so that "
+    "dV/dq_i = (V(q_i + 90 deg) - V(q_i - 90 deg)) / 2. (The shift is a double: an error of 6e-17, far below the bar.)"
+)
+
+
+def gradient(potential_energy, q) -> np.ndarray:
+    """dV/dq by the shift rule above, N m, (states, n)."""
+    quarter = np.pi / 2 * np.eye(q.shape[1])
+    shifted = (potential_energy(q[:, None] + quarter) - potential_energy(q[:, None] - quarter)) / 2
+    return shifted
+
+
+def rows(setup) -> Result:
+    """Torques at each named posture and at random ones, their gradients, and the exchange of torques."""
+    result = Result("gravity")
+    engine, scale = setup.engine, gravity_scale()
+    for sample in (*setup.named.each(), setup.random):
+        q = sample.q
+        ours, theirs = tmt.gravity_balance(q), engine.gravity_balance(q)
+        result.agree(sample, "holding torque", "N m", ours, theirs, scale, truth="gravity_balance")
+        if len(q) == 1:
+            result.curves.setdefault("postures", {})[sample.name] = (ours[0], theirs[0])
+            continue
+        result.agree(sample, "TMT: torque - dV/dq", "N m", ours, gradient(tmt.potential_energy, q), scale)
+        result.agree(sample, "MuJoCo: torque - dV/dq", "N m", gradient(engine.potential_energy, q), theirs, scale)
+
+    for sample in (setup.named, setup.random):
+        q = sample.q
+        at_rest = np.zeros_like(q)
+        limit = acceleration_scale(q, scale), FACTOR * condition(q)
+        left = {
+            "qdd of MuJoCo under TMT's torque": (at_rest, engine.acceleration(q, at_rest, tmt.gravity_balance(q))),
+            "qdd of TMT under MuJoCo's torque": (tmt.acceleration(q, at_rest, engine.gravity_balance(q)), at_rest),
+        }
+        for quantity, (ours, theirs) in left.items():
+            result.agree(sample, quantity, "rad/s2", ours, theirs, *limit)
+    return result
+
+
+def figures(result):
+    yield draw.distances(result, "random states", ["holding torque"])
+    yield draw.holding_torques(result)
