@@ -94,12 +94,7 @@ def run(options, command, terminal) -> int:
     try:
         setup = Setup(load(options.mjcf or ARM_XML), options.quick)
         with new_report(options.out) as folder:
-            (folder / "figures").mkdir()
-            sections = []
-            for name in names:
-                with terminal.status(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})"):
-                    sections.append(examine(name, setup, folder))
-                tell(terminal, sections[-1])
+            sections = examine(names, setup, folder, terminal)
             report.write(folder, sections, report.provenance(command, time.perf_counter() - started))
     except (ModelError, FolderError) as error:
         raise Refused(error) from None
@@ -109,22 +104,30 @@ def run(options, command, terminal) -> int:
     return 0 if report.passed(sections) else 1
 
 
-def examine(name, setup, folder):
-    """One experiment: its rows, its figures on disk, its section of the report."""
+def examine(names, setup, folder, terminal) -> list:
+    """The section of each experiment, its figures drawn."""
+    from .artist import artist
     from .report import Section
 
-    started = time.perf_counter()
-    module = importlib.import_module(f".{name}", __package__)
-    result = module.rows(setup)
-    section = Section(name, module.TITLE, module.CLAIM, module.BAR, result)
-    for file_name, figure, caption in module.figures(result):
-        figure.savefig(folder / "figures" / f"{file_name}.png", bbox_inches="tight")
-        section.figures.append((file_name, caption))
-    section.seconds = time.perf_counter() - started
-    return section
+    (folder / "figures").mkdir()
+    sections, drawings = [], []
+    progress = Terminal(stderr=True)
+    with artist() as drawing:
+        for name in names:
+            with progress.status(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})"):
+                started = time.perf_counter()
+                module = importlib.import_module(f".{name}", __package__)
+                result = module.rows(setup)
+                sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, result))
+                drawings.append(drawing(name, result, folder / "figures"))
+            tell(terminal, sections[-1], time.perf_counter() - started)
+        with progress.status("figures"):
+            for section, drawn in zip(sections, drawings):
+                section.figures = drawn.result()
+    return sections
 
 
-def tell(terminal, section):
+def tell(terminal, section, seconds):
     """One line for an experiment, one more for each check that failed."""
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
@@ -132,7 +135,7 @@ def tell(terminal, section):
     most = f"worst {max(used):.2g} of its bar" if used else ""
     word = f"{len(failed)} FAILED" if failed else "ok"
     terminal.line(
-        f"{section.name:<13} {word:<10} {len(checks):>3} checks  {most:<26} {section.seconds:5.1f} s",
+        f"{section.name:<13} {word:<10} {len(checks):>3} checks  {most:<26} {seconds:5.1f} s",
         "red" if failed else "",
     )
     for check in failed:

@@ -35,6 +35,7 @@ class Check:
     tolerance: float
     unit: str
     note: str = ""
+    rounding: bool = False  # the tolerance is a bar of rounding, not a printed digit or a count
 
     @property
     def passed(self) -> bool:
@@ -42,8 +43,8 @@ class Check:
 
     @property
     def over_bar(self) -> float | None:
-        """How much of its tolerance is used; None if the tolerance is zero or there is no value."""
-        return self.value / self.tolerance if self.tolerance and self.value is not None else None
+        """How much of a bar of rounding is used; None if it is no such bar, or zero, or there is no value."""
+        return self.value / self.tolerance if self.rounding and self.tolerance and self.value is not None else None
 
     def record(self) -> dict:
         names = ("experiment", "scene", "quantity", "value", "tolerance", "unit", "passed", "note")
@@ -73,9 +74,9 @@ class Result:
     def table(self) -> pd.DataFrame:
         return pd.DataFrame(self.rows)
 
-    def check(self, scene, quantity, value, tolerance, unit, note="") -> Check:
+    def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False) -> Check:
         value = float(value) if np.isfinite(value) else None
-        self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note))
+        self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding))
         return self.checks[-1]
 
     def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, factor=FACTOR, truth=None) -> None:
@@ -95,7 +96,7 @@ class Result:
         in_eps = {name: d / (EPS * scale[: len(d)]) for name, d in apart.items()}
         difference = apart["TMT to MuJoCo"]
         worst = int(np.argmax(np.where(np.isfinite(difference), difference / bar, np.inf)))
-        check = self.check(sample.name, quantity, difference[worst], bar[worst], unit, sample.describe(worst))
+        check = self.check(sample.name, quantity, difference[worst], bar[worst], unit, sample.describe(worst), True)
         self.rows.append(
             {
                 "scene": sample.name,

@@ -47,12 +47,13 @@ def band(stepping, q, qd, tau, dt) -> np.ndarray:
     """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, n): (steps + 1, 2n)."""
     jacobians = step_jacobians(stepping, q[:-1], qd[:-1], tau, dt)
     delta = step_rounding(q[:-1], qd[:-1], tau, dt)
-    size = delta.shape[1]
-    widths = np.zeros((len(q), size))
-    carried = np.empty((0, size, size))
+    steps, size = delta.shape
+    widths = np.zeros((steps + 1, size))
+    carried = np.empty((size, steps, size))  # carried[:, k]: J_n ... J_(k+1), what has become of step k's rounding
     for n, J in enumerate(jacobians):
-        carried = np.concatenate([J @ carried, np.eye(size)[None]])
-        widths[n + 1] = np.einsum("kij,kj->i", np.abs(carried), delta[: n + 1])
+        carried[:, :n] = np.tensordot(J, carried[:, :n], axes=1)
+        carried[:, n] = np.eye(size)
+        widths[n + 1] = np.abs(carried[:, : n + 1]).reshape(size, -1) @ delta[: n + 1].ravel()
         if widths[n + 1].max() > 1e6 * NARROW:  # far beyond judging: the rest only grows
             widths[n + 2 :] = np.inf
             break

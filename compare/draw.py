@@ -32,7 +32,8 @@ matplotlib.rcParams.update(STYLE)
 
 def sketch():
     """The arm with its hinge axes, from the method's own frames."""
-    fig = Figure(figsize=(WIDTH, 3.9), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 3.9))
+    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.06, top=0.98, wspace=0.05)
     for k, name in enumerate(("zero", "ball catch")):
         ax = fig.add_subplot(1, 2, k + 1, projection="3d")
         q = posture(name).tolist()
@@ -41,7 +42,7 @@ def sketch():
         for frame, (hinge, colour, _) in zip(method.hinge_frames(tmt.ARM, q), HINGES):
             origin, axis = np.array(list(frame.origin)), 0.22 * np.array(list(frame.axis))
             ax.quiver(*origin, *axis, color=colour, linewidth=2, arrow_length_ratio=0.2)
-            ax.text(*(origin + 1.25 * axis), GREEK[hinge], color=colour, fontsize=13, ha="center", va="center")
+            ax.text(*(origin + 1.3 * axis), GREEK[hinge], color=colour, fontsize=13, ha="center", va="center")
         for com, body in zip(tmt.com_positions(q), ("1", "2")):
             ax.scatter(*com, color="black", s=25, depthshade=False)
             ax.text(*(com + [0.03, 0.03, 0.03]), body, fontsize=9)
@@ -49,10 +50,10 @@ def sketch():
             ax.text(*(point - [0.0, 0.0, 0.07]), text, color=GREY, ha="center", fontsize=8)
         ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(q))})°")
         ax.set(xlabel="x north, m", ylabel="y west, m", zlabel="z up, m")
-        ax.set(xlim=(-0.3, 0.4), ylim=(-0.35, 0.35), zlim=(-0.45, 0.25), box_aspect=(1, 1, 1))
+        ax.set(xlim=(-0.3, 0.4), ylim=(-0.35, 0.35), zlim=(-0.4, 0.3), box_aspect=(1, 1, 1))
         for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
             axis.set_major_locator(matplotlib.ticker.MultipleLocator(0.2))
-        ax.view_init(elev=18, azim=-60)
+        ax.view_init(elev=20, azim=-70)
     caption = (
         "The arm and its hinges, drawn from the method's own kinematics: α about y, then β about x, at the shoulder; "
         "γ about y at the elbow. Dots: centres of mass of the upper arm (1) and the forearm (2)."
@@ -151,14 +152,15 @@ def held(result, scene_name, name):
     number = {"assignment_figure_2": 2, "assignment_figure_3": 3}[name]
     caption = (
         f"The assignment's Figure {number} redrawn: {scene_name} with TMT's torque in both engines, RK4, dt = 5/64 s. "
-        f"In five seconds the arm of TMT {left[0]}, that of MuJoCo {left[1]}."
+        f"In five seconds the arm of TMT {left[0]}, that of MuJoCo {left[1]}. (An engine whose own bias is the torque, bit "
+        "for bit, has nothing that could start a motion.)"
     )
     return name, fig, caption
 
 
 def run(result, scene):
     """One scene with both step sizes: angles, rates, and the difference under its band."""
-    curves = {n: c for (s, n), c in result.curves.items() if s is scene}
+    curves = {n: c for (s, n), c in result.curves.items() if s == scene}
     fig = Figure(figsize=(WIDTH, 6.2), layout="constrained")
     axes = fig.subplots(3, len(curves), sharex=True, sharey="row")
     ratios = []
@@ -175,7 +177,9 @@ def run(result, scene):
         column[2].semilogy(
             c["t"][1:], np.maximum(difference[1:], 1e-18), color="black", linewidth=1, label="difference"
         )
-        column[2].semilogy(c["t"][1:], np.minimum(width[1:], 1e3), "--", color=ORANGE, label="band of rounding")
+        column[2].semilogy(
+            c["t"][1:], np.where(width[1:] < 1e3, width[1:], np.nan), "--", color=ORANGE, label="band of rounding"
+        )
         if not judged.all():
             column[2].axvspan(c["judged_until_s"], c["t"][-1], color=GREY, alpha=0.15, label="not judged")
         column[2].set(xlabel="time, s", xlim=(0, scene.duration))

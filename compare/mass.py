@@ -28,7 +28,14 @@ def rows(setup) -> Result:
     q = setup.random.q
     for party, M in (("TMT", tmt.mass_matrix(q)), ("MuJoCo", setup.engine.mass_matrix(q))):
         skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2)) / mass_scale(q)
-        result.check("random states", f"{party}: Mbar - Mbar' over its largest entry", skew.max(), FACTOR * EPS, "-")
+        result.check(
+            "random states",
+            f"{party}: Mbar - Mbar' over its largest entry",
+            skew.max(),
+            FACTOR * EPS,
+            "-",
+            rounding=True,
+        )
         indefinite = (np.linalg.eigvalsh(M)[:, 0] <= 0.0).sum()
         result.check("random states", f"{party}: Mbar not positive definite", indefinite, 0.0, "states")
 

@@ -53,7 +53,9 @@ def rows(setup) -> Result:
         expected, found = np.asarray(expected, dtype=float), np.asarray(compiled[quantity], dtype=float)
         names = ("world",) if quantity in ("gravity", "other mass") else owners[len(expected)]
         for owner, e, f in zip(names, expected.reshape(len(names), -1), found.reshape(len(names), -1)):
-            result.check(owner, quantity, np.abs(e - f).max(), FACTOR * EPS * np.abs(e).max(), UNITS[quantity])
+            result.check(
+                owner, quantity, np.abs(e - f).max(), FACTOR * EPS * np.abs(e).max(), UNITS[quantity], rounding=True
+            )
             for k, (a, b) in enumerate(zip(e, f)):
                 result.rows.append(
                     {

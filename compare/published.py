@@ -76,7 +76,7 @@ def rows(setup) -> Result:
                 result.check(where, f"{party}: {item.quantity} - printed", off, tolerance, item.unit)
             elif party != "exact":
                 off = distance(values, truth).max()
-                result.check(where, f"{party}: {item.quantity} - exact", off, bar, item.unit)
+                result.check(where, f"{party}: {item.quantity} - exact", off, bar, item.unit, rounding=True)
         for index in np.ndindex(printed.shape):
             result.rows.append(
                 {

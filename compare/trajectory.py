@@ -49,7 +49,7 @@ def rows(setup) -> Result:
                 k, i = np.unravel_index(np.nanargmax(np.where(judged[:, None], ratio, -1.0)), ratio.shape)
                 note = f"{tmt.ARM.hinge_names[i]} at t = {t[k]:.3f} s"
                 value = np.nan if diverged[judged].any() else difference[k, i]
-                check = result.check(where, f"{quantity}, TMT to MuJoCo", value, bar[k, i], unit, note)
+                check = result.check(where, f"{quantity}, TMT to MuJoCo", value, bar[k, i], unit, note, True)
                 result.rows.append(
                     {
                         "scene": scene.name,
