@@ -85,16 +85,19 @@ class Refused(ValueError):
 def run(options, command, terminal) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
-    from . import report  # here, so that --help and a wrong word answer at once
-    from .agreement import Setup
+    from .artist import artist  # imports are here, so that --help and a wrong word answer at once
     from .engine import ARM_XML, ModelError, load
     from .folder import FolderError, new_report
 
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        setup = Setup(load(options.mjcf or ARM_XML), options.quick)
+        engine = load(options.mjcf or ARM_XML)
         with new_report(options.out) as folder:
-            sections = examine(names, setup, folder, terminal)
+            with artist() as drawing:
+                from . import report
+                from .agreement import Setup
+
+                sections = examine(names, Setup(engine, options.quick), folder, terminal, drawing)
             report.write(folder, sections, report.provenance(command, time.perf_counter() - started))
     except (ModelError, FolderError) as error:
         raise Refused(error) from None
@@ -104,26 +107,24 @@ def run(options, command, terminal) -> int:
     return 0 if report.passed(sections) else 1
 
 
-def examine(names, setup, folder, terminal) -> list:
+def examine(names, setup, folder, terminal, drawing) -> list:
     """The section of each experiment, its figures drawn."""
-    from .artist import artist
     from .report import Section
 
     (folder / "figures").mkdir()
     sections, drawings = [], []
     progress = Terminal(stderr=True)
-    with artist() as drawing:
-        for name in names:
-            with progress.status(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})"):
-                started = time.perf_counter()
-                module = importlib.import_module(f".{name}", __package__)
-                result = module.rows(setup)
-                sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, result))
-                drawings.append(drawing(name, result, folder / "figures"))
-            tell(terminal, sections[-1], time.perf_counter() - started)
-        with progress.status("figures"):
-            for section, drawn in zip(sections, drawings):
-                section.figures = drawn.result()
+    for name in names:
+        with progress.status(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})"):
+            started = time.perf_counter()
+            module = importlib.import_module(f".{name}", __package__)
+            result = module.rows(setup)
+            sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, result))
+            drawings.append(drawing(name, result, folder / "figures"))
+        tell(terminal, sections[-1], time.perf_counter() - started)
+    with progress.status("figures"):
+        for section, drawn in zip(sections, drawings):
+            section.figures = drawn.result()
     return sections
 
 

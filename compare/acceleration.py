@@ -7,7 +7,6 @@ import numpy as np
 import tmt
 from tmt import method
 
-from . import draw
 from .agreement import FACTOR, Result, acceleration_scale, bias_scale, condition, gravity_scale, mass_scale
 
 TITLE = "Accelerations: the same equations in motion?"
@@ -87,4 +86,6 @@ def alpha_momentum(q, qd):
 
 
 def figures(result):
+    from . import draw  # matplotlib is for the process that draws
+
     yield draw.distances(result, "random states", ["bias", "qdd", "energy", "potential energy"])

@@ -1,4 +1,4 @@
-"""A second process that draws the figures of one experiment while the next one computes."""
+"""Two further processes that draw the figures of an experiment while the next one computes."""
 
 import importlib
 import signal
@@ -10,7 +10,9 @@ from multiprocessing import get_context
 @contextmanager
 def artist():
     """Yields submit(experiment, result, folder), whose future is the list of (file name, caption) it has drawn."""
-    with ProcessPoolExecutor(1, get_context("spawn"), ignore_interrupt) as pool:
+    with ProcessPoolExecutor(2, get_context("spawn"), ignore_interrupt) as pool:
+        for _ in range(2):
+            pool.submit(importlib.import_module, ".draw", __package__)  # matplotlib loads meanwhile
         try:
             yield lambda *work: pool.submit(draw, *work)
         finally:

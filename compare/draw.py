@@ -33,7 +33,7 @@ matplotlib.rcParams.update(STYLE)
 def sketch():
     """The arm with its hinge axes, from the method's own frames."""
     fig = Figure(figsize=(WIDTH, 3.9))
-    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.06, top=0.98, wspace=0.05)
+    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.05, top=0.9, wspace=0.05)
     for k, name in enumerate(("zero", "ball catch")):
         ax = fig.add_subplot(1, 2, k + 1, projection="3d")
         q = posture(name).tolist()
@@ -162,7 +162,7 @@ def run(result, scene):
     """One scene with both step sizes: angles, rates, and the difference under its band."""
     curves = {n: c for (s, n), c in result.curves.items() if s == scene}
     fig = Figure(figsize=(WIDTH, 6.2), layout="constrained")
-    axes = fig.subplots(3, len(curves), sharex=True, sharey="row")
+    axes = fig.subplots(3, len(curves), sharex=True, sharey="row", squeeze=False)
     ratios = []
     for column, (steps, c) in zip(axes.T, curves.items()):
         every = max(1, steps // 64)

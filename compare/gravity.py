@@ -4,7 +4,6 @@ import numpy as np
 
 import tmt
 
-from . import draw
 from .agreement import FACTOR, Result, acceleration_scale, condition, gravity_scale
 
 TITLE = "Gravity balance: do both hold the arm with the same torque?"
@@ -54,5 +53,7 @@ def rows(setup) -> Result:
 
 
 def figures(result):
+    from . import draw  # matplotlib is for the process that draws
+
     yield draw.distances(result, "random states", ["holding torque"])
     yield draw.holding_torques(result)

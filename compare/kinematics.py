@@ -2,7 +2,6 @@
 
 import tmt
 
-from . import draw
 from .agreement import Result, reaches
 
 TITLE = "Kinematics: do the bodies move alike?"
@@ -43,4 +42,6 @@ def rows(setup) -> Result:
 
 
 def figures(result):
+    from . import draw  # matplotlib is for the process that draws
+
     yield draw.distances(result, "random states")

@@ -5,7 +5,6 @@ from scipy.optimize import minimize
 
 import tmt
 
-from . import draw
 from .agreement import EPS, FACTOR, Result, condition, mass_scale
 
 TITLE = "Mass matrix: is Mbar MuJoCo's M?"
@@ -61,5 +60,7 @@ def rows(setup) -> Result:
 
 
 def figures(result):
+    from . import draw  # matplotlib is for the process that draws
+
     yield draw.distances(result, "random states")
     yield draw.condition_map(result)

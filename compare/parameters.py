@@ -4,7 +4,6 @@ import numpy as np
 
 import tmt
 
-from . import draw
 from .agreement import EPS, FACTOR, Result
 
 TITLE = "Parameters: is MuJoCo's compiled arm the stated arm?"
@@ -82,4 +81,6 @@ def component(k, count) -> str:
 
 
 def figures(result):
+    from . import draw  # matplotlib is for the process that draws
+
     yield draw.sketch()

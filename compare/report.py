@@ -87,7 +87,7 @@ def answers(sections) -> pd.DataFrame:
         rows = [
             r for r in results["published"].rows if r["item"] == item and r["component"] in (column or r["component"])
         ]
-        return f"TMT ({', '.join('{:.5g}'.format(r['tmt']) for r in rows)}) {rows[0]['unit']}"
+        return f"TMT ({', '.join('{:.6g}'.format(r['tmt']) for r in rows)}) {rows[0]['unit']}"
 
     def run():
         if "trajectory" not in results:
@@ -172,7 +172,8 @@ def shown(table, columns=None) -> pd.DataFrame:
             return f"{value:.{digits}g}" if math.isfinite(value) else ""
         return "" if value is None else str(value)
 
-    return pd.DataFrame({c: [text(v, DIGITS.get(c, 3)) for v in table[c].astype(object)] for c in table.columns})
+    columns = {c: [text(v, DIGITS.get(c, 3)) for v in table[c].astype(object)] for c in table.columns}
+    return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
 
 
 def tables(section) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -218,7 +219,7 @@ def page(folder, sections, origin) -> str:
     body = [
         f"<p>{html.escape(INTRO)}</p>",
         '<h2 id="questions">The assignment\'s questions</h2>',
-        html_table(answers(sections)),
+        html_table(answers(sections), "text"),
     ]
     for section in sections:
         table, failed = tables(section)
@@ -237,6 +238,8 @@ def page(folder, sections, origin) -> str:
         body.append(
             f"<details><summary>Table, {len(table)} rows</summary>{text}</details>" if len(table) > LONG else text
         )
+        checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
+        body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:
             body.append("<ul>" + "".join(f"<li>{html.escape(note)}</li>" for note in section.result.notes) + "</ul>")
     body += ['<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
@@ -250,5 +253,5 @@ def page(folder, sections, origin) -> str:
     )
 
 
-def html_table(table) -> str:
-    return f'<div class="scroll">{table.to_html(index=False, border=0)}</div>'
+def html_table(table, kind="data") -> str:
+    return f'<div class="scroll">{table.to_html(index=False, border=0, classes=kind)}</div>'
