@@ -97,7 +97,8 @@ def run(options, command, terminal) -> int:
                 from . import report
                 from .agreement import Setup
 
-                sections = examine(names, Setup(engine, options.quick), folder, terminal, drawing)
+                setup = Setup.quick(engine) if options.quick else Setup(engine)
+                sections = examine(names, setup, folder, terminal, drawing)
             report.write(folder, sections, report.provenance(command, time.perf_counter() - started))
     except (ModelError, FolderError) as error:
         raise Refused(error) from None

@@ -163,7 +163,14 @@ class Setup:
     """What an experiment needs: the engine under judgement, the states, how many of them."""
 
     engine: Engine
-    quick: bool = False
+    states: int = 10_000  # random states
+    exact_states: int = 200  # of these, how many are held against the exact values too
+    steps: tuple = (64, 1024)  # of a trajectory: the assignment's dt = 5/64 s, and 5/1024 s
+
+    @classmethod
+    def quick(cls, engine) -> "Setup":
+        """Fewer of everything, for a first answer in seconds."""
+        return cls(engine, states=1000, exact_states=20, steps=(64,))
 
     @cached_property
     def named(self) -> Sample:
@@ -177,10 +184,9 @@ class Setup:
     def random(self) -> Sample:
         """Random states: q in [-pi, pi] rad, qd in [-10, 10] rad/s, tau in [-10, 10] N m."""
         rng = np.random.default_rng(SEED)
-        count, exact_states = (1000, 20) if self.quick else (10_000, 200)
-        q = rng.uniform(-np.pi, np.pi, (count, 3))
-        rates, torques = rng.uniform(-10.0, 10.0, (2, count, 3))
-        return Sample("random states", q, rates, torques, exact_states)
+        q = rng.uniform(-np.pi, np.pi, (self.states, 3))
+        rates, torques = rng.uniform(-10.0, 10.0, (2, self.states, 3))
+        return Sample("random states", q, rates, torques, self.exact_states)
 
 
 # scales: from the stated numbers and TMT's own terms, per state

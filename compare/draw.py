@@ -163,7 +163,7 @@ def run(result, scene):
     curves = {n: c for (s, n), c in result.curves.items() if s == scene}
     fig = Figure(figsize=(WIDTH, 6.2), layout="constrained")
     axes = fig.subplots(3, len(curves), sharex=True, sharey="row", squeeze=False)
-    ratios = []
+    found = [r for r in result.rows if r["scene"] == scene.name and r["quantity"] == "angles"]
     for column, (steps, c) in zip(axes.T, curves.items()):
         every = max(1, steps // 64)
         for row, ax in enumerate(column[:2]):
@@ -183,14 +183,16 @@ def run(result, scene):
         if not judged.all():
             column[2].axvspan(c["judged_until_s"], c["t"][-1], color=GREY, alpha=0.15, label="not judged")
         column[2].set(xlabel="time, s", xlim=(0, scene.duration))
-        ratios.append(np.max(difference[1:][judged[1:]] / width[1:][judged[1:]]))
     for ax, label in zip(axes[:, 0], ("angle, rad", "rate, rad/s", "angle: |TMT - MuJoCo|, rad")):
         ax.set_ylabel(label)
     handles = [axes[0, 0].get_legend_handles_labels(), axes[2, 0].get_legend_handles_labels()]
     fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="outside upper center", ncols=4)
-    until = min(c["judged_until_s"] for c in curves.values())
-    caption = (
-        f"{scene.name[0].upper()}{scene.name[1:]}: while judged (to {until:.2f} s) the angles stay within "
-        f"{max(ratios):.1e} of the band of rounding. Differences of exactly zero are drawn at 1e-18."
-    )
+    until = min(row["judged_until_s"] for row in found)
+    diverged = [row["diverged_at_s"] for row in found if row["diverged_at_s"] is not None]
+    if diverged:
+        outcome = f"a run diverges at {min(diverged):.2f} s"
+    else:
+        most = max(row["difference_over_band"] for row in found)
+        outcome = f"while judged (to {until:.2f} s) the angles use at most {most:.1e} of the band of rounding"
+    caption = f"{scene.name[0].upper()}{scene.name[1:]}: {outcome}. Differences of exactly zero are drawn at 1e-18."
     return "trajectory_" + scene.name.replace(", ", "_").replace(" ", "_"), fig, caption

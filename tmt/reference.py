@@ -67,4 +67,4 @@ def _array(nested):
 
 def distance(values, truth) -> np.ndarray:
     """|values - truth| as floats: the difference is taken exactly and rounded once."""
-    return np.abs(np.asarray(values, dtype=float).astype(object) - truth).astype(float)
+    return np.asarray(np.abs(np.asarray(values, dtype=float).astype(object) - truth), dtype=float)

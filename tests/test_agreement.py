@@ -1,0 +1,85 @@
+"""Every experiment agrees with MuJoCo, and so does the method on random trees."""
+
+import dataclasses
+import importlib
+
+import numpy as np
+import pytest
+from trees import mjcf, random_tree
+
+import tmt
+from compare.__main__ import EXPERIMENTS
+from compare.agreement import EPS, FACTOR, Check, bias_scale, reaches
+from compare.engine import parse
+from compare.parameters import stated
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_experiment_agrees(experiment, setup):
+    result = importlib.import_module(f"compare.{experiment}").rows(setup)
+    assert result.checks
+    assert [str(check) for check in result.checks if not check.passed] == []
+
+
+def test_the_two_sets_of_numbers_are_one(engine):
+    """tmt/arm.py and mjcf/arm.xml hold the arm twice; this ties them."""
+    compiled = engine.parameters()
+    for quantity, value in stated().items():
+        assert np.allclose(compiled[quantity], value, rtol=1e-15, atol=1e-16), quantity
+
+
+def test_states_move(setup):
+    """No vacuous pass: the states have torque, speed, energy."""
+    sample = setup.random
+    assert np.abs(tmt.bias(sample.q, sample.qd)).mean() > 1.0
+    assert np.abs(tmt.acceleration(sample.q, sample.qd, sample.tau)).mean() > 10.0
+    assert np.abs(tmt.energy(sample.q, sample.qd)).mean() > 1.0
+
+
+def test_parties_are_near_but_not_the_same_bits(setup):
+    """Were every difference zero, one party would be compared with itself."""
+    q, qd = setup.random.q, setup.random.qd
+    assert np.abs(tmt.mass_matrix(q) - setup.engine.mass_matrix(q)).max() > 0.0
+    assert np.abs(tmt.bias(q, qd) - setup.engine.bias(q, qd)).max() > 0.0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_trees(seed):
+    """Branches, several hinges in a body, products of inertia, CoM off every axis, damping."""
+    rng = np.random.default_rng(seed)
+    tree = random_tree(rng, bodies=int(rng.integers(1, 6)), damping=1.0)
+    n = len(tree.hinge_names)
+    engine = parse(mjcf(tree), tree.hinge_names, [tree.hinge_names[h] for h in tree.body_hinge])
+    q, qd, tau = rng.uniform(-3, 3, (3, 20, n))
+
+    M = tmt.mass_matrix(q, tree)
+    size = np.abs(M).max(axis=(1, 2))
+    assert (np.abs(M - engine.mass_matrix(q)).max(axis=(1, 2)) < FACTOR * EPS * size).all()
+    h, force = tmt.bias(q, qd, tree), bias_scale(q, qd, tree)
+    assert (np.abs(h - engine.bias(q, qd)).max(axis=1) < FACTOR * EPS * force).all()
+    qdd = tmt.acceleration(q, qd, tau, tree)
+    values = np.linalg.eigvalsh(M)
+    bar = FACTOR * EPS * values[:, -1] / values[:, 0] * (force + 6.0) / values[:, 0]
+    assert (np.abs(qdd - engine.acceleration(q, qd, tau)).max(axis=1) < bar).all()
+    assert np.abs(tmt.com_positions(q, tree) - engine.com_positions(q)).max() < FACTOR * EPS * reaches(tree).max()
+    for ours, theirs in zip(tmt.convective_terms(q, qd, tree), engine.convective_terms(q, qd)):
+        assert np.abs(ours - theirs).max() < FACTOR * EPS * (3.0 * n) ** 2 * reaches(tree).max()
+
+
+def test_mirror_symmetry_hides_a_flipped_beta_axis_from_mass_and_bias(rng):
+    """Why kinematics and an asymmetric tree are tested too."""
+    flipped = dataclasses.replace(tmt.ARM, axis=((0, 1, 0), (-1, 0, 0), (0, 1, 0)))
+    q = rng.uniform(-3, 3, (100, 3))
+    assert np.allclose(tmt.mass_matrix(q), tmt.mass_matrix(q, flipped), atol=1e-14)
+    assert np.abs(tmt.com_positions(q) - tmt.com_positions(q, flipped)).max() > 0.1
+    lopsided = dataclasses.replace(tmt.ARM, com=((0, 0.02, -0.15), (0.15, 0.01, 0)))
+    other = dataclasses.replace(lopsided, axis=flipped.axis)
+    assert np.abs(tmt.mass_matrix(q, lopsided) - tmt.mass_matrix(q, other)).max() > 1e-3
+
+
+@pytest.mark.parametrize("value, passes", [(0.5, True), (1.0, True), (1.5, False), (None, False)])
+def test_a_check_passes_within_its_tolerance(value, passes):
+    check = Check("mass", "zero", "Mbar", value, 1.0, "kg m2", rounding=True)
+    assert check.passed is passes
+    assert check.over_bar == value
+    assert ("diverged" in str(check)) == (value is None)

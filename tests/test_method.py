@@ -1,0 +1,269 @@
+"""The physics of TMT alone: no engine is asked."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import mpmath
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from trees import random_tree
+
+import tmt
+from tmt import method, space
+from tmt.reference import DIGITS, distance, exact
+
+EPS = np.finfo(float).eps
+TINY = 1e-30
+states = arrays(float, 3, elements=st.floats(-10, 10))
+
+for kind in (sympy.Expr,):
+    space.sin.register(kind, sympy.sin)
+    space.cos.register(kind, sympy.cos)
+
+
+def complex_step(function, q, direction):
+    """d function / d q . direction, exact to rounding."""
+    return np.imag(np.array(function(list(q + 1j * TINY * direction)), dtype=complex)) / TINY
+
+
+@pytest.fixture(params=["arm", "tree"])
+def model(request, rng):
+    return tmt.ARM if request.param == "arm" else random_tree(rng)
+
+
+@pytest.fixture
+def state(model, rng):
+    n = len(model.hinge_names)
+    return rng.uniform(-3, 3, n), rng.uniform(-5, 5, n), rng.uniform(-5, 5, n)
+
+
+# the assignment, symbol by symbol
+
+
+@pytest.fixture(scope="module")
+def symbols():
+    """The arm in symbols, and the bodies that the method makes of it."""
+    d, e, a, b, g, ad, bd, gd = sympy.symbols("d e a b g ad bd gd", real=True)
+    zero, one = sympy.Integer(0), sympy.Integer(1)
+    tree = SimpleNamespace(
+        parent=(-1, 0, 1),
+        offset=((zero,) * 3, (zero,) * 3, (zero, zero, -d)),
+        axis=((zero, one, zero), (one, zero, zero), (zero, one, zero)),
+        body_hinge=(1, 2),
+        com=((zero, zero, -d / 2), (sympy.Rational(2, 5) * e, zero, zero)),
+        mass=(one, one),
+        inertia=(((one,) * 3,) * 3,) * 2,
+        moves=tmt.ARM.moves,
+    )
+    return SimpleNamespace(
+        d=d, e=e, a=a, b=b, g=g, bodies=method.bodies(tree, [a, b, g], [ad, bd, gd]), qd=(ad, bd, gd)
+    )
+
+
+def same(found, expected):
+    found = [sympy.nsimplify(sympy.simplify(f - x)) for f, x in zip(found, expected)]
+    return found == [0] * len(expected)
+
+
+def test_positions_are_equation_1(symbols):
+    s = symbols
+    ca, sa, cb, sb, cg, sg = (f(x) for x in (s.a, s.b, s.g) for f in (sympy.cos, sympy.sin))
+    k = sympy.Rational(2, 5) * s.e
+    assert same(s.bodies[0].x, (-s.d / 2 * cb * sa, s.d / 2 * sb, -s.d / 2 * ca * cb))
+    assert same(
+        s.bodies[1].x,
+        (
+            k * (ca * cg - cb * sa * sg) - s.d * cb * sa,
+            s.d * sb + k * sb * sg,
+            -k * (cg * sa + ca * cb * sg) - s.d * ca * cb,
+        ),
+    )
+
+
+def test_angular_velocities_are_the_stated_B(symbols):
+    s = symbols
+    cb, sb, cg, sg = (f(x) for x in (s.b, s.g) for f in (sympy.cos, sympy.sin))
+    for body, B in zip(
+        s.bodies,
+        (((0, 1, 0), (cb, 0, 0), (-sb, 0, 0)), ((sb * sg, cg, 0), (cb, 0, 1), (-cg * sb, sg, 0))),
+    ):
+        rows = list(zip(*(list(column) for column in body.B)))
+        for row, expected in zip(rows, B):
+            assert same(row, expected)
+        assert same(body.omega, [sum(x * rate for x, rate in zip(row, s.qd)) for row in B])
+
+
+# each quantity is the derivative that its name says
+
+
+def test_T_is_the_derivative_of_the_position(model, state):
+    q, *_ = state
+    T, _ = tmt.jacobians(q, model)
+    for j, direction in enumerate(np.eye(len(q))):
+        dx = complex_step(lambda q: [list(b.x) for b in method.bodies(model, q)], q, direction)
+        assert np.abs(T[:, :, j] - dx).max() < 64 * EPS * 5
+
+
+def test_B_is_the_derivative_of_the_rotation(model, state):
+    q, *_ = state
+    _, B = tmt.jacobians(q, model)
+    turns = np.array([[list(row) for row in method.hinge_frames(model, list(q))[h].turn] for h in model.body_hinge])
+    for j, direction in enumerate(np.eye(len(q))):
+        rates = complex_step(
+            lambda q: [[list(row) for row in method.hinge_frames(model, q)[h].turn] for h in model.body_hinge],
+            q,
+            direction,
+        )
+        spin = turns.transpose(0, 2, 1) @ rates  # R' dR = [omega]x in body axes
+        omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        assert np.abs(B[:, :, j] - omega).max() < 64 * EPS
+
+
+def test_convective_terms_are_derivatives_of_velocities(model, state):
+    q, qd, _ = state
+    v_conv, w_conv = tmt.convective_terms(q, qd, model)
+
+    def velocities(q):
+        parts = method.bodies(model, q, list(qd))
+        return [[sum((c * v for c, v in zip(b.T, qd)), space.ZERO), b.omega] for b in parts]
+
+    rates = complex_step(lambda q: [[list(x) for x in pair] for pair in velocities(q)], q, qd)
+    scale = np.abs(qd).sum() ** 2
+    assert np.abs(rates[:, 0] - v_conv).max() < 64 * EPS * scale
+    assert np.abs(rates[:, 1] - w_conv).max() < 64 * EPS * scale
+    assert np.abs(v_conv).max() > 0.1 and np.abs(w_conv).max() > 0.1
+
+
+# energy, power, momentum
+
+
+def test_kinetic_energy_is_that_of_the_mass_matrix(model, state):
+    q, qd, _ = state
+    M = tmt.mass_matrix(q, model)
+    kinetic = tmt.energy(q, qd, model) - tmt.potential_energy(q, model)
+    assert kinetic > 0.1
+    assert kinetic == pytest.approx(qd @ M @ qd / 2, rel=1e-13)
+
+
+def test_gravity_balance_is_the_gradient_of_potential_energy(model, state):
+    q, *_ = state
+    for j, direction in enumerate(np.eye(len(q))):
+        slope = complex_step(lambda q: method.potential(method.bodies(model, q), model.gravity), q, direction)
+        assert tmt.gravity_balance(q, model)[j] == pytest.approx(slope, abs=1e-13)
+
+
+def test_power_of_the_torque_is_the_rate_of_the_energy(model, state):
+    q, qd, tau = state
+    model = dataclasses.replace(model, damping=np.full(len(q), 0.3))
+    qdd = tmt.acceleration(q, qd, tau, model)
+    parts = [list(a + 1j * TINY * b) for a, b in ((q, qd), (qd, qdd))]
+    bodies = method.bodies(model, *parts)
+    rate = np.imag(method.potential(bodies, model.gravity) + method.kinetic(bodies, parts[1])) / TINY
+    power = tau @ qd - 0.3 * qd @ qd
+    assert abs(power) > 0.1
+    assert rate == pytest.approx(power, abs=1e-11)
+
+
+def test_alpha_momentum_is_constant_without_gravity_and_torque(rng):
+    weightless = dataclasses.replace(tmt.ARM, gravity=(0, 0, 0))
+    q, qd = rng.uniform(-3, 3, (2, 3))
+    _, path_q, path_qd = tmt.simulate(q, qd, np.zeros(3), 1e-3, 1000, model=weightless)
+    momentum = np.einsum("sj,sj->s", tmt.mass_matrix(path_q)[:, 0], path_qd)
+    assert np.ptp(path_qd[:, 0]) > 0.1
+    assert np.abs(momentum - momentum[0]).max() < 1e-9 * np.abs(path_qd).max()
+
+
+@given(states)
+def test_mass_matrix_is_symmetric_positive_definite(q):
+    M = tmt.mass_matrix(q)
+    assert np.abs(M - M.T).max() <= 64 * EPS * M.max()
+    assert np.linalg.eigvalsh(M)[0] > 1e-4
+
+
+@given(states, states, states)
+def test_forward_and_inverse_dynamics_close(q, qd, tau):
+    qdd = tmt.acceleration(q, qd, tau)
+    back = tmt.mass_matrix(q) @ qdd + tmt.bias(q, qd)
+    force = np.abs(tau).max() + np.abs(tmt.bias(q, qd)).max() + 10.0
+    assert np.abs(back - tau).max() <= 64 * EPS * 127 * force
+
+
+@given(arrays(float, (2, 4, 3), elements=st.floats(-4, 4)))
+def test_a_batch_is_its_states_one_by_one(q):
+    for function in (tmt.mass_matrix, tmt.com_positions, tmt.gravity_balance, tmt.potential_energy):
+        batch = function(q)
+        single = np.array([[function(state) for state in row] for row in q])
+        assert batch.shape == single.shape
+        assert np.abs(batch - single).max() < 1e-14  # NumPy's vector sine may differ in the last bit
+
+
+def test_a_body_fixed_to_the_world_does_not_count():
+    fixed = dataclasses.replace(tmt.ARM, body_hinge=(-1, 2))
+    light = dataclasses.replace(tmt.ARM, mass=(0.0, 1.5), inertia=(np.zeros((3, 3)), tmt.ARM.inertia[1]))
+    q = np.array([0.3, 0.2, 0.5])
+    assert np.array_equal(tmt.mass_matrix(q, fixed), tmt.mass_matrix(q, light))
+    assert np.array_equal(tmt.com_positions(q, fixed)[0], [0, 0, -0.15])
+
+
+# many digits, and an independent derivation
+
+
+def test_fifty_digits_contain_the_floats(rng):
+    q, qd, tau = rng.uniform(-3, 3, (3, 3))
+    truth = exact(tmt.ARM, q, qd, tau)
+    assert distance(tmt.mass_matrix(q), truth.mass_matrix).max() < 16 * EPS
+    assert distance(tmt.bias(q, qd), truth.bias).max() < 64 * EPS * 10
+    assert distance(tmt.acceleration(q, qd, tau), truth.acceleration).max() < 1e-11
+    assert distance(tmt.energy(q, qd), truth.energy) < 64 * EPS * 10
+    assert distance(truth.mass_matrix.astype(float), truth.mass_matrix).max() > 0.0  # the truth has more digits
+
+
+def test_lagrange_from_equation_1_and_energies_alone(rng):
+    """Kinetic energy from (1) and from R, potential energy from (1): no B, no convective terms, 50 digits.
+
+    The rotational energy is tr(Rd J Rd') / 2 with J = tr(I)/2 - I, from the rotation matrix itself.
+    """
+    q = sympy.symbols("a b g")
+    qd = sympy.symbols("ad bd gd")
+    d, e = sympy.symbols("d e")
+    m, I, grav = sympy.symbols("m1 m2"), sympy.symbols("I11 I12 I13 I21 I22 I23"), sympy.Symbol("grav")
+    (ca, cb, cg), (sa, sb, sg) = ([f(x) for x in q] for f in (sympy.cos, sympy.sin))
+    x1 = sympy.Matrix([-d * cb * sa, d * sb, -d * ca * cb])  # d: to the CoM of the upper arm, d/2 of (1)
+    x2 = sympy.Matrix(
+        [
+            e * (ca * cg - cb * sa * sg) - 2 * d * cb * sa,
+            2 * d * sb + e * sb * sg,
+            -e * (cg * sa + ca * cb * sg) - 2 * d * ca * cb,
+        ]
+    )
+    Ra = sympy.Matrix([[ca, 0, sa], [0, 1, 0], [-sa, 0, ca]])
+    Rb = sympy.Matrix([[1, 0, 0], [0, cb, -sb], [0, sb, cb]])
+    Rg = sympy.Matrix([[cg, 0, sg], [0, 1, 0], [-sg, 0, cg]])
+
+    def rate(matrix):
+        return sum((matrix.diff(x) * v for x, v in zip(q, qd)), sympy.zeros(*matrix.shape))
+
+    T = V = 0
+    for k, (x, R) in enumerate(((x1, Ra * Rb), (x2, Ra * Rb * Rg))):
+        moments = sympy.diag(*I[3 * k : 3 * k + 3])
+        J = moments.trace() / 2 * sympy.eye(3) - moments
+        Rd = rate(R)
+        T += m[k] * rate(x).dot(rate(x)) / 2 + (Rd * J * Rd.T).trace() / 2
+        V += m[k] * grav * x[2]
+    p = [T.diff(v) for v in qd]
+    M = [[pi.diff(v) for v in qd] for pi in p]
+    h = [sum(pi.diff(x) * v for x, v in zip(q, qd)) - (T - V).diff(x) for pi, x in zip(p, q)]
+    evaluate = sympy.lambdify([*q, *qd, d, e, *m, *I, grav], [M, h], "mpmath", cse=True)
+
+    numbers = (0.15, 0.15, 1.9, 1.5, 0.015, 0.014, 0.002, 0.001, 0.019, 0.019, 9.81)
+    for _ in range(20):
+        q0, qd0 = rng.uniform(-np.pi, np.pi, 3), rng.uniform(-10, 10, 3)
+        truth = exact(tmt.ARM, q0, qd0, np.zeros(3))
+        with mpmath.workdps(DIGITS):
+            M0, h0 = evaluate(*map(mpmath.mpf, map(float, (*q0, *qd0, *numbers))))
+            assert max(abs(x - y) for row, line in zip(M0, truth.mass_matrix) for x, y in zip(row, line)) < 1e-47
+            assert max(abs(x - y) for x, y in zip(h0, truth.bias)) < 1e-45

@@ -1,0 +1,81 @@
+"""Random trees and their MJCF, so that the method is judged on more than one arm."""
+
+import numpy as np
+
+from tmt import Tree
+
+
+def random_tree(rng, bodies=4, damping=0.0) -> Tree:
+    """Bodies with one to three hinges each, branched, off-axis, with products of inertia."""
+    parent, offset, axis, body_hinge, inertias = [], [], [], [], []
+    for b in range(bodies):
+        before = -1 if b == 0 else int(rng.choice([-1, *body_hinge]))
+        for _ in range(rng.integers(1, 4)):
+            parent.append(before)
+            before = len(parent) - 1
+            offset.append(rng.uniform(-0.4, 0.4, 3))
+            axis.append(rng.normal(size=3))
+        body_hinge.append(before)
+        spread = rng.uniform(-0.1, 0.1, (6, 3))  # six point masses: a tensor that a body can have
+        inertias.append(sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in spread))
+    n = len(parent)
+    return Tree(
+        hinge_names=[f"hinge{i}" for i in range(n)],
+        parent=parent,
+        offset=offset,
+        axis=axis,
+        damping=rng.uniform(0.0, 1.0, n) * damping,
+        body_names=[f"body{b}" for b in range(bodies)],
+        body_hinge=body_hinge,
+        mass=rng.uniform(0.5, 2.0, bodies),
+        com=rng.uniform(-0.3, 0.3, (bodies, 3)),
+        inertia=inertias,
+        gravity=rng.normal(size=3) * 5.0,
+    )
+
+
+def mjcf(tree) -> str:
+    """The same tree as MJCF text: one body for each body, its hinges in it."""
+
+    def numbers(values):
+        return " ".join(repr(float(v)) for v in values)
+
+    def body(b):
+        chain = [tree.body_hinge[b]]
+        while tree.parent[chain[0]] >= 0 and tree.parent[chain[0]] not in tree.body_hinge:
+            chain.insert(0, tree.parent[chain[0]])
+        first = chain[0]
+        base = at_end.get(tree.parent[first], np.zeros(3))
+        where = np.zeros(3)
+        lines = [f'<body pos="{numbers(base + tree.offset[first])}">']
+        for i in chain:
+            where = where + (tree.offset[i] if i != first else np.zeros(3))
+            lines.append(
+                f'<joint name="{tree.hinge_names[i]}" type="hinge" pos="{numbers(where)}" '
+                f'axis="{numbers(tree.axis[i])}" damping="{tree.damping[i]!r}"/>'
+            )
+        at_end[chain[-1]] = where
+        I = np.array(tree.inertia[b])
+        full = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+        com = numbers(where + tree.com[b])
+        lines.append(f'<inertial pos="{com}" mass="{tree.mass[b]!r}" fullinertia="{numbers(full)}"/>')
+        for child in range(len(tree.body_hinge)):
+            start = child_root(child)
+            if tree.parent[start] == tree.body_hinge[b]:
+                lines += body(child)
+        return [*lines, "</body>"]
+
+    def child_root(b):
+        hinge = tree.body_hinge[b]
+        while tree.parent[hinge] >= 0 and tree.parent[hinge] not in tree.body_hinge:
+            hinge = tree.parent[hinge]
+        return hinge
+
+    at_end = {}
+    roots = [b for b in range(len(tree.body_hinge)) if tree.parent[child_root(b)] == -1]
+    inside = "\n".join(line for b in roots for line in body(b))
+    return f"""<mujoco>
+      <compiler angle="radian" inertiafromgeom="false" balanceinertia="false"/>
+      <option gravity="{numbers(tree.gravity)}"><flag contact="disable" constraint="disable"/></option>
+      <worldbody>{inside}</worldbody>
+    </mujoco>"""
