@@ -1,8 +1,8 @@
 """Two parties held against each other: states, scales, bars, checks.
 
-A difference is judged against `factor` x eps x scale. The scale of a quantity is the sum of the absolute
-values of the terms that are added up in it, taken per state, never the quantity itself (which may be
-zero); the factor is 64, times the condition number of Mbar where a linear system is solved.
+A difference is judged against 64 x eps x scale. The scale of a quantity is the sum of the absolute
+values of the terms that are added up in it, times the condition number of Mbar where a linear system is
+solved; it is taken per state and is never the quantity itself (which may be zero).
 """
 
 from dataclasses import dataclass, field
@@ -79,15 +79,15 @@ class Result:
         self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding))
         return self.checks[-1]
 
-    def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, factor=FACTOR, truth=None) -> None:
+    def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, truth=None) -> None:
         """A row and a check: the worst difference of two parties over the states of a sample.
 
-        tmt_values, mujoco_values: (states, ...); scale, factor: numbers or (states,); truth: the name of a
-        field of tmt.reference.Truth, for the distance of each party from the exact value in eps x scale.
+        tmt_values, mujoco_values: (states, ...); scale: a number or (states,); truth: the name of a field of
+        tmt.reference.Truth, for the distance of each party from the exact value in eps x scale.
         """
         states = len(sample.q)
         scale = np.broadcast_to(scale, states)
-        bar = factor * EPS * scale
+        bar = FACTOR * EPS * scale
         apart = {"TMT to MuJoCo": largest(np.subtract(tmt_values, mujoco_values))}
         if truth:
             known = sample.truth(truth)
@@ -115,9 +115,8 @@ class Result:
                 "passed": check.passed,
             }
         )
-        self.curves.setdefault(sample.name, {})[quantity] = {
-            name: np.sort(values) for name, values in in_eps.items()
-        } | {"bar": np.max(factor)}
+        curves = {name: np.sort(values) for name, values in in_eps.items()}
+        self.curves.setdefault(sample.name, {})[quantity] = curves
         self.shown = SHOWN
 
 
@@ -229,5 +228,9 @@ def condition(q) -> np.ndarray:
 
 
 def acceleration_scale(q, force) -> np.ndarray:
-    """|Mbar^-1| times the scale of the forces, rad/s2, (states,): a bound of the acceleration."""
-    return force / np.linalg.eigvalsh(tmt.mass_matrix(q))[:, 0]
+    """cond(Mbar) |Mbar^-1| times the scale of the forces, rad/s2, (states,).
+
+    The bound of a backward-stable solve: errors of eps in Mbar and in the force change the solution by at most
+    cond(Mbar) eps of its size, which is at most |Mbar^-1| times the force.
+    """
+    return condition(q) * force / np.linalg.eigvalsh(tmt.mass_matrix(q))[:, 0]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 import tmt
 from tmt import arm, method
 
+from .agreement import FACTOR
 from .scenes import posture
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
@@ -50,10 +51,11 @@ def sketch():
             ax.text(*(point - [0.0, 0.0, 0.07]), text, color=GREY, ha="center", fontsize=8)
         ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(q))})°")
         ax.set(xlabel="x north, m", ylabel="y west, m", zlabel="z up, m")
-        ax.set(xlim=(-0.3, 0.4), ylim=(-0.35, 0.35), zlim=(-0.4, 0.3), box_aspect=(1, 1, 1))
+        ax.set(xlim=(-0.3, 0.4), ylim=(-0.35, 0.35), zlim=(-0.4, 0.3))
         for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
             axis.set_major_locator(matplotlib.ticker.MultipleLocator(0.2))
         ax.view_init(elev=20, azim=-70)
+        ax.set_box_aspect((1, 1, 1), zoom=1.1)
     caption = (
         "The arm and its hinges, drawn from the method's own kinematics: α about y, then β about x, at the shoulder; "
         "γ about y at the elbow. Dots: centres of mass of the upper arm (1) and the forearm (2)."
@@ -65,7 +67,7 @@ def distances(result, sample, quantities=None):
     """How far apart the parties are over all states, and how far each is from the exact value."""
     curves = result.curves[sample]
     quantities = quantities or [name for name, c in curves.items() if "TMT to exact" in c]
-    columns = min(3, len(quantities))
+    columns = 2 if len(quantities) == 4 else min(3, len(quantities))
     lines = -(-len(quantities) // columns)
     fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
     axes = fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
@@ -75,8 +77,7 @@ def distances(result, sample, quantities=None):
             values = np.maximum(curves[quantity][name], FLOOR)
             share = np.arange(1, len(values) + 1) / len(values)
             ax.step(values, share, where="post", color=colour, linestyle=dash, label=name)
-        bar = curves[quantity]["bar"]
-        ax.axvline(bar, color=RED, linewidth=2, label="bar" if np.isclose(bar, 64) else "bar: 64 cond(Mbar)")
+        ax.axvline(FACTOR, color=RED, linewidth=2, label=f"bar, {FACTOR} eps")
         ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
     for ax in axes.flat[len(quantities) :]:
         ax.set_visible(False)

@@ -43,7 +43,7 @@ class Engine:
 
     def __init__(self, model, hinges, carriers):
         self.model, self.data = model, mujoco.MjData(model)
-        self.hinges = list(hinges)
+        self.hinges, self.carriers = list(hinges), list(carriers)
         joints = [model.joint(name) for name in hinges]
         self.joints = np.array([joint.id for joint in joints])
         self.qpos = np.array([joint.qposadr[0] for joint in joints])
@@ -94,7 +94,7 @@ class Engine:
         """The same model in a world without gravity."""
         other = mujoco.MjModel.__copy__(self.model)
         other.opt.gravity[:] = 0.0
-        return Engine(other, self.hinges, [self._last_hinge(body) for body in self.bodies])
+        return Engine(other, self.hinges, self.carriers)
 
     # quantities at states
 
@@ -225,9 +225,6 @@ class Engine:
         """(translation, rotation) rows of Jacobians: hinges in our order, rotation in body axes."""
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
-
-    def _last_hinge(self, body):
-        return [name for name, j in zip(self.hinges, self.joints) if self.model.jnt_bodyid[j] == body][-1]
 
 
 HINGES = ("alpha", "beta", "gamma")

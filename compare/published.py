@@ -7,7 +7,7 @@ import numpy as np
 import tmt
 from tmt.reference import distance, exact
 
-from .agreement import EPS, FACTOR, Result, acceleration_scale, condition, gravity_scale, mass_scale
+from .agreement import EPS, FACTOR, Result, acceleration_scale, gravity_scale, mass_scale
 from .scenes import posture
 
 TITLE = "Published numbers: does either party contradict the assignment?"
@@ -56,7 +56,7 @@ def answers(item, engine) -> tuple:
     if item.quantity == "Mbar":
         return truth.mass_matrix, tmt.mass_matrix(q), engine.mass_matrix(q), mass_scale(q[None])[0]
     if item.quantity == "qdd":
-        scale = condition(q) * acceleration_scale(q[None], gravity_scale())[0]
+        scale = acceleration_scale(q[None], gravity_scale())[0]
         return truth.acceleration, tmt.acceleration(q, rest, tau), engine.acceleration(q, rest, tau), scale
     return truth.gravity_balance, tmt.gravity_balance(q), engine.gravity_balance(q), gravity_scale()
 
