@@ -7,11 +7,9 @@ import argparse
 import importlib
 import os
 import shlex
+import signal
 import sys
 import time
-
-from rich.console import Console
-from rich.markup import escape
 
 EXPERIMENTS = {
     "parameters": "MuJoCo's compiled model read back beside the stated numbers",
@@ -37,15 +35,10 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}\n")
 
 
-class Terminal(Console):
-    """Prints as rich does; if the reader has gone (| head -1) the work goes on in silence."""
-
-    def on_broken_pipe(self):
-        self.quiet = True
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-    def line(self, text, style=""):
-        self.print(escape(text), style=style, highlight=False, soft_wrap=True)
+def not_empty(text):
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty; a name is expected")
+    return text
 
 
 def main(arguments=None) -> int:
@@ -60,21 +53,34 @@ def main(arguments=None) -> int:
         "experiment", choices=[*EXPERIMENTS, "all"], metavar="EXPERIMENT", help="one of those below, or all"
     )
     parser.add_argument(
-        "--out", default="reports/latest", metavar="DIR", help="where the report goes (default: %(default)s)"
+        "--out",
+        type=not_empty,
+        default="reports/latest",
+        metavar="DIR",
+        help="where the report goes (default: %(default)s)",
     )
-    parser.add_argument("--quick", action="store_true", help="fewer states: under 10 seconds")
+    parser.add_argument("--quick", action="store_true", help="fewer states, in seconds")
     parser.add_argument(
-        "--mjcf", metavar="FILE", help="another model of the same three hinges, held against the stated arm"
+        "--mjcf",
+        type=not_empty,
+        metavar="FILE",
+        help="another model of the same three hinges, held against the stated arm",
     )
     options = parser.parse_args(arguments)
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
-    terminal = Terminal()
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        return run(options, command, terminal)
+        return run(options, command)
     except KeyboardInterrupt:
         print("interrupted; a report that was there is unchanged", file=sys.stderr)
     except Refused as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
+    except OSError as error:
+        print(f"{parser.prog}: cannot go on: {' '.join(str(error).split())}", file=sys.stderr)
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
     return 2
 
 
@@ -82,16 +88,21 @@ class Refused(ValueError):
     """A request that cannot be carried out; the message is one line."""
 
 
-def run(options, command, terminal) -> int:
+def run(options, command) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
+    from concurrent.futures import BrokenExecutor
+
     from .artist import artist  # imports are here, so that --help and a wrong word answer at once
     from .engine import ARM_XML, ModelError, load
     from .folder import FolderError, new_report
+    from .terminal import Terminal
 
+    terminal = Terminal()
+    path = options.mjcf or ARM_XML
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        engine = load(options.mjcf or ARM_XML)
+        engine = load(path)
         with new_report(options.out) as folder:
             with artist() as drawing:
                 from . import report
@@ -99,11 +110,16 @@ def run(options, command, terminal) -> int:
 
                 setup = Setup.quick(engine) if options.quick else Setup(engine)
                 sections = examine(names, setup, folder, terminal, drawing)
-            report.write(folder, sections, report.provenance(command, time.perf_counter() - started))
+            verdict = report.verdict(sections, len(EXPERIMENTS))
+            seconds = time.perf_counter() - started
+            report.write(folder, sections, report.provenance(command, path, seconds), verdict)
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # from here on the new report is there
     except (ModelError, FolderError) as error:
         raise Refused(error) from None
+    except BrokenExecutor:
+        raise Refused("a process that draws figures was ended from outside; the old report is unchanged") from None
     terminal.line("")
-    terminal.line(report.verdict(sections), "bold green" if report.passed(sections) else "bold red")
+    terminal.line(verdict, "bold green" if report.passed(sections) else "bold red")
     terminal.line(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
     return 0 if report.passed(sections) else 1
 
@@ -111,6 +127,7 @@ def run(options, command, terminal) -> int:
 def examine(names, setup, folder, terminal, drawing) -> list:
     """The section of each experiment, its figures drawn."""
     from .report import Section
+    from .terminal import Terminal
 
     (folder / "figures").mkdir()
     sections, drawings = [], []

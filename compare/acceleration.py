@@ -6,6 +6,7 @@ import numpy as np
 
 import tmt
 from tmt import method
+from tmt.dual import Dual
 
 from .agreement import Result, acceleration_scale, bias_scale, condition, gravity_scale, mass_scale
 
@@ -17,11 +18,10 @@ CLAIM = (
 )
 BAR = (
     "With S the sum of the absolute convective, Euler and gravity terms and |tau|: bias 64 eps x S; accelerations "
-    "64 eps x cond(Mbar) x |Mbar^-1| S; inverse dynamics 64 eps x cond(Mbar) x S; power the same times the sum of "
+    "64 eps x (cond(Mbar) + 1) x |Mbar^-1| S; inverse dynamics 64 eps x cond(Mbar) x S; power the same times the sum of "
     "|rates|; momentum 64 eps x cond(Mbar) x the largest entry of Mbar x the square of the sum of |rates|; "
     "energy 64 eps x (9.42 J + |qd|' |Mbar| |qd| / 2)."
 )
-TINY = 1e-30  # complex step: exact to rounding, nothing is subtracted
 
 
 def rows(setup) -> Result:
@@ -68,19 +68,18 @@ def rows(setup) -> Result:
 
 
 def rate(quantity, q, qd, qdd) -> np.ndarray:
-    """Time derivative of quantity(q, qd) along the motion, by a complex step, (states,)."""
-    columns = [list((start + 1j * TINY * slope).T) for start, slope in ((q, qd), (qd, qdd))]
-    return np.imag(quantity(*columns)) / TINY
+    """Time derivative of quantity(q, qd) along the motion, exact by dual numbers, (states,)."""
+    return quantity(list(map(Dual, q.T, qd.T)), list(map(Dual, qd.T, qdd.T))).slope
 
 
 def total_energy(model, q, qd):
-    """Potential and kinetic energy over complex scalars, J."""
+    """Potential and kinetic energy over any scalars, J."""
     parts = method.bodies(model, q, qd)
     return method.potential(parts, model.gravity) + method.kinetic(parts, qd)
 
 
 def alpha_momentum(q, qd):
-    """The first row of Mbar qd over complex scalars: angular momentum about the first hinge, N m s."""
+    """The first row of Mbar qd over any scalars: angular momentum about the first hinge, N m s."""
     first_row = method.mass_matrix(method.bodies(tmt.ARM, q, qd))[0]
     return sum(m * v for m, v in zip(first_row, qd))
 

@@ -20,7 +20,7 @@ from .scenes import POSTURES, posture
 EPS = float(np.finfo(float).eps)
 FACTOR = 64
 SEED = 10  # of every random number in a report
-SHOWN = ["scene", "quantity", "states", "worst_difference", "bar", "difference_over_bar",
+SHOWN = ["scene", "quantity", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
          "tmt_from_exact_eps", "mujoco_from_exact_eps", "unit"]  # fmt: skip
 
 
@@ -52,10 +52,10 @@ class Check:
 
     def __str__(self):
         if self.tolerance == 0.0 and self.value is not None:
-            found = f"{self.value:.6g} {self.unit}, none allowed"
+            found = f"{self.value:.6g} {self.unit}".rstrip() + ", none allowed"
         else:
-            value = "diverged" if self.value is None else f"off by {self.value:.3g} {self.unit}"
-            found = f"{value}, bar {self.tolerance:.3g} {self.unit}"
+            value = "diverged" if self.value is None else f"off by {self.value:.3g} {self.unit}".rstrip()
+            found = f"{value}, bar {self.tolerance:.3g} {self.unit}".rstrip()
         return f"{self.experiment}: {self.quantity}, {self.scene}: {found}" + (f" ({self.note})" if self.note else "")
 
 
@@ -80,7 +80,7 @@ class Result:
         return self.checks[-1]
 
     def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, truth=None) -> None:
-        """A row and a check: the worst difference of two parties over the states of a sample.
+        """A row and a check: the worst difference of two parties over the states, the closest to its bar.
 
         tmt_values, mujoco_values: (states, ...); scale: a number or (states,); truth: the name of a field of
         tmt.reference.Truth, for the distance of each party from the exact value in eps x scale.
@@ -103,6 +103,7 @@ class Result:
                 "quantity": quantity,
                 "unit": unit,
                 "states": states,
+                "largest_difference": float(difference.max()) if np.isfinite(difference).all() else None,
                 "worst_difference": check.value,
                 "bar": check.tolerance,
                 "difference_over_bar": check.over_bar,
@@ -112,12 +113,20 @@ class Result:
                 "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if truth else None,
                 "exact_states": len(known) if truth else None,
                 "worst_state": check.note,
+                "worst_q": numbers(sample.q[worst]),
+                "worst_qd": numbers(sample.qd[worst]),
+                "worst_tau": numbers(sample.tau[worst]),
                 "passed": check.passed,
             }
         )
         curves = {name: np.sort(values) for name, values in in_eps.items()}
         self.curves.setdefault(sample.name, {})[quantity] = curves
         self.shown = SHOWN
+
+
+def numbers(values) -> str:
+    """Numbers with all their digits, for whoever wants to see a state again."""
+    return " ".join(repr(float(v)) for v in values)
 
 
 def largest(values) -> np.ndarray:
@@ -227,10 +236,12 @@ def condition(q) -> np.ndarray:
     return np.linalg.cond(tmt.mass_matrix(q))
 
 
-def acceleration_scale(q, force) -> np.ndarray:
-    """cond(Mbar) |Mbar^-1| times the scale of the forces, rad/s2, (states,).
+def acceleration_scale(q, force, size=None) -> np.ndarray:
+    """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): what errors of eps in Mbar and in the force do to qdd.
 
-    The bound of a backward-stable solve: errors of eps in Mbar and in the force change the solution by at most
-    cond(Mbar) eps of its size, which is at most |Mbar^-1| times the force.
+    force: scale of the forces, N m, (states,). size: |qdd| where it is known; without it, its bound |Mbar^-1| force,
+    so that the scale is (cond(Mbar) + 1) |Mbar^-1| force. Norms of Mbar are its eigenvalues.
     """
-    return condition(q) * force / np.linalg.eigvalsh(tmt.mass_matrix(q))[:, 0]
+    eigenvalues = np.linalg.eigvalsh(tmt.mass_matrix(q))
+    size = force / eigenvalues[:, 0] if size is None else size
+    return (eigenvalues[:, -1] * size + force) / eigenvalues[:, 0]

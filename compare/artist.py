@@ -1,27 +1,37 @@
 """Two further processes that draw the figures of an experiment while the next one computes."""
 
 import importlib
+import os
 import signal
+import threading
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 
 
 @contextmanager
 def artist():
     """Yields submit(experiment, result, folder), whose future is the list of (file name, caption) it has drawn."""
-    with ProcessPoolExecutor(2, get_context("spawn"), ignore_interrupt) as pool:
+    with ProcessPoolExecutor(2, get_context("spawn"), watch_parent) as pool:
+        # Ctrl-C is this process's business: the others are started deaf to it
+        hearing = signal.signal(signal.SIGINT, signal.SIG_IGN)
         for _ in range(2):
             pool.submit(importlib.import_module, ".draw", __package__)  # matplotlib loads meanwhile
+        signal.signal(signal.SIGINT, hearing)
         try:
             yield lambda *work: pool.submit(draw, *work)
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def ignore_interrupt():
-    """Ctrl-C is the main process's business."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def watch_parent():
+    """End with the main process, however that ends."""
+
+    def wait():
+        parent_process().join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def draw(experiment, result, folder) -> list:

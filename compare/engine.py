@@ -33,6 +33,9 @@ FLAGS = {
 class ModelError(ValueError):
     """A file that cannot be held against the stated arm; the message is one line."""
 
+    def __str__(self):
+        return " ".join(super().__str__().split())
+
 
 class Engine:
     """MuJoCo with one model of given hinges; quantities at any states q, qd, tau of shape (..., n).
@@ -65,10 +68,10 @@ class Engine:
         return {
             "axis": d.xaxis[self.joints].copy(),
             "anchor": anchors,
-            "damping": m.dof_damping.reshape(m.nv, -1)[self.dofs, 0],
+            "damping": m.dof_damping[self.dofs],
             "armature": m.dof_armature[self.dofs],
             "frictionloss": m.dof_frictionloss[self.dofs],
-            "stiffness": m.jnt_stiffness.reshape(m.njnt, -1)[self.joints, 0],
+            "stiffness": m.jnt_stiffness[self.joints],
             "limited": m.jnt_limited[self.joints].astype(float),
             "order": np.argsort(np.argsort(self.joints)).astype(float),
             "mass": m.body_mass[self.bodies],
@@ -76,6 +79,7 @@ class Engine:
             "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[self.bodies])]),
             "gravcomp": m.body_gravcomp[self.bodies],
             "gravity": m.opt.gravity * self.enabled("gravity"),
+            "tendon armature": m.tendon_armature.sum(),
             "other mass": m.body_subtreemass[0] - m.body_mass[self.bodies].sum(),
         }
 
@@ -85,7 +89,8 @@ class Engine:
         flags = {f"flag {name}": "enable" if self.enabled(name) else "disable" for name in FLAGS}
         counts = ("ngeom", "nu", "nsensor", "neq", "ntendon")
         integrator = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-        return flags | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}
+        refs = {f"ref {name}": f"{m.qpos0[i]:g}" for name, i in zip(self.hinges, self.qpos)}
+        return flags | refs | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}
 
     def enabled(self, flag) -> bool:
         return not self.model.opt.disableflags & int(FLAGS[flag])
@@ -162,6 +167,15 @@ class Engine:
 
         return self._each(torque, q, qd, qdd)  # qdd travels in the place of tau
 
+    def other_forces(self, q, qd) -> dict:
+        """What else acts than gravity, torque and damping, by its source, N m, (..., n) each."""
+        D = self.model.dof_damping
+        return {
+            "springs, fluid and tendons": self._each(lambda d: (d.qfrc_passive + D * d.qvel)[self.dofs], q, qd),
+            "actuators": self._each(lambda d: d.qfrc_actuator[self.dofs], q, qd),
+            "constraints and contacts": self._each(lambda d: d.qfrc_constraint[self.dofs], q, qd),
+        }
+
     def potential_energy(self, q) -> np.ndarray:
         """V, J, (...): mj_energyPos."""
         return self._each(lambda d: self._energies(d)[0], q)
@@ -234,16 +248,15 @@ CARRIERS = ("beta", "gamma")  # upper arm, forearm
 def load(path=ARM_XML, hinges=HINGES, carriers=CARRIERS) -> Engine:
     """The Engine for an MJCF file; ModelError if it cannot be read or does not have these hinges."""
     try:
-        text = Path(path).read_text()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not text"
-        raise ModelError(f"cannot read {path}: {reason}; an MJCF file is expected") from None
+        text = Path(path).read_text(errors="replace")
+    except OSError as error:
+        raise ModelError(f"cannot read {path}: {error.strerror}; an MJCF file is expected") from None
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         if "<mujoco" not in text:
-            raise ModelError(f"{path} is not MJCF: MuJoCo says {_one_line(error)}") from None
-        raise ModelError(f"MuJoCo cannot compile {path}: {_one_line(error)}") from None
+            raise ModelError(f"{path} is not MJCF: MuJoCo says {error}") from None
+        raise ModelError(f"MuJoCo cannot compile {path}: {error}") from None
     return check_hinges(model, path, hinges, carriers)
 
 
@@ -260,7 +273,3 @@ def check_hinges(model, path, hinges, carriers) -> Engine:
         found = ", ".join(f"{name or 'unnamed'} ({kind})" for name, kind in zip(names, kinds)) or "none"
         raise ModelError(f"{path} has the joints {found}; hinges {', '.join(hinges)} and no others are expected")
     return Engine(model, hinges, carriers)
-
-
-def _one_line(error):
-    return " ".join(str(error).split())

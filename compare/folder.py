@@ -1,9 +1,8 @@
 """The output folder: a new report takes the place of the old one only when it is complete."""
 
+import json
 import shutil
-import signal
 import tempfile
-import threading
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,7 +18,7 @@ def new_report(out):
     """A fresh folder inside `out`; what is in it takes the old report's place when the block ends well.
 
     Whatever else is in `out` stays. If the block raises, `out` is as it was. FolderError if `out` cannot be
-    written, or has files with a report's names that are not a report's.
+    written, or has files under a report's names that are not the old report's.
     """
     out = Path(out)
     existed = out.exists()
@@ -31,19 +30,33 @@ def new_report(out):
             f"cannot write to {out}: {error.strerror}; a folder that can be written is expected"
         ) from None
     try:
-        foreign = [name for name in OWN if (out / name).exists()]
-        if foreign and not (out / "results.json").exists():
+        foreign = not_of_a_report(out)
+        if foreign:
             raise FolderError(
-                f"{out} has {', '.join(foreign)} but no results.json, so this is not a report to be replaced; "
+                f"{out} has {foreign[0]}, which is not of an earlier report and would be replaced; "
                 "another folder is expected"
             )
         yield work
-        with uninterrupted():
-            exchange(work, out)
+        exchange(work, out)
     finally:
         shutil.rmtree(work, ignore_errors=True)
-        if not existed and not any(out.iterdir()):
+        if not existed and out.exists() and not any(out.iterdir()):
             out.rmdir()
+
+
+def files(folder) -> list[str]:
+    """What lies in a folder under a report's names, relative to it."""
+    found = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")] if path.is_file()]
+    return sorted(str(path.relative_to(folder)) for path in found)
+
+
+def not_of_a_report(out) -> list[str]:
+    """Files under a report's names that the report in `out` does not list as its own."""
+    try:
+        own = json.loads((out / "results.json").read_text())["provenance"]["files"]
+        return [name for name in files(out) if name not in own]
+    except (OSError, ValueError, KeyError, TypeError):
+        return files(out)
 
 
 def exchange(work, out):
@@ -62,16 +75,3 @@ def exchange(work, out):
         raise FolderError(f"cannot replace the report in {out}: {error.strerror}; the old one is unchanged") from None
     finally:
         shutil.rmtree(old, ignore_errors=True)
-
-
-@contextmanager
-def uninterrupted():
-    """Ctrl-C waits for the end of the block."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)

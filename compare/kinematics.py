@@ -33,7 +33,7 @@ def rows(setup) -> Result:
             ("x_b", "m", tmt.com_positions(q), engine.com_positions(q), reach, "com_positions"),
             ("omega_b", "rad/s", *omega, speed, "angular_velocities"),
             ("T_b", "m/rad", T, engine_T, reach, "T"),
-            ("B_b", "-", B, engine_B, 1.0, "B"),
+            ("B_b", "", B, engine_B, 1.0, "B"),
             ("v_conv", "m/s2", v_conv, engine_v, reach * speed**2, "v_conv"),
             ("w_conv", "rad/s2", w_conv, engine_w, speed**2, "w_conv"),
         ):

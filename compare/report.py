@@ -1,6 +1,7 @@
 """Results to files: CSV, JSON, Markdown, HTML and PNG, with where they come from."""
 
 import base64
+import hashlib
 import html
 import json
 import math
@@ -9,22 +10,26 @@ import platform
 import subprocess
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from string import Template
 
 import pandas as pd
 
 from .agreement import SEED
+from .engine import ARM_XML
+from .folder import files
 
 TITLE = "TMT and MuJoCo, held against each other on a human arm"
+OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich")
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
 LONG = 30  # rows: a longer table is folded in the HTML
 INTRO = (
     "A human arm, two rigid bodies on three hinges, modelled twice: as MJCF, run by MuJoCo, and by the TMT method in a "
     "program that shares nothing with it. Each difference stands beside a bar that was fixed beforehand; 'exact' is "
-    "the method in 50-digit arithmetic, and distances from it are in eps = 2.2e-16 of the quantity's scale."
+    "the method in 50-digit arithmetic, and distances from it are in eps = 2.2e-16 of the quantity's scale. Of the states "
+    "in a row, the largest difference is the largest of all; the worst is the one that comes closest to its own bar."
 )
 
 
@@ -50,15 +55,17 @@ def worst(sections):
     return max(checks, key=lambda check: check.over_bar, default=None)
 
 
-def verdict(sections) -> str:
-    """The outcome in words, with the worst figure."""
+def verdict(sections, experiments) -> str:
+    """The outcome in words, with the worst figure; `experiments`: how many there are in all."""
     checks = [check for section in sections for check in section.result.checks]
     failed = [check for check in checks if not check.passed]
+    names = ", ".join(section.name for section in sections)
+    ran = "" if len(sections) == experiments else f" in {names} ({len(sections)} of {experiments} experiments)"
     if failed:
-        return f"The two models do not agree: {len(failed)} of {len(checks)} checks fail. First: {failed[0]}."
-    text = f"The two models agree: all {len(checks)} checks pass."
+        return f"The two models do not agree{ran}: {len(failed)} of {len(checks)} checks fail. First: {failed[0]}."
+    text = f"The two models agree{ran}: all {len(checks)} checks pass."
     top = worst(sections)
-    if top is None:
+    if top is None or top.value == 0.0:
         return text
     where = f"{top.quantity}, {top.scene}" + (f", {top.note}" if top.note else "")
     return (
@@ -67,55 +74,72 @@ def verdict(sections) -> str:
     )
 
 
+def outcome(section) -> str:
+    """Whether a section's claim holds, in words."""
+    checks = section.result.checks
+    failed = sum(not check.passed for check in checks)
+    return (
+        f"It does not hold: {failed} of {len(checks)} checks fail."
+        if failed
+        else f"It holds: all {len(checks)} checks pass."
+    )
+
+
 def answers(sections) -> pd.DataFrame:
-    """The assignment's parts (a) to (i): what is asked, where it is answered, the figure."""
+    """The assignment's parts (a) to (i): what is asked, where it is answered, the answer."""
     results = {section.name: section.result for section in sections}
 
-    def far(name, quantities):
+    def apart(name, quantity):
         if name not in results:
             return "not run"
-        rows = [r for r in results[name].rows if r["quantity"] in quantities]
-        values = [r["worst_difference"] for r in rows]
-        if None in values:
+        rows = [row for row in results[name].rows if row["quantity"] == quantity]
+        if any(row["largest_difference"] is None for row in rows):
             return "diverged"
-        top = max(rows, key=lambda r: r["worst_difference"])
-        return f"{top['quantity']}: at most {top['worst_difference']:.1e} {top['unit']} apart"
+        top = max(rows, key=lambda row: row["largest_difference"])
+        judged = ", while judged" if name == "trajectory" else ""
+        return f"{quantity}: at most {top['largest_difference']:.1e} {top['unit']} apart ({top['scene']}{judged})"
 
-    def printed(item, column=None):
+    def printed(*items):
         if "published" not in results:
             return "not run"
-        rows = [
-            r for r in results["published"].rows if r["item"] == item and r["component"] in (column or r["component"])
-        ]
-        return f"TMT ({', '.join('{:.6g}'.format(r['tmt']) for r in rows)}) {rows[0]['unit']}"
-
-    def run():
-        if "trajectory" not in results:
-            return "not run"
-        curve = next(
-            c for (s, n), c in results["trajectory"].curves.items() if s.name == "ball catch, held" and n == 64
-        )
-        left = [f"{t:.2f} s" if t else "never" for t in curve["left"]]
-        return f"ball catch left by 0.1 rad: TMT {left[0]}, MuJoCo {left[1]}; " + far("trajectory", ["angles"])
+        texts = []
+        for item in items:
+            rows = [row for row in results["published"].rows if row["item"] == item]
+            values = {
+                party: "(" + ", ".join(f"{row[party]:.5g}" for row in rows) + ")"
+                for party in ("published", "tmt", "mujoco")
+            }
+            unit = rows[0]["unit"]
+            texts.append(
+                f"{item}: printed {values['published']}, TMT {values['tmt']}, MuJoCo {values['mujoco']} {unit}"
+            )
+        return "; ".join(texts)
 
     parts = (
-        ("a", "sketch of the arm with its hinges", "parameters", "figures/arm.png"),
-        ("b", "positions of the centres of mass", "kinematics", far("kinematics", ["x_b"])),
+        ("a", "sketch of the arm with its hinges", "parameters", "figure 'arm'"),
+        ("b", "positions of the centres of mass", "kinematics", apart("kinematics", "x_b")),
         ("c", "torques that hold the zero posture", "published, gravity", printed("c")),
-        ("d", "angular velocities in body axes", "kinematics", far("kinematics", ["omega_b"])),
-        ("e", "equations of motion by TMT", "mass, acceleration", far("acceleration", ["bias"])),
-        ("f", "accelerations from rest that can be foreseen", "published", "f1: " + printed("f1")),
-        ("g", "Mbar at the zero posture", "published, mass", printed("g", ("alpha alpha", "beta beta", "gamma gamma"))),
+        ("d", "angular velocities in body axes", "kinematics", apart("kinematics", "omega_b")),
+        (
+            "e",
+            "equations of motion by TMT",
+            "mass, acceleration",
+            apart("mass", "Mbar") + "; " + apart("acceleration", "bias"),
+        ),
+        ("f", "accelerations from rest that can be foreseen", "published", printed("f1", "f2", "f3", "f4")),
+        ("g", "Mbar at the zero posture, by rows", "published, mass", printed("g")),
         ("h", "torques that hold ball catch", "published, gravity", printed("h")),
-        ("i", "five seconds of motion by RK4", "trajectory", run()),
+        ("i", "five seconds of motion by RK4", "trajectory", apart("trajectory", "angles")),
     )
-    return pd.DataFrame(parts, columns=["part", "asked", "answered in", "figure"])
+    return pd.DataFrame(parts, columns=["part", "asked", "answered in", "answer"])
 
 
-def provenance(command, seconds) -> dict:
-    """What a reader needs to repeat the run: command, versions, machine, commit, seed."""
+def provenance(command, model, seconds) -> dict:
+    """What a reader needs to repeat the run: command, model, versions, machine, commit, seed."""
     return {
         "command": command,
+        "model": "mjcf/arm.xml" if model == ARM_XML else str(model),
+        "model_sha256": hashlib.sha256(Path(model).read_bytes()).hexdigest(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "seconds": round(seconds, 1),
         "seed": SEED,
@@ -124,7 +148,15 @@ def provenance(command, seconds) -> dict:
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
-    } | {package: version(package) for package in PACKAGES}
+    } | {package: installed(package) for package in (OURS, *PACKAGES)}
+
+
+def installed(package) -> str | None:
+    """The version of an installed package; None for this one where it runs from a checkout that is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
 
 
 def commit() -> str | None:
@@ -151,16 +183,17 @@ def cpu() -> str:
         return platform.processor() or "unknown"
 
 
-def write(folder, sections, origin) -> None:
-    """All files of a report, the figures excepted, into an empty folder."""
+def write(folder, sections, origin, result) -> None:
+    """All files of a report, the figures excepted, into a folder that has those."""
     (folder / "tables").mkdir()
     for section in sections:
         section.result.table.to_csv(folder / "tables" / f"{section.name}.csv", index=False)
     checks = [check.record() for section in sections for check in section.result.checks]
+    (folder / "report.md").write_text(markdown(sections, origin, result), encoding="utf-8")
+    (folder / "index.html").write_text(page(folder, sections, origin, result), encoding="utf-8")
+    origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
     results = {"passed": passed(sections), "checks": checks, "provenance": origin}
     (folder / "results.json").write_text(json.dumps(results, indent=1, allow_nan=False) + "\n")
-    (folder / "report.md").write_text(markdown(sections, origin), encoding="utf-8")
-    (folder / "index.html").write_text(page(folder, sections, origin), encoding="utf-8")
 
 
 def shown(table, columns=None) -> pd.DataFrame:
@@ -184,17 +217,18 @@ def tables(section) -> tuple[pd.DataFrame, pd.DataFrame]:
     )
 
 
-def markdown(sections, origin) -> str:
+def markdown(sections, origin, result) -> str:
+    """The report as Markdown; `result`: the verdict."""
     lines = [
         f"# {TITLE}",
-        f"**{verdict(sections)}**",
+        f"**{result}**",
         INTRO,
         "## The assignment's questions",
         md_table(answers(sections)),
     ]
     for section in sections:
         table, failed = tables(section)
-        lines += [f"## {section.title}", section.claim, f"*Bar:* {section.bar}"]
+        lines += [f"## {section.title}", f"*Claim:* {section.claim} **{outcome(section)}**", f"*Bar:* {section.bar}"]
         if len(failed):
             lines += ["**Checks that fail:**", md_table(failed)]
         lines += [md_table(table), f"All columns: [tables/{section.name}.csv](tables/{section.name}.csv)"]
@@ -214,7 +248,7 @@ def origins(origin) -> pd.DataFrame:
     return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
 
 
-def page(folder, sections, origin) -> str:
+def page(folder, sections, origin, result) -> str:
     """The report as one HTML file with its figures inside."""
     body = [
         f"<p>{html.escape(INTRO)}</p>",
@@ -225,7 +259,7 @@ def page(folder, sections, origin) -> str:
         table, failed = tables(section)
         body += [
             f'<h2 id="{section.name}">{html.escape(section.title)}</h2>',
-            f"<p>{html.escape(section.claim)}</p>",
+            f"<p><em>Claim:</em> {html.escape(section.claim)} <strong>{outcome(section)}</strong></p>",
             f"<p><em>Bar:</em> {html.escape(section.bar)}</p>",
         ]
         if len(failed):
@@ -247,7 +281,7 @@ def page(folder, sections, origin) -> str:
     return Template((Path(__file__).parent / "report.html").read_text()).substitute(
         title=TITLE,
         colour="#009E73" if passed(sections) else "#D55E00",
-        verdict=html.escape(verdict(sections)),
+        verdict=html.escape(result),
         contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),
         body="\n".join(body),
     )

@@ -1,5 +1,7 @@
 """Whatever a user can get wrong gets a ValueError that says what was given and what is accepted."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -59,13 +61,24 @@ def test_an_empty_batch_is_a_batch():
     assert tmt.mass_matrix(np.zeros((0, 3))).shape == (0, 3, 3)
 
 
-@given(st.one_of(st.floats(max_value=0), st.just(np.nan), st.just(np.inf), st.text(), st.none(), st.complex_numbers()))
+@given(
+    st.one_of(
+        st.floats(max_value=0),
+        st.just(np.nan),
+        st.just(np.inf),
+        st.text(),
+        st.none(),
+        st.complex_numbers(),
+        st.booleans(),
+        st.just(10**400),
+    )
+)
 def test_steps_in_time(dt):
     with pytest.raises(ValueError, match="a step in s above 0 is expected"):
         tmt.simulate(REST, REST, REST, dt, 1)
 
 
-@given(st.one_of(st.integers(max_value=0), st.floats(), st.text(), st.none()))
+@given(st.one_of(st.integers(max_value=0), st.floats(), st.text(), st.none(), st.booleans()))
 def test_numbers_of_steps(steps):
     with pytest.raises(ValueError, match="a whole number of at least 1 is expected"):
         tmt.simulate(REST, REST, REST, 0.1, steps)
@@ -74,5 +87,19 @@ def test_numbers_of_steps(steps):
 def test_unknown_method_and_model():
     with pytest.raises(ValueError, match="unknown method 'rk5'; known are rk4"):
         tmt.simulate(REST, REST, REST, 0.1, 1, "rk5")
+    with pytest.raises(ValueError, match="unknown method"):
+        tmt.simulate(REST, REST, REST, 0.1, 1, ["rk4"])
     with pytest.raises(ValueError, match=r"a tmt\.Tree is expected"):
         tmt.mass_matrix(REST, model="arm")
+
+
+def test_messages_are_one_line():
+    with pytest.raises(ValueError) as error:
+        tmt.mass_matrix(np.full((3, 1000), 1j))
+    assert "\n" not in str(error.value) and len(str(error.value)) < 300
+
+
+@given(st.sampled_from([int, np.int32, np.int64]), st.sampled_from([float, np.float64, np.float32, Fraction]))
+def test_any_kind_of_number_will_do(whole, real):
+    t, q, _ = tmt.simulate([0, 0, 1], REST, REST, real(0.5), whole(2))
+    assert t.dtype == q.dtype == float and t[-1] == 1.0

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -119,6 +120,8 @@ def test_an_arm_that_flies_apart_is_reported_as_diverged(tmp_path):
         (["nothing"], "invalid choice: 'nothing' (choose from"),
         ([], "required: EXPERIMENT"),
         (["mass", "--fast"], "unrecognized arguments: --fast"),
+        (["mass", "--mjcf", ""], "--mjcf: it is empty"),
+        (["mass", "--out", ""], "--out: it is empty"),
         (["mass", "--mjcf", "missing.xml"], "cannot read missing.xml: No such file or directory"),
         (["mass", "--mjcf", str(ROOT / "pyproject.toml")], "is not MJCF"),
         (["mass", "--mjcf", str(ROOT)], "Is a directory"),
@@ -161,19 +164,26 @@ def test_help_has_examples(capsys):
 
 
 def started(cwd, *arguments):
+    """A run in a process group of its own, as a terminal's."""
     command = [sys.executable, "-m", "compare", *arguments, "--quick"]
-    return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd, env=ENVIRONMENT
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=cwd, env=ENVIRONMENT, start_new_session=True, **pipes)
 
 
-def test_ctrl_c_leaves_the_old_report_whole(ran):
+@pytest.mark.parametrize(
+    "number, moment",
+    [(signal.SIGINT, 0.7), (signal.SIGINT, 1.2), (signal.SIGINT, "a line"), (signal.SIGTERM, "a line")],
+)
+def test_ctrl_c_leaves_the_old_report_whole(ran, number, moment):
     _, folder = ran
     report = folder / "reports" / "latest"
     before = {p: p.read_bytes() for p in report.rglob("*") if p.is_file()}
     run = started(folder, "all")
-    run.stdout.readline()
-    run.send_signal(signal.SIGINT)
+    if moment == "a line":
+        run.stdout.readline()
+    else:
+        time.sleep(moment)
+    os.killpg(run.pid, number)
     _, err = run.communicate(timeout=60)
     assert run.returncode == 2
     assert err.splitlines() == ["interrupted; a report that was there is unchanged"]

@@ -25,7 +25,7 @@ def test_a_file_that_is_not_there(tmp_path):
     [
         (b"not xml", "is not MJCF"),
         (b"<robot/>", "has the joints none"),
-        (b"\xff\xfe\x00", "it is not text"),
+        (b"\xff\xfe\x00", "is not MJCF"),
         (b"<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo cannot compile"),
         (b"<mujoco/>", "has the joints none; hinges alpha, beta, gamma and no others are expected"),
     ],
@@ -72,6 +72,12 @@ def test_body_axes_are_those_of_the_world_at_zero(rng):
     assert np.allclose(engine.jacobians(q)[1], arm.jacobians(q)[1], atol=1e-12)
     assert np.allclose(engine.parameters()["inertia"], arm.parameters()["inertia"], atol=1e-15)
     assert np.allclose(engine.parameters()["com"], arm.parameters()["com"], atol=1e-15)
+
+
+def test_a_comment_in_another_encoding_is_no_obstacle(tmp_path):
+    path = tmp_path / "model.xml"
+    path.write_bytes(XML.encode().replace(b"<!--", b"<!-- \xe9 ", 1))
+    assert load(path).mass_matrix(REST)[0, 0] == pytest.approx(0.2445)
 
 
 def test_quantities_are_those_of_the_state_that_is_asked_for(engine, rng):

@@ -1,18 +1,24 @@
 """A report takes the old one's place when it is complete, and nothing else is touched."""
 
+import json
+
 import pytest
 
 from compare.folder import FolderError, new_report
 
 
 def fill(work, text):
+    """A small report that lists its files."""
     (work / "tables").mkdir()
     (work / "tables" / "mass.csv").write_text(text)
-    (work / "results.json").write_text(text)
+    listed = ["report.md", "results.json", "tables/mass.csv"]
+    (work / "results.json").write_text(json.dumps({"provenance": {"files": listed}, "text": text}))
 
 
 def files(folder):
-    return {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*") if p.is_file()}
+    """What is in a folder; of results.json only the text of `fill`."""
+    found = {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*") if p.is_file()}
+    return {name: json.loads(text)["text"] if name == "results.json" else text for name, text in found.items()}
 
 
 def test_a_new_report_replaces_the_old_one_and_keeps_other_files(tmp_path):
@@ -60,12 +66,28 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
     assert files(tmp_path) == {"tables/mass.csv": "old", "results.json": "old"}
 
 
-def test_a_folder_of_somebody_elses_is_refused(tmp_path):
-    (tmp_path / "tables").mkdir()
+@pytest.mark.parametrize("report", [False, True])
+def test_files_of_somebody_elses_are_not_replaced(tmp_path, report):
+    if report:
+        with new_report(tmp_path) as work:
+            fill(work, "old")
+    (tmp_path / "tables").mkdir(exist_ok=True)
     (tmp_path / "tables" / "precious.csv").write_text("1")
-    with pytest.raises(FolderError, match=r"tables but no results\.json"), new_report(tmp_path):
+    before = files(tmp_path)
+    with (
+        pytest.raises(FolderError, match=r"has tables/precious\.csv, which is not of an earlier report"),
+        new_report(tmp_path),
+    ):
         pass
-    assert files(tmp_path) == {"tables/precious.csv": "1"}
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"provenance": {"files": null}}'])
+def test_some_other_results_json_is_not_replaced(tmp_path, text):
+    (tmp_path / "results.json").write_text(text)
+    with pytest.raises(FolderError, match=r"has results\.json, which is not"), new_report(tmp_path):
+        pass
+    assert (tmp_path / "results.json").read_text() == text
 
 
 def test_a_file_is_not_a_folder(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from trees import random_tree
 
 import tmt
+from compare.agreement import EPS, FACTOR, bias_scale
 from tmt import kernels, method
 from tmt.methods import METHODS
 from tmt.trace import Tape
@@ -43,7 +44,10 @@ def test_traced_acceleration_is_the_method(rng, damping):
         q, qd, tau = rng.uniform(-3, 3, (3, n)).tolist()
         expected = np.array(method.acceleration(tree, q, qd, tau), dtype=float)
         assert np.abs(expected).max() > 0.1
-        assert np.allclose(acceleration(*q, *qd, *tau), expected, rtol=1e-12, atol=1e-12)
+        force = bias_scale(np.array([q]), np.array([qd]), tree)[0] + 10.0
+        eigenvalues = np.linalg.eigvalsh(tmt.mass_matrix(q, tree))
+        bar = FACTOR * EPS * eigenvalues[-1] / eigenvalues[0] * force / eigenvalues[0]
+        assert np.abs(np.array(acceleration(*q, *qd, *tau)) - expected).max() < bar
 
 
 def test_the_arm_folds_to_fewer_operations():
@@ -73,6 +77,26 @@ def test_a_damaged_cache_file_is_written_anew(tmp_path, monkeypatch):
     (file,) = tmp_path.glob("kernel_*.py")
     file.write_text("value = 2\n")
     assert kernels.load("value = 1\n").value == 1
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_damaged_machine_code_is_compiled_anew(tmp_path, monkeypatch, suffix):
+    monkeypatch.setenv("TMT_CACHE", str(tmp_path))
+    text = 'from numba import njit\n\n@njit("float64(float64)", cache=CACHE)\ndef f(x):\n    return 2.0 * x\n'
+    assert kernels.load(text).f(1.5) == 3.0
+    damaged = list(tmp_path.glob(f"__pycache__/*.{suffix}"))
+    assert damaged
+    for file in damaged:
+        file.write_bytes(b"junk")
+    assert kernels.load(text).f(1.5) == 3.0
+    assert kernels.load(text).f(2.5) == 5.0
+    assert all(file.read_bytes() != b"junk" for file in damaged)
+
+
+def test_an_empty_setting_is_no_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMT_CACHE", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert kernels.cache_folder() == tmp_path / "tmt"
 
 
 def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path, monkeypatch):

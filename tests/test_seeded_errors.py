@@ -28,6 +28,22 @@ IN_THE_MJCF = {
     "beta axis flipped": (BETA, BETA.replace('"1 0 0"', '"-1 0 0"'), ["parameters axis", "kinematics x_b", "kinematics B_b"]),
     "gamma axis tilted": (GAMMA, GAMMA.replace('"0 1 0"', '"0 1 0.001"'), ["parameters axis", "kinematics T_b"]),
     "elbow 1 mm lower": ('pos="0 0 -0.3"', 'pos="0 0 -0.301"', ["parameters anchor", "kinematics v_conv"]),
+    "a position servo": (
+        "</mujoco>",
+        '<actuator><position joint="beta" kp="3"/></actuator></mujoco>',
+        ["parameters forces of actuators", "acceleration qdd"],
+    ),
+    "air": ('<option gravity', '<option density="50" viscosity="1" gravity', ["parameters forces of springs, fluid"]),
+    "tendon armature": (
+        "</mujoco>",
+        '<tendon><fixed armature="0.1"><joint joint="alpha" coef="1"/></fixed></tendon></mujoco>',
+        ["parameters tendon armature", "mass Mbar"],
+    ),
+    "an equality constraint": (
+        'constraint="disable" autoreset="disable"/>\n  </option>',
+        'autoreset="disable"/></option><equality><joint joint1="alpha" joint2="gamma"/></equality>',
+        ["parameters forces of constraints", "acceleration qdd"],
+    ),
     "a hidden mass": (
         '<body name="forearm"',
         '<body pos="0 0 -0.1"><inertial pos="0 0 0" mass="0.01" diaginertia="1e-6 1e-6 1e-6"/></body><body name="forearm"',
@@ -36,7 +52,7 @@ IN_THE_MJCF = {
 }  # fmt: skip
 
 IN_THE_METHOD = {
-    "Rb for Rb'": ("to_body = frame.turn.T", "to_body = frame.turn", ["kinematics omega_b", "kinematics B_b"]),
+    "Rb for Rb'": ("to_body = frame.turn.transposed", "to_body = frame.turn", ["kinematics omega_b", "kinematics B_b"]),
     "rotations in the wrong order": (
         "p.turn @ rotation(tree.axis[i], q[i])",
         "rotation(tree.axis[i], q[i]) @ p.turn",

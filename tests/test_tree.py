@@ -42,6 +42,10 @@ def test_tree_knows_which_hinges_move_a_body():
         ({"damping": (0, -1, 0)}, "damping"),
         ({"inertia": (np.diag([1, 1, 3]), np.eye(3))}, "none larger than the other two"),
         ({"inertia": ([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]], np.eye(3))}, "not symmetric"),
+        ({"body_hinge": (1, 1)}, "hinge 'gamma' moves nothing that has mass"),
+        ({"mass": (1.9, 0), "inertia": (np.eye(3), np.zeros((3, 3)))}, "hinge 'gamma' moves nothing"),
+        ({"hinge_names": 3}, "different names are expected"),
+        ({"hinge_names": ("a", "b", "a")}, "different names are expected"),
         ({"gravity": (0, 0)}, "gravity has shape"),
     ],
 )

@@ -55,10 +55,14 @@ def mjcf(tree) -> str:
                 f'axis="{numbers(tree.axis[i])}" damping="{tree.damping[i]!r}"/>'
             )
         at_end[chain[-1]] = where
-        I = np.array(tree.inertia[b])
-        full = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+        # principal moments and axes: MuJoCo 3.10 turns a fullinertia only to about 1e-8
+        moments, axes = np.linalg.eigh(tree.inertia[b])
+        axes[:, 0] *= np.linalg.det(axes)
         com = numbers(where + tree.com[b])
-        lines.append(f'<inertial pos="{com}" mass="{tree.mass[b]!r}" fullinertia="{numbers(full)}"/>')
+        lines.append(
+            f'<inertial pos="{com}" mass="{tree.mass[b]!r}" '
+            f'xyaxes="{numbers(axes[:, :2].T.ravel())}" diaginertia="{numbers(moments)}"/>'
+        )
         for child in range(len(tree.body_hinge)):
             start = child_root(child)
             if tree.parent[start] == tree.body_hinge[b]:

@@ -9,10 +9,12 @@ are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd, with
 qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that holds the arm at rest.
 """
 
+import math
 import numbers
-import operator
+import reprlib
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import method as _method
 from .arm import ARM
@@ -25,7 +27,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-def com_positions(q, model: Tree = ARM) -> np.ndarray:
+def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Positions x_b of the centres of mass in the inertial frame, m, shape (..., m, 3).
 
     q: hinge angles (..., n), rad. Assignment, part b, equation (1).
@@ -34,7 +36,7 @@ def com_positions(q, model: Tree = ARM) -> np.ndarray:
     return _gather((list(b.x) for b in _method.bodies(model, q)), q[0].shape)
 
 
-def angular_velocities(q, qd, model: Tree = ARM) -> np.ndarray:
+def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Angular velocities omega_b = B_b qd in body axes, rad/s, shape (..., m, 3).
 
     q, qd: hinge angles and rates (..., n), rad and rad/s. Assignment, part d.
@@ -43,7 +45,7 @@ def angular_velocities(q, qd, model: Tree = ARM) -> np.ndarray:
     return _gather((list(b.omega) for b in _method.bodies(model, q, qd)), q[0].shape)
 
 
-def jacobians(q, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
+def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, n).
 
     q: hinge angles (..., n), rad. Assignment, parts d and e.
@@ -54,7 +56,7 @@ def jacobians(q, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     return _gather((zip(*b.T) for b in parts), shape), _gather((zip(*b.B) for b in parts), shape)
 
 
-def convective_terms(q, qd, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
+def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """v_conv = d(T_b qd)/dq qd, m/s2, inertial frame, and w_conv = d(B_b qd)/dq qd, rad/s2, body axes.
 
     q, qd: hinge angles and rates (..., n), rad and rad/s. both results are (..., m, 3).
@@ -66,7 +68,7 @@ def convective_terms(q, qd, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     return _gather((list(b.v_conv) for b in parts), shape), _gather((list(b.w_conv) for b in parts), shape)
 
 
-def mass_matrix(q, model: Tree = ARM) -> np.ndarray:
+def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, shape (..., n, n), symmetric positive definite.
 
     q: hinge angles (..., n), rad. Assignment, part e.
@@ -75,7 +77,7 @@ def mass_matrix(q, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.mass_matrix(_method.bodies(model, q)), q[0].shape)
 
 
-def bias(q, qd, model: Tree = ARM) -> np.ndarray:
+def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Bias h = Coriolis, centrifugal and gravity terms, N m, shape (..., n): Mbar qdd + h = tau - D qd.
 
     q, qd: hinge angles and rates (..., n), rad and rad/s. It is -Qbar at tau = 0 (assignment, part e)
@@ -85,7 +87,7 @@ def bias(q, qd, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.bias(_method.bodies(model, q, qd), model.gravity), q[0].shape)
 
 
-def gravity_balance(q, model: Tree = ARM) -> np.ndarray:
+def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque +dV/dq that holds the model at rest, N m, shape (..., n).
 
     q: hinge angles (..., n), rad. Assignment, parts c and h; MuJoCo's qfrc_bias at rest.
@@ -94,7 +96,7 @@ def gravity_balance(q, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.bias(_method.bodies(model, q), model.gravity), q[0].shape)
 
 
-def acceleration(q, qd, tau, model: Tree = ARM) -> np.ndarray:
+def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Hinge accelerations qdd from Mbar qdd = tau - D qd - h, rad/s2, shape (..., n).
 
     q, qd, tau: hinge angles, rates and torques (..., n), rad, rad/s, N m. Assignment, parts e and f.
@@ -103,7 +105,7 @@ def acceleration(q, qd, tau, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.acceleration(model, q, qd, tau), q[0].shape)
 
 
-def potential_energy(q, model: Tree = ARM) -> np.ndarray:
+def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin.
 
     q: hinge angles (..., n), rad.
@@ -112,7 +114,7 @@ def potential_energy(q, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.potential(_method.bodies(model, q), model.gravity), q[0].shape)
 
 
-def energy(q, qd, model: Tree = ARM) -> np.ndarray:
+def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Total energy, kinetic and potential, J, shape (...).
 
     q, qd: hinge angles and rates (..., n), rad and rad/s. Its zero is that of `potential_energy`.
@@ -123,23 +125,24 @@ def energy(q, qd, model: Tree = ARM) -> np.ndarray:
 
 
 def simulate(
-    q, qd, tau, dt, steps, method: str = "rk4", model: Tree = ARM
+    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Motion under constant torque: t (steps+1,) s, q and qd (..., steps+1, n), rad and rad/s.
 
     q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1;
     method: a key of METHODS. States after a run has left the finite numbers are NaN. Assignment, part i.
     """
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
+    if not isinstance(steps, numbers.Integral) or isinstance(steps, bool) or steps < 1:
+        raise ValueError(f"steps is {steps!r}; a whole number of at least 1 is expected")
     try:
-        steps = operator.index(steps)
-    except TypeError:
-        raise ValueError(f"steps is {steps!r}; a whole number of at least 1 is expected") from None
-    if steps < 1:
-        raise ValueError(f"steps is {steps}; a whole number of at least 1 is expected")
-    if not (isinstance(dt, numbers.Real) and 0.0 < dt < float("inf")):
-        raise ValueError(f"dt is {dt!r}; a step in s above 0 is expected")
+        seconds = float(dt) if isinstance(dt, numbers.Real) and not isinstance(dt, bool) else math.nan
+    except OverflowError:
+        seconds = math.inf
+    if not 0.0 < seconds < math.inf:
+        raise ValueError(f"dt is {reprlib.repr(dt)}; a step in s above 0 is expected")
+    steps, dt = int(steps), seconds
     q, qd, tau = (np.stack(state, axis=-1) for state in _states(model, q=q, qd=qd, tau=tau))
     batch, n = q.shape[:-1], q.shape[-1]
     path_q, path_qd = np.full((2, q.size // n, steps + 1, n), np.nan)
@@ -147,7 +150,7 @@ def simulate(
 
     from .kernels import stepper  # here, so that `import tmt` need not wait for numba
 
-    stepper(model, method)(path_q, path_qd, np.ascontiguousarray(tau.reshape(-1, n)), float(dt))
+    stepper(model, method)(path_q, path_qd, np.ascontiguousarray(tau.reshape(-1, n)), dt)
     return dt * np.arange(steps + 1), path_q.reshape(*batch, steps + 1, n), path_qd.reshape(*batch, steps + 1, n)
 
 
@@ -164,7 +167,9 @@ def _states(model, **arrays):
                 raise TypeError
             array = array.astype(float)
         except (TypeError, ValueError):
-            raise ValueError(f"{name} is {values!r}; real numbers of shape (..., {n}) are expected") from None
+            raise ValueError(
+                f"{name} is {' '.join(reprlib.repr(values).split())}; real numbers of shape (..., {n}) are expected"
+            ) from None
         if array.ndim == 0 or array.shape[-1] != n:
             hinges = ", ".join(model.hinge_names)
             raise ValueError(f"{name} has shape {array.shape}; (..., {n}) is expected, one number per hinge ({hinges})")

@@ -40,8 +40,8 @@ ARM = Tree(
 )
 
 
-def points(q, model: Tree = ARM) -> list:
+def points(q) -> list:
     """Shoulder, elbow and finger tips in the world, three Vectors in m, at hinge angles q (3 scalars, rad)."""
-    frames = hinge_frames(model, q)
+    frames = hinge_frames(ARM, q)
     elbow, turn = frames[2].origin, frames[2].turn
     return [frames[0].origin, elbow, elbow + turn @ Vector(E, 0.0, 0.0)]

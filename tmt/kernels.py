@@ -13,6 +13,7 @@ import sys
 import tempfile
 from functools import lru_cache
 from pathlib import Path
+from types import ModuleType
 
 from . import method as tmt_method
 from .methods import METHODS
@@ -27,7 +28,7 @@ from numba import njit
 '''
 
 LOOP = '''
-@njit({options})
+@njit("void(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64)", {options})
 def run(q, qd, tau, dt):
     """Fill q and qd (batch, steps + 1, n) from their first state, until one is not finite."""
     for b in range(q.shape[0]):
@@ -93,33 +94,43 @@ def _inputs(tape, n):
 
 def cache_folder() -> Path:
     """Where generated code is kept."""
-    if "TMT_CACHE" in os.environ:
+    if os.environ.get("TMT_CACHE"):
         return Path(os.environ["TMT_CACHE"])
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tmt"
 
 
 def load(text):
-    """The module with this source, from the cache folder if that can be used, else from memory."""
+    """The module with this source, from the cache folder if that can be used, else from memory.
+
+    numba unpickles what it finds there: the folder must be the user's own.
+    """
     name = "kernel_" + hashlib.sha256(text.encode()).hexdigest()[:16]
     try:
-        path = cache_folder() / f"{name}.py"
-        kept = text.replace("CACHE", "True")
-        if not path.exists() or path.read_text() != kept:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            # written aside and moved, so that a process that reads meanwhile sees all of it or nothing
-            with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".py", delete=False) as file:
-                file.write(kept)
-            os.replace(file.name, path)
-        if not os.access(path.parent, os.W_OK):
-            raise PermissionError(path.parent)
-    except (OSError, RuntimeError):  # RuntimeError: no home folder
-        module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader=None))
+        return from_disk(name, text.replace("CACHE", "True"), cache_folder())
+    except Exception:  # whatever is wrong with the folder or with a file in it: compile without them
+        module = ModuleType(name)
         text = text.replace("CACHE", "False")
         linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
         exec(compile(text, name, "exec"), module.__dict__)
         return module
+
+
+def from_disk(name, text, folder):
+    """The module from its file in the folder, written if it is not there; a damaged cache is cleared away."""
+    path = folder / f"{name}.py"
+    if not path.exists() or path.read_text() != text:
+        folder.mkdir(parents=True, exist_ok=True)
+        # written aside and moved, so that a process that reads meanwhile sees all of it or nothing
+        with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".new", delete=False) as file:
+            file.write(text)
+        os.replace(file.name, path)
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # numba looks it up there when it reads machine code back
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except Exception:
+        for file in folder.glob(f"__pycache__/{name}.*"):
+            file.unlink()
+        raise
     return module

@@ -86,7 +86,7 @@ def bodies(tree, q, qd=None) -> list[Body]:
     for b, hinge in enumerate(tree.body_hinge):
         frame = frames[hinge] if hinge >= 0 else WORLD
         x, v_conv = carried(frame, Vector(*tree.com[b]))
-        to_body = frame.turn.T
+        to_body = frame.turn.transposed
         moved_by = list(zip(frames, tree.moves(b)))
         result.append(
             Body(

@@ -77,11 +77,11 @@ class Matrix:
     def __matmul__(self, other):
         if isinstance(other, Vector):
             return Vector(*(row.dot(other) for row in self.rows))
-        columns = other.T.rows
+        columns = other.transposed.rows
         return Matrix([[row.dot(column) for column in columns] for row in self.rows])
 
     @property
-    def T(self):
+    def transposed(self):
         return Matrix(zip(*self.rows))
 
 

@@ -1,5 +1,6 @@
 """A kinematic tree of hinges that carry rigid bodies, as plain numbers."""
 
+import reprlib
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -28,13 +29,13 @@ class Tree:
     gravity: tuple  # (3,) m/s2, inertial frame
 
     def __post_init__(self):
+        for name in ("hinge_names", "body_names"):
+            object.__setattr__(self, name, _names(name, getattr(self, name)))
         n, m = len(self.hinge_names), len(self.body_names)
         shapes = {
             "parent": (n,), "offset": (n, 3), "axis": (n, 3), "damping": (n,),
             "body_hinge": (m,), "mass": (m,), "com": (m, 3), "inertia": (m, 3, 3), "gravity": (3,),
         }  # fmt: skip
-        for name in ("hinge_names", "body_names"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
         for name, shape in shapes.items():
             object.__setattr__(self, name, _numbers(name, getattr(self, name), shape))
         if n == 0 or m == 0:
@@ -56,6 +57,10 @@ class Tree:
             raise ValueError(f"Tree.damping is {self.damping}; values of at least 0 N m s/rad are expected")
         for name, inertia in zip(self.body_names, self.inertia):
             _check_inertia(name, np.array(inertia))
+        for i, name in enumerate(self.hinge_names):
+            moved = [b for b in range(m) if self.moves(b)[i]]
+            if not any(self.mass[b] or np.any(self.inertia[b]) for b in moved):
+                raise ValueError(f"hinge {name!r} moves nothing that has mass or inertia; Mbar would be singular")
 
     def __repr__(self):
         return f"Tree({', '.join(f'{field.name}={getattr(self, field.name)}' for field in fields(self))})"
@@ -70,16 +75,24 @@ class Tree:
         return on_path
 
 
+def _names(field, values):
+    """The values as a tuple of different strings."""
+    names = (values,) if isinstance(values, str) else tuple(values) if hasattr(values, "__iter__") else (values,)
+    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+        raise ValueError(f"Tree.{field} is {values!r}; different names are expected")
+    return names
+
+
 def _numbers(name, values, shape):
     """The values as nested tuples of float, after a check of their shape."""
     try:
         array = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"Tree.{name} is {values!r}; numbers of shape {shape} are expected") from None
+        raise ValueError(f"Tree.{name} is {reprlib.repr(values)}; numbers of shape {shape} are expected") from None
     if array.shape != shape:
         raise ValueError(f"Tree.{name} has shape {array.shape}; {shape} is expected")
     if not np.isfinite(array).all():
-        raise ValueError(f"Tree.{name} is {values!r}; finite numbers are expected")
+        raise ValueError(f"Tree.{name} is {reprlib.repr(values)}; finite numbers are expected")
 
     def nested(item):
         return tuple(map(nested, item)) if isinstance(item, list) else item
