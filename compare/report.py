@@ -167,7 +167,7 @@ def commit() -> str | None:
     try:
         told = [
             subprocess.run(["git", "-C", root, *words], capture_output=True, text=True, check=True).stdout.strip()
-            for words in (["rev-parse", "HEAD"], ["status", "--porcelain"])
+            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", ":/", ":!/reports"])
         ]
     except (OSError, subprocess.CalledProcessError):
         return None
