@@ -20,8 +20,8 @@ from .scenes import POSTURES, posture
 EPS = float(np.finfo(float).eps)
 FACTOR = 64
 SEED = 10  # of every random number in a report
-SHOWN = ["scene", "quantity", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
-         "tmt_from_exact_eps", "mujoco_from_exact_eps", "unit"]  # fmt: skip
+SHOWN = ["scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
+         "tmt_from_exact_eps", "mujoco_from_exact_eps"]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ matplotlib.rcParams.update(STYLE)
 def sketch():
     """The arm with its hinge axes, from the method's own frames."""
     fig = Figure(figsize=(WIDTH, 3.9))
-    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.05, top=0.9, wspace=0.05)
+    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.95, wspace=0.05)
     offsets = {  # of the labels, m, clear of the links
         "zero": {"shoulder": (-0.12, 0.0, 0.0), "elbow": (-0.09, 0.0, 0.0), "hand": (0.0, 0.0, -0.06)},
         "ball catch": {"shoulder": (-0.13, 0.0, 0.0), "elbow": (0.11, 0.0, 0.0), "hand": (0.08, 0.0, 0.03)},

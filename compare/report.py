@@ -106,7 +106,7 @@ def answers(sections) -> pd.DataFrame:
         for item in items:
             rows = [row for row in results["published"].rows if row["item"] == item]
             values = {
-                party: "(" + ", ".join(f"{row[party]:.5g}" for row in rows) + ")"
+                party: "(" + ", ".join(f"{row[party]:.6g}" for row in rows) + ")"
                 for party in ("published", "tmt", "mujoco")
             }
             unit = rows[0]["unit"]
