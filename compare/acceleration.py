@@ -6,7 +6,7 @@ import numpy as np
 
 import tmt
 from tmt import method
-from tmt.dual import Dual
+from tmt.dual import seeded
 
 from .agreement import Result, acceleration_scale, bias_scale, condition, gravity_scale, mass_scale
 
@@ -69,7 +69,8 @@ def rows(setup) -> Result:
 
 def rate(quantity, q, qd, qdd) -> np.ndarray:
     """Time derivative of quantity(q, qd) along the motion, exact by dual numbers, (states,)."""
-    return quantity(list(map(Dual, q.T, qd.T)), list(map(Dual, qd.T, qdd.T))).slope
+    state = seeded([*q.T, *qd.T], [*qd.T, *qdd.T])
+    return quantity(state[: q.shape[1]], state[q.shape[1] :]).slope
 
 
 def total_energy(model, q, qd):

@@ -1,5 +1,6 @@
 """Traced and compiled code: the same numbers as the method, kept where it should be."""
 
+import dataclasses
 import math
 import stat
 
@@ -10,7 +11,7 @@ from trees import random_tree
 import tmt
 from compare.agreement import EPS, FACTOR, bias_scale
 from tmt import kernels, method
-from tmt.methods import METHODS
+from tmt.methods import METHODS, one_step
 from tmt.trace import Tape
 
 
@@ -40,27 +41,29 @@ def test_subtraction_and_division_keep_their_order():
 def test_traced_acceleration_is_the_method(rng, damping):
     for tree in (tmt.ARM, random_tree(rng, bodies=3, damping=damping)):
         n = len(tree.parent)
-        acceleration = python_function(kernels.acceleration_source(tree)[0], "acceleration")
+        acceleration = python_function(kernels.slope_source(tree, "rk4")[0], "slope")
         q, qd, tau = rng.uniform(-3, 3, (3, n)).tolist()
         expected = np.array(method.acceleration(tree, q, qd, tau), dtype=float)
         assert np.abs(expected).max() > 0.1
         force = bias_scale(np.array([q]), np.array([qd]), tree)[0] + 10.0
         eigenvalues = np.linalg.eigvalsh(tmt.mass_matrix(q, tree))
         bar = FACTOR * EPS * eigenvalues[-1] / eigenvalues[0] * force / eigenvalues[0]
-        assert np.abs(np.array(acceleration(*q, *qd, *tau)) - expected).max() < bar
+        assert np.abs(np.array(acceleration(*q, *qd, *tau, 0.01)) - expected).max() < bar
 
 
 def test_the_arm_folds_to_fewer_operations():
-    _, operations = kernels.acceleration_source(tmt.ARM)
+    _, operations = kernels.slope_source(tmt.ARM, "rk4")
     assert 100 < operations < 600
 
 
-def test_compiled_loop_is_the_step_in_python(rng):
+@pytest.mark.parametrize("name", METHODS)
+def test_compiled_loop_is_the_step_in_python(rng, name):
+    model = dataclasses.replace(tmt.ARM, damping=(0.1, 0.2, 0.3))
     q, qd, tau = rng.uniform(-2, 2, (3, 3))
-    _, path_q, path_qd = tmt.simulate(q, qd, tau, 0.01, 5)
+    _, path_q, path_qd = tmt.simulate(q, qd, tau, 0.01, 5, name, model)
     state = q.tolist(), qd.tolist()
     for k in range(1, 6):
-        state = METHODS["rk4"].step(lambda q, qd: method.acceleration(tmt.ARM, q, qd, tau.tolist()), *state, 0.01)
+        state = one_step(METHODS[name], model, *state, tau.tolist(), 0.01)
         assert np.allclose(state, [path_q[k], path_qd[k]], rtol=0, atol=1e-12)
 
 

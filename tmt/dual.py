@@ -1,62 +1,88 @@
 """A scalar that carries its derivative: exact derivatives over any other scalar.
 
-The slope may be an array of more dimensions than the value: derivatives in many directions at once.
+The slope may be an array of more dimensions than the value: derivatives in many directions at once. Dual numbers may
+be nested (a derivative inside a step that is itself differentiated): each differentiation has a level of its own, and
+a number of another level is a constant to it.
 """
 
+from itertools import count
+
 from .space import cos, sin
+
+levels = count()
 
 
 class Dual:
     """value + slope d, with d d = 0; both parts are scalars of any type."""
 
-    __slots__ = ("slope", "value")
+    __slots__ = ("level", "slope", "value")
     __array_ufunc__ = None  # else ndarray * Dual would be taken apart by NumPy
 
-    def __init__(self, value, slope):
-        self.value, self.slope = value, slope
+    def __init__(self, value, slope, level):
+        self.value, self.slope, self.level = value, slope, level
+
+    def new(self, value, slope) -> "Dual":
+        return Dual(value, slope, self.level)
+
+    def parts(self, other):
+        """Value and slope of another scalar at this level; a constant has slope 0."""
+        return (other.value, other.slope) if getattr(other, "level", None) == self.level else (other, 0.0)
+
+    def outranked(self, other) -> bool:
+        """Whether the other is a dual number of an inner differentiation: then it decides."""
+        return isinstance(other, Dual) and other.level > self.level
 
     def __add__(self, other):
-        value, slope = parts(other)
-        return Dual(self.value + value, self.slope + slope)
+        if self.outranked(other):
+            return NotImplemented
+        value, slope = self.parts(other)
+        return self.new(self.value + value, self.slope + slope)
 
     __radd__ = __add__
 
     def __sub__(self, other):
-        value, slope = parts(other)
-        return Dual(self.value - value, self.slope - slope)
+        if self.outranked(other):
+            return NotImplemented
+        value, slope = self.parts(other)
+        return self.new(self.value - value, self.slope - slope)
 
     def __rsub__(self, other):
-        value, slope = parts(other)
-        return Dual(value - self.value, slope - self.slope)
+        value, slope = self.parts(other)
+        return self.new(value - self.value, slope - self.slope)
 
     def __mul__(self, other):
-        value, slope = parts(other)
-        return Dual(self.value * value, self.slope * value + self.value * slope)
+        if self.outranked(other):
+            return NotImplemented
+        value, slope = self.parts(other)
+        return self.new(self.value * value, self.slope * value + self.value * slope)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other):
-        value, slope = parts(other)
+        if self.outranked(other):
+            return NotImplemented
+        value, slope = self.parts(other)
         quotient = self.value / value
-        return Dual(quotient, (self.slope - quotient * slope) / value)
+        return self.new(quotient, (self.slope - quotient * slope) / value)
 
     def __rtruediv__(self, other):
-        return Dual(*parts(other)) / self
+        return self.new(*self.parts(other)) / self
 
 
-def parts(scalar):
-    """Value and slope of a scalar; a constant has slope 0."""
-    return (scalar.value, scalar.slope) if isinstance(scalar, Dual) else (scalar, 0.0)
+def seeded(values, slopes) -> list[Dual]:
+    """Dual numbers of one new level with these values and slopes."""
+    level = next(levels)
+    return [Dual(value, slope, level) for value, slope in zip(values, slopes)]
 
 
 def jacobian(function, x) -> list:
     """d function_i / d x_j (rows i, columns j) of a function from a list of scalars to a list of scalars."""
     columns = []
     for j in range(len(x)):
-        nudged = [Dual(value, 1.0 if i == j else 0.0) for i, value in enumerate(x)]
-        columns.append([parts(result)[1] for result in function(nudged)])
+        nudged = seeded(x, [1.0 if i == j else 0.0 for i in range(len(x))])
+        columns.append([nudged[0].parts(result)[1] for result in function(nudged)])
     return [list(row) for row in zip(*columns)]
 
 
-sin.register(Dual, lambda angle: Dual(sin(angle.value), cos(angle.value) * angle.slope))
-cos.register(Dual, lambda angle: Dual(cos(angle.value), sin(angle.value) * angle.slope * -1.0))
+sin.register(Dual, lambda angle: angle.new(sin(angle.value), cos(angle.value) * angle.slope))
+cos.register(Dual, lambda angle: angle.new(cos(angle.value), sin(angle.value) * angle.slope * -1.0))

@@ -15,7 +15,6 @@ from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from . import method as tmt_method
 from .methods import METHODS
 from .trace import Tape
 
@@ -48,25 +47,22 @@ def stepper(tree, method_name):
     return load(source(tree, method_name)).run
 
 
-def acceleration_source(tree) -> tuple[str, int]:
-    """Straight-line Python source of acceleration(q, qd, tau) and its number of operations."""
-    n = len(tree.parent)
+def slope_source(tree, method_name) -> tuple[str, int]:
+    """Straight-line Python source of slope(q, qd, tau, dt) and its number of operations."""
     tape = Tape()
-    q, qd, tau = _inputs(tape, n)
-    return tape.function("acceleration", [*q, *qd, *tau], tmt_method.acceleration(tree, q, qd, tau))
+    q, qd, tau, dt = _inputs(tape, tree)
+    return tape.function("slope", [*q, *qd, *tau, dt], METHODS[method_name].slope(tree, q, qd, tau, dt))
 
 
 def source(tree, method_name) -> str:
-    """The module for one model and one method: acceleration, step, and the loop over both."""
+    """The module for one model and one method: slope, step, and the loop over both."""
     n = len(tree.parent)
-    acceleration, _ = acceleration_source(tree)
-
+    slope, _ = slope_source(tree, method_name)
     tape = Tape()
-    q, qd, tau = _inputs(tape, n)
-    (dt,) = tape.inputs("dt")
+    q, qd, tau, dt = _inputs(tape, tree)
 
     def traced(q, qd):
-        return tape.call("acceleration", [*q, *qd, *tau], n)
+        return tape.call("slope", [*q, *qd, *tau, dt], n)
 
     new_q, new_qd = METHODS[method_name].step(traced, q, qd, dt)
     step, _ = tape.function("step", [*q, *qd, *tau, dt], [*new_q, *new_qd])
@@ -85,11 +81,12 @@ def source(tree, method_name) -> str:
         sum=list_of("{name}{i}").replace(", ", " + "),
     )
     njit = f"@njit({options})\n"
-    return f"{HEADER}\n{njit}{acceleration}\n\n{njit}{step}\n{loop}"
+    return f"{HEADER}\n{njit}{slope}\n\n{njit}{step}\n{loop}"
 
 
-def _inputs(tape, n):
-    return [tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau")]
+def _inputs(tape, tree):
+    n = len(tree.parent)
+    return *(tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau")), tape.inputs("dt")[0]
 
 
 def cache_folder() -> Path:

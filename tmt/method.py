@@ -20,6 +20,7 @@ frame unless they are said to be in body axes.
 
 from typing import NamedTuple
 
+from .dual import jacobian
 from .space import IDENTITY, ZERO, Matrix, Vector, rotation, solve, total
 
 
@@ -119,6 +120,11 @@ def bias(parts, gravity) -> list:
     newton = [b.mass * (b.v_conv - g) for b in parts]
     euler = [b.inertia @ b.w_conv + b.omega.cross(b.inertia @ b.omega) for b in parts]
     return [total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in zip(parts, newton, euler)) for i in range(n)]
+
+
+def bias_rates(tree, q, qd) -> list:
+    """dh/dqd (n rows of n, N m s/rad): the exact derivative of the bias by the rates, by dual numbers."""
+    return jacobian(lambda rates: bias(bodies(tree, q, rates), tree.gravity), qd)
 
 
 def reduced_force(tree, parts, qd, tau) -> list:

@@ -1,11 +1,14 @@
 """Integration methods as data, each with one step written over any scalar.
 
-A step takes the state (q, qd), each a list of n scalars, and `acceleration(q, qd) -> qdd`, and returns
-the state one dt later. The same lines integrate floats, complex numbers (their exact Jacobian), mpmath
-numbers and traced expressions (the compiled loop of kernels.py).
+A method has a `slope`, the acceleration that it uses, and a `step`, which takes the state (q, qd), each a list of n
+scalars, and `slope(q, qd) -> qdd`, and returns the state one dt later. The same lines integrate floats, dual numbers
+(their exact Jacobian), mpmath numbers and traced expressions (the compiled loop of kernels.py).
 """
 
 from dataclasses import dataclass
+
+from . import method
+from .space import solve_any
 
 
 @dataclass(frozen=True)
@@ -32,14 +35,54 @@ class RungeKutta:
         if abs(sum(self.b) - 1.0) > 1e-14:
             raise ValueError(f"b sums to {sum(self.b)}, not to 1")
 
-    def step(self, acceleration, q, qd, dt):
+    def matrix(self, tree, q, qd, dt):
+        """The matrix of the linear system for the slope: Mbar."""
+        return method.mass_matrix(method.bodies(tree, q))
+
+    def slope(self, tree, q, qd, tau, dt):
+        """qdd from Mbar qdd = tau - D qd - h."""
+        return method.acceleration(tree, q, qd, tau)
+
+    def step(self, slope, q, qd, dt):
+        """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
         stages = []
         for row in self.A:
             q_i = advance(q, dt, row, [rate for rate, _ in stages])
             qd_i = advance(qd, dt, row, [change for _, change in stages])
-            stages.append((qd_i, acceleration(q_i, qd_i)))
+            stages.append((qd_i, slope(q_i, qd_i)))
         rates, changes = zip(*stages)
         return advance(q, dt, self.b, rates), advance(qd, dt, self.b, changes)
+
+
+@dataclass(frozen=True)
+class SemiImplicitEuler:
+    """qd+ = qd + dt a, then q+ = q + dt qd+, with (Mbar + dt D [+ dt dh/dqd]) a = tau - D qd - h.
+
+    Joint damping is implicit in the rates, and so is the bias if `implicit_bias`: what MuJoCo calls Euler,
+    implicitfast and discrete (without), and implicit (with). MuJoCo documentation, numerical integration.
+    """
+
+    implicit_bias: bool
+    order: int = 1
+
+    def matrix(self, tree, q, qd, dt):
+        """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd]."""
+        n = len(q)
+        matrix = method.mass_matrix(method.bodies(tree, q))
+        matrix = [[matrix[i][j] + (dt * tree.damping[i] if i == j else 0.0) for j in range(n)] for i in range(n)]
+        if self.implicit_bias:
+            rates = method.bias_rates(tree, q, qd)
+            matrix = [[matrix[i][j] + dt * rates[i][j] for j in range(n)] for i in range(n)]
+        return matrix
+
+    def slope(self, tree, q, qd, tau, dt):
+        """a from the linear system above."""
+        return solve_any(self.matrix(tree, q, qd, dt), method.reduced_force(tree, method.bodies(tree, q, qd), qd, tau))
+
+    def step(self, slope, q, qd, dt):
+        """The state (q, qd) one dt later."""
+        qd = advance(qd, dt, (1.0,), [slope(q, qd)])
+        return advance(q, dt, (1.0,), [qd]), qd
 
 
 def advance(start, dt, weights, slopes):
@@ -51,6 +94,11 @@ def advance(start, dt, weights, slopes):
     return result
 
 
+def one_step(stepping, tree, q, qd, tau, dt):
+    """The state (q, qd) of a tree one dt later by a method, over any scalar."""
+    return stepping.step(lambda q, qd: stepping.slope(tree, q, qd, tau, dt), q, qd, dt)
+
+
 METHODS = {
     "rk4": RungeKutta(  # the classical method of Kutta (1901), the assignment's part i
         order=4,
@@ -58,4 +106,7 @@ METHODS = {
         b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
         c=(0.0, 0.5, 0.5, 1.0),
     ),
+    "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),
+    "semi_implicit_euler": SemiImplicitEuler(implicit_bias=False),
+    "implicit": SemiImplicitEuler(implicit_bias=True),
 }

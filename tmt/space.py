@@ -127,6 +127,24 @@ def solve(matrix, right):
     return x
 
 
+def solve_any(matrix, right):
+    """Solution x of `matrix` x = `right` for any matrix that needs no pivots, given by rows: L U.
+
+    MuJoCo's implicit integrator factorises its unsymmetric matrix without pivots too.
+    """
+    n = len(right)
+    upper, x = [list(row) for row in matrix], list(right)
+    for k in range(n):
+        for i in range(k + 1, n):
+            factor = upper[i][k] / upper[k][k]
+            for j in range(k + 1, n):
+                upper[i][j] = upper[i][j] - factor * upper[k][j]
+            x[i] = x[i] - factor * x[k]
+    for i in reversed(range(n)):
+        x[i] = (x[i] - total(upper[i][k] * x[k] for k in range(i + 1, n))) / upper[i][i]
+    return x
+
+
 def total(terms):
     """Sum of scalars of any type, 0.0 if there are none."""
     return sum(terms, 0.0)

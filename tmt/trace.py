@@ -6,6 +6,7 @@ subexpressions are computed once. What remains is the arithmetic of this one mod
 
 import math
 import operator
+from numbers import Real
 
 from .space import cos, sin
 
@@ -136,27 +137,33 @@ class Expression:
         """The name of an input."""
         return self.tape.nodes[self.i][1][0]
 
+    def apply(self, operation, *values):
+        """The expression for an operation; NotImplemented if another kind of scalar takes part, which then decides."""
+        if all(isinstance(value, (Expression, Real)) for value in values):
+            return self.tape.apply(operation, *values)
+        return NotImplemented
+
     def __add__(self, other):
-        return self.tape.apply("+", self, other)
+        return self.apply("+", self, other)
 
     __radd__ = __add__
 
     def __mul__(self, other):
-        return self.tape.apply("*", self, other)
+        return self.apply("*", self, other)
 
     __rmul__ = __mul__
 
     def __sub__(self, other):
-        return self.tape.apply("-", self, other)
+        return self.apply("-", self, other)
 
     def __rsub__(self, other):
-        return self.tape.apply("-", other, self)
+        return self.apply("-", other, self)
 
     def __truediv__(self, other):
-        return self.tape.apply("/", self, other)
+        return self.apply("/", self, other)
 
     def __rtruediv__(self, other):
-        return self.tape.apply("/", other, self)
+        return self.apply("/", other, self)
 
 
 sin.register(Expression, lambda angle: angle.tape.apply("sin", angle))
