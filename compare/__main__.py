@@ -93,10 +93,10 @@ def run(options, command) -> int:
     started = time.perf_counter()
     from concurrent.futures import BrokenExecutor
 
-    from .artist import artist  # imports are here, so that --help and a wrong word answer at once
     from .engine import ARM_XML, ModelError, load
     from .folder import FolderError, new_report
     from .terminal import Terminal
+    from .workers import start_workers  # imports are here, so that --help and a wrong word answer at once
 
     terminal = Terminal()
     path = options.mjcf or ARM_XML
@@ -104,12 +104,12 @@ def run(options, command) -> int:
     try:
         engine = load(path)
         with new_report(options.out) as folder:
-            with artist() as drawing:
+            with start_workers() as workers:
                 from . import report
                 from .agreement import Setup
 
-                setup = Setup.quick(engine) if options.quick else Setup(engine)
-                sections = examine(names, setup, folder, terminal, drawing)
+                setup = (Setup.quick if options.quick else Setup)(engine, map=workers.map)
+                sections = examine(names, setup, folder, terminal, workers)
             verdict = report.verdict(sections, len(EXPERIMENTS))
             seconds = time.perf_counter() - started
             report.write(folder, sections, report.provenance(command, path, seconds), verdict)
@@ -124,21 +124,25 @@ def run(options, command) -> int:
     return 0 if report.passed(sections) else 1
 
 
-def examine(names, setup, folder, terminal, drawing) -> list:
+def examine(names, setup, folder, terminal, workers) -> list:
     """The section of each experiment, its figures drawn."""
     from .report import Section
     from .terminal import Terminal
+    from .workers import draw
 
     (folder / "figures").mkdir()
     sections, drawings = [], []
     progress = Terminal(stderr=True)
-    for name in names:
+    modules = {name: importlib.import_module(f".{name}", __package__) for name in names}
+    for module in modules.values():
+        if hasattr(module, "begin"):
+            module.begin(setup)
+    for name, module in modules.items():
         with progress.status(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})"):
             started = time.perf_counter()
-            module = importlib.import_module(f".{name}", __package__)
             result = module.rows(setup)
             sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, result))
-            drawings.append(drawing(name, result, folder / "figures"))
+            drawings.append(workers.submit(draw, name, result, folder / "figures"))
         tell(terminal, sections[-1], time.perf_counter() - started)
     with progress.status("figures"):
         for section, drawn in zip(sections, drawings):

@@ -27,7 +27,7 @@ BAR = (
 def rows(setup) -> Result:
     """Each quantity at the named postures and at random states."""
     result = Result("acceleration")
-    engine, floating = setup.engine, setup.engine.without_gravity()
+    engine, floating = setup.engine, setup.engine.variant(gravity=0.0)
     weightless = dataclasses.replace(tmt.ARM, gravity=(0.0, 0.0, 0.0))
     for sample in (setup.named, setup.random):
         q, qd, tau = sample.q, sample.qd, sample.tau

@@ -5,11 +5,11 @@ values of the terms that are added up in it, times the condition number of Mbar 
 solved; it is taken per state and is never the quantity itself (which may be zero).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import pandas as pd
 
 import tmt
 from tmt.reference import distance, exact
@@ -69,10 +69,6 @@ class Result:
     curves: dict = field(default_factory=dict)
     notes: list = field(default_factory=list)  # sentences for the report
     shown: list | None = None  # columns of the table in the report, if not all
-
-    @property
-    def table(self) -> pd.DataFrame:
-        return pd.DataFrame(self.rows)
 
     def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False) -> Check:
         value = float(value) if np.isfinite(value) else None
@@ -173,12 +169,14 @@ class Setup:
     engine: Engine
     states: int = 10_000  # random states
     exact_states: int = 200  # of these, how many are held against the exact values too
-    steps: tuple = (64, 1024)  # of a trajectory: the assignment's dt = 5/64 s, and 5/1024 s
+    map: Callable = map  # where the scenes of an experiment may run side by side
+    background: dict = field(default_factory=dict)  # work under way, by its name
+    steps: tuple = (64, 1024, 8192)  # of a trajectory: the assignment's dt = 5/64 s, and finer
 
     @classmethod
-    def quick(cls, engine) -> "Setup":
+    def quick(cls, engine, **more) -> "Setup":
         """Fewer of everything, for a first answer in seconds."""
-        return cls(engine, states=1000, exact_states=20, steps=(64,))
+        return cls(engine, states=1000, exact_states=20, steps=(64,), **more)
 
     @cached_property
     def named(self) -> Sample:

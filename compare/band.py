@@ -2,72 +2,110 @@
 
 import numpy as np
 
-import tmt
-from tmt import method
-from tmt.dual import Dual
+from tmt.dual import seeded
+from tmt.methods import one_step
 
-from .agreement import EPS, FACTOR, acceleration_scale, bias_scale
+from .agreement import EPS, FACTOR, bias_scale
 
-NARROW = 1e-3  # rad: while the band is below, a run is judged
+SAMPLED = 16  # states of a block at which the bound of a step is taken
+NARROW = 1e-3  # rad: while the band of the angles is below, a run is judged
 
 
-def step_jacobians(stepping, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> np.ndarray:
+def step_jacobians(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> np.ndarray:
     """Exact Jacobians of the method's own step at states q, qd (steps, n): (steps, 2n, 2n).
 
     The step is taken on dual numbers, all states and all directions at once.
     """
     n = q.shape[1]
-    directions = np.eye(2 * n)[:, :, None]  # component, direction, state
-    state = [Dual(values, slope) for values, slope in zip([*q.T, *qd.T], directions)]
-
-    def acceleration(q, qd):
-        return method.acceleration(tmt.ARM, q, qd, tau)
-
-    new_q, new_qd = stepping.step(acceleration, state[:n], state[n:], dt)
+    state = seeded([*q.T, *qd.T], np.eye(2 * n)[:, :, None])  # slopes: direction, state
+    new_q, new_qd = one_step(stepping, model, state[:n], state[n:], tau, dt)
     slopes = [np.broadcast_to(component.slope, (2 * n, len(q))) for component in (*new_q, *new_qd)]
     return np.array(slopes).transpose(2, 0, 1)
 
 
-def step_rounding(stepping, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> np.ndarray:
+def slope_rounding(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
+    """a, |a| and the bound of the rounding of a, rad/s2; (states,) each: a solves A a = force, A the method's matrix.
+
+    |A^-1| (64 eps |A| |a| + 64 eps S): A by its singular values, S the sum of the absolute terms of the force.
+    """
+    shape = q.shape[:1]
+    a = stepping.slope(model, list(q.T), list(qd.T), tau, dt)
+    rows = stepping.matrix(model, list(q.T), list(qd.T), dt)
+    A = np.array([[np.broadcast_to(entry, shape) for entry in row] for row in rows]).transpose(2, 0, 1)
+    values = np.linalg.svd(A, compute_uv=False)
+    size = np.abs([np.broadcast_to(component, shape) for component in a]).max(axis=0)
+    force = bias_scale(q, qd, model) + np.abs(tau).max() + np.max(model.damping) * np.abs(qd).max(axis=1)
+    return a, size, FACTOR * EPS * (values[:, 0] * size + force) / values[:, -1]
+
+
+def step_rounding(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> np.ndarray:
     """Bound delta, to first order in dt, of the difference that rounding adds in one step, (steps, 2n).
 
-    Rates: dt x the rounding of an acceleration, the largest over the stages of the step (64 eps x its scale, with the
-    stage's own |qdd|), plus that of the sum qd + dt qdd. Angles: that of the sum q + dt qd, plus dt times that of the
-    rates. The sums have at most 8 roundings on both sides together.
+    Rates: dt x the rounding of the slope, the largest over the stages of the step, plus that of the sum qd + dt a.
+    Angles: that of the sum q + dt qd, plus dt times that of the rates. The sums have at most 8 roundings on both sides.
     """
     stages = []
 
-    def acceleration(q, qd):
-        q, qd = np.stack(q, axis=-1), np.stack(qd, axis=-1)
-        qdd = tmt.acceleration(q, qd, tau)
-        size = np.abs(qdd).max(axis=1)
-        stages.append((size, acceleration_scale(q, bias_scale(q, qd) + np.abs(tau).max(), size)))
-        return list(qdd.T)
+    def slope(q, qd):
+        a, *bounds = slope_rounding(stepping, model, np.stack(q, axis=-1), np.stack(qd, axis=-1), tau, dt)
+        stages.append(bounds)
+        return a
 
-    stepping.step(acceleration, list(q.T), list(qd.T), dt)
-    qdd, scale = np.max(stages, axis=0)[..., None]
-    rates = dt * FACTOR * EPS * scale + 8 * EPS * (np.abs(qd) + dt * qdd)
+    stepping.step(slope, list(q.T), list(qd.T), dt)
+    size, rounding = np.max(stages, axis=0)[..., None]
+    rates = dt * rounding + 8 * EPS * (np.abs(qd) + dt * size)
     angles = 8 * EPS * (np.abs(q) + dt * np.abs(qd)) + dt * rates
     return np.concatenate([angles, rates], axis=1)
 
 
-def band(stepping, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> np.ndarray:
-    """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, n): (steps + 1, 2n).
+def band(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int = 1) -> np.ndarray:
+    """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, n), at every so many steps.
 
-    Infinite from where the run has diverged, or the band is far too wide to judge by.
+    Shape (steps / every + 1, 2n). Infinite from where the run has diverged, or the band is far too wide to judge by.
     """
-    ran = int(np.cumsum(~np.isfinite([*q.T, *qd.T]).all(axis=0)).searchsorted(1))
-    q, qd, steps = q[: ran - 1], qd[: ran - 1], len(q)
-    jacobians = step_jacobians(stepping, q, qd, tau, dt)
-    delta = step_rounding(stepping, q, qd, tau, dt)
-    count, size = delta.shape
-    widths = np.full((steps, size), np.inf)
+    blocks = (len(q) - 1) // every
+    finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
+    ran = (int(np.argmin(finite)) - 1) // every if not finite.all() else blocks  # whole blocks before it diverges
+    size = 2 * q.shape[1]
+    widths = np.full((blocks + 1, size), np.inf)
     widths[0] = 0.0
-    carried = np.empty((size, count, size))  # carried[:, k]: J_n ... J_(k+1), what has become of step k's rounding
-    for n, J in enumerate(jacobians):
-        carried[:, :n] = np.tensordot(J, carried[:, :n], axes=1)
-        carried[:, n] = np.eye(size)
-        widths[n + 1] = np.abs(carried[:, : n + 1]).reshape(size, -1) @ delta[: n + 1].ravel()
-        if not widths[n + 1].max() < 1e6 * NARROW:
+    if ran <= 0:
+        return widths
+    q, qd = q[: ran * every], qd[: ran * every]
+    jacobians = step_jacobians(stepping, model, q, qd, tau, dt).reshape(ran, every, size, size)
+    # the bound varies slowly: at fine steps it is taken at some of the states, and holds for those that follow
+    stride = max(1, every // SAMPLED)
+    delta = step_rounding(stepping, model, q[::stride], qd[::stride], tau, dt)
+    delta = np.repeat(delta, stride, axis=0).reshape(ran, every, size)
+
+    # to_end[j, k]: from after step k of block j to the end of the block; all blocks at once
+    to_end = np.empty_like(jacobians)
+    to_end[:, -1] = np.eye(size)
+    for k in reversed(range(every - 1)):
+        to_end[:, k] = to_end[:, k + 1] @ jacobians[:, k + 1]
+    across = to_end[:, 0] @ jacobians[:, 0]
+
+    carried = np.empty((size, ran * every, size))  # carried[:, k]: what has become of step k's rounding
+    for j in range(ran):
+        done, here = j * every, (j + 1) * every
+        carried[:, :done] = np.tensordot(across[j], carried[:, :done], axes=1)
+        carried[:, done:here] = to_end[j].transpose(1, 0, 2)
+        widths[j + 1] = np.abs(carried[:, :here]).reshape(size, -1) @ delta.reshape(-1, size)[:here].ravel()
+        if not widths[j + 1].max() < 1e6 * NARROW:
             break
     return widths
+
+
+def growth(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int) -> np.ndarray:
+    """log10 of how much a small difference of the state at the start has grown, at every so many steps.
+
+    The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled on the way so that it may grow without limit.
+    """
+    product, scale, result = np.eye(2 * q.shape[1]), 0.0, [0.0]
+    for k, J in enumerate(step_jacobians(stepping, model, q[:-1], qd[:-1], tau, dt)):
+        product = J @ product
+        if (k + 1) % every == 0:
+            size = np.linalg.norm(product, 2)
+            product, scale = product / size, scale + np.log10(size)
+            result.append(scale)
+    return np.array(result)

@@ -21,7 +21,13 @@ _log = mujoco.MjLogConfig.get()
 _log.logto_file = _log.logto_console = False
 _log.set()
 
-INTEGRATORS = {"rk4": mujoco.mjtIntegrator.mjINT_RK4}
+# by MuJoCo's names, as far as the installed version has them (discrete: from 3.13)
+NAMES = {"Euler": "EULER", "implicitfast": "IMPLICITFAST", "discrete": "DISCRETE", "implicit": "IMPLICIT", "RK4": "RK4"}
+INTEGRATORS = {
+    name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}")
+    for name, member in NAMES.items()
+    if hasattr(mujoco.mjtIntegrator, f"mjINT_{member}")
+}
 FLAGS = {
     "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
     "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
@@ -95,10 +101,12 @@ class Engine:
     def enabled(self, flag) -> bool:
         return not self.model.opt.disableflags & int(FLAGS[flag])
 
-    def without_gravity(self) -> "Engine":
-        """The same model in a world without gravity."""
+    def variant(self, gravity=None, damping=0.0) -> "Engine":
+        """The same model with other gravity, m/s2, and with damping added to every hinge, N m s/rad."""
         other = mujoco.MjModel.__copy__(self.model)
-        other.opt.gravity[:] = 0.0
+        if gravity is not None:
+            other.opt.gravity[:] = gravity
+        other.dof_damping[:] += damping
         return Engine(other, self.hinges, self.carriers)
 
     # quantities at states
@@ -186,26 +194,41 @@ class Engine:
 
     # motion
 
-    def trajectory(self, q, qd, tau, dt, steps, integrator="rk4") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Motion under constant torque like tmt.simulate: t (steps+1,), q and qd (steps+1, n).
+    def trajectory(self, q, qd, tau, dt, steps, integrator="RK4") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Motion under constant torque like tmt.simulate: t (steps+1,), q and qd (..., steps+1, n).
 
         From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
         """
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         model.opt.disableflags |= int(FLAGS["autoreset"])  # a reset would hide the divergence
-        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, qd, tau
+        q, qd, tau = np.broadcast_arrays(q, qd, tau)
+        batch, n = q.shape[:-1], q.shape[-1]
         spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        start = np.zeros((1, mujoco.mj_stateSize(model, spec)))
-        mujoco.mj_getState(model, data, start[0], spec)
+        starts = np.zeros((q.size // n, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
-        torque = data.qfrc_applied.reshape(1, 1, -1).copy()
+        torques = np.zeros((len(starts), 1, model.nv))
+        for start, torque, *state in zip(starts, torques, *(a.reshape(-1, n) for a in (q, qd, tau))):
+            data.qpos[self.qpos], data.qvel[self.dofs], torque[0, self.dofs] = state
+            mujoco.mj_getState(model, data, start, spec)
         applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-        states, _ = rollout(model, data, start, torque, control_spec=applied, nstep=steps)
-        states = np.concatenate([start, states[0]])
-        ran = np.isfinite(states).all(axis=1) & (np.diff(states[:, 0], prepend=-dt) > 0.0)
-        states[np.cumsum(~ran) > 0] = np.nan
-        return dt * np.arange(steps + 1), states[:, 1 + self.qpos], states[:, 1 + model.nq + self.dofs]
+        states, _ = rollout(model, data, starts, torques, control_spec=applied, nstep=steps)
+        states = np.concatenate([starts[:, None], states], axis=1)
+        ran = np.isfinite(states).all(axis=2) & (np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0)
+        states[np.cumsum(~ran, axis=1) > 0] = np.nan
+        paths = states[:, :, 1 + self.qpos], states[:, :, 1 + model.nq + self.dofs]
+        return dt * np.arange(steps + 1), *(path.reshape(*batch, steps + 1, n) for path in paths)
+
+    def implicit_derivative(self, q, qd, dt=1e-3) -> np.ndarray:
+        """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (n, n): qDeriv."""
+        model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
+        model.opt.integrator, model.opt.timestep = INTEGRATORS["implicit"], dt
+        data.qpos[self.qpos], data.qvel[self.dofs] = q, qd
+        mujoco.mj_step(model, data)
+        dense = np.zeros((model.nv, model.nv))
+        for row, (start, count) in enumerate(zip(model.D_rowadr, model.D_rownnz)):
+            dense[row, model.D_colind[start : start + count]] = data.qDeriv[start : start + count]
+        return dense[np.ix_(self.dofs, self.dofs)]
 
     # how the fields are read
 

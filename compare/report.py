@@ -89,10 +89,11 @@ def answers(sections) -> pd.DataFrame:
     """The assignment's parts (a) to (i): what is asked, where it is answered, the answer."""
     results = {section.name: section.result for section in sections}
 
-    def apart(name, quantity):
+    def apart(name, quantity, **where):
         if name not in results:
             return "not run"
-        rows = [row for row in results[name].rows if row["quantity"] == quantity]
+        where = where or {"quantity": quantity}
+        rows = [row for row in results[name].rows if all(row[key] == value for key, value in where.items())]
         if any(row["largest_difference"] is None for row in rows):
             return "diverged"
         top = max(rows, key=lambda row: row["largest_difference"])
@@ -129,7 +130,12 @@ def answers(sections) -> pd.DataFrame:
         ("f", "accelerations from rest that can be foreseen", "published", printed("f1", "f2", "f3", "f4")),
         ("g", "Mbar at the zero posture, by rows", "published, mass", printed("g")),
         ("h", "torques that hold ball catch", "published, gravity", printed("h")),
-        ("i", "five seconds of motion by RK4", "trajectory", apart("trajectory", "angles")),
+        (
+            "i",
+            "five seconds of motion by RK4",
+            "trajectory",
+            apart("trajectory", "RK4, angles", level="open loop", twin="rk4"),
+        ),
     )
     return pd.DataFrame(parts, columns=["part", "asked", "answered in", "answer"])
 
@@ -187,7 +193,7 @@ def write(folder, sections, origin, result) -> None:
     """All files of a report, the figures excepted, into a folder that has those."""
     (folder / "tables").mkdir()
     for section in sections:
-        section.result.table.to_csv(folder / "tables" / f"{section.name}.csv", index=False)
+        pd.DataFrame(section.result.rows).to_csv(folder / "tables" / f"{section.name}.csv", index=False)
     checks = [check.record() for section in sections for check in section.result.checks]
     (folder / "report.md").write_text(markdown(sections, origin, result), encoding="utf-8")
     (folder / "index.html").write_text(page(folder, sections, origin, result), encoding="utf-8")
@@ -212,7 +218,7 @@ def shown(table, columns=None) -> pd.DataFrame:
 def tables(section) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The table of a section as text, and its checks that failed."""
     failed = [check.record() for check in section.result.checks if not check.passed]
-    return shown(section.result.table, section.result.shown), shown(
+    return shown(pd.DataFrame(section.result.rows), section.result.shown), shown(
         pd.DataFrame(failed).drop(columns="passed", errors="ignore")
     )
 

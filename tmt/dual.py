@@ -33,34 +33,43 @@ class Dual:
         return isinstance(other, Dual) and other.level > self.level
 
     def __add__(self, other):
+        if isinstance(other, float):  # constants are many, and zeros and ones among them
+            return self if other == 0.0 else self.new(self.value + other, self.slope)
         if self.outranked(other):
-            return NotImplemented
+            return other.__radd__(self)
         value, slope = self.parts(other)
         return self.new(self.value + value, self.slope + slope)
 
     __radd__ = __add__
 
     def __sub__(self, other):
+        if isinstance(other, float):
+            return self if other == 0.0 else self.new(self.value - other, self.slope)
         if self.outranked(other):
-            return NotImplemented
+            return other.__rsub__(self)
         value, slope = self.parts(other)
         return self.new(self.value - value, self.slope - slope)
 
     def __rsub__(self, other):
-        value, slope = self.parts(other)
-        return self.new(value - self.value, slope - self.slope)
+        return self * -1.0 + other
 
     def __mul__(self, other):
+        if isinstance(other, float):
+            if other in (0.0, 1.0):
+                return self if other else 0.0
+            return self.new(self.value * other, self.slope * other)
         if self.outranked(other):
-            return NotImplemented
+            return other.__rmul__(self)
         value, slope = self.parts(other)
         return self.new(self.value * value, self.slope * value + self.value * slope)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other):
+        if isinstance(other, float):
+            return self.new(self.value / other, self.slope / other)
         if self.outranked(other):
-            return NotImplemented
+            return other.__rtruediv__(self)
         value, slope = self.parts(other)
         quotient = self.value / value
         return self.new(quotient, (self.slope - quotient * slope) / value)

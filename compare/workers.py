@@ -1,4 +1,4 @@
-"""Two further processes that draw the figures of an experiment while the next one computes."""
+"""Two further processes: they draw the figures of an experiment while the next one computes, and follow scenes."""
 
 import importlib
 import os
@@ -10,8 +10,8 @@ from multiprocessing import get_context, parent_process
 
 
 @contextmanager
-def artist():
-    """Yields submit(experiment, result, folder), whose future is the list of (file name, caption) it has drawn."""
+def start_workers():
+    """Yields a pool of two processes, for `draw` and for scenes that can run side by side."""
     with ProcessPoolExecutor(2, get_context("spawn"), watch_parent) as pool:
         # Ctrl-C is this process's business: the others are started deaf to it
         hearing = signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -19,7 +19,7 @@ def artist():
             pool.submit(importlib.import_module, ".draw", __package__)  # matplotlib loads meanwhile
         signal.signal(signal.SIGINT, hearing)
         try:
-            yield lambda *work: pool.submit(draw, *work)
+            yield pool
         finally:
             pool.shutdown(cancel_futures=True)
 

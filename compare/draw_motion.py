@@ -1,0 +1,132 @@
+"""Figures of runs: angles and rates against time, differences in their bands, drift, growth of errors."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .draw import BLUE, GREEK, GREEN, GREY, HINGES, ORANGE, RED, WIDTH
+from .motion import DRIFT, DRIFT_STEPS
+
+TWINS = (("semi_implicit_euler", "Euler"), ("implicit", "implicit"), ("rk4", "RK4"))
+DASHES = {"Euler": (BLUE, "-"), "implicit": (RED, "--"), "RK4": (GREEN, "-.")}
+ZERO = 1e-18  # rad: where differences of exactly zero are drawn
+
+
+def over_time(ax, t, ours, theirs):
+    """Hinge angles or rates against time: lines for TMT, up to 65 marks for MuJoCo."""
+    every = slice(None, None, max(1, len(t) // 64))
+    marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
+    for i, (hinge, colour, dash) in enumerate(HINGES):
+        ax.plot(t, ours[:, i], dash, color=colour, label=f"{GREEK[hinge]}, TMT")
+        ax.plot(t[every], theirs[every, i], color=colour, clip_on=False, **marks)
+    ax.plot([], [], color="black", label="MuJoCo", **marks)
+
+
+def held(result, scene, name):
+    """The assignment's figure of a held posture: hinge angles against time."""
+    curve = result.curves["runs"][(scene, "rk4", 64)]
+    fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
+    ax = fig.subplots()
+    over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]))
+    ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, curve["t"][-1]))
+    fig.legend(loc="outside upper center", ncols=4)
+    left = {p: "does not leave" if at is None else f"is 0.1 rad away at {at:.2f} s" for p, at in curve["left"].items()}
+    number = name.removeprefix("assignment_figure_")
+    caption = (
+        f"The assignment's Figure {number} redrawn: {scene} with TMT's torque in both engines, RK4, dt = 5/64 s. "
+        f"In five seconds the arm of TMT {left['TMT']}, that of MuJoCo {left['MuJoCo']}."
+    )
+    return name, fig, caption
+
+
+def run(result, scene):
+    """One scene under each twin: angles, rates, and the difference under its band."""
+    steps = max((n for name, _, n in result.curves["runs"] if name == scene.name and n <= 1024), default=64)
+    fig = Figure(figsize=(WIDTH, 6.2), layout="constrained")
+    axes = fig.subplots(3, len(TWINS), sharex=True, sharey="row")
+    until = []
+    for column, (twin, title) in zip(axes.T, TWINS):
+        c = result.curves["runs"][(scene.name, twin, steps)]
+        for row, ax in enumerate(column[:2]):
+            over_time(ax, c["t"], c["tmt"][row], c["mujoco"][row])
+        column[0].set_title(f"{title}, dt = 5/{steps} s")
+        difference = np.abs(c["tmt"][0] - c["mujoco"][0]).max(axis=1)
+        ulp = np.abs(c["tmt"][0] - c["ulp"]).max(axis=1)
+        band = np.where(c["band"] < 1e3, c["band"], np.nan)
+        lines = column[2]
+        lines.semilogy(c["t"][1:], np.maximum(ulp[1:], ZERO), color=BLUE, linewidth=0.8, label="TMT, start 1 ulp away")
+        lines.semilogy(c["t"][1:], np.maximum(difference[1:], ZERO), color="black", linewidth=1, label="TMT to MuJoCo")
+        lines.semilogy(c["t"][:: c["every"]][1:], band[1:], "--", color=ORANGE, label="band of rounding")
+        if c["judged_until_s"] < scene.duration:
+            lines.axvspan(c["judged_until_s"], scene.duration, color=GREY, alpha=0.15)
+        lines.set(xlabel="time, s", xlim=(0, scene.duration))
+        until.append(f"{title} to {c['judged_until_s']:.2f} s")
+    for ax, label in zip(axes[:, 0], ("angle, rad", "rate, rad/s", "angle: difference, rad")):
+        ax.set_ylabel(label)
+    handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
+    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="outside upper center", ncols=4)
+    rows = [row for row in result.rows if row["scene"] == scene.name and row["level"] == "open loop"]
+    ended = sorted({f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in rows if row["diverged_at_s"]})
+    used = [row["difference_over_band"] for row in rows if row["difference_over_band"] is not None]
+    caption = (
+        f"{scene.name[0].upper()}{scene.name[1:]}. While judged ({', '.join(until)}; grey: not judged) the twins use at most "
+        f"{max(used, default=float('inf')):.1e} of the band, over all steps and integrators. "
+        + (f"Diverged: {', '.join(ended)}. " if ended else "")
+        + f"Differences of exactly zero are drawn at {ZERO:g}."
+    )
+    return "trajectory_" + scene.name.replace(", ", "_").replace(" ", "_"), fig, caption
+
+
+def drift(result):
+    """Drift of energy and momentum against the step size, both parties."""
+    drifts = result.curves["drift"]
+    fig = Figure(figsize=(WIDTH, 3.1), layout="constrained")
+    axes = fig.subplots(1, len(drifts), sharex=True, sharey=True, squeeze=False)[0]
+    for ax, ((scene, quantity, unit), of_scene) in zip(axes, drifts.items()):
+        for integrator, parties in of_scene.items():
+            colour, dash = DASHES[integrator]
+            dt = DRIFT / np.array(DRIFT_STEPS[integrator])
+            ax.loglog(dt, parties["TMT"], dash, color=colour, label=f"{integrator}, TMT")
+            label = "MuJoCo" if integrator == "Euler" else None
+            ax.loglog(dt, parties["MuJoCo"], "o", mfc="none", color=colour, label=label)
+        ax.set_title(f"{scene},\n{quantity}, {unit}", fontsize=8)
+    axes[0].set_ylabel("largest drift in 1 s")
+    fig.supxlabel("dt, s", fontsize=9)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    worst = {
+        integrator: max(
+            of_scene[integrator]["TMT"][-1] for (_, quantity, _), of_scene in drifts.items() if quantity == "energy"
+        )
+        for integrator in DASHES
+    }
+    caption = (
+        f"Drift of what should be constant: it falls with dt for Euler and implicit, with dt^4 for RK4. Worst of energy: "
+        f"{worst['Euler']:.1e} J for Euler at dt = 1/{DRIFT_STEPS['Euler'][-1]} s, {worst['RK4']:.1e} J for RK4 at "
+        f"1/{DRIFT_STEPS['RK4'][-1]} s. TMT (lines) and MuJoCo (marks) drift alike."
+    )
+    return "trajectory_drift", fig, caption
+
+
+def growth(result):
+    """Growth of a small difference over a minute, scene by scene."""
+    t, curves = (result.curves["growth"][key] for key in ("t", "curves"))
+    fig = Figure(figsize=(WIDTH, 3.2), layout="constrained")
+    ax = fig.subplots()
+    colours = (BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9", GREY)
+    ends = sorted(curves, key=lambda name: curves[name][-1])
+    places = {}
+    for name in ends:  # labels at the ends of the curves, not over each other
+        places[name] = max(min(curves[name][-1], 60.0), max(places.values(), default=-20.0) + 5.5)
+    for (name, grown), colour in zip(curves.items(), colours):
+        ax.plot(t, grown, color=colour)
+        ax.text(t[-1] * 1.01, places[name], name, color=colour, va="center", fontsize=8)
+    for digits, text in ((16, "doubles"), (30, "30 digits")):
+        ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")
+        ax.text(0.5, digits + 0.8, text, fontsize=8)
+    ax.set(xlabel="time, s", ylabel="log10 of the growth", xlim=(0, t[-1]), ylim=(-20, 65))
+    free = curves["ball catch, free"]
+    five = np.searchsorted(t, 5.0)
+    caption = (
+        f"How much a small difference of the state grows: from ball catch, free, by 10^{free[five]:.1f} in 5 s and "
+        f"10^{free[-1]:.0f} in 60 s. Where a curve crosses a dotted line, numbers of so many digits know nothing of the state."
+    )
+    return "trajectory_growth", fig, caption
