@@ -41,7 +41,8 @@ def held(result, scene, name):
 def run(result, scene):
     """One scene under each twin: angles, rates, and the difference under its band."""
     steps = max((n for name, _, n in result.curves["runs"] if name == scene.name and n <= 1024), default=64)
-    fig = Figure(figsize=(WIDTH, 6.2), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
+    fig.subplots_adjust(left=0.1, right=0.985, bottom=0.075, top=0.87, hspace=0.12, wspace=0.08)
     axes = fig.subplots(3, len(TWINS), sharex=True, sharey="row")
     until = []
     for column, (twin, title) in zip(axes.T, TWINS):
@@ -63,7 +64,7 @@ def run(result, scene):
     for ax, label in zip(axes[:, 0], ("angle, rad", "rate, rad/s", "angle: difference, rad")):
         ax.set_ylabel(label)
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
-    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="outside upper center", ncols=4)
+    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=4)
     rows = [row for row in result.rows if row["scene"] == scene.name and row["level"] == "open loop"]
     ended = sorted({f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in rows if row["diverged_at_s"]})
     used = [row["difference_over_band"] for row in rows if row["difference_over_band"] is not None]

@@ -71,7 +71,7 @@ def test_tables_are_tidy(ran):
         assert "nan" not in path.read_text().lower()
     columns = set(pd.read_csv(folder / "reports/latest/tables/trajectory.csv").columns)
     assert {
-        "scene", "engine_integrator", "twin", "dt_s", "level", "worst_difference", "band", "judged_until_s", "diverged_at_s",
+        "scene", "engine_integrator", "twin", "dt_s", "level", "largest_difference", "worst_difference", "band", "judged_until_s", "diverged_at_s",
     } <= columns  # fmt: skip
 
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.engine import ARM_XML, ModelError, load, parse
+from compare import motion
+from compare.engine import ARM_XML, INTEGRATORS, ModelError, load, parse
+from compare.scenes import SCENES
 
 XML = ARM_XML.read_text()
 REST = np.zeros(3)
@@ -112,3 +114,21 @@ def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypa
     _, q, _ = lenient.trajectory(REST, np.full(3, 1e3), REST, 10.0, 200)
     assert not np.isfinite(q[-1]).any()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_batch_of_runs_is_each_run(engine, integrator, rng):
+    q, qd, tau = rng.uniform(-1, 1, (3, 2, 3, 3))
+    _, path_q, path_qd = engine.trajectory(q, qd, tau, 0.01, 5, integrator)
+    _, single_q, single_qd = engine.trajectory(q[1, 2], qd[1, 2], tau[1, 2], 0.01, 5, integrator)
+    assert np.array_equal(path_q[1, 2], single_q) and np.array_equal(path_qd[1, 2], single_qd)
+
+
+def test_silent_nonsense_is_found_by_its_energy(engine):
+    """implicit at 5/64 s from ball catch: finite, no warning, far beyond its physical energy."""
+    scene = next(scene for scene in SCENES if scene.name == "ball catch, free")
+    t, q, qd = engine.trajectory(*scene.start, scene.tau, 5 / 64, 64, "implicit")
+    assert np.isfinite(q).all()
+    assert motion.diverged_at(scene, t, q, qd) is not None
+    t, q, qd = engine.trajectory(*scene.start, scene.tau, 5 / 64, 64, "RK4")
+    assert motion.diverged_at(scene, t, q, qd) is None

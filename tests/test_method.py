@@ -15,6 +15,7 @@ from trees import random_tree
 import tmt
 from compare.agreement import acceleration_scale, bias_scale, gravity_scale, reaches
 from tmt import method, space
+from tmt.dual import jacobian
 from tmt.reference import DIGITS, distance, exact
 
 BAR = 64 * np.finfo(float).eps  # times the scale of each quantity, as in the experiments
@@ -274,3 +275,19 @@ def test_lagrange_from_equation_1_and_energies_alone(rng):
             M0, h0 = evaluate(*map(mpmath.mpf, map(float, (*q0, *qd0, *numbers))))
             assert max(abs(x - y) for row, line in zip(M0, truth.mass_matrix) for x, y in zip(row, line)) < 1e-47
             assert max(abs(x - y) for x, y in zip(h0, truth.bias)) < 1e-45
+
+
+def test_derivative_of_the_bias_is_that_of_a_complex_step(model, state):
+    q, qd, _ = state
+    rates = np.array(method.bias_rates(model, list(q), list(qd)))
+    for j, direction in enumerate(np.eye(len(q))):
+        slope = complex_step(lambda qd: method.bias(method.bodies(model, list(q), qd), model.gravity), qd, direction)
+        scale = bias_scale(q[None], qd[None], model)[0] + np.abs(tmt.mass_matrix(q, model)).max() * np.abs(qd).sum()
+        assert np.abs(rates[:, j] - slope).max() < BAR * scale
+    assert np.abs(rates).max() > 1e-3
+
+
+def test_nested_dual_numbers_are_not_confused():
+    """d/dx (x d/dy (x y)) = 2 x at any y: the inner derivative is a constant of the outer one and the reverse."""
+    (outer,) = jacobian(lambda x: [x[0] * jacobian(lambda y: [x[0] * y[0]], [3.0])[0][0]], [5.0])
+    assert outer[0] == 10.0

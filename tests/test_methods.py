@@ -33,7 +33,8 @@ def test_a_wrong_tableau_cannot_be_built(changes, says):
 @pytest.mark.parametrize("name", METHODS)
 def test_order(name):
     order = METHODS[name].order
-    runs = [tmt.simulate(BENT, REST, REST, 1.0 / steps, steps, name) for steps in (256, 512, 1024)]
+    counts = (256, 512, 1024) if order > 1 else (8192, 16384, 32768)
+    runs = [tmt.simulate(BENT, REST, REST, 1.0 / steps, steps, name) for steps in counts]
     ends = [np.concatenate([q[-1], qd[-1]]) for _, q, qd in runs]
     coarse, fine = (np.linalg.norm(a - b) for a, b in pairwise(ends))
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15)
@@ -42,13 +43,14 @@ def test_order(name):
 @pytest.mark.parametrize("name", METHODS)
 def test_energy_drift_falls_with_the_order(name):
     drifts = []
-    for steps in (128, 256, 512):
+    order = METHODS[name].order
+    for steps in (128, 256, 512) if order > 1 else (1024, 2048, 4096):
         _, q, qd = tmt.simulate(BENT, REST, REST, 1.0 / steps, steps, name)
         energy = tmt.energy(q, qd)
         assert np.ptp(tmt.potential_energy(q)) > 0.5
         drifts.append(np.abs(energy - energy[0]).max())
     assert drifts[2] > 0.0
-    assert np.log2(drifts[0] / drifts[2]) / 2 > METHODS[name].order - 0.3
+    assert np.log2(drifts[0] / drifts[2]) / 2 > order - 0.3
 
 
 def test_shapes_and_start():
@@ -84,5 +86,5 @@ def test_damping_takes_energy():
 def test_the_assignments_bent_posture_holds():
     tau = tmt.gravity_balance(BENT)
     _, q, qd = tmt.simulate(BENT, REST, tau, 5 / 64, 64)
-    width = band(METHODS["rk4"], q, qd, tau, 5 / 64)
+    width = band(METHODS["rk4"], tmt.ARM, q, qd, tau, 5 / 64)
     assert (np.abs(q - BENT) <= width[:, :3]).all()

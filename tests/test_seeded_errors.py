@@ -1,14 +1,17 @@
 """A check that never failed on a seeded error is not a check: each edit must make a named one fail."""
 
+import dataclasses
 import importlib
 import inspect
 
 import pytest
 
-from compare.agreement import Setup
+from compare.agreement import EPS, Setup
 from compare.engine import ARM_XML, parse
+from compare.scenes import SCENES
+from compare.trajectory import follow
 from tmt import kernels, method
-from tmt.methods import METHODS, RungeKutta
+from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler
 
 XML = ARM_XML.read_text()
 ALPHA = '<joint name="alpha" type="hinge" axis="0 1 0"/>'
@@ -24,7 +27,7 @@ IN_THE_MJCF = {
     "hinge order": (f"{ALPHA}\n      {BETA}", f"{BETA}\n      {ALPHA}", ["parameters order", "kinematics x_b"]),
     "armature left in": (GAMMA, GAMMA.replace("/>", ' armature="0.01"/>'), ["parameters armature", "mass Mbar"]),
     "damping left in": (BETA, BETA.replace("/>", ' damping="0.1"/>'), ["parameters damping", "acceleration qdd"]),
-    "spring left in": (BETA, BETA.replace("/>", ' stiffness="1"/>'), ["parameters stiffness", "trajectory angles"]),
+    "spring left in": (BETA, BETA.replace("/>", ' stiffness="1"/>'), ["parameters stiffness", "trajectory open loop"]),
     "beta axis flipped": (BETA, BETA.replace('"1 0 0"', '"-1 0 0"'), ["parameters axis", "kinematics x_b", "kinematics B_b"]),
     "gamma axis tilted": (GAMMA, GAMMA.replace('"0 1 0"', '"0 1 0.001"'), ["parameters axis", "kinematics T_b"]),
     "elbow 1 mm lower": ('pos="0 0 -0.3"', 'pos="0 0 -0.301"', ["parameters anchor", "kinematics v_conv"]),
@@ -133,20 +136,54 @@ def test_error_in_the_method(old, new, expected, engine):
         exec(compile(text, method.__file__, "exec"), method.__dict__)
 
 
-def test_another_method_of_the_same_order(engine, monkeypatch):
-    """Kutta's 3/8 rule is as good as the classical one, and leaves the band."""
-    three_eighths = RungeKutta(
-        order=4,
-        A=((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)),
-        b=(1 / 8, 3 / 8, 3 / 8, 1 / 8),
-        c=(0.0, 1 / 3, 2 / 3, 1.0),
-    )
-    monkeypatch.setitem(METHODS, "rk4", three_eighths)
+@dataclasses.dataclass(frozen=True)
+class Altered(SemiImplicitEuler):
+    """A wrong twin: damping explicit, or the derivative of the bias dropped."""
+
+    drop: str = ""
+
+    def matrix(self, tree, q, qd, dt):
+        if self.drop == "damping":
+            tree = dataclasses.replace(tree, damping=(0.0, 0.0, 0.0))
+        wanted = dataclasses.replace(self, implicit_bias=self.implicit_bias and self.drop != "bias")
+        return SemiImplicitEuler.matrix(wanted, tree, q, qd, dt)
+
+
+@dataclasses.dataclass(frozen=True)
+class Hasty(RungeKutta):
+    """A wrong twin: its step is a little too long."""
+
+    def step(self, slope, q, qd, dt):
+        return RungeKutta.step(self, slope, q, qd, dt * (1.0 + 1e6 * EPS))
+
+
+RK4 = {"order": 4, "A": METHODS["rk4"].A, "b": METHODS["rk4"].b, "c": METHODS["rk4"].c}
+WRONG_TWINS = {
+    "damping explicit": ("semi_implicit_euler", Altered(False, drop="damping"), "bent, damped, Euler"),
+    "derivative of the bias dropped": ("implicit", Altered(True, drop="bias"), "bent, free, implicit"),
+    "stages swapped": ("rk4", RungeKutta(**RK4 | {"b": (1 / 3, 1 / 6, 1 / 6, 1 / 3)}), "bent, free, RK4"),
+    "another method of order 4, Kutta's 3/8 rule": (
+        "rk4",
+        RungeKutta(
+            4, ((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8), (0.0, 1 / 3, 2 / 3, 1.0)
+        ),
+        "bent, free, RK4",
+    ),
+    "dt off by one ulp times 1e6": ("rk4", Hasty(**RK4), "bent, free, RK4"),
+}
+
+
+@pytest.mark.parametrize("twin, wrong, where", WRONG_TWINS.values(), ids=WRONG_TWINS)
+def test_a_wrong_twin_leaves_the_band(twin, wrong, where, engine, monkeypatch):
+    scene = next(scene for scene in SCENES if where.startswith(scene.name))
+    assert [str(c) for c in follow(scene, engine, (64,)).checks if not c.passed] == []
+    monkeypatch.setitem(METHODS, twin, wrong)
     kernels.stepper.cache_clear()
     try:
-        assert_named(small(engine), ["trajectory angles"])
+        failed = {c.quantity for c in follow(scene, engine, (64,)).checks if not c.passed and c.scene.startswith(where)}
     finally:
         kernels.stepper.cache_clear()
+    assert {"one step, TMT to MuJoCo", "open loop, TMT to MuJoCo"} <= failed
 
 
 def test_mirror_symmetry_needs_the_kinematics():
