@@ -90,6 +90,8 @@ def drift(result):
             label = "MuJoCo" if integrator == "Euler" else None
             ax.loglog(dt, parties["MuJoCo"], "o", mfc="none", color=colour, label=label)
         ax.set_title(f"{scene},\n{quantity}, {unit}", fontsize=8)
+        ax.set_xticks([2e-4, 1e-3, 4e-3], ["2e-4", "1e-3", "4e-3"])
+        ax.minorticks_off()
     axes[0].set_ylabel("largest drift in 1 s")
     fig.supxlabel("dt, s", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)

@@ -125,10 +125,12 @@ def grown(scene) -> np.ndarray:
     return growth(METHODS["rk4"], scene.model, *path, scene.tau, dt, every=16)
 
 
-def growth_of_errors(result, curves) -> None:
+def growth_of_errors(result, scenes, curves) -> None:
     """log10 of the growth of a small difference over 5 s and 60 s, scene by scene, told in words."""
+    if not scenes:
+        return
     t = np.linspace(0.0, LONG, LONG_STEPS // 16 + 1)
-    curves = {scene.name: curve for scene, curve in zip(SCENES, curves)}
+    curves = {scene.name: curve for scene, curve in zip(scenes, curves)}
     five = np.searchsorted(t, 5.0)
     told = "; ".join(f"{name}: 10^{g[five]:.1f} and 10^{g[-1]:.1f}" for name, g in curves.items())
     horizons = {digits: reach(t, curves["ball catch, free"], digits) for digits in (16, 30)}
