@@ -7,6 +7,7 @@ import tmt
 from compare import motion
 from compare.engine import ARM_XML, INTEGRATORS, ModelError, load, parse
 from compare.scenes import SCENES
+from compare.trajectory import follow
 
 XML = ARM_XML.read_text()
 REST = np.zeros(3)
@@ -132,3 +133,15 @@ def test_silent_nonsense_is_found_by_its_energy(engine):
     assert motion.diverged_at(scene, t, q, qd) is not None
     t, q, qd = engine.trajectory(*scene.start, scene.tau, 5 / 64, 64, "RK4")
     assert motion.diverged_at(scene, t, q, qd) is None
+
+
+def test_an_arm_that_flies_apart_is_reported_as_diverged():
+    """A forearm of nearly no inertia: MuJoCo's run diverges, its twin's does not; no number stands for it."""
+    text = XML.replace("0.001 0.019 0.019", "1e-9 1e-9 1e-9")
+    feather = parse(text.replace('pos="0.15 0 0" mass="1.5"', 'pos="1e-5 0 0" mass="1.5"'))
+    part = follow(SCENES[0], feather, (64,))
+    failed = {check.quantity for check in part.checks if not check.passed}
+    assert {"derivative, TMT to MuJoCo", "judged for less than 5 s"} <= failed
+    for row in part.rows:
+        assert row["diverged_at_s"] < (row["twin_diverged_at_s"] or 5.1)
+        assert not any(isinstance(value, float) and np.isnan(value) for value in row.values())
