@@ -18,7 +18,7 @@ EXPERIMENTS = {
     "mass": "the mass matrix",
     "gravity": "the torque that holds the arm",
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
-    "trajectory": "five seconds of motion by the same method on both sides",
+    "trajectory": "five seconds of motion, a twin for every integrator",
 }
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
