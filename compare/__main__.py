@@ -105,29 +105,29 @@ def run(options, command) -> int:
         engine = load(path)
         with new_report(options.out) as folder:
             with start_workers() as workers:
-                from . import report
+                from . import report, verdict
                 from .agreement import Setup
 
                 setup = (Setup.quick if options.quick else Setup)(engine, map=workers.map)
                 sections = examine(names, setup, folder, terminal, workers)
-            verdict = report.verdict(sections, len(EXPERIMENTS))
+            words = verdict.verdict(sections, len(EXPERIMENTS))
             seconds = time.perf_counter() - started
-            report.write(folder, sections, report.provenance(command, path, seconds), verdict)
+            report.write(folder, sections, report.provenance(command, path, seconds), words)
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # from here on the new report is there
     except (ModelError, FolderError) as error:
         raise Refused(error) from None
     except BrokenExecutor:
         raise Refused("a process that draws figures was ended from outside; the old report is unchanged") from None
     terminal.line("")
-    terminal.line(verdict, "bold green" if report.passed(sections) else "bold red")
+    terminal.line(words, "bold green" if verdict.passed(sections) else "bold red")
     terminal.line(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
-    return 0 if report.passed(sections) else 1
+    return 0 if verdict.passed(sections) else 1
 
 
 def examine(names, setup, folder, terminal, workers) -> list:
     """The section of each experiment, its figures drawn."""
-    from .report import Section
     from .terminal import Terminal
+    from .verdict import Section
     from .workers import draw
 
     (folder / "figures").mkdir()

@@ -42,13 +42,14 @@ def run(result, scene):
     """One scene under each twin: angles, rates, and the difference under its band."""
     steps = max((n for name, _, n in result.curves["runs"] if name == scene.name and n <= 1024), default=64)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
-    fig.subplots_adjust(left=0.1, right=0.985, bottom=0.075, top=0.87, hspace=0.12, wspace=0.08)
+    fig.subplots_adjust(left=0.105, right=0.985, bottom=0.075, top=0.87, hspace=0.12, wspace=0.08)
     axes = fig.subplots(3, len(TWINS), sharex=True, sharey="row")
     until = []
     for column, (twin, title) in zip(axes.T, TWINS):
         c = result.curves["runs"][(scene.name, twin, steps)]
         for row, ax in enumerate(column[:2]):
             over_time(ax, c["t"], c["tmt"][row], c["mujoco"][row])
+            ax.ticklabel_format(axis="y", scilimits=(-2, 3))
         column[0].set_title(f"{title}, dt = 5/{steps} s")
         difference = np.abs(c["tmt"][0] - c["mujoco"][0]).max(axis=1)
         ulp = np.abs(c["tmt"][0] - c["ulp"]).max(axis=1)

@@ -1,0 +1,116 @@
+"""A report for its readers: Markdown, and HTML as one file."""
+
+import base64
+import html
+import math
+from pathlib import Path
+from string import Template
+
+import pandas as pd
+
+from .verdict import answers, outcome, passed
+
+TITLE = "TMT and MuJoCo, held against each other on a human arm"
+DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
+LONG = 30  # rows: a longer table is folded in the HTML
+INTRO = (
+    "A human arm, two rigid bodies on three hinges, modelled twice: as MJCF, run by MuJoCo, and by the TMT method in a "
+    "program that shares nothing with it. Each difference stands beside a bar that was fixed beforehand; 'exact' is "
+    "the method in 50-digit arithmetic, and distances from it are in eps = 2.2e-16 of the quantity's scale. Of the states "
+    "in a row, the largest difference is the largest of all; the worst is the one that comes closest to its own bar."
+)
+
+
+def shown(table, columns=None) -> pd.DataFrame:
+    """A table as text, with the digits that a reader needs."""
+    table = table[columns] if columns else table
+
+    def text(value, digits):
+        if isinstance(value, float):
+            return f"{value:.{digits}g}" if math.isfinite(value) else ""
+        return "" if value is None else str(value)
+
+    columns = {c: [text(v, DIGITS.get(c, 3)) for v in table[c].astype(object)] for c in table.columns}
+    return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
+
+
+def tables(section) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The table of a section as text, and its checks that failed."""
+    failed = [check.record() for check in section.result.checks if not check.passed]
+    return shown(pd.DataFrame(section.result.rows), section.result.shown), shown(
+        pd.DataFrame(failed).drop(columns="passed", errors="ignore")
+    )
+
+
+def markdown(sections, origin, result) -> str:
+    """The report as Markdown; `result`: the verdict."""
+    lines = [
+        f"# {TITLE}",
+        f"**{result}**",
+        INTRO,
+        "## The assignment's questions",
+        md_table(answers(sections)),
+    ]
+    for section in sections:
+        table, failed = tables(section)
+        lines += [f"## {section.title}", f"*Claim:* {section.claim} **{outcome(section)}**", f"*Bar:* {section.bar}"]
+        if len(failed):
+            lines += ["**Checks that fail:**", md_table(failed)]
+        lines += [md_table(table), f"All columns: [tables/{section.name}.csv](tables/{section.name}.csv)"]
+        lines += [f"- {note}" for note in section.result.notes]
+        for name, caption in section.figures:
+            lines += [f"![{name}](figures/{name}.png)", caption]
+    lines += ["## Where this comes from", md_table(origins(origin))]
+    return "\n\n".join(lines).replace("\n\n- ", "\n- ") + "\n"
+
+
+def md_table(table) -> str:
+    cells = [list(table.columns), ["---"] * len(table.columns), *table.astype(str).values.tolist()]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
+
+
+def origins(origin) -> pd.DataFrame:
+    return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
+
+
+def page(folder, sections, origin, result) -> str:
+    """The report as one HTML file with its figures inside."""
+    body = [
+        f"<p>{html.escape(INTRO)}</p>",
+        '<h2 id="questions">The assignment\'s questions</h2>',
+        html_table(answers(sections), "text"),
+    ]
+    for section in sections:
+        table, failed = tables(section)
+        body += [
+            f'<h2 id="{section.name}">{html.escape(section.title)}</h2>',
+            f"<p><em>Claim:</em> {html.escape(section.claim)} <strong>{outcome(section)}</strong></p>",
+            f"<p><em>Bar:</em> {html.escape(section.bar)}</p>",
+        ]
+        if len(failed):
+            body += ["<p><strong>Checks that fail:</strong></p>", html_table(failed)]
+        for name, caption in section.figures:
+            data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
+            image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
+            body.append(f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>")
+        text = html_table(table)
+        body.append(
+            f"<details><summary>Table, {len(table)} rows</summary>{text}</details>" if len(table) > LONG else text
+        )
+        checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
+        body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
+        if section.result.notes:
+            body.append("<ul>" + "".join(f"<li>{html.escape(note)}</li>" for note in section.result.notes) + "</ul>")
+    body += ['<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
+    links = [("questions", "questions"), *((s.name, s.name) for s in sections), ("provenance", "provenance")]
+    return Template((Path(__file__).parent / "report.html").read_text()).substitute(
+        title=TITLE,
+        colour="#009E73" if passed(sections) else "#D55E00",
+        verdict=html.escape(result),
+        contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),
+        body="\n".join(body),
+    )
+
+
+def html_table(table, kind="data") -> str:
+    return f'<div class="scroll">{table.to_html(index=False, border=0, classes=kind)}</div>'

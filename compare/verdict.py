@@ -1,0 +1,112 @@
+"""The outcome of a report in words: sections, verdict, the answers to the assignment's questions."""
+
+from dataclasses import dataclass, field
+
+import pandas as pd
+
+
+@dataclass
+class Section:
+    """One experiment in the report."""
+
+    name: str
+    title: str
+    claim: str
+    bar: str
+    result: object
+    figures: list = field(default_factory=list)  # (file name, caption)
+
+
+def passed(sections) -> bool:
+    return all(check.passed for section in sections for check in section.result.checks)
+
+
+def worst(sections):
+    """The check that uses most of a bar of rounding, or None."""
+    checks = [check for section in sections for check in section.result.checks if check.over_bar is not None]
+    return max(checks, key=lambda check: check.over_bar, default=None)
+
+
+def verdict(sections, experiments) -> str:
+    """The outcome in words, with the worst figure; `experiments`: how many there are in all."""
+    checks = [check for section in sections for check in section.result.checks]
+    failed = [check for check in checks if not check.passed]
+    names = ", ".join(section.name for section in sections)
+    ran = "" if len(sections) == experiments else f" in {names} ({len(sections)} of {experiments} experiments)"
+    if failed:
+        return f"The two models do not agree{ran}: {len(failed)} of {len(checks)} checks fail. First: {failed[0]}."
+    text = f"The two models agree{ran}: all {len(checks)} checks pass."
+    top = worst(sections)
+    if top is None or top.value == 0.0:
+        return text
+    where = f"{top.quantity}, {top.scene}" + (f", {top.note}" if top.note else "")
+    return (
+        f"{text} The difference that comes closest to its bar of rounding is {top.value:.2g} {top.unit}, "
+        f"{100 * top.over_bar:.2g} % of the bar ({top.experiment}: {where})."
+    )
+
+
+def outcome(section) -> str:
+    """Whether a section's claim holds, in words."""
+    checks = section.result.checks
+    failed = sum(not check.passed for check in checks)
+    return (
+        f"It does not hold: {failed} of {len(checks)} checks fail."
+        if failed
+        else f"It holds: all {len(checks)} checks pass."
+    )
+
+
+def answers(sections) -> pd.DataFrame:
+    """The assignment's parts (a) to (i): what is asked, where it is answered, the answer."""
+    results = {section.name: section.result for section in sections}
+
+    def apart(name, quantity, **where):
+        if name not in results:
+            return "not run"
+        where = where or {"quantity": quantity}
+        rows = [row for row in results[name].rows if all(row[key] == value for key, value in where.items())]
+        if any(row["largest_difference"] is None for row in rows):
+            return "diverged"
+        top = max(rows, key=lambda row: row["largest_difference"])
+        judged = ", while judged" if name == "trajectory" else ""
+        return f"{quantity}: at most {top['largest_difference']:.1e} {top['unit']} apart ({top['scene']}{judged})"
+
+    def printed(*items):
+        if "published" not in results:
+            return "not run"
+        texts = []
+        for item in items:
+            rows = [row for row in results["published"].rows if row["item"] == item]
+            values = {
+                party: "(" + ", ".join(f"{row[party]:.6g}" for row in rows) + ")"
+                for party in ("published", "tmt", "mujoco")
+            }
+            unit = rows[0]["unit"]
+            texts.append(
+                f"{item}: printed {values['published']}, TMT {values['tmt']}, MuJoCo {values['mujoco']} {unit}"
+            )
+        return "; ".join(texts)
+
+    parts = (
+        ("a", "sketch of the arm with its hinges", "parameters", "figure 'arm'"),
+        ("b", "positions of the centres of mass", "kinematics", apart("kinematics", "x_b")),
+        ("c", "torques that hold the zero posture", "published, gravity", printed("c")),
+        ("d", "angular velocities in body axes", "kinematics", apart("kinematics", "omega_b")),
+        (
+            "e",
+            "equations of motion by TMT",
+            "mass, acceleration",
+            apart("mass", "Mbar") + "; " + apart("acceleration", "bias"),
+        ),
+        ("f", "accelerations from rest that can be foreseen", "published", printed("f1", "f2", "f3", "f4")),
+        ("g", "Mbar at the zero posture, by rows", "published, mass", printed("g")),
+        ("h", "torques that hold ball catch", "published, gravity", printed("h")),
+        (
+            "i",
+            "five seconds of motion by RK4",
+            "trajectory",
+            apart("trajectory", "RK4, angles", level="open loop", twin="rk4"),
+        ),
+    )
+    return pd.DataFrame(parts, columns=["part", "asked", "answered in", "answer"])
