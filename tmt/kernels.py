@@ -1,7 +1,7 @@
 """A model and a method as compiled code: traced to straight lines, compiled by numba, kept on disk.
 
 The generated module goes to the user's cache folder ($TMT_CACHE, else $XDG_CACHE_HOME/tmt, else
-~/.cache/tmt) under a name that is the hash of its text, and numba keeps the machine code beside it.
+~/.cache/tmt) under a name that is the hash of its text and of numba's version, and numba keeps the machine code beside it.
 Where that folder cannot be written the code is compiled anew in each process: it only costs time.
 """
 
@@ -12,6 +12,7 @@ import os
 import sys
 import tempfile
 from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
@@ -101,7 +102,8 @@ def load(text):
 
     numba unpickles what it finds there: the folder must be the user's own.
     """
-    name = "kernel_" + hashlib.sha256(text.encode()).hexdigest()[:16]
+    # numba versions do not read each other's machine code: each keeps its own
+    name = "kernel_" + hashlib.sha256(f"{version('numba')}\n{text}".encode()).hexdigest()[:16]
     try:
         return from_disk(name, text.replace("CACHE", "True"), cache_folder())
     except Exception:  # whatever is wrong with the folder or with a file in it: compile without them
