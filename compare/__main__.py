@@ -166,4 +166,8 @@ def tell(terminal, section, seconds):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    status = main()
+    if status == 2:  # sys.exit would end by the signal, not with 2, if Ctrl-C came inside an exec()
+        sys.stderr.flush()
+        os._exit(2)
+    sys.exit(status)
