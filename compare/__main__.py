@@ -93,7 +93,7 @@ def run(options, command) -> int:
     started = time.perf_counter()
     from concurrent.futures import BrokenExecutor
 
-    from .engine import ARM_XML, ModelError, load
+    from .engine_file import ARM_XML, ModelError, load
     from .folder import FolderError, new_report
     from .terminal import Terminal
     from .workers import start_workers  # imports are here, so that --help and a wrong word answer at once

@@ -1,4 +1,4 @@
-"""MuJoCo, spoken to in the project's symbols. The only module that imports it.
+"""MuJoCo, spoken to in the project's symbols. Only the engine*.py of this room import it.
 
     q, qd, qdd <-> qpos, qvel, qacc      h <-> qfrc_bias      tau <-> qfrc_applied
     M qdd + h = tau - D qd
@@ -7,13 +7,10 @@ MuJoCo's derived fields belong to the state of the last mj_forward, not to that 
 quantity here is evaluated with mj_forward at the state that is asked for.
 """
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-ARM_XML = Path(__file__).resolve().parent.parent / "mjcf" / "arm.xml"
 VERSION = mujoco.__version__
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
@@ -34,13 +31,6 @@ FLAGS = {
     "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY,
     "autoreset": mujoco.mjtDisableBit.mjDSBL_AUTORESET,
 }
-
-
-class ModelError(ValueError):
-    """A file that cannot be held against the stated arm; the message is one line."""
-
-    def __str__(self):
-        return " ".join(super().__str__().split())
 
 
 class Engine:
@@ -262,37 +252,3 @@ class Engine:
         """(translation, rotation) rows of Jacobians: hinges in our order, rotation in body axes."""
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
-
-
-HINGES = ("alpha", "beta", "gamma")
-CARRIERS = ("beta", "gamma")  # upper arm, forearm
-
-
-def load(path=ARM_XML, hinges=HINGES, carriers=CARRIERS) -> Engine:
-    """The Engine for an MJCF file; ModelError if it cannot be read or does not have these hinges."""
-    try:
-        text = Path(path).read_text(errors="replace")
-    except OSError as error:
-        raise ModelError(f"cannot read {path}: {error.strerror}; an MJCF file is expected") from None
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        if "<mujoco" not in text:
-            raise ModelError(f"{path} is not MJCF: MuJoCo says {error}") from None
-        raise ModelError(f"MuJoCo cannot compile {path}: {error}") from None
-    return check_hinges(model, path, hinges, carriers)
-
-
-def parse(text, hinges=HINGES, carriers=CARRIERS) -> Engine:
-    """The Engine for MJCF text."""
-    return check_hinges(mujoco.MjModel.from_xml_string(text), "the text", hinges, carriers)
-
-
-def check_hinges(model, path, hinges, carriers) -> Engine:
-    """The Engine, if the model moves by exactly these hinges."""
-    names = [model.joint(j).name for j in range(model.njnt)]
-    kinds = [mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower() for j in range(model.njnt)]
-    if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
-        found = ", ".join(f"{name or 'unnamed'} ({kind})" for name, kind in zip(names, kinds)) or "none"
-        raise ModelError(f"{path} has the joints {found}; hinges {', '.join(hinges)} and no others are expected")
-    return Engine(model, hinges, carriers)

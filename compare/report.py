@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from .agreement import SEED
-from .engine import ARM_XML
+from .engine_file import ARM_XML
 from .folder import files
 from .page import markdown, page
 from .verdict import passed

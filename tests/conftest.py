@@ -3,7 +3,7 @@ import pytest
 from hypothesis import settings
 
 from compare.agreement import Setup
-from compare.engine import load
+from compare.engine_file import load
 
 # no example database in the checkout; the same examples in every run
 settings.register_profile("project", database=None, derandomize=True, deadline=None, max_examples=50)

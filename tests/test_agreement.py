@@ -10,7 +10,7 @@ from trees import mjcf, random_tree
 import tmt
 from compare.__main__ import EXPERIMENTS
 from compare.agreement import EPS, FACTOR, Check, bias_scale, reaches
-from compare.engine import parse
+from compare.engine_file import parse
 from compare.parameters import stated
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from compare.__main__ import EXPERIMENTS, main
-from compare.engine import ARM_XML
+from compare.engine_file import ARM_XML
 
 ROOT = Path(__file__).resolve().parent.parent
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}

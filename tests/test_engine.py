@@ -5,7 +5,8 @@ import pytest
 
 import tmt
 from compare import motion
-from compare.engine import ARM_XML, INTEGRATORS, ModelError, load, parse
+from compare.engine import INTEGRATORS
+from compare.engine_file import ARM_XML, ModelError, load, parse
 from compare.scenes import SCENES
 from compare.trajectory import follow
 

@@ -7,7 +7,7 @@ import inspect
 import pytest
 
 from compare.agreement import EPS, Setup
-from compare.engine import ARM_XML, parse
+from compare.engine_file import ARM_XML, parse
 from compare.scenes import SCENES
 from compare.trajectory import follow
 from tmt import kernels, method

@@ -30,13 +30,14 @@ def test_tmt_knows_nothing_of_the_engine_or_the_judge(path):
 
 
 def test_only_the_engine_imports_mujoco():
-    assert [p.name for p in (ROOT / "compare").glob("*.py") if "mujoco" in imports(p)] == ["engine.py"]
+    importing = {p.name for p in (ROOT / "compare").glob("*.py") if "mujoco" in imports(p)}
+    assert "engine.py" in importing and all(name.startswith("engine") for name in importing)
 
 
 def test_mujocos_names_are_spoken_only_by_the_engine():
     spoken = re.compile(r"\.(qpos|qvel|qacc|qfrc_\w+|xipos|cvel)\b")
     for path in [*(ROOT / "compare").glob("*.py"), *(ROOT / "tmt").glob("*.py")]:
-        if path.name != "engine.py":
+        if not path.name.startswith("engine"):
             assert not spoken.search(path.read_text()), path.name
 
 
