@@ -108,7 +108,7 @@ def run(options, command) -> int:
                 from . import report, verdict
                 from .agreement import Setup
 
-                setup = (Setup.quick if options.quick else Setup)(engine, map=workers.map)
+                setup = (Setup.quick if options.quick else Setup)(engine, map=workers.map, quiet=workers.quiet)
                 sections = examine(names, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS))
             seconds = time.perf_counter() - started

@@ -170,6 +170,7 @@ class Setup:
     states: int = 10_000  # random states
     exact_states: int = 200  # of these, how many are held against the exact values too
     map: Callable = map  # where the scenes of an experiment may run side by side
+    quiet: Callable = lambda: None  # waits until nothing runs beside: for timings
     background: dict = field(default_factory=dict)  # work under way, by its name
     steps: tuple = (64, 1024, 8192)  # of a trajectory: the assignment's dt = 5/64 s, and finer
 

@@ -4,15 +4,31 @@ import importlib
 import os
 import signal
 import threading
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
+
+
+class Workers(ProcessPoolExecutor):
+    """A pool of processes that knows when nothing is under way."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.futures = []
+
+    def submit(self, *arguments, **named):
+        self.futures.append(super().submit(*arguments, **named))
+        return self.futures[-1]
+
+    def quiet(self):
+        """Wait until all that was submitted is done: a timing needs the machine for itself."""
+        wait(self.futures)
 
 
 @contextmanager
 def start_workers():
     """Yields a pool of two processes, for `draw` and for scenes that can run side by side."""
-    with ProcessPoolExecutor(2, get_context("spawn"), watch_parent) as pool:
+    with Workers(2, get_context("spawn"), watch_parent) as pool:
         # Ctrl-C is this process's business: the others are started deaf to it
         hearing = signal.signal(signal.SIGINT, signal.SIG_IGN)
         for _ in range(2):
