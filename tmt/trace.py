@@ -9,10 +9,9 @@ import math
 import operator
 from collections import Counter
 from collections.abc import Callable
+from decimal import Decimal
 from numbers import Real
 from typing import NamedTuple
-
-import mpmath
 
 from .space import cos, sin
 
@@ -22,8 +21,8 @@ FOLD = {
     "*": operator.mul,
     "/": operator.truediv,
     "neg": operator.neg,
-    "sin": lambda x: math.sin(x) if isinstance(x, float) else mpmath.sin(x),
-    "cos": lambda x: math.cos(x) if isinstance(x, float) else mpmath.cos(x),
+    "sin": lambda x: math.sin(x) if isinstance(x, float) else sin(x),
+    "cos": lambda x: math.cos(x) if isinstance(x, float) else cos(x),
 }
 
 
@@ -38,7 +37,7 @@ class Code(NamedTuple):
 class Tape:
     """The expressions of one trace, each held once, in an order in which they can be computed.
 
-    number: the type of the model's numbers, float or mpmath.mpf.
+    number: the type of the model's numbers: float, or an exact one that can be made from a float.
     """
 
     def __init__(self, number: Callable = float):
@@ -244,7 +243,7 @@ class Expression:
 
     def apply(self, operation, *values):
         """The expression for an operation; NotImplemented if another kind of scalar takes part, which then decides."""
-        if all(isinstance(value, (Expression, Real, mpmath.mpf)) for value in values):
+        if all(isinstance(value, (Expression, Real, Decimal)) for value in values):
             return self.tape.apply(operation, *values)
         return NotImplemented
 
