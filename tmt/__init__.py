@@ -155,7 +155,8 @@ def simulate(
         tolerance = 1e-9 if tolerance is None else _positive("tolerance", tolerance, "a number")
         kernels.stepper(model, method)(*paths, dt, tolerance)
     else:
-        in_lanes = runs // kernels.LANES * kernels.LANES if runs * steps >= kernels.WORTH else 0
+        worth = runs * steps >= kernels.WORTH and n <= kernels.TRACED
+        in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
         if in_lanes:
             kernels.lane_stepper(model, method)(*(array[:in_lanes] for array in paths), dt)
         kernels.stepper(model, method)(*(array[in_lanes:] for array in paths), dt)
