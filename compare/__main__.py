@@ -19,6 +19,7 @@ EXPERIMENTS = {
     "gravity": "the torque that holds the arm",
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
     "trajectory": "five seconds of motion, a twin for every integrator",
+    "speed": "time against error: every method, every step, and what to use",
 }
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
@@ -98,18 +99,19 @@ def run(options, command) -> int:
     from .terminal import Terminal
     from .workers import start_workers  # imports are here, so that --help and a wrong word answer at once
 
-    terminal = Terminal()
+    terminal, progress = Terminal(), Terminal(stderr=True)
     path = options.mjcf or ARM_XML
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
         engine = load(path)
         with new_report(options.out) as folder:
-            with start_workers() as workers:
+            with start_workers() as workers, progress.status("imports") as status:
                 from . import report, verdict
                 from .agreement import Setup
 
-                setup = (Setup.quick if options.quick else Setup)(engine, map=workers.map, quiet=workers.quiet)
-                sections = examine(names, setup, folder, terminal, workers)
+                of_run = {"map": workers.map, "quiet": workers.quiet, "tell": status.update}
+                setup = (Setup.quick if options.quick else Setup)(engine, **of_run)
+                sections = examine(names, setup, folder, terminal, workers, status)
             words = verdict.verdict(sections, len(EXPERIMENTS))
             seconds = time.perf_counter() - started
             report.write(folder, sections, report.provenance(command, path, seconds), words)
@@ -124,29 +126,29 @@ def run(options, command) -> int:
     return 0 if verdict.passed(sections) else 1
 
 
-def examine(names, setup, folder, terminal, workers) -> list:
+def examine(names, setup, folder, terminal, workers, status) -> list:
     """The section of each experiment, its figures drawn."""
-    from .terminal import Terminal
     from .verdict import Section
     from .workers import draw
 
     (folder / "figures").mkdir()
     sections, drawings = [], []
-    progress = Terminal(stderr=True)
     modules = {name: importlib.import_module(f".{name}", __package__) for name in names}
     for module in modules.values():
         if hasattr(module, "begin"):
             module.begin(setup)
     for name, module in modules.items():
-        with progress.status(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})"):
-            started = time.perf_counter()
-            result = module.rows(setup)
-            sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, result))
-            drawings.append(workers.submit(draw, name, result, folder / "figures"))
+        setup.tell(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})")
+        started = time.perf_counter()
+        result = module.rows(setup)
+        sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, result))
+        drawings.append(workers.submit(draw, name, result, folder / "figures"))
+        status.stop()
         tell(terminal, sections[-1], time.perf_counter() - started)
-    with progress.status("figures"):
-        for section, drawn in zip(sections, drawings):
-            section.figures = drawn.result()
+        status.start()
+    setup.tell("figures")
+    for section, drawn in zip(sections, drawings):
+        section.figures = drawn.result()
     return sections
 
 

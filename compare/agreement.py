@@ -68,7 +68,8 @@ class Result:
     checks: list = field(default_factory=list)
     curves: dict = field(default_factory=dict)
     notes: list = field(default_factory=list)  # sentences for the report
-    shown: list | None = None  # columns of the table in the report, if not all
+    shown: list | None = None  # columns of the table in the report, if not all; none: only in its file
+    tables: dict = field(default_factory=dict)  # further tables by name: lists of rows
 
     def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False) -> Check:
         value = float(value) if np.isfinite(value) else None
@@ -171,8 +172,13 @@ class Setup:
     exact_states: int = 200  # of these, how many are held against the exact values too
     map: Callable = map  # where the scenes of an experiment may run side by side
     quiet: Callable = lambda: None  # waits until nothing runs beside: for timings
+    tell: Callable = lambda text: None  # says how far long work has come
     background: dict = field(default_factory=dict)  # work under way, by its name
     steps: tuple = (64, 1024, 8192)  # of a trajectory: the assignment's dt = 5/64 s, and finer
+
+    @property
+    def is_quick(self) -> bool:
+        return len(self.steps) == 1
 
     @classmethod
     def quick(cls, engine, **more) -> "Setup":

@@ -193,11 +193,15 @@ class Engine:
         """
         shape = np.broadcast_shapes(np.shape(q), np.shape(qd), np.shape(tau))
         starts, run = self.runner(q, qd, tau, dt, steps, integrator)
-        states = np.concatenate([starts[:, None], run()], axis=1)
+        paths = self.path(starts, run(), dt)[1:]
+        return dt * np.arange(steps + 1), *(path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
+
+    def path(self, starts, states, dt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """MuJoCo's time, q and qd of runs (runs, steps + 1, ...), NaN from the moment in which one has diverged."""
+        states = np.concatenate([starts[:, None], states], axis=1)
         ran = np.isfinite(states).all(axis=2) & (np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0)
         states[np.cumsum(~ran, axis=1) > 0] = np.nan
-        paths = states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs]
-        return dt * np.arange(steps + 1), *(path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
+        return states[:, :, 0], states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs]
 
     def runner(self, q, qd, tau, dt, steps, integrator) -> tuple[np.ndarray, Callable]:
         """The first states, and a call that follows the motion from them in MuJoCo's C loop, again and again.

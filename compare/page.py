@@ -23,7 +23,7 @@ INTRO = (
 
 def shown(table, columns=None) -> pd.DataFrame:
     """A table as text, with the digits that a reader needs."""
-    table = table[columns] if columns else table
+    table = table if columns is None else table[columns]
 
     def text(value, digits):
         if isinstance(value, float):
@@ -56,12 +56,24 @@ def markdown(sections, origin, result) -> str:
         lines += [f"## {section.title}", f"*Claim:* {section.claim} **{outcome(section)}**", f"*Bar:* {section.bar}"]
         if len(failed):
             lines += ["**Checks that fail:**", md_table(failed)]
-        lines += [md_table(table), f"All columns: [tables/{section.name}.csv](tables/{section.name}.csv)"]
+        lines += [md_table(table)] if len(table.columns) else []
+        lines += [f"All columns, {len(table)} rows: {link(section.name)}"]
+        for name, rows in section.result.tables.items():
+            lines += [f"**{heading(name)}**", md_table(shown(pd.DataFrame(rows))), f"In full: {link(name)}"]
         lines += [f"- {note}" for note in section.result.notes]
         for name, caption in section.figures:
             lines += [f"![{name}](figures/{name}.png)", caption]
     lines += ["## Where this comes from", md_table(origins(origin))]
     return "\n\n".join(lines).replace("\n\n- ", "\n- ") + "\n"
+
+
+def heading(name) -> str:
+    """A table's name as words."""
+    return name.replace("_", " ").capitalize()
+
+
+def link(name) -> str:
+    return f"[tables/{name}.csv](tables/{name}.csv)"
 
 
 def md_table(table) -> str:
@@ -93,10 +105,10 @@ def page(folder, sections, origin, result) -> str:
             data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
             image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
             body.append(f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>")
-        text = html_table(table)
-        body.append(
-            f"<details><summary>Table, {len(table)} rows</summary>{text}</details>" if len(table) > LONG else text
-        )
+        if len(table.columns):
+            body.append(folded(table, f"Table, {len(table)} rows"))
+        for name, rows in section.result.tables.items():
+            body += [f"<h3>{heading(name)}</h3>", folded(shown(pd.DataFrame(rows)), f"{len(rows)} rows")]
         checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
         body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:
@@ -110,6 +122,12 @@ def page(folder, sections, origin, result) -> str:
         contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),
         body="\n".join(body),
     )
+
+
+def folded(table, summary) -> str:
+    """A table in HTML, folded if it is long."""
+    text = html_table(table)
+    return f"<details><summary>{summary}</summary>{text}</details>" if len(table) > LONG else text
 
 
 def html_table(table, kind="data") -> str:

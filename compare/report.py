@@ -14,6 +14,7 @@ import pandas as pd
 from .agreement import SEED
 from .engine_file import ARM_XML
 from .folder import files
+from .machine import vectors
 from .page import markdown, page
 from .verdict import passed
 
@@ -31,7 +32,7 @@ def provenance(command, model, seconds) -> dict:
         "seconds": round(seconds, 1),
         "seed": SEED,
         "commit": commit(),
-        "cpu": cpu(),
+        "cpu": vectors(),
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
@@ -61,20 +62,15 @@ def commit() -> str | None:
     return told[0] + (" with uncommitted changes" if told[1] else "")
 
 
-def cpu() -> str:
-    """The processor's name."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or "unknown"
-
-
 def write(folder, sections, origin, result) -> None:
     """All files of a report, the figures excepted, into a folder that has those."""
     (folder / "tables").mkdir()
     for section in sections:
-        pd.DataFrame(section.result.rows).to_csv(folder / "tables" / f"{section.name}.csv", index=False)
+        for name, rows in {section.name: section.result.rows, **section.result.tables}.items():
+            table = pd.DataFrame(rows)
+            for column in table.select_dtypes(bool):
+                table[column] = table[column].map({True: "true", False: "false"})
+            table.to_csv(folder / "tables" / f"{name}.csv", index=False)
     checks = [check.record() for section in sections for check in section.result.checks]
     (folder / "report.md").write_text(markdown(sections, origin, result), encoding="utf-8")
     (folder / "index.html").write_text(page(folder, sections, origin, result), encoding="utf-8")

@@ -41,7 +41,7 @@ def begin(setup) -> None:
 
     A quick run takes fewer scenes, and leaves out many digits and the growth of errors.
     """
-    quick = len(setup.steps) == 1
+    quick = setup.is_quick
     scenes = [scene for scene in SCENES if scene.name in QUICK or not quick]
     exact = [scene for scene in scenes if scene.name in EXACT_SCENES and not quick]
     grown = [] if quick else scenes

@@ -157,6 +157,17 @@ def lanes(q, qd, tau, out):
     each(q[full:], qd[full:], tau[full:], out[full:])
 '''
 
+RATE = '''
+
+@njit("float64[::1](float64[:], float64[::1])", cache=CACHE, error_model="numpy")
+def rate(y, tau):
+    """dy/dt of y = (q, qd): the first-order system that solvers of differential equations ask for."""
+    result = np.empty({twice})
+    result[:{n}] = y[{n}:]
+    {rates} = quantity({given})
+    return result
+'''
+
 
 @lru_cache(maxsize=64)
 def stepper(tree, method_name):
@@ -182,7 +193,7 @@ def lane_stepper(tree, method_name):
 def evaluator(tree, quantity, terms=composite.mass_matrix_and_bias, sine="sincos"):
     """Compiled evaluation of many states: a module with `each`, `lanes` (q, qd, tau, out) and `chain`.
 
-    quantity: "forward_dynamics", qdd to out (N, n); or "mass_matrix_and_bias", the rows of the upper triangle of Mbar and
+    quantity: "forward_dynamics", qdd to out (N, n), with `rate(y, tau)` for solvers besides; or "mass_matrix_and_bias", the rows of the upper triangle of Mbar and
     then h, to out (N, n (n + 1) / 2 + n). Arrays are contiguous, q, qd, tau of shape (N, n); rad, s, kg, m, N m.
     terms: the form of the dynamics that is traced; sine: "sincos" or "library_sincos".
     """
@@ -327,7 +338,11 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     sure = '@njit(error_model="numpy")\n' + text.replace("def quantity(", "def by_library(").replace(
         "sincos(", "library_sincos("
     )
-    return "\n\n".join([HEADER + fast, sure, EVALUATE.format(**words)])
+    text = "\n\n".join([HEADER + fast, sure, EVALUATE.format(**words)])
+    if quantity != "forward_dynamics":
+        return text
+    given = sequence(lambda k: f"y[{k}]", 2 * n) + ", " + sequence(lambda k: f"tau[{k}]", n)
+    return text + RATE.format(n=n, twice=2 * n, rates=sequence(lambda k: f"result[{n + k}]", n), given=given)
 
 
 def _inputs(tape, tree):

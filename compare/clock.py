@@ -1,0 +1,22 @@
+"""Timing: what is compared is timed in turns, so that whatever slows the machine down slows all of them."""
+
+import time
+from collections.abc import Callable
+
+ENOUGH = 0.03  # s: what has taken so long in all is timed no more than twice
+LONG = 0.2  # s: what takes so long is timed once; interruptions are short beside it
+WARM = 0.02  # s: a first call that takes longer needs no other before it counts
+
+
+def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
+    """Seconds of each call of each function, at most so many rounds, after one to warm up."""
+    times = [[] for _ in runs]
+    for k in range(rounds + 1):
+        for run, taken in zip(runs, times):
+            if not taken or (len(taken) < 2 and taken[0] < LONG) or sum(taken) < ENOUGH:
+                begin = time.perf_counter()
+                run()
+                taken.append(time.perf_counter() - begin)
+                if k == 0 and taken[0] < WARM:
+                    taken.clear()
+    return times

@@ -1,0 +1,160 @@
+"""What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+
+import tmt
+from tmt import generic, kernels, method
+
+from . import clock, machine
+from .agreement import SEED
+
+STATES = (1000, 1_000_000)
+TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
+FORWARD, TERMS, STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"
+WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
+WAITING, EACH, LANES = "traced kernel, each waits for the last", "traced kernel", "lanes"
+
+
+def costs(engine, quick) -> tuple[list[dict], list[str]]:
+    """The rows of evaluations.csv, and sentences about them."""
+    from .engine_calls import loops
+
+    rng = np.random.default_rng([SEED, 2])
+    most = 10_000 if quick else max(STATES)
+    states = rng.uniform(-3.0, 3.0, (3, most, 3))
+    first = [np.ascontiguousarray(a[0]) for a in states]
+    repeated = {(quantity, name, 1, 1): loop for name, (quantity, loop) in loops(engine, *first).items()}
+    repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(first)}
+    calls = {key: counted(loop) for key, loop in repeated.items()}
+    with ThreadPoolExecutor(2) as pool:
+        for count in STATES[:1] if quick else STATES:
+            for key, run in of_many_states(states[:, :count], pool).items():
+                calls[key] = run, count
+        taken = clock.in_turns([run for run, _ in calls.values()], rounds=5 if quick else 12)
+    nanoseconds = {key: 1e9 * min(t) / count for (key, (_, count)), t in zip(calls.items(), taken)}
+    rows = [
+        dict(zip(("quantity", "implementation", "states", "threads"), key)) | {"ns_per_state": value}
+        for key, value in sorted(nanoseconds.items(), key=lambda item: (item[0][0], -item[1]))
+    ]
+    return rows, told(nanoseconds)
+
+
+def counted(loop) -> tuple[Callable, int]:
+    """A call that does the same so often that it takes a millisecond, and how often."""
+    loop(1)
+    (once,) = clock.in_turns([lambda: loop(4)], 5)
+    count = max(1, int(TAKEN / (min(once) / 4)))
+    return lambda: loop(count), count
+
+
+def of_one_state(state):
+    """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
+    q, qd, tau = state
+    floats = [a.tolist() for a in state]
+    forward = kernels.evaluator(tmt.ARM, FORWARD)
+    literal = kernels.evaluator(tmt.ARM, FORWARD, method.mass_matrix_and_bias, "library_sincos")
+    library = kernels.evaluator(tmt.ARM, FORWARD, sine="library_sincos")
+    terms = kernels.evaluator(tmt.ARM, TERMS)
+    tree, out, M, h = generic.arrays(tmt.ARM), np.empty(3), np.empty((3, 3)), np.empty(3)
+    path = np.zeros((2, 1, 10_000, 3))
+    path[:, 0, 0] = q, qd
+    run = kernels.stepper(tmt.ARM, "rk4")
+
+    def plain(count):
+        for _ in range(count):
+            method.acceleration(tmt.ARM, *floats)
+
+    def steps(count):
+        run(path[0, :, : count + 1].copy(), path[1, :, : count + 1].copy(), tau[None], 1e-4)
+
+    yield FORWARD, "literal, Python floats", plain
+    yield FORWARD, "generic compiled loop", lambda count: looped()[0](tree, q, qd, tau, out, count)
+    yield TERMS, "generic compiled loop", lambda count: looped()[1](tree, q, qd, M, h, count)
+    yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
+    yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
+    yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)
+    yield TERMS, WAITING, lambda count: terms.chain(q, qd, tau, count)
+    yield STEP, EACH, steps
+
+
+@lru_cache
+def looped():
+    """Compiled loops over the generic functions."""
+
+    @njit
+    def forward(tree, q, qd, tau, out, count):
+        for _ in range(count):
+            generic.forward_dynamics(tree, q, qd, tau, out)
+
+    @njit
+    def terms(tree, q, qd, M, h, count):
+        for _ in range(count):
+            generic.mass_matrix_and_bias(tree, q, qd, M, h)
+
+    return forward, terms
+
+
+def of_many_states(states, pool) -> dict:
+    """{(quantity, implementation, states, threads): run} for many states of shape (3, N, 3); memory is bounded by them."""
+    q, qd, tau = (np.ascontiguousarray(a) for a in states)
+    count = len(q)
+    runs = {}
+    for quantity, columns in ((FORWARD, 3), (TERMS, 9)):
+        compiled, out = kernels.evaluator(tmt.ARM, quantity), np.empty((count, columns))
+        halves = [slice(None, count // 2), slice(count // 2, None)]
+
+        def both(compiled=compiled, out=out, halves=halves):
+            list(pool.map(lambda part: compiled.lanes(q[part], qd[part], tau[part], out[part]), halves))
+
+        runs[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
+        runs[quantity, LANES, count, 1] = lambda compiled=compiled, out=out: compiled.lanes(q, qd, tau, out)
+        runs[quantity, LANES, count, 2] = both
+    if count <= 1000:
+        runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.acceleration(q, qd, tau)
+    in_lanes = count // kernels.LANES * kernels.LANES
+    paths = np.zeros((2, in_lanes, 2, 3))
+    paths[:, :, 0] = q[:in_lanes], qd[:in_lanes]
+    step, step_lanes = kernels.stepper(tmt.ARM, "rk4"), kernels.lane_stepper(tmt.ARM, "rk4")
+    runs[STEP, EACH, count, 1] = lambda: step(*paths, tau[:in_lanes], 1e-3)
+    runs[STEP, LANES, count, 1] = lambda: step_lanes(*paths, tau[:in_lanes], 1e-3)
+    return runs
+
+
+def told(ns) -> list[str]:
+    """The ratios in words."""
+    many = max(states for _, _, states, _ in ns)
+    lanes = min(ns[FORWARD, LANES, states, 1] for states in {key[2] for key in ns} - {1})
+    sentences = [f"Processor: {machine.vectors()}."]
+    if (FORWARD, WHOLE, 1, 1) in ns:
+        whole, equal, step = (
+            ns[key, name, 1, 1] for key, name in ((FORWARD, WHOLE), (FORWARD, EQUAL), (STEP, MJ_STEP))
+        )
+        one, apart = ns[FORWARD, WAITING, 1, 1], ns[FORWARD, EACH, 1000, 1]
+        sentences.append(
+            f"Forward dynamics of the arm: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work {equal:.0f} ns, "
+            f"the kernel {one:.1f} ns where each evaluation waits for the last ({whole / one:.0f} and {equal / one:.0f} times "
+            f"less), {apart:.1f} ns where they are independent ({whole / apart:.0f} and {equal / apart:.0f} times less), in lanes "
+            f"{lanes:.1f} ns a state ({whole / lanes:.0f} times less)."
+        )
+        kernel = ns[STEP, EACH, 1, 1]
+        sentences.append(
+            f"A step of RK4: mj_step {step:.0f} ns, the kernel {kernel:.0f} ns ({step / kernel:.0f} times less), in lanes "
+            f"{ns[STEP, LANES, many, 1]:.0f} ns a run."
+        )
+    else:
+        sentences.append(
+            "MuJoCo's library was not found beside its package: its calls were not timed in compiled loops."
+        )
+    literal, composite = (
+        kernels.slope_source(tmt.ARM, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())
+    )
+    sentences.append(
+        f"Straight-line code of the literal method has {literal} operations, that of the composite form {composite}; the kernel "
+        "is made for this one arm, MuJoCo for any model."
+    )
+    return sentences

@@ -1,0 +1,145 @@
+"""The runs with many digits that errors are measured against: a table, made anew where a number of the model has changed.
+
+`python -m compare.reference` remakes reference.csv. How many digits are right is seen by halving the step: each run stands in
+the table with the largest difference from a run with half as many steps, which bounds the error of the coarser of the two.
+"""
+
+import csv
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from decimal import Decimal
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tmt.cache import cache_folder
+from tmt.reference_run import trajectory
+
+from .scenes import SCENES, Scene
+
+TABLE = Path(__file__).with_name("reference.csv")
+RECORDS = 64  # of a run, and its start
+STEPS = {"zero, free": 1024, "ball catch, free": 2048, "bent, free": 512, "bent, damped": 512}
+STATE = [f"{name}_{unit}" for unit in ("rad", "rad_per_s") for name in ("alpha", "beta", "gamma")]
+COLUMNS = ["scene", "key", "steps", "halving_difference", "t_s", *STATE]
+
+
+class Reference(NamedTuple):
+    """One run: every number as the sum of two doubles."""
+
+    t: np.ndarray  # (65,) s
+    high: np.ndarray  # (65, 6) rad, rad/s
+    low: np.ndarray  # (65, 6)
+    halving: float  # largest difference from the run with half the steps
+    steps: int
+
+    def error(self, q: np.ndarray) -> np.ndarray:
+        """The largest error of the angles q (65, 3) at each time, rad, (65,)."""
+        return np.abs((q - self.high[:, :3]) - self.low[:, :3]).max(axis=1)
+
+
+def key(scene: Scene) -> str:
+    """A hash of every number on which the motion depends."""
+    numbers = scene.model, *(a.tolist() for a in scene.start), scene.tau.tolist(), scene.duration
+    return hashlib.sha256(repr(numbers).encode()).hexdigest()[:16]
+
+
+def references(map: Callable = map, tell: Callable = print) -> dict[str, Reference]:
+    """Each scene's reference: from the committed table, else from the user's cache folder, else computed and kept there."""
+    scenes = [scene for scene in SCENES if scene.name in STEPS]
+    rows = read(TABLE)
+    missing = [scene for scene in scenes if key(scene) not in rows]
+    kept = {scene.name: cache_folder() / f"reference_{key(scene)}.csv" for scene in missing}
+    for scene in missing:
+        rows |= read(kept[scene.name])
+    missing = [scene for scene in missing if key(scene) not in rows]
+    for scene, made in zip(missing, remade(missing, map, tell)):
+        rows[key(scene)] = made
+        with suppress(OSError):  # a folder that cannot be written only costs time
+            write(kept[scene.name], made)
+    return {scene.name: reference(rows[key(scene)]) for scene in scenes}
+
+
+def remade(scenes: list[Scene], map: Callable, tell: Callable) -> list[list[dict]]:
+    """The rows of each scene, computed: two runs a scene, one with half the steps."""
+    runs = [(scene, STEPS[scene.name] // part) for scene in scenes for part in (2, 1)]
+    paths = []
+    for path in map(run, runs):
+        paths.append(path)
+        tell(f"runs with many digits: {len(paths)} of {len(runs)}")
+    result = []
+    for scene, coarse, fine in zip(scenes, paths[::2], paths[1::2]):
+        difference = float(abs(fine - coarse).max())
+        about = {
+            "scene": scene.name,
+            "key": key(scene),
+            "steps": STEPS[scene.name],
+            "halving_difference": f"{difference:.2e}",
+        }
+        times = np.linspace(0.0, scene.duration, RECORDS + 1)
+        result.append(
+            [
+                about | {"t_s": t} | dict(zip(STATE, (f"{v:.32g}" if v else "0" for v in row)))
+                for t, row in zip(times, fine)
+            ]
+        )
+    return result
+
+
+def run(job) -> np.ndarray:
+    """One run with many digits."""
+    scene, steps = job
+    return trajectory(scene.model, *scene.start, scene.tau, scene.duration, RECORDS, steps)
+
+
+def reference(rows) -> Reference:
+    """The rows of one scene as numbers."""
+    exact = np.array([[Decimal(row[name]) for name in STATE] for row in rows])
+    high = exact.astype(float)
+    low = np.array([[float(d - Decimal(h)) for d, h in zip(*pair)] for pair in zip(exact, high.tolist())])
+    times = np.array([float(row["t_s"]) for row in rows])
+    return Reference(times, high, low, float(rows[0]["halving_difference"]), int(rows[0]["steps"]))
+
+
+def read(path) -> dict[str, list[dict]]:
+    """The rows of a table by their key; nothing if it is not there, or is not whole."""
+    if not path.exists():
+        return {}
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    by_key = {row["key"]: [r for r in rows if r["key"] == row["key"]] for row in rows}
+    return {name: of_key for name, of_key in by_key.items() if len(of_key) == RECORDS + 1}
+
+
+def write(path, rows) -> None:
+    """The rows as a table, written aside and moved."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".new", delete=False, newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    os.chmod(file.name, 0o644)
+    os.replace(file.name, path)
+
+
+def main() -> None:
+    """Remake the committed table."""
+    from .terminal import Terminal
+    from .workers import start_workers
+
+    progress = Terminal(stderr=True)
+    scenes = [scene for scene in SCENES if scene.name in STEPS]
+    with start_workers() as workers, progress.status("runs with many digits") as status:
+        tables = remade(scenes, workers.map, status.update)
+    write(TABLE, [row for rows in tables for row in rows])
+    for rows in tables:
+        print(f"{rows[0]['scene']}: {rows[0]['steps']} steps, {rows[0]['halving_difference']} from half as many")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

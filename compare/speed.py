@@ -1,0 +1,173 @@
+"""Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
+
+from functools import partial
+
+import numpy as np
+
+import tmt
+from tmt.methods import METHODS
+
+from . import clock, evaluations
+from .advice import EARLY, advice, orders
+from .agreement import EPS, FACTOR, Result
+from .band import growth
+from .competitors import competitors
+from .motion import TWINS, diverged_at
+from .reference import references
+from .scenes import SCENES
+
+TITLE = "Speed against accuracy"
+CLAIM = (
+    "Which integrator and which step give so many correct digits in the least time: every integrator of MuJoCo, every method "
+    "of tmt, SciPy's on the same compiled equations, and heyoka's Taylor method where it is installed. What is compared is "
+    "code made for this one model (tmt, SciPy, heyoka) against an engine made for any model (MuJoCo): the ratios say what "
+    "that costs, not that one is better. Timings make no checks; the errors do."
+)
+BAR = (
+    "Errors are the largest of the angles on the grid of 65 times, against runs with more than 20 digits (shown by halving "
+    "their step). Checked: those digits; that each method of fixed step has its order, within 0.15, in the error of the first "
+    "second, which falls regularly (order 8: at least 7; rounding ends it too soon for more); that MuJoCo and its twin make the same error where rounding plays no part; and that the smallest "
+    "errors are explained by rounding, at most 64 eps times the growth of a small difference along the scene."
+)
+GOOD_DIGITS = 1e-20  # rad, rad/s
+SAME = 1e-3  # twins: difference of their errors, relative
+QUICK_SCENES = ("bent, free",)
+COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluations", "seconds", "error_rad", "worst_error_rad",
+           "energy_error_J", "diverged"]  # fmt: skip
+
+
+def begin(setup) -> None:
+    """Measure all errors beside other work: they are no timings."""
+    known = references(setup.map, setup.tell)
+    scenes = [scene for scene in SCENES if scene.name in known and (scene.name in QUICK_SCENES or not setup.is_quick)]
+    judged = setup.map(partial(judge, engine=setup.engine, known=known, quick=setup.is_quick), scenes)
+    setup.background["speed"] = known, scenes, judged
+
+
+def rows(setup) -> Result:
+    """Errors, times, orders, floors, and what follows for a choice."""
+    if "speed" not in setup.background:
+        begin(setup)
+    known, scenes, judged = setup.background.pop("speed")
+    result = Result("speed", shown=[])
+    floors = {}
+    for scene, (of_scene, floors[scene.name]) in zip(scenes, judged):
+        result.rows += of_scene
+        digits = known[scene.name].halving
+        result.check(scene.name, "reference, from half as many steps", digits, GOOD_DIGITS, "rad or rad/s")
+    setup.quiet()  # nothing else may run beside a timing
+    spread = []
+    for scene in scenes:
+        setup.tell(f"speed: timing {scene.name}")
+        spread += take_times(result.rows, scene, setup)
+    fixed = [(c.engine, c.method, c.order) for c in competitors(setup.engine) if c.order]
+    result.tables["speed_orders"] = orders(result, [s.name for s in scenes], fixed)
+    twins(result)
+    rounding(result, floors)
+    result.tables["what_should_i_use"] = advice(result.rows, [s.name for s in scenes], floors)
+    setup.tell("speed: one evaluation")
+    result.tables["evaluations"], told = evaluations.costs(setup.engine, setup.is_quick)
+    result.notes += told
+    result.notes.append(
+        "Every time is the least of up to five runs (one, where it takes longer than 0.2 s), in turns with all others of its scene; the "
+        f"median of a setting's runs is {np.median(spread) - 1:.1%} above its least, for one in ten more than "
+        f"{np.quantile(spread, 0.9) - 1:.0%}. Errors come from runs of their own."
+    )
+    result.curves["floors"] = floors
+    result.rows = [{name: row[name] for name in COLUMNS} for row in result.rows]
+    return result
+
+
+def judge(scene, engine, known, quick) -> tuple[list[dict], float]:
+    """The rows of one scene without times; and the error that rounding leaves in it, rad."""
+    reference = known[scene.name]
+    states = reference.high[:, :3], reference.high[:, 3:]
+    energy = tmt.energy(*states, scene.model)
+    found = []
+    for place, competitor in enumerate(competitors(engine)):
+        best, last = np.inf, 0
+        for setting in competitor.settings[:5] if quick else competitor.settings:
+            run, read = competitor.prepare(scene, setting)
+            with np.errstate(all="ignore"):
+                outcome = read(run())
+                ended = diverged_at(scene, reference.t, outcome.q, outcome.qd) is not None
+                error = reference.error(outcome.q)
+                off = np.abs(tmt.energy(outcome.q, outcome.qd, scene.model) - energy).max() if not ended else None
+            found.append({
+                "place": (place, setting), "early": float(error[reference.t <= EARLY].max()), "scene": scene.name, "engine": competitor.engine, "method": competitor.method,
+                "dt_s": scene.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
+                "steps": outcome.steps, "evaluations": outcome.evaluations, "seconds": None,
+                "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
+                "energy_error_J": None if ended else float(off), "diverged": ended,
+            })  # fmt: skip
+            # one more run that cost more and gained nothing shows that rounding has taken over
+            work = outcome.evaluations or outcome.steps
+            if best < 1e-6 and work > 1.2 * last and not error.max() < 0.7 * best:
+                break
+            best, last = best if ended else min(best, error.max()), work
+    return found, floor(scene)
+
+
+def floor(scene) -> float:
+    """What rounding leaves of the angles: eps times the largest growth of a small difference up to each time, rad."""
+    steps = 1024
+    dt = scene.duration / steps
+    _, q, qd = tmt.simulate(*scene.start, scene.tau, dt, steps, "rk4", scene.model)
+    return float(
+        EPS * 10.0 ** growth(METHODS["rk4"], scene.model, q, qd, scene.tau, dt, 16).max() * max(1.0, np.abs(q).max())
+    )
+
+
+def take_times(table, scene, setup) -> list[float]:
+    """Fill in the seconds of one scene, all its settings in turns; the median of each over its least."""
+    field = competitors(setup.engine)
+    timed = []
+    for row in table:
+        if row["scene"] == scene.name and not row["diverged"]:
+            place, setting = row["place"]
+            timed.append((row, field[place].prepare(scene, setting)[0]))
+    times = clock.in_turns([run for _, run in timed], rounds=2 if setup.is_quick else 5)
+    for (row, _), of_row in zip(timed, times):
+        row["seconds"] = min(of_row)
+    return [float(np.median(of_row)) / min(of_row) for of_row in times]
+
+
+def twins(result) -> None:
+    """MuJoCo's integrators and their twins make the same error, as long as it is far above that of rounding."""
+    by_place = {(row["scene"], row["engine"], row["method"], row["dt_s"]): row for row in result.rows}
+    for (scene, engine, method, dt), row in by_place.items():
+        twin = by_place.get((scene, "tmt", TWINS.get(method), dt)) if engine == "mujoco" else None
+        if twin and not row["diverged"] and not twin["diverged"] and 1e-8 < row["worst_error_rad"] < 0.1:
+            difference = abs(row["worst_error_rad"] / twin["worst_error_rad"] - 1.0)
+            where = f"{scene}, {method}, dt = {dt:.3g} s"
+            result.check(where, "error over that of the twin, less 1", difference, SAME, "", rounding=False)
+
+
+def rounding(result, floors) -> None:
+    """The smallest error of the exact methods of each party is that of rounding."""
+    for scene, left in floors.items():
+        for engine, method in (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")):
+            errors = [
+                row["worst_error_rad"] for row in result.rows
+                if (row["scene"], row["engine"], row["method"]) == (scene, engine, method) and not row["diverged"]
+            ]  # fmt: skip
+            least = min(errors)
+            if errors.index(least) < len(errors) - 1:  # rounding took over before the steps ended
+                result.check(
+                    scene, f"smallest error of {engine}'s {method}", least, FACTOR * left, "rad", rounding=True
+                )
+    told = "; ".join(f"{scene}: {left:.1e} rad" for scene, left in floors.items())
+    result.notes.append(
+        f"What rounding leaves, eps times the growth of a small difference up to the end: {told}. Below that no double can go, "
+        "whatever the method; a smaller step then only adds roundings."
+    )
+
+
+def figures(result):
+    """Error against time, against evaluations, and energy against time."""
+    from . import draw_speed
+
+    yield from draw_speed.times(result)
+    yield draw_speed.evaluations(result)
+    yield draw_speed.energy(result)
+    yield draw_speed.cost_of_one(result)
