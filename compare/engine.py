@@ -40,14 +40,16 @@ class Engine:
     with the hinge named in `carriers`; its axes are those that coincide with the world's at q = 0.
     """
 
-    def __init__(self, model, hinges, carriers):
+    def __init__(self, model, hinges, carriers, source=None, bodies=None, locked=None):
         self.model, self.data = model, mujoco.MjData(model)
+        self.source, self.locked = source, locked or {}  # what the model was read from; {hinge: rad}, taken out of it
         self.hinges, self.carriers = list(hinges), list(carriers)
         joints = [model.joint(name) for name in hinges]
         self.joints = np.array([joint.id for joint in joints])
         self.qpos = np.array([joint.qposadr[0] for joint in joints])
         self.dofs = np.array([joint.dofadr[0] for joint in joints])
-        self.bodies = [int(model.jnt_bodyid[self.joints[self.hinges.index(name)]]) for name in carriers]
+        moved_by = model.jnt_bodyid[self.joints]
+        self.bodies = bodies or [int(moved_by[self.hinges.index(name)]) for name in carriers]
         self._at(np.zeros(len(joints)))
         self.zero_axes = self._turns(self.data.xmat)
 
@@ -97,7 +99,23 @@ class Engine:
         if gravity is not None:
             other.opt.gravity[:] = gravity
         other.dof_damping[:] += damping
-        return Engine(other, self.hinges, self.carriers)
+        return Engine(other, self.hinges, self.carriers, self.source, self.bodies, self.locked)
+
+    def lock(self, angles: dict) -> "Engine":
+        """The same model without the hinges that are named in `angles`, {name: rad}: they stay there, at rest.
+
+        The file is read again and compiled without them; gravity and damping are those of this engine.
+        """
+        from .engine_lock import locked_model
+
+        if not angles:
+            return self
+        locked = self.locked | angles
+        hinges = [name for name in self.hinges if name not in angles]
+        other = Engine(locked_model(self.source, locked), hinges, self.carriers, self.source, self.bodies, locked)
+        other.model.opt.gravity[:] = self.model.opt.gravity
+        other.model.dof_damping[other.dofs] = self.model.dof_damping[[self.dofs[self.hinges.index(h)] for h in hinges]]
+        return other
 
     # quantities at states
 
