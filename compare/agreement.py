@@ -68,6 +68,7 @@ class Result:
     checks: list = field(default_factory=list)
     curves: dict = field(default_factory=dict)
     notes: list = field(default_factory=list)  # sentences for the report
+    tables: dict = field(default_factory=dict)  # further tables: name -> list of rows
     shown: list | None = None  # columns of the table in the report, if not all
 
     def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False) -> Check:
