@@ -8,7 +8,7 @@ from . import engine_cost
 from .scenes import SCENES
 
 STEPS = 512  # of a timed run
-ROUNDS = 25
+ROUNDS = 40
 QUICK_ROUNDS = 3
 INTEGRATORS = ("Euler", "RK4")
 SETTLED = 0.5  # N m s/rad, with which the arm comes to rest on the floor

@@ -82,21 +82,24 @@ def run(result, scene):
 def drift(result):
     """Drift of energy and momentum against the step size, both parties."""
     drifts = result.curves["drift"]
-    fig = Figure(figsize=(WIDTH, 3.1), layout="constrained")
-    axes = fig.subplots(1, len(drifts), sharex=True, sharey=True, squeeze=False)[0]
-    for ax, ((scene, quantity, unit), of_scene) in zip(axes, drifts.items()):
+    lines = -(-len(drifts) // 3)
+    fig = Figure(figsize=(WIDTH, 0.8 + 1.8 * lines), layout="constrained")
+    axes = fig.subplots(lines, 3, sharex=True, sharey=True, squeeze=False)
+    for ax in axes.flat[len(drifts) :]:
+        ax.set_visible(False)
+    for ax, ((scene, quantity, unit), of_scene) in zip(axes.flat, drifts.items()):
         for integrator, parties in of_scene.items():
             colour, dash = DASHES[integrator]
             dt = DRIFT / np.array(DRIFT_STEPS[integrator])
             ax.loglog(dt, parties["TMT"], dash, color=colour, label=f"{integrator}, TMT")
             label = "MuJoCo" if integrator == "Euler" else None
             ax.loglog(dt, parties["MuJoCo"], "o", mfc="none", color=colour, label=label)
-        ax.set_title(f"{scene},\n{quantity}, {unit}", fontsize=8)
+        ax.set_title(f"{scene}: {quantity}, {unit}", fontsize=8)
         ax.set_xticks([2e-4, 1e-3, 4e-3], ["2e-4", "1e-3", "4e-3"])
         ax.minorticks_off()
-    axes[0].set_ylabel("largest drift in 1 s")
+    fig.supylabel("largest drift in 1 s", fontsize=9)
     fig.supxlabel("dt, s", fontsize=9)
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     worst = {
         integrator: max(
             of_scene[integrator]["TMT"][-1] for (_, quantity, _), of_scene in drifts.items() if quantity == "energy"

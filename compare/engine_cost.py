@@ -13,7 +13,8 @@ STAGES = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # of a step, that the
 RADIUS = 0.03  # m, of the capsules
 FAR, NEAR = -2.0, -0.4  # m, height of a floor that the arm cannot reach, and of one that it falls on
 NOTHING = "nothing (minimal)"
-CONTACT = "default flags, capsules, floor in reach"
+AGAIN = "nothing, timed again"
+CONTACT = "default flags + capsules + floor in reach"
 
 
 def with_additions(engine) -> dict:
@@ -51,6 +52,7 @@ def with_additions(engine) -> dict:
 
     edits = {
         NOTHING: lambda spec: None,
+        AGAIN: lambda spec: None,
         "two capsules": capsules,
         "a floor": floor,
         "contact stage": lambda spec: stage(spec, "contact"),
@@ -59,8 +61,8 @@ def with_additions(engine) -> dict:
         f"{2 * len(engine.hinges)} sensors": sensors,
         "a motor": motor,
         "default flags": default,
-        "default flags, capsules": default_with(capsules),
-        "default flags, capsules, floor out of reach": default_with(capsules, floor),
+        "default flags + capsules": default_with(capsules),
+        "default flags + capsules + floor out of reach": default_with(capsules, floor),
         CONTACT: default_with(capsules, lambda spec: floor(spec, NEAR)),
     }
     return {name: edited(engine, edit) for name, edit in edits.items()}

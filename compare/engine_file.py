@@ -49,5 +49,7 @@ def check_hinges(model, source, hinges, carriers) -> Engine:
     kinds = [mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower() for j in range(model.njnt)]
     if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
         found = ", ".join(f"{name or 'unnamed'} ({kind})" for name, kind in zip(names, kinds)) or "none"
-        raise ModelError(f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected")
+        raise ModelError(
+            f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected"
+        )
     return Engine(model, hinges, carriers, source)

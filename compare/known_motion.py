@@ -7,14 +7,14 @@ from tmt.methods import METHODS
 from tmt.reference import distance
 
 from .agreement import EPS, FACTOR
+from .cost import INTEGRATORS
 from .exact_motion import exact_swing, modes, pendulum, small_oscillation, swing
+from .motion import ORDER_MARGIN, TWINS
 from .scenes import SCENES, posture
 
-METHOD_OF = {"rk4": "RK4", "semi_implicit_euler": "Euler"}  # of tmt: of MuJoCo
 SWINGS = (256, 512, 1024, 2048, 4096, 8192)  # steps
 AMPLITUDES = (0.16, 0.08, 0.04, 0.02, 0.01)  # rad, each half of the one before
 FINE = 8192  # steps, at which the error of RK4 is far below that of the linear modes
-ORDER_MARGIN = 0.15
 
 
 def swings(result, engine) -> None:
@@ -30,23 +30,23 @@ def swings(result, engine) -> None:
     bar = FACTOR * EPS * (np.abs(exact).max() + fastest * scene.duration)
     result.check(scene.name, "elliptic function, scipy to 50 digits", off.max(), bar, "rad", rounding=True)
     errors = {}
-    for method, integrator in METHOD_OF.items():
+    for integrator in INTEGRATORS:
         for steps in SWINGS:
             dt, every = scene.duration / steps, steps // SWINGS[0]
-            _, ours, _ = tmt.simulate(*scene.start, scene.tau, dt, steps, method, scene.model)
+            _, ours, _ = tmt.simulate(*scene.start, scene.tau, dt, steps, TWINS[integrator], scene.model)
             _, theirs, _ = scene.engine(engine).trajectory(*scene.start, scene.tau, dt, steps, integrator)
             for party, path in (("TMT", ours), ("MuJoCo", theirs)):
                 error = np.abs(path[::every, 0] - exact).max()
-                errors.setdefault((party, method), []).append(float(error))
+                errors.setdefault((party, integrator), []).append(float(error))
                 if steps == 1024:
-                    result.curves.setdefault("apart", {})[scene.name, party, method] = float(error)
-    for (party, method), values in errors.items():
-        order = METHODS[method].order
-        where = f"{scene.name}, {METHOD_OF[method]}, {party}"
+                    result.curves["apart"][scene.name, party, integrator] = float(error)
+    for (party, integrator), values in errors.items():
+        order = METHODS[TWINS[integrator]].order
+        where = f"{scene.name}, {integrator}, {party}"
         off = abs(np.log2(values[-2] / values[-1]) - order)
         result.check(where, f"order of the error against the elliptic function, from {order}", off, ORDER_MARGIN, "")
     result.curves["swing"] = {"dt": scene.duration / np.array(SWINGS), "errors": errors}
-    best = errors["TMT", "rk4"][-1], errors["MuJoCo", "rk4"][-1]
+    best = errors["TMT", "RK4"][-1], errors["MuJoCo", "RK4"][-1]
     result.notes.append(
         f"The elbow alone swings as a physical pendulum, small swings at {numbers[1]:.4f} rad/s. With {SWINGS[-1]} steps of RK4 "
         f"TMT is at most {best[0]:.2e} rad from the elliptic function and MuJoCo {best[1]:.2e} rad, in five seconds."

@@ -28,7 +28,9 @@ class Scene:
 
     name: str
     posture: str | tuple  # of POSTURES, or three angles in deg
-    torque: str | tuple  # "free": none; "hold": TMT's gravity balance at the start, given to both engines; or three, N m
+    torque: (
+        str | tuple
+    )  # "free": none; "hold": TMT's gravity balance at the start, given to both engines; or three, N m
     speed: tuple = (0.0, 0.0, 0.0)  # deg/s at the start
     damping: float = 0.0  # N m s/rad, of every hinge
     gravity: bool = True

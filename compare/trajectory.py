@@ -26,10 +26,10 @@ BAR = (
     "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
     "the sum of the absolute terms of the force, and 8 eps of the sums of the step. Open loop: a band computed along the "
     "run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's own "
-    "steps. Judged at the states of the coarsest step while the band of the angles is below 1e-3 rad and no run has diverged; each scene "
-    "states how long that must be. A free run must move by 0.1 rad, and the parties must not give the same bits. A run has "
-    "diverged if it stops, is not finite, or has gained more energy than its bound: the arm's whole potential range and "
-    "the kinetic energy at the start. Parties that diverge while the band is narrow must do so at the same step."
+    "steps. Judged at the states of the coarsest step while the band of the angles is below 1e-3 rad and no run has diverged; "
+    "each scene states how long that must be. A free run must move by 0.1 rad, and the parties must not give the same bits. A "
+    "run has diverged if it stops, is not finite, or has gained more energy than its bound: the arm's whole potential range "
+    "and the kinetic energy at the start. Parties that diverge while the band is narrow must do so at the same step."
 )
 MOVES = 0.1  # rad: a free run that moves less shows nothing
 QUICK = ("ball catch, free", "bent, free", "ball catch, held", "bent, held")  # the scenes of a quick run
