@@ -7,9 +7,8 @@ import numpy as np
 from . import engine_cost
 from .scenes import SCENES
 
-STEPS = 512  # of a timed run
-ROUNDS = 40
-QUICK_ROUNDS = 3
+TIMED = 256  # steps of a timed run: short enough to pass between the interruptions of a machine that is in use
+ROUNDS, QUICK_ROUNDS = 80, 8  # of the timing
 INTEGRATORS = ("Euler", "RK4")
 SETTLED = 0.5  # N m s/rad, with which the arm comes to rest on the floor
 
@@ -35,7 +34,7 @@ def costs(result, setup) -> None:
     _, *rest = on_floor.trajectory(*scene.start, scene.tau, dt, steps, "Euler")
     rest = [path[-1] for path in rest]
     runs = {
-        (name, integrator): engine_cost.run(engine, *rest, scene.tau, dt, STEPS, integrator)
+        (name, integrator): engine_cost.run(engine, *rest, scene.tau, dt, TIMED, integrator)
         for name, engine in engines.items()
         for integrator in INTEGRATORS
     }
@@ -54,9 +53,9 @@ def costs(result, setup) -> None:
                 {
                     "added": name,
                     "integrator": integrator,
-                    "ns_per_step": 1e9 * seconds[name, integrator] / STEPS,
+                    "ns_per_step": 1e9 * seconds[name, integrator] / TIMED,
                     "ratio": seconds[name, integrator] / seconds[engine_cost.NOTHING, integrator],
-                    "contacts_per_step": engine_cost.contacts(engines[name], *rest, scene.tau, dt, STEPS, integrator),
+                    "contacts_per_step": engine_cost.contacts(engines[name], *rest, scene.tau, dt, TIMED, integrator),
                     "same_bits": same,
                     "max_difference_rad": float(apart) if np.isfinite(apart) else None,
                 }

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
-from mujoco.rollout import rollout
+from mujoco.rollout import Rollout
 
 from .engine import FLAGS, INTEGRATORS, Engine
 from .engine_lock import read
@@ -96,8 +96,10 @@ def run(engine, q, qd, tau, dt, steps, integrator) -> Callable:
     torque = np.zeros((1, steps, model.nv))
     torque[..., engine.dofs] = tau
     states = np.zeros((1, steps, start.size))
-    options = {"control_spec": int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), "state": states, "nstep": steps}
-    return lambda: rollout([model], [data], start, torque, skip_checks=True, **options)
+    sensors = np.zeros((1, steps, model.nsensordata))
+    options = {"control_spec": int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), "skip_checks": True, "nstep": steps}
+    loop = Rollout(nthread=0)  # in this thread
+    return lambda: loop.rollout([model], [data], start, torque, state=states, sensordata=sensors, **options)
 
 
 def prepared(engine, q, qd, dt, integrator) -> tuple:

@@ -5,16 +5,17 @@ import dataclasses
 import numpy as np
 
 import tmt
-from tmt.kernels import slope_source, stepper
+from tmt.kernels import stepper
 from tmt.methods import METHODS
 
 from . import engine_cost, known_motion, sub_blocks
 from .agreement import Result
 from .band import NARROW, band
-from .cost import INTEGRATORS, costs, fastest
+from .cost import INTEGRATORS, QUICK_ROUNDS, ROUNDS, TIMED, costs, fastest
 from .motion import TWINS, farthest, step
 from .scenes import HINGES, SCENES
 from .smallest import needed, reduced
+from .sub_blocks import operations
 
 TITLE = "Reduction: no more model than a scene needs"
 CLAIM = (
@@ -31,9 +32,8 @@ BAR = (
     "fall with the step at the method's order, and with the square of the amplitude where the solution is linear. Additions "
     "that exert no force leave the same bits. Timings are no checks."
 )
-STEPS = 1024  # of a run that is timed and compared
+STEPS = 1024  # of a run that is compared
 EVERY = 16  # steps, at which the band is taken
-ROUNDS, QUICK_ROUNDS = 25, 3  # of the timing
 MOVES = 0.1  # rad: a run without a torque that holds shows nothing if it moves less
 
 
@@ -136,7 +136,7 @@ def timed(result, models, engine, rounds) -> None:
     for name, scene in models:
         for integrator in INTEGRATORS if scene else ():
             calls[name, scene.hinges, "TMT", integrator] = tmt_run(scene, TWINS[integrator])
-            arguments = *scene.start, scene.tau, scene.duration / STEPS, STEPS, integrator
+            arguments = *scene.start, scene.tau, scene.duration / STEPS, TIMED, integrator
             calls[name, scene.hinges, "MuJoCo", integrator] = engine_cost.run(scene.engine(engine), *arguments)
     seconds = fastest(calls, rounds)
     for name, scene in models:
@@ -144,7 +144,7 @@ def timed(result, models, engine, rounds) -> None:
         for party in ("TMT", "MuJoCo"):
             for integrator in INTEGRATORS:
                 taken = seconds.get((name, hinges, party, integrator))
-                count = slope_source(scene.model, TWINS[integrator])[1] if scene else 0
+                count = operations(scene.model, TWINS[integrator]) if scene else 0
                 apart = None if hinges == HINGES else result.curves["apart"].get((name, party, integrator))
                 result.rows.append(
                     {
@@ -154,7 +154,7 @@ def timed(result, models, engine, rounds) -> None:
                         "integrator": integrator,
                         "nv": len(hinges),
                         "operations": count if party == "TMT" else None,
-                        "ns_per_step": 1e9 * taken / STEPS if taken else None,
+                        "ns_per_step": 1e9 * taken / TIMED if taken else None,
                         "speedup": seconds[name, HINGES, party, integrator] / taken if taken else None,
                         "max_difference_rad": apart,
                     }
@@ -163,7 +163,7 @@ def timed(result, models, engine, rounds) -> None:
 
 def tmt_run(scene, method):
     """A function that makes the run of a scene's model in tmt's compiled loop, without what surrounds it."""
-    q, qd = (np.tile(start, (1, STEPS + 1, 1)) for start in scene.start)
+    q, qd = (np.tile(start, (1, TIMED + 1, 1)) for start in scene.start)
     compiled, tau, dt = stepper(scene.model, method), scene.tau[None].copy(), scene.duration / STEPS
     return lambda: compiled(q, qd, tau, dt)
 

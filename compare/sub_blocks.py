@@ -1,5 +1,6 @@
 """Every subset of hinges locked: Mbar and the bias of what is left against the sub-blocks of the whole model."""
 
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -78,6 +79,7 @@ def differences(engine, at, q, qd):
             yield quantity, parties, largest(one - other), FACTOR * EPS * scale
 
 
-def operations(tree) -> int:
-    """Operations of one evaluation of the accelerations in a tree's compiled code."""
-    return slope_source(tree, "rk4")[1]
+@lru_cache
+def operations(tree, method="rk4") -> int:
+    """Operations of one evaluation of the accelerations in the compiled code of a tree and a method."""
+    return slope_source(tree, method)[1]
