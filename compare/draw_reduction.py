@@ -79,9 +79,9 @@ def rows_of(result, scene, party):
     return [row for row in result.rows if (row["scene"], row["engine"], row["integrator"]) == (scene, party, "RK4")]
 
 
-def swings(result):
-    """Error of the elbow's swing against the elliptic function, over the step."""
-    dt, errors = result.curves["swing"]["dt"], result.curves["swing"]["errors"]
+def swing(result, scene):
+    """Error of a swing of one hinge against the elliptic function, over the step."""
+    dt, errors, orders = (result.curves["swings"][scene][key] for key in ("dt", "errors", "orders"))
     fig = Figure(figsize=(WIDTH, 3.0), layout="constrained")
     ax = fig.subplots()
     for (party, integrator), values in errors.items():
@@ -89,19 +89,20 @@ def swings(result):
             colour, dash = STYLES[party, integrator]
             ax.loglog(dt, values, dash, color=colour, label=f"{integrator}, TMT")
             ax.loglog(dt, errors["MuJoCo", integrator], "o", mfc="none", color=colour, label=f"{integrator}, MuJoCo")
-            order = METHODS[TWINS[integrator]].order
-            power = f"order {order}"
+            power = f"order {METHODS[TWINS[integrator]].order}"
             ax.annotate(power, (dt[3], values[3]), xytext=(0, 8), textcoords="offset points", ha="right", color=colour)
-    ax.set(xlabel="dt, s", ylabel="largest error of γ in 5 s, rad")
+    ax.set(xlabel="dt, s", ylabel="largest error of the angle, rad")
     fig.legend(loc="outside upper center", ncols=4)
-    slopes = {name: np.log2(errors["MuJoCo", name][-2] / errors["MuJoCo", name][-1]) for name in ("RK4", "Euler")}
-    caption = (
-        "The elbow alone, let go from horizontal: distance of both engines from the exact swing, an elliptic function. At the "
-        f"finest step MuJoCo's error falls as dt^{slopes['RK4']:.2f} with RK4, to {errors['MuJoCo', 'RK4'][-1]:.1e} rad, and as "
-        f"dt^{slopes['Euler']:.2f} with Euler, to {errors['MuJoCo', 'Euler'][-1]:.1e} rad; TMT's is "
-        f"{errors['TMT', 'RK4'][-1]:.1e} and {errors['TMT', 'Euler'][-1]:.1e} rad."
+    told = "; ".join(
+        f"{integrator}: order {orders['TMT', integrator]:.2f} and {orders['MuJoCo', integrator]:.2f}, down to "
+        f"{errors['TMT', integrator][-1]:.1e} and {errors['MuJoCo', integrator][-1]:.1e} rad"
+        for integrator in ("RK4", "Euler")
     )
-    return "reduction_swing", fig, caption
+    caption = (
+        f"{scene[0].upper()}{scene[1:]}: distance from the exact motion, an elliptic function of time. TMT and MuJoCo with "
+        f"{told}."
+    )
+    return f"reduction_{scene.replace(', ', '_').replace(' ', '_')}", fig, caption
 
 
 def small_oscillations(result):

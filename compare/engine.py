@@ -106,16 +106,9 @@ class Engine:
 
         The file is read again and compiled without them; gravity and damping are those of this engine.
         """
-        from .engine_lock import locked_model
+        from .engine_lock import locked
 
-        if not angles:
-            return self
-        locked = self.locked | angles
-        hinges = [name for name in self.hinges if name not in angles]
-        other = Engine(locked_model(self.source, locked), hinges, self.carriers, self.source, self.bodies, locked)
-        other.model.opt.gravity[:] = self.model.opt.gravity
-        other.model.dof_damping[other.dofs] = self.model.dof_damping[[self.dofs[self.hinges.index(h)] for h in hinges]]
-        return other
+        return locked(self, angles) if angles else self
 
     # quantities at states
 

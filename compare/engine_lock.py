@@ -10,12 +10,24 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from .engine import Engine
 from .engine_file import ModelError, name_of
 
 
 def read(source) -> mujoco.MjSpec:
     """The editable form of a file (a Path) or of MJCF text."""
     return mujoco.MjSpec.from_file(str(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
+
+
+def locked(engine, angles: dict) -> Engine:
+    """The engine without the hinges that are named in `angles`, {name: rad}, with its gravity and damping."""
+    every = engine.locked | angles
+    hinges = [name for name in engine.hinges if name not in angles]
+    other = Engine(locked_model(engine.source, every), hinges, engine.carriers, engine.source, engine.bodies, every)
+    other.model.opt.gravity[:] = engine.model.opt.gravity
+    left = [engine.dofs[engine.hinges.index(name)] for name in hinges]
+    other.model.dof_damping[other.dofs] = engine.model.dof_damping[left]
+    return other
 
 
 def locked_model(source, angles: dict) -> mujoco.MjModel:

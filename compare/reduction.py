@@ -39,11 +39,11 @@ MOVES = 0.1  # rad: a run without a torque that holds shows nothing if it moves 
 
 def rows(setup, scenes=SCENES) -> Result:
     """Sub-blocks for every subset; for each scene what it needs, runs and times; exact solutions; costs in MuJoCo."""
-    result = Result("reduction", curves={"needs": {}, "apart": {}})
+    result = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}})
     quick = len(setup.steps) == 1
     sub_blocks.compare(result, setup.engine, angles=3 if quick else 10)
     models = [model for scene in scenes for model in of_scene(result, scene, setup.engine)]
-    known_motion.swings(result, setup.engine)
+    known_motion.swings(result, setup.engine, scenes)
     known_motion.small_oscillations(result, setup.engine)
     setup.quiet()
     timed(result, models, setup.engine, QUICK_ROUNDS if quick else ROUNDS)
@@ -74,9 +74,10 @@ def told(scene, need) -> str:
         why += f"; of {', '.join(need.undecided)} it is not decided: the acceleration does not fold to 0"
     why = why[:1].upper() + why[1:]
     if len(need.stays) == len(names):
+        torque = " under the exact torque that holds" if scene.torque == "hold" else ""
         return (
-            f"{scene.name}: no hinge and no integrator. Under the torque that holds, every acceleration folds to 0, and is 0 "
-            "with 50 digits: the exact solution stays."
+            f"{scene.name}: no hinge and no integrator. At the start and at rest every acceleration folds to 0{torque}, and is "
+            "0 with 50 digits: the exact solution stays."
         )
     declared = f" ({' and '.join(scene.locked)} declared locked)" if scene.locked else ""
     if not need.stays:
@@ -115,7 +116,7 @@ def runs(result, scene, smaller, engine, integrator) -> None:
         result.curves["apart"][scene.name, party, integrator] = float(apart[:, :n].max())
     if not smaller:
         result.notes.append(
-            f"{scene.name}, {integrator}, under the rounded torque of TMT: in the {until:.2f} s that are judged, the arm of TMT "
+            f"{scene.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the arm of TMT "
             f"moves by {result.curves['apart'][scene.name, 'TMT', integrator]:.1e} rad, that of MuJoCo by "
             f"{result.curves['apart'][scene.name, 'MuJoCo', integrator]:.1e} rad."
         )
@@ -173,6 +174,7 @@ def figures(result):
     from . import draw_reduction  # matplotlib is for the process that draws
 
     yield draw_reduction.needs(result)
-    yield draw_reduction.swings(result)
+    for scene in result.curves["swings"]:
+        yield draw_reduction.swing(result, scene)
     yield draw_reduction.small_oscillations(result)
     yield draw_reduction.costs(result)
