@@ -11,8 +11,6 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-VERSION = mujoco.__version__
-
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
 _log.logto_file = _log.logto_console = False

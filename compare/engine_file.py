@@ -18,7 +18,7 @@ class ModelError(ValueError):
         return " ".join(super().__str__().split())
 
 
-def load(path=ARM_XML, hinges=HINGES, carriers=CARRIERS) -> Engine:
+def load(path=ARM_XML) -> Engine:
     """The Engine for an MJCF file; ModelError if it cannot be read or does not have these hinges."""
     try:
         text = Path(path).read_text(errors="replace")
@@ -30,7 +30,7 @@ def load(path=ARM_XML, hinges=HINGES, carriers=CARRIERS) -> Engine:
         if "<mujoco" not in text:
             raise ModelError(f"{path} is not MJCF: MuJoCo says {error}") from None
         raise ModelError(f"MuJoCo cannot compile {path}: {error}") from None
-    return check_hinges(model, Path(path), hinges, carriers)
+    return check_hinges(model, Path(path), HINGES, CARRIERS)
 
 
 def parse(text, hinges=HINGES, carriers=CARRIERS) -> Engine:

@@ -20,7 +20,8 @@ CLAIM = (
     "For every integrator of MuJoCo the same scheme stands on the TMT side (Euler, implicitfast and discrete are one scheme "
     "here, and give the same bits; implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is the "
     "assignment's). Twins agree in the derivative at every recorded state, in one step from every recorded state, and in "
-    "the open-loop run as long as rounding allows."
+    "the open-loop run as long as rounding allows. A scene that does not need all hinges (see reduction) runs once more, by RK4, "
+    "without those."
 )
 BAR = (
     "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
