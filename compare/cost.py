@@ -7,8 +7,8 @@ import numpy as np
 from . import engine_cost
 from .scenes import SCENES
 
-TIMED = 256  # steps of a timed run: short enough to pass between the interruptions of a machine that is in use
-ROUNDS, QUICK_ROUNDS = 80, 8  # of the timing
+TIMED = 128  # steps of a timed run: short enough to pass between the interruptions of a machine that is in use
+ROUNDS, QUICK_ROUNDS = 160, 16  # of the timing
 INTEGRATORS = ("Euler", "RK4")
 SETTLED = 0.5  # N m s/rad, with which the arm comes to rest on the floor
 
