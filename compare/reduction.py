@@ -32,8 +32,8 @@ BAR = (
     "fall with the step at the method's order, and with the square of the amplitude where the solution is linear. Additions "
     "that exert no force leave the same bits. Timings are no checks."
 )
-STEPS = 1024  # of a run that is compared
-EVERY = 16  # steps, at which the band is taken
+FINER = 16  # times as fine as a scene's own step: runs that are compared, judged at the scene's own
+TIMED_TMT = 1024  # steps of a timed run in tmt
 MOVES = 0.1  # rad: a run without a torque that holds shows nothing if it moves less
 
 
@@ -92,22 +92,23 @@ def told(scene, need) -> str:
 
 def runs(result, scene, smaller, engine, integrator) -> None:
     """Runs of the scene and of the smaller one (None: it stays), by the same method, within the band."""
-    dt, method, n = scene.duration / STEPS, TWINS[integrator], len(scene.hinges)
+    method, n, steps = TWINS[integrator], len(scene.hinges), FINER * scene.steps
+    dt = scene.duration / steps
     paths = both(scene, engine, integrator)
     references = both(smaller, engine, integrator) if smaller else dict.fromkeys(paths)
-    width = band(METHODS[method], scene.model, *np.split(paths["TMT"], 2, axis=1), scene.tau, dt, EVERY)
-    t = dt * EVERY * np.arange(len(width))
+    width = band(METHODS[method], scene.model, *np.split(paths["TMT"], 2, axis=1), scene.tau, dt, FINER)
+    t = dt * FINER * np.arange(len(width))
     judged = np.cumsum(~(width[:, :n].max(axis=1) < NARROW)) == 0
     until, required = float(t[judged][-1]), scene.required(method, dt)
     for party, path in paths.items():
-        where = f"{scene.name}, {party}, {integrator}, {step(scene, STEPS)}"
-        reference = np.tile(np.concatenate(scene.start), (STEPS + 1, 1))
+        where = f"{scene.name}, {party}, {integrator}, {step(scene, steps)}"
+        reference = np.tile(np.concatenate(scene.start), (steps + 1, 1))
         if smaller:
             free = [scene.hinges.index(name) for name in smaller.hinges]
             reference[:, free + [n + i for i in free]] = references[party]
             moved = farthest(path[:, :n] - path[0, :n])
             result.check(where, f"moves less than {MOVES} rad", max(0.0, MOVES - moved), 0.0, "rad missing")
-        apart = np.abs(path - reference)[::EVERY][judged]
+        apart = np.abs(path - reference)[::FINER][judged]
         ratio = np.divide(apart, width[judged], out=np.zeros_like(apart), where=width[judged] > 0)
         k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
         place, unit = f"{scene.hinges[i % n]} at t = {t[k]:.3f} s", ("rad", "rad/s")[i // n]
@@ -123,8 +124,9 @@ def runs(result, scene, smaller, engine, integrator) -> None:
 
 
 def both(scene, engine, integrator) -> dict:
-    """Angles and rates of the scene's hinges by party, each (STEPS + 1, 2 n)."""
-    arguments = *scene.start, scene.tau, scene.duration / STEPS, STEPS
+    """Angles and rates of the scene's hinges by party, each (steps + 1, 2 n)."""
+    steps = FINER * scene.steps
+    arguments = *scene.start, scene.tau, scene.duration / steps, steps
     return {
         "TMT": np.concatenate(tmt.simulate(*arguments, TWINS[integrator], scene.model)[1:], axis=1),
         "MuJoCo": np.concatenate(scene.engine(engine).trajectory(*arguments, integrator)[1:], axis=1),
@@ -133,13 +135,15 @@ def both(scene, engine, integrator) -> dict:
 
 def timed(result, models, engine, rounds) -> None:
     """The table: all models of all scenes, timed in turn, against the whole model of the same scene."""
-    calls = {}
+    calls, steps = {}, {"TMT": TIMED_TMT, "MuJoCo": TIMED}
     for name, scene in models:
         for integrator in INTEGRATORS if scene else ():
-            calls[name, scene.hinges, "TMT", integrator] = tmt_run(scene, TWINS[integrator])
-            arguments = *scene.start, scene.tau, scene.duration / STEPS, TIMED, integrator
-            calls[name, scene.hinges, "MuJoCo", integrator] = engine_cost.run(scene.engine(engine), *arguments)
-    seconds = fastest(calls, rounds)
+            state = *scene.start, scene.tau, scene.duration / scene.steps / FINER
+            calls[name, scene.hinges, "TMT", integrator] = tmt_run(scene.model, TWINS[integrator], *state)
+            calls[name, scene.hinges, "MuJoCo", integrator] = engine_cost.run(
+                scene.engine(engine), *state, TIMED, integrator
+            )
+    seconds = {key: taken / steps[key[2]] for key, taken in fastest(calls, rounds).items()}
     for name, scene in models:
         hinges = scene.hinges if scene else ()
         for party in ("TMT", "MuJoCo"):
@@ -155,18 +159,18 @@ def timed(result, models, engine, rounds) -> None:
                         "integrator": integrator,
                         "nv": len(hinges),
                         "operations": count if party == "TMT" else None,
-                        "ns_per_step": 1e9 * taken / TIMED if taken else None,
+                        "ns_per_step": 1e9 * taken if taken else None,
                         "speedup": seconds[name, HINGES, party, integrator] / taken if taken else None,
                         "max_difference_rad": apart,
                     }
                 )
 
 
-def tmt_run(scene, method):
-    """A function that makes the run of a scene's model in tmt's compiled loop, without what surrounds it."""
-    q, qd = (np.tile(start, (1, TIMED + 1, 1)) for start in scene.start)
-    compiled, tau, dt = stepper(scene.model, method), scene.tau[None].copy(), scene.duration / STEPS
-    return lambda: compiled(q, qd, tau, dt)
+def tmt_run(model, method, q, qd, tau, dt):
+    """A function that makes a run in tmt's compiled loop, without what surrounds it."""
+    paths = [np.tile(start, (1, TIMED_TMT + 1, 1)) for start in (q, qd)]
+    compiled, torque = stepper(model, method), tau[None].copy()
+    return lambda: compiled(*paths, torque, dt)
 
 
 def figures(result):
