@@ -210,6 +210,7 @@ def reaches(model=tmt.ARM) -> np.ndarray:
     to_hinge = []
     for parent, offset in zip(model.parent, model.offset):
         to_hinge.append((to_hinge[parent] if parent >= 0 else 0.0) + np.linalg.norm(offset))
+    to_hinge.append(0.0)  # of the world, hinge -1
     return np.array([to_hinge[hinge] + np.linalg.norm(com) for hinge, com in zip(model.body_hinge, model.com)])
 
 

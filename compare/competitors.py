@@ -34,8 +34,8 @@ class Setting(NamedTuple):
 class Outcome(NamedTuple):
     """What is judged of a run."""
 
-    q: np.ndarray  # (65, 3) rad; NaN from where it diverged
-    qd: np.ndarray  # (65, 3) rad/s
+    q: np.ndarray  # (65, n) rad; NaN from where it diverged
+    qd: np.ndarray  # (65, n) rad/s
     steps: int | None
     evaluations: int | None  # of the right-hand side; None where a method has no such thing
 
@@ -81,7 +81,7 @@ def halvings(finest) -> tuple[Setting, ...]:
 
 def mujoco_run(engine, integrator, scene, setting):
     """MuJoCo's loop in C, with the flags of the model."""
-    variant = engine.variant(scene.model.gravity, scene.damping)
+    variant = scene.engine(engine)
     dt, every = scene.duration / setting.steps, setting.steps // GRID
     starts, run = variant.runner(*scene.start, scene.tau, dt, setting.steps, integrator)
     stages = 4 if integrator == "RK4" else 1
@@ -97,7 +97,7 @@ def tmt_run(method, scene, setting):
     """The compiled loop of tmt."""
     stepping = METHODS[method]
     steps = setting.steps or GRID
-    paths = np.full((2, 1, steps + 1, 3), np.nan)
+    paths = np.full((2, 1, steps + 1, len(scene.hinges)), np.nan)
     paths[:, 0, 0] = scene.start
     arguments = [*paths, scene.tau[None], scene.duration / steps]
     if setting.tolerance is not None:
@@ -126,8 +126,8 @@ def scipy_run(method, scene, setting):
         return solve_ivp(lambda t, y: rate(y, tau), span, start, method, **options)
 
     def read(solution):
-        path = np.full((GRID + 1, 6), np.nan)
+        path = np.full((GRID + 1, start.size), np.nan)
         path[: solution.y.shape[1]] = solution.y.T
-        return Outcome(path[:, :3], path[:, 3:], None, int(solution.nfev))
+        return Outcome(*np.split(path, 2, axis=1), None, int(solution.nfev))
 
     return run, read

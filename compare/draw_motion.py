@@ -4,18 +4,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .draw import BLUE, GREEK, GREEN, GREY, HINGES, ORANGE, RED, WIDTH
-from .motion import DRIFT, DRIFT_STEPS
+from .motion import DRIFT, DRIFT_STEPS, step
 
 TWINS = (("semi_implicit_euler", "Euler"), ("implicit", "implicit"), ("rk4", "RK4"))
 DASHES = {"Euler": (BLUE, "-"), "implicit": (RED, "--"), "RK4": (GREEN, "-.")}
 ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 
 
-def over_time(ax, t, ours, theirs):
+def over_time(ax, t, ours, theirs, hinges):
     """Hinge angles or rates against time: lines for TMT, up to 65 marks for MuJoCo."""
     every = slice(None, None, max(1, len(t) // 64))
     marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
-    for i, (hinge, colour, dash) in enumerate(HINGES):
+    for i, (hinge, colour, dash) in enumerate(style for style in HINGES if style[0] in hinges):
         ax.plot(t, ours[:, i], dash, color=colour, label=f"{GREEK[hinge]}, TMT")
         ax.plot(t[every], theirs[every, i], color=colour, clip_on=False, **marks)
     ax.plot([], [], color="black", label="MuJoCo", **marks)
@@ -24,9 +24,10 @@ def over_time(ax, t, ours, theirs):
 def held(result, scene, name):
     """The assignment's figure of a held posture: hinge angles against time."""
     curve = result.curves["runs"][(scene, "rk4", 64)]
+    hinges = [hinge for hinge, *_ in HINGES]
     fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
     ax = fig.subplots()
-    over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]))
+    over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]), hinges)
     ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, curve["t"][-1]))
     fig.legend(loc="outside upper center", ncols=4)
     left = {p: "does not leave" if at is None else f"is 0.1 rad away at {at:.2f} s" for p, at in curve["left"].items()}
@@ -40,7 +41,7 @@ def held(result, scene, name):
 
 def run(result, scene):
     """One scene under each twin: angles, rates, and the difference under its band."""
-    steps = max((n for name, _, n in result.curves["runs"] if name == scene.name and n <= 1024), default=64)
+    steps = max((n for name, _, n in result.curves["runs"] if name == scene.name and n <= 16 * scene.steps))
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     fig.subplots_adjust(left=0.105, right=0.985, bottom=0.075, top=0.87, hspace=0.12, wspace=0.08)
     axes = fig.subplots(3, len(TWINS), sharex=True, sharey="row")
@@ -48,9 +49,9 @@ def run(result, scene):
     for column, (twin, title) in zip(axes.T, TWINS):
         c = result.curves["runs"][(scene.name, twin, steps)]
         for row, ax in enumerate(column[:2]):
-            over_time(ax, c["t"], c["tmt"][row], c["mujoco"][row])
+            over_time(ax, c["t"], c["tmt"][row], c["mujoco"][row], scene.hinges)
             ax.ticklabel_format(axis="y", scilimits=(-2, 3))
-        column[0].set_title(f"{title}, dt = 5/{steps} s")
+        column[0].set_title(f"{title}, {step(scene, steps)}")
         difference = np.abs(c["tmt"][0] - c["mujoco"][0]).max(axis=1)
         ulp = np.abs(c["tmt"][0] - c["ulp"]).max(axis=1)
         band = np.where(c["band"] < 1e3, c["band"], np.nan)
@@ -81,21 +82,24 @@ def run(result, scene):
 def drift(result):
     """Drift of energy and momentum against the step size, both parties."""
     drifts = result.curves["drift"]
-    fig = Figure(figsize=(WIDTH, 3.1), layout="constrained")
-    axes = fig.subplots(1, len(drifts), sharex=True, sharey=True, squeeze=False)[0]
-    for ax, ((scene, quantity, unit), of_scene) in zip(axes, drifts.items()):
+    lines = -(-len(drifts) // 3)
+    fig = Figure(figsize=(WIDTH, 0.8 + 1.8 * lines), layout="constrained")
+    axes = fig.subplots(lines, 3, sharex=True, sharey=True, squeeze=False)
+    for ax in axes.flat[len(drifts) :]:
+        ax.set_visible(False)
+    for ax, ((scene, quantity, unit), of_scene) in zip(axes.flat, drifts.items()):
         for integrator, parties in of_scene.items():
             colour, dash = DASHES[integrator]
             dt = DRIFT / np.array(DRIFT_STEPS[integrator])
             ax.loglog(dt, parties["TMT"], dash, color=colour, label=f"{integrator}, TMT")
             label = "MuJoCo" if integrator == "Euler" else None
             ax.loglog(dt, parties["MuJoCo"], "o", mfc="none", color=colour, label=label)
-        ax.set_title(f"{scene},\n{quantity}, {unit}", fontsize=8)
+        ax.set_title(f"{scene}: {quantity}, {unit}", fontsize=8)
         ax.set_xticks([2e-4, 1e-3, 4e-3], ["2e-4", "1e-3", "4e-3"])
         ax.minorticks_off()
-    axes[0].set_ylabel("largest drift in 1 s")
+    fig.supylabel("largest drift in 1 s", fontsize=9)
     fig.supxlabel("dt, s", fontsize=9)
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     worst = {
         integrator: max(
             of_scene[integrator]["TMT"][-1] for (_, quantity, _), of_scene in drifts.items() if quantity == "energy"
@@ -115,7 +119,7 @@ def growth(result):
     t, curves = (result.curves["growth"][key] for key in ("t", "curves"))
     fig = Figure(figsize=(WIDTH, 3.2), layout="constrained")
     ax = fig.subplots()
-    colours = (BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9", GREY)
+    colours = (BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9", GREY, "black")
     ends = sorted(curves, key=lambda name: curves[name][-1])
     places = {}
     for name in ends:  # labels at the ends of the curves, not over each other

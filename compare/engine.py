@@ -13,8 +13,6 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-VERSION = mujoco.__version__
-
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
 _log.logto_file = _log.logto_console = False
@@ -42,14 +40,16 @@ class Engine:
     with the hinge named in `carriers`; its axes are those that coincide with the world's at q = 0.
     """
 
-    def __init__(self, model, hinges, carriers):
+    def __init__(self, model, hinges, carriers, source=None, bodies=None, locked=None):
         self.model, self.data = model, mujoco.MjData(model)
+        self.source, self.locked = source, locked or {}  # what the model was read from; {hinge: rad}, taken out of it
         self.hinges, self.carriers = list(hinges), list(carriers)
         joints = [model.joint(name) for name in hinges]
         self.joints = np.array([joint.id for joint in joints])
         self.qpos = np.array([joint.qposadr[0] for joint in joints])
         self.dofs = np.array([joint.dofadr[0] for joint in joints])
-        self.bodies = [int(model.jnt_bodyid[self.joints[self.hinges.index(name)]]) for name in carriers]
+        moved_by = model.jnt_bodyid[self.joints]
+        self.bodies = bodies or [int(moved_by[self.hinges.index(name)]) for name in carriers]
         self._at(np.zeros(len(joints)))
         self.zero_axes = self._turns(self.data.xmat)
 
@@ -99,7 +99,16 @@ class Engine:
         if gravity is not None:
             other.opt.gravity[:] = gravity
         other.dof_damping[:] += damping
-        return Engine(other, self.hinges, self.carriers)
+        return Engine(other, self.hinges, self.carriers, self.source, self.bodies, self.locked)
+
+    def lock(self, angles: dict) -> "Engine":
+        """The same model without the hinges that are named in `angles`, {name: rad}: they stay there, at rest.
+
+        The file is read again and compiled without them; gravity and damping are those of this engine.
+        """
+        from .engine_lock import locked
+
+        return locked(self, angles) if angles else self
 
     # quantities at states
 

@@ -18,7 +18,7 @@ class ModelError(ValueError):
         return " ".join(super().__str__().split())
 
 
-def load(path=ARM_XML, hinges=HINGES, carriers=CARRIERS) -> Engine:
+def load(path=ARM_XML) -> Engine:
     """The Engine for an MJCF file; ModelError if it cannot be read or does not have these hinges."""
     try:
         text = Path(path).read_text(errors="replace")
@@ -30,19 +30,26 @@ def load(path=ARM_XML, hinges=HINGES, carriers=CARRIERS) -> Engine:
         if "<mujoco" not in text:
             raise ModelError(f"{path} is not MJCF: MuJoCo says {error}") from None
         raise ModelError(f"MuJoCo cannot compile {path}: {error}") from None
-    return check_hinges(model, path, hinges, carriers)
+    return check_hinges(model, Path(path), HINGES, CARRIERS)
 
 
 def parse(text, hinges=HINGES, carriers=CARRIERS) -> Engine:
     """The Engine for MJCF text."""
-    return check_hinges(mujoco.MjModel.from_xml_string(text), "the text", hinges, carriers)
+    return check_hinges(mujoco.MjModel.from_xml_string(text), text, hinges, carriers)
 
 
-def check_hinges(model, path, hinges, carriers) -> Engine:
-    """The Engine, if the model moves by exactly these hinges."""
+def name_of(source) -> str:
+    """What a message calls a source, a Path or MJCF text."""
+    return str(source) if isinstance(source, Path) else "the text"
+
+
+def check_hinges(model, source, hinges, carriers) -> Engine:
+    """The Engine, if the model moves by exactly these hinges; it remembers its source, a Path or MJCF text."""
     names = [model.joint(j).name for j in range(model.njnt)]
     kinds = [mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower() for j in range(model.njnt)]
     if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
         found = ", ".join(f"{name or 'unnamed'} ({kind})" for name, kind in zip(names, kinds)) or "none"
-        raise ModelError(f"{path} has the joints {found}; hinges {', '.join(hinges)} and no others are expected")
-    return Engine(model, hinges, carriers)
+        raise ModelError(
+            f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected"
+        )
+    return Engine(model, hinges, carriers, source)

@@ -138,8 +138,8 @@ def told(ns) -> list[str]:
         sentences.append(
             f"Forward dynamics of the arm: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work {equal:.0f} ns, "
             f"the kernel {one:.1f} ns where each evaluation waits for the last ({whole / one:.0f} and {equal / one:.0f} times "
-            f"less), {apart:.1f} ns where they are independent ({whole / apart:.0f} and {equal / apart:.0f} times less), in lanes "
-            f"{lanes:.1f} ns a state ({whole / lanes:.0f} times less)."
+            f"less), {apart:.1f} ns where they are independent ({whole / apart:.0f} and {equal / apart:.0f} times less), in "
+            f"lanes {lanes:.1f} ns a state ({whole / lanes:.0f} times less)."
         )
         kernel = ns[STEP, EACH, 1, 1]
         sentences.append(

@@ -32,6 +32,11 @@ EXACT_STEPS = 64  # of the runs with many digits
 FAST = 1e4  # rad/s: a run with many digits that is faster has diverged
 
 
+def step(scene, steps) -> str:
+    """The step of a run in words."""
+    return f"dt = {scene.duration:g}/{steps} s"
+
+
 def farthest(deviation) -> float:
     """The largest deviation of a run, as long as it has not diverged."""
     return float(np.nanmax(np.abs(deviation)))
@@ -67,7 +72,7 @@ def derivative(result, engine) -> None:
     """The derivative of the bias by the rates that `implicit` uses: TMT's dual numbers against MuJoCo's qDeriv."""
     scene = next(scene for scene in SCENES if scene.damping)
     rng = np.random.default_rng(0)
-    engine = engine.variant(scene.model.gravity, scene.damping)
+    engine = scene.engine(engine)
     worst, bar = 0.0, FACTOR * EPS * 9.0  # the rates sum to at most 9 rad/s, and |Mbar| is below 1 kg m2
     for q, qd in rng.uniform(-3.0, 3.0, (20, 2, 3)):
         ours = np.array(tmt.method.bias_rates(scene.model, list(q), list(qd))) + np.diag(scene.model.damping)
@@ -79,10 +84,10 @@ def drift(result, engine) -> None:
     """Energy and, without gravity, alpha-momentum along runs: drift falls with dt at the method's order."""
     drifts = {}  # (scene, quantity, unit): integrator: party: a value for each of the steps
     for scene in (scene for scene in SCENES if scene.torque == "free" and not scene.damping):
-        party_of = {"TMT": tmt_run, "MuJoCo": partial(mujoco_run, engine.variant(scene.model.gravity))}
+        party_of = {"TMT": tmt_run, "MuJoCo": partial(mujoco_run, scene.engine(engine))}
         quantities = {("energy", "J"): partial(tmt.energy, model=scene.model)}
-        if not scene.gravity:
-            quantities["alpha-momentum", "N m s"] = alpha_momentum
+        if not scene.gravity and "alpha" in scene.hinges:
+            quantities["alpha-momentum", "N m s"] = partial(alpha_momentum, scene.model)
         for integrator, steps in DRIFT_STEPS.items():
             for party, run in party_of.items():
                 paths = [run(scene, integrator, DRIFT / count, count) for count in steps]
@@ -113,9 +118,9 @@ def mujoco_run(engine, scene, integrator, dt, steps) -> list:
     return engine.trajectory(*scene.start, scene.tau, dt, steps, integrator)[1:]
 
 
-def alpha_momentum(q, qd) -> np.ndarray:
+def alpha_momentum(model, q, qd) -> np.ndarray:
     """Angular momentum about the first hinge along a run, N m s."""
-    return np.einsum("sj,sj->s", tmt.mass_matrix(q)[:, 0], qd)
+    return np.einsum("sj,sj->s", tmt.mass_matrix(q, model)[:, 0], qd)
 
 
 def grown(scene) -> np.ndarray:
@@ -150,13 +155,13 @@ def reach(t, grown, digits) -> str:
 def many_digits(result, engine, scenes, runs) -> None:
     """Both runs against a run of the same scheme with many digits: which party carries the rounding."""
     for scene, integrator, exact in runs_by(scenes, runs):
-        variant = engine.variant(scene.model.gravity, scene.damping)
+        variant = scene.engine(engine)
         curve = result.curves["runs"][(scene.name, TWINS[integrator], EXACT_STEPS)]
         dt = scene.duration / EXACT_STEPS
         last = round(curve["judged_until_s"] / dt)
         _, *theirs = variant.trajectory(*scene.start, scene.tau, dt, EXACT_STEPS, integrator)
         bar = curve["band"][: last + 1]
-        where = f"{scene.name}, {integrator}, dt = 5/{EXACT_STEPS} s"
+        where = f"{scene.name}, {integrator}, {step(scene, EXACT_STEPS)}"
         off = {}
         for party, path in (("TMT", curve["tmt"]), ("MuJoCo", theirs)):
             apart = distance(path[0][: last + 1], exact[: last + 1]).max(axis=1)

@@ -14,45 +14,116 @@ POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "ball catch": (-70, 70, -30),
     "bent": (30, 20, 60),
 }
+HINGES = tmt.ARM.hinge_names
 
 
 def posture(name) -> np.ndarray:
-    """Hinge angles of a named posture, rad, shape (3,)."""
-    return np.radians(np.array(POSTURES[name], dtype=float))
+    """Hinge angles of a named posture, or of three angles in deg: rad, shape (3,)."""
+    return np.radians(np.array(POSTURES[name] if isinstance(name, str) else name, dtype=float))
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A motion under constant torque."""
+    """A motion under constant torque. Raises ValueError, in one line, for what cannot be a scene."""
 
     name: str
-    posture: str
-    torque: str  # "free": none; "hold": TMT's gravity balance at the start, given to both engines
+    posture: str | tuple  # of POSTURES, or three angles in deg
+    torque: (
+        str | tuple
+    )  # "free": none; "hold": TMT's gravity balance at the start, given to both engines; or three, N m
     speed: tuple = (0.0, 0.0, 0.0)  # deg/s at the start
     damping: float = 0.0  # N m s/rad, of every hinge
     gravity: bool = True
+    locked: tuple = ()  # names of the hinges that stay at the start
     duration: float = 5.0  # s
-    judged: float = 5.0  # s, for how long a run must be judged: its band of rounding stays narrow that long
+    dt: float = 5.0 / 64  # s, the coarsest step; runs with finer ones divide it
+    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along
+
+    def __post_init__(self):
+        three = f"three numbers, one per hinge ({', '.join(HINGES)})"
+        choices = {
+            "posture": (tuple(POSTURES), f"{', '.join(POSTURES)} or {three}, in deg"),
+            "torque": (("free", "hold"), f"free, hold or {three}, in N m"),
+            "speed": ((), f"{three}, in deg/s"),
+        }
+        for name, (words, accepted) in choices.items():
+            value = getattr(self, name)
+            known = value in words if isinstance(value, str) else finite(value, (3,))
+            self.refuse(name, not known, accepted)
+        for name in ("duration", "dt"):
+            self.refuse(name, not finite(getattr(self, name), ()) or getattr(self, name) <= 0.0, "a time in s above 0")
+        self.refuse("damping", not finite(self.damping, ()) or self.damping < 0.0, "at least 0 N m s/rad")
+        left = abs(self.steps * self.dt - self.duration)
+        self.refuse("dt", self.steps < 1 or left > 1e-9 * self.duration, f"a step that divides {self.duration:g} s")
+        locked = self.locked
+        wrong = isinstance(locked, str) or not set(locked) <= set(HINGES) or len(set(locked)) >= len(HINGES)
+        self.refuse("locked", wrong, f"a tuple of at most two of {', '.join(HINGES)}")
+        moving = [name for name, rate in zip(HINGES, self.speed) if rate and name in locked]
+        self.refuse("speed", moving, f"no speed of a locked hinge ({', '.join(locked)})")
+
+    def refuse(self, name, wrong, accepted):
+        if wrong:
+            raise ValueError(f"scene {self.name!r}: {name} is {getattr(self, name)!r}; {accepted} is expected")
 
     @property
-    def model(self) -> tmt.Tree:
-        """The arm with the scene's damping and gravity."""
+    def steps(self) -> int:
+        """The number of the coarsest steps."""
+        return round(self.duration / self.dt)
+
+    @property
+    def hinges(self) -> tuple:
+        """The names of the hinges that are not locked."""
+        return tuple(name for name in HINGES if name not in self.locked)
+
+    @property
+    def whole(self) -> tmt.Tree:
+        """The arm with the scene's damping and gravity, no hinge locked."""
         gravity = tmt.ARM.gravity if self.gravity else (0.0, 0.0, 0.0)
         return dataclasses.replace(tmt.ARM, damping=(self.damping,) * 3, gravity=gravity)
 
     @property
-    def start(self) -> tuple[np.ndarray, np.ndarray]:
-        """Hinge angles and rates at t = 0, rad and rad/s."""
-        return posture(self.posture), np.radians(np.array(self.speed, dtype=float))
+    def angles(self) -> dict:
+        """The angles of the locked hinges, rad, by their names."""
+        return {name: float(angle) for name, angle in zip(HINGES, posture(self.posture)) if name in self.locked}
 
-    def required(self, twin, dt) -> float:
-        """For how long a run must be judged, s: with the assignment's coarse step only RK4 is stable that long."""
-        return self.judged if twin == "rk4" or dt < 0.01 else min(self.judged, 0.3)
+    @property
+    def model(self) -> tmt.Tree:
+        """The scene's model on the side of TMT: the arm with the scene's damping and gravity, without the locked hinges."""
+        return self.whole.lock(self.angles)
+
+    def engine(self, engine):
+        """The scene's model on the side of MuJoCo, from the engine that is held against the arm."""
+        return engine.lock(self.angles).variant(self.whole.gravity, self.damping)
+
+    @property
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        """Angles and rates of the free hinges at t = 0, rad and rad/s."""
+        return self.free(posture(self.posture)), self.free(np.radians(np.array(self.speed, dtype=float)))
 
     @property
     def tau(self) -> np.ndarray:
-        """Torque at the hinges, N m."""
-        return tmt.gravity_balance(posture(self.posture), self.model) if self.torque == "hold" else np.zeros(3)
+        """Torque at the free hinges, N m."""
+        if self.torque == "hold":
+            return self.free(tmt.gravity_balance(posture(self.posture), self.whole))
+        return self.free(np.zeros(3) if self.torque == "free" else np.array(self.torque, dtype=float))
+
+    def free(self, values) -> np.ndarray:
+        """Of values for all hinges those of the free ones."""
+        return values[[HINGES.index(name) for name in self.hinges]]
+
+    def required(self, twin, dt) -> float:
+        """For how long a run must be judged, s: with the assignment's coarse step only RK4 is stable that long."""
+        judged = self.duration if self.judged is None else self.judged
+        return judged if twin == "rk4" or dt < 0.01 else min(judged, 0.3)
+
+
+def finite(value, shape) -> bool:
+    """Whether a value is one finite number, or so many."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    return array.shape == shape and bool(np.isfinite(array).all())
 
 
 SCENES = (
@@ -63,4 +134,5 @@ SCENES = (
     Scene("bent, held", "bent", "hold"),
     Scene("bent, damped", "bent", "free", damping=0.5),
     Scene("thrown, no gravity", "bent", "free", speed=(100.0, 200.0, -150.0), gravity=False, judged=4.5),
+    Scene("elbow swing", "zero", "free", locked=("alpha", "beta")),
 )

@@ -11,10 +11,11 @@ from . import clock, evaluations
 from .advice import EARLY, advice, orders
 from .agreement import EPS, FACTOR, Result
 from .band import growth
-from .competitors import competitors
+from .competitors import Setting, competitors
 from .motion import TWINS, diverged_at
 from .reference import references
-from .scenes import SCENES
+from .scenes import HINGES, SCENES
+from .smallest import reduced
 
 TITLE = "Speed against accuracy"
 CLAIM = (
@@ -26,11 +27,14 @@ CLAIM = (
 BAR = (
     "Errors are the largest of the angles on the grid of 65 times, against runs with more than 20 digits (shown by halving "
     "their step). Checked: those digits; that each method of fixed step has its order, within 0.15, in the error of the first "
-    "second, which falls regularly (order 8: at least 7; rounding ends it too soon for more); that MuJoCo and its twin make the same error where rounding plays no part; and that the smallest "
-    "errors are explained by rounding, at most 64 eps times the growth of a small difference along the scene."
+    "second, which falls regularly (order 8: at least 7, since rounding ends its range early); that MuJoCo and its twin make "
+    "the same error where rounding plays no part; and that the smallest errors are explained by rounding, at most 64 eps "
+    "times the growth of a small difference along the scene."
 )
 GOOD_DIGITS = 1e-20  # rad, rad/s
 SAME = 1e-3  # twins: difference of their errors, relative
+# who follows the smaller model of a scene too, where there is one
+SMALLER, SMALLER_STEPS = (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")), 1024
 QUICK_SCENES = ("bent, free",)
 COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluations", "seconds", "error_rad", "worst_error_rad",
            "energy_error_J", "diverged"]  # fmt: skip
@@ -40,26 +44,28 @@ def begin(setup) -> None:
     """Measure all errors beside other work: they are no timings."""
     known = references(setup.map, setup.tell)
     scenes = [scene for scene in SCENES if scene.name in known and (scene.name in QUICK_SCENES or not setup.is_quick)]
-    judged = setup.map(partial(judge, engine=setup.engine, known=known, quick=setup.is_quick), scenes)
-    setup.background["speed"] = known, scenes, judged
+    measured = setup.map(partial(judge, engine=setup.engine, known=known, quick=setup.is_quick), scenes)
+    setup.background["speed"] = known, scenes, measured
 
 
 def rows(setup) -> Result:
     """Errors, times, orders, floors, and what follows for a choice."""
     if "speed" not in setup.background:
         begin(setup)
-    known, scenes, judged = setup.background.pop("speed")
+    known, scenes, measured = setup.background.pop("speed")
     result = Result("speed", shown=[])
     floors = {}
-    for scene, (of_scene, floors[scene.name]) in zip(scenes, judged):
+    found = []
+    for scene, (of_scene, floors[scene.name]) in zip(scenes, measured):
+        found.append(of_scene)
         result.rows += of_scene
         digits = known[scene.name].halving
         result.check(scene.name, "reference, from half as many steps", digits, GOOD_DIGITS, "rad or rad/s")
     setup.quiet()  # nothing else may run beside a timing
     spread = []
-    for scene in scenes:
+    for scene, of_scene in zip(scenes, found):
         setup.tell(f"speed: timing {scene.name}")
-        spread += take_times(result.rows, scene, setup)
+        spread += take_times(of_scene, setup)
     fixed = [(c.engine, c.method, c.order) for c in competitors(setup.engine) if c.order]
     result.tables["speed_orders"] = orders(result, [s.name for s in scenes], fixed)
     twins(result)
@@ -69,11 +75,12 @@ def rows(setup) -> Result:
     result.tables["evaluations"], told = evaluations.costs(setup.engine, setup.is_quick)
     result.notes += told
     result.notes.append(
-        "Every time is the least of up to five runs (one, where it takes longer than 0.2 s), in turns with all others of its scene; the "
+        "Each time is the least of up to five runs (one, if it takes longer than 0.2 s), in turns with all of its scene; the "
         f"median of a setting's runs is {np.median(spread) - 1:.1%} above its least, for one in ten more than "
         f"{np.quantile(spread, 0.9) - 1:.0%}. Errors come from runs of their own."
     )
     result.curves["floors"] = floors
+    result.notes += smaller_models(result.rows)
     result.rows = [{name: row[name] for name in COLUMNS} for row in result.rows]
     return result
 
@@ -81,31 +88,46 @@ def rows(setup) -> Result:
 def judge(scene, engine, known, quick) -> tuple[list[dict], float]:
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[scene.name]
-    states = reference.high[:, :3], reference.high[:, 3:]
-    energy = tmt.energy(*states, scene.model)
-    found = []
-    for place, competitor in enumerate(competitors(engine)):
+    found, field = [], competitors(engine)
+    for place, competitor in enumerate(field):
         best, last = np.inf, 0
         for setting in competitor.settings[:5] if quick else competitor.settings:
-            run, read = competitor.prepare(scene, setting)
-            with np.errstate(all="ignore"):
-                outcome = read(run())
-                ended = diverged_at(scene, reference.t, outcome.q, outcome.qd) is not None
-                error = reference.error(outcome.q)
-                off = np.abs(tmt.energy(outcome.q, outcome.qd, scene.model) - energy).max() if not ended else None
-            found.append({
-                "place": (place, setting), "early": float(error[reference.t <= EARLY].max()), "scene": scene.name, "engine": competitor.engine, "method": competitor.method,
-                "dt_s": scene.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
-                "steps": outcome.steps, "evaluations": outcome.evaluations, "seconds": None,
-                "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
-                "energy_error_J": None if ended else float(off), "diverged": ended,
-            })  # fmt: skip
+            found.append(judged(scene, scene, competitor, setting, reference) | {"place": (place, scene, setting)})
             # one more run that cost more and gained nothing shows that rounding has taken over
-            work = outcome.evaluations or outcome.steps
-            if best < 1e-6 and work > 1.2 * last and not error.max() < 0.7 * best:
+            error = np.inf if found[-1]["diverged"] else found[-1]["worst_error_rad"]
+            work = found[-1]["evaluations"] or found[-1]["steps"]
+            if best < 1e-6 and work > 1.2 * last and not error < 0.7 * best:
                 break
-            best, last = best if ended else min(best, error.max()), work
+            best, last = min(best, error), work
+    smaller = reduced(scene)
+    for place, competitor in enumerate(field if smaller else ()):
+        if (competitor.engine, competitor.method) in SMALLER:
+            setting = Setting(steps=SMALLER_STEPS)
+            found.append(judged(smaller, scene, competitor, setting, reference) | {"place": (place, smaller, setting)})
     return found, floor(scene)
+
+
+def judged(scene, whole, competitor, setting, reference) -> dict:
+    """A row: one run of a scene, or of the smaller model that has the motion of the whole one."""
+    hinges = [HINGES.index(name) for name in scene.hinges]
+    energy = tmt.energy(reference.high[:, :3], reference.high[:, 3:], whole.model)
+    run, read = competitor.prepare(scene, setting)
+    with np.errstate(all="ignore"):
+        outcome = read(run())
+        ended = diverged_at(scene, reference.t, outcome.q, outcome.qd) is not None
+        error = reference.error(outcome.q, hinges)
+        states = reference.high[:, :3].copy(), reference.high[:, 3:].copy()
+        for state, part in zip(states, (outcome.q, outcome.qd)):
+            state[:, hinges] = 0.0 if ended else part
+        off = np.abs(tmt.energy(*states, whole.model) - energy).max()
+    return {
+        "scene": scene.name, "engine": competitor.engine, "method": competitor.method,
+        "dt_s": scene.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
+        "steps": outcome.steps, "evaluations": outcome.evaluations, "seconds": None,
+        "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
+        "energy_error_J": None if ended else float(off), "diverged": ended,
+        "early": float(error[reference.t <= EARLY].max()),
+    }  # fmt: skip
 
 
 def floor(scene) -> float:
@@ -118,16 +140,13 @@ def floor(scene) -> float:
     )
 
 
-def take_times(table, scene, setup) -> list[float]:
-    """Fill in the seconds of one scene, all its settings in turns; the median of each over its least."""
+def take_times(rows, setup) -> list[float]:
+    """Fill in the seconds of one scene's rows, all settings in turns; the median of each over its least."""
     field = competitors(setup.engine)
-    timed = []
-    for row in table:
-        if row["scene"] == scene.name and not row["diverged"]:
-            place, setting = row["place"]
-            timed.append((row, field[place].prepare(scene, setting)[0]))
-    times = clock.in_turns([run for _, run in timed], rounds=2 if setup.is_quick else 5)
-    for (row, _), of_row in zip(timed, times):
+    timed = [row for row in rows if not row["diverged"]]
+    runs = [field[place].prepare(scene, setting)[0] for place, scene, setting in (row["place"] for row in timed)]
+    times = clock.in_turns(runs, rounds=2 if setup.is_quick else 5)
+    for row, of_row in zip(timed, times):
         row["seconds"] = min(of_row)
     return [float(np.median(of_row)) / min(of_row) for of_row in times]
 
@@ -161,6 +180,22 @@ def rounding(result, floors) -> None:
         f"What rounding leaves, eps times the growth of a small difference up to the end: {told}. Below that no double can go, "
         "whatever the method; a smaller step then only adds roundings."
     )
+
+
+def smaller_models(rows) -> list[str]:
+    """What the smaller model of a scene saves, in words."""
+    told = []
+    for row in rows:
+        name = row["scene"].rsplit(", ", 1)[0]
+        for whole in rows:
+            same = all(whole[key] == row[key] for key in ("engine", "method", "dt_s", "tolerance"))
+            if whole["scene"] == name and same and whole["seconds"] and row["seconds"]:
+                gain = whole["seconds"] / row["seconds"]
+                told.append(
+                    f"{row['scene']} ({row['engine']} {row['method']}, {row['steps']} steps): {gain:.2f} times faster than the "
+                    f"whole model, {row['worst_error_rad']:.2e} rad off where that is {whole['worst_error_rad']:.2e}."
+                )
+    return told
 
 
 def figures(result):

@@ -13,24 +13,25 @@ from .agreement import Result
 from .band import NARROW, band, slope_rounding, step_rounding
 from .engine import INTEGRATORS
 from .scenes import SCENES
+from .smallest import reduced
 
 TITLE = "Trajectories: a twin for every integrator of MuJoCo"
 CLAIM = (
     "For every integrator of MuJoCo the same scheme stands on the TMT side (Euler, implicitfast and discrete are one scheme "
     "here, and give the same bits; implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is the "
     "assignment's). Twins agree in the derivative at every recorded state, in one step from every recorded state, and in "
-    "the open-loop run as long as rounding allows."
+    "the open-loop run as long as rounding allows. A scene that does not need all hinges (see reduction) runs once more, by RK4, "
+    "without those."
 )
 BAR = (
     "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
     "the sum of the absolute terms of the force, and 8 eps of the sums of the step. Open loop: a band computed along the "
     "run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's own "
-    "steps. Judged at 65 recorded states while the band of the angles is below 1e-3 rad and no run has diverged; each scene "
-    "states how long that must be. A free run must move by 0.1 rad, and the parties must not give the same bits. A run has "
-    "diverged if it stops, is not finite, or has gained more energy than its bound: the arm's whole potential range and "
-    "the kinetic energy at the start. Parties that diverge while the band is narrow must do so at the same step."
+    "steps. Judged at the states of the coarsest step while the band of the angles is below 1e-3 rad and no run has diverged; "
+    "each scene states how long that must be. A free run must move by 0.1 rad, and the parties must not give the same bits. A "
+    "run has diverged if it stops, is not finite, or has gained more energy than its bound: the arm's whole potential range "
+    "and the kinetic energy at the start. Parties that diverge while the band is narrow must do so at the same step."
 )
-RECORDED = 64  # steps of the grid on which a run is judged
 MOVES = 0.1  # rad: a free run that moves less shows nothing
 QUICK = ("ball catch, free", "bent, free", "ball catch, held", "bent, held")  # the scenes of a quick run
 EXACT_SCENES = ("bent, free", "ball catch, free")  # held against a run of the same scheme with many digits
@@ -72,21 +73,25 @@ def rows(setup) -> Result:
 
 
 def follow(scene, engine, steps) -> Result:
-    """One scene with every twin and step size."""
+    """One scene with every twin and step size, and once by RK4 without the hinges that it does not need.
+
+    steps: the numbers of steps, of a scene of 64; of others as much finer than their own dt.
+    """
     result = Result("trajectory")
-    engine = engine.variant(scene.model.gravity, scene.damping)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for count in steps:
             for twin, integrators in groupby(INTEGRATORS, motion.TWINS.get):
-                pair(result, scene, engine, count, twin, list(integrators))
+                pair(result, scene, scene.engine(engine), scene.steps * count // 64, twin, list(integrators))
+        if smaller := reduced(scene):
+            pair(result, smaller, smaller.engine(engine), smaller.steps, "rk4", ["RK4"])
     return result
 
 
 def pair(result, scene, engine, steps, twin, integrators) -> None:
     """One method of tmt and the integrators of MuJoCo whose twin it is, from the same start with the same step."""
     model, tau, dt = scene.model, scene.tau, scene.duration / steps
-    stepping = METHODS[twin]
-    every = steps // RECORDED
+    stepping, n = METHODS[twin], len(tau)
+    every = steps // scene.steps
     t, *ours = tmt.simulate(*scene.start, tau, dt, steps, twin, model)
     width = band(stepping, model, *ours, tau, dt, every)
     ours_end = motion.diverged_at(scene, t, *ours)
@@ -104,11 +109,11 @@ def pair(result, scene, engine, steps, twin, integrators) -> None:
         _, *theirs = engine.trajectory(*scene.start, tau, dt, steps, integrator)
         theirs_end = motion.diverged_at(scene, t, *theirs)
         ends = [end for end in (ours_end, theirs_end) if end is not None]
-        judged = (width[:, :3].max(axis=1) < NARROW) & (t[::every] < min(ends, default=np.inf))
+        judged = (width[:, :n].max(axis=1) < NARROW) & (t[::every] < min(ends, default=np.inf))
         judged = np.cumsum(~judged) == 0
         until = float(t[::every][judged][-1])
         required = scene.required(twin, dt)
-        where = f"{scene.name}, {integrator}, dt = 5/{steps} s"
+        where = f"{scene.name}, {integrator}, {motion.step(scene, steps)}"
         about = {
             "scene": scene.name, "engine_integrator": integrator, "twin": twin, "dt_s": dt,
         }  # fmt: skip
@@ -118,12 +123,15 @@ def pair(result, scene, engine, steps, twin, integrators) -> None:
         one = stack(*(path[:, 1] for path in engine.trajectory(*states, tau, dt, 1, integrator)[1:]))
         apart = stack(*(a[::every][judged] - b[::every][judged] for a, b in zip(ours, theirs)))
         times = t[::every]
-        level(result, where, about, "derivative", derivative_apart, derivative_bar[:, None], times[alive], ending)
-        level(result, where, about, "one step", stepped - one, step_bar, times[alive], ending)
-        level(result, where, about, "open loop", apart, width[judged], times[judged], ending)
+        for name, difference, bar, at in (
+            ("derivative", derivative_apart, derivative_bar[:, None], times[alive]),
+            ("one step", stepped - one, step_bar, times[alive]),
+            ("open loop", apart, width[judged], times[judged]),
+        ):
+            level(result, where, about | {"level": name}, scene.hinges, difference, bar, at, ending)
 
         result.check(where, f"judged for less than {required:g} s", max(0.0, required - until), 0.0, "s missing")
-        if ends and width[min(int(min(ends) / dt / every), RECORDED), :3].max() < NARROW:
+        if ends and width[min(int(min(ends) / dt / every), scene.steps), :n].max() < NARROW:
             apart_steps = abs((ours_end or np.inf) - (theirs_end or np.inf)) / dt
             result.check(where, "diverged at another step than its twin", round(min(apart_steps, steps)), 0.0, "steps")
         if scene.torque == "free":
@@ -134,7 +142,7 @@ def pair(result, scene, engine, steps, twin, integrators) -> None:
         if first is None:
             first = theirs
             result.curves[(scene.name, twin, steps)] = {
-                "integrator": integrator, "t": t, "every": every, "tmt": ours, "mujoco": theirs, "band": width[:, :3].max(axis=1),
+                "integrator": integrator, "t": t, "every": every, "tmt": ours, "mujoco": theirs, "band": width[:, :n].max(axis=1),
                 "ulp": motion.one_ulp(scene, twin, dt, steps), "judged_until_s": until, "left": {
                     "TMT": motion.departure(t, ours[0]), "MuJoCo": motion.departure(t, theirs[0])},
             }  # fmt: skip
@@ -148,20 +156,20 @@ def stack(q, qd) -> np.ndarray:
     return np.concatenate([q, qd], axis=-1)
 
 
-def level(result, where, about, name, difference, bar, times, ending) -> None:
+def level(result, where, about, hinges, difference, bar, times, ending) -> None:
     """A row and a check: the component and state of the recorded ones that come closest to their bar."""
+    name, n = about["level"], len(hinges)
     difference = np.abs(difference)
     bar = np.broadcast_to(bar, difference.shape)
     ratio = np.divide(difference, bar, out=np.zeros_like(difference), where=bar > 0)
     k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
-    unit, largest_unit = ("rad/s2",) * 2 if name == "derivative" else (("rad", "rad/s")[i // 3], "rad")
-    place = f"{tmt.ARM.hinge_names[i % 3]} at t = {times[k]:.3f} s"
+    unit, largest_unit = ("rad/s2",) * 2 if name == "derivative" else (("rad", "rad/s")[i // n], "rad")
+    place = f"{hinges[i % n]} at t = {times[k]:.3f} s"
     check = result.check(where, f"{name}, TMT to MuJoCo", difference[k, i], bar[k, i], unit, place, True)
     result.rows.append(
         about
         | {
-            "level": name,
-            "largest_difference": None if check.value is None else difference[:, :3].max(),
+            "largest_difference": None if check.value is None else difference[:, :n].max(),
             "unit": largest_unit,
             "worst_difference": check.value,
             "band": check.tolerance,

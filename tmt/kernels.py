@@ -193,8 +193,9 @@ def lane_stepper(tree, method_name):
 def evaluator(tree, quantity, terms=composite.mass_matrix_and_bias, sine="sincos"):
     """Compiled evaluation of many states: a module with `each`, `lanes` (q, qd, tau, out) and `chain`.
 
-    quantity: "forward_dynamics", qdd to out (N, n), with `rate(y, tau)` for solvers besides; or "mass_matrix_and_bias", the rows of the upper triangle of Mbar and
-    then h, to out (N, n (n + 1) / 2 + n). Arrays are contiguous, q, qd, tau of shape (N, n); rad, s, kg, m, N m.
+    quantity: "forward_dynamics", qdd to out (N, n), and besides `rate(y, tau)` for solvers; or "mass_matrix_and_bias", the
+    rows of the upper triangle of Mbar, then h, to out (N, n (n + 1) / 2 + n). Arrays are contiguous, q, qd, tau of shape
+    (N, n); rad, s, kg, m, N m.
     terms: the form of the dynamics that is traced; sine: "sincos" or "library_sincos".
     """
     return load(evaluator_source(tree, quantity, terms, sine))

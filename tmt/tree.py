@@ -1,9 +1,11 @@
 """A kinematic tree of hinges that carry rigid bodies, as plain numbers."""
 
 import reprlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+
+from .space import IDENTITY, ZERO, Matrix, Vector, rotation
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,49 @@ class Tree:
     def __repr__(self):
         return f"Tree({', '.join(f'{field.name}={getattr(self, field.name)}' for field in fields(self))})"
 
+    def lock(self, angles: dict) -> "Tree":
+        """The tree without the hinges that are named in `angles`, {name: rad}: they stay at these angles, at rest.
+
+        What hangs on a locked hinge is carried by the hinge before it, its vectors turned so that all frames are again
+        parallel to the inertial frame where the free hinges are at zero. A hinge locked at 0 rounds nothing. Raises
+        ValueError for an unknown hinge, an angle that is no finite number, or if no hinge is left.
+        """
+        names = self.hinge_names
+        if unknown := [name for name in angles if name not in names]:
+            raise ValueError(f"there is no hinge {unknown[0]!r} to lock; the hinges are {', '.join(names)}")
+        if len(angles) == len(names):
+            raise ValueError(f"all hinges ({', '.join(names)}) are locked; at least one must be free")
+        locked = dict(zip(angles, _numbers("lock", list(angles.values()), (len(angles),))))
+        free = [i for i, name in enumerate(names) if name not in locked]
+
+        # of each hinge's frame: the free hinge that carries it now, and where it is in the frame of that one
+        frames = []
+
+        def frame(hinge):
+            return frames[hinge] if hinge >= 0 else (-1, ZERO, IDENTITY)
+
+        for i, name in enumerate(names):
+            carrier, origin, turn = frame(self.parent[i])
+            if i in free:
+                frames.append((free.index(i), ZERO, turn))
+            else:
+                turned = turn @ rotation(self.axis[i], locked[name]) if locked[name] else turn
+                frames.append((carrier, _moved(origin, turn, self.offset[i]), turned))
+
+        before = [frame(self.parent[i]) for i in free]
+        carried = [frame(hinge) for hinge in self.body_hinge]
+        return replace(
+            self,
+            hinge_names=[names[i] for i in free],
+            parent=[carrier for carrier, _, _ in before],
+            offset=[tuple(_moved(origin, turn, self.offset[i])) for i, (_, origin, turn) in zip(free, before)],
+            axis=[tuple(_moved(ZERO, turn, self.axis[i])) for i, (_, _, turn) in zip(free, before)],
+            damping=[self.damping[i] for i in free],
+            body_hinge=[carrier for carrier, _, _ in carried],
+            com=[tuple(_moved(origin, turn, com)) for com, (_, origin, turn) in zip(self.com, carried)],
+            inertia=[_turned(turn, inertia) for inertia, (_, _, turn) in zip(self.inertia, carried)],
+        )
+
     def moves(self, body: int) -> list[bool]:
         """Which of the n hinges move the body: those on its path to the world."""
         on_path = [False] * len(self.parent)
@@ -73,6 +118,19 @@ class Tree:
             on_path[hinge] = True
             hinge = self.parent[hinge]
         return on_path
+
+
+def _moved(origin, turn, point):
+    """A point of a frame in the axes and from the origin of the one that carries it."""
+    return origin + (turn @ Vector(*point) if turn is not IDENTITY else Vector(*point))
+
+
+def _turned(turn, inertia):
+    """A tensor in the axes of the frame that carries it, symmetric."""
+    if turn is IDENTITY:
+        return inertia
+    tensor = np.array([list(row) for row in turn @ Matrix(inertia) @ turn.transposed])
+    return (tensor + tensor.T) / 2.0
 
 
 def _names(field, values):

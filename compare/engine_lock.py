@@ -1,0 +1,103 @@
+"""An engine with fewer hinges: the file is read again as an MjSpec, and its hinges are taken out there.
+
+A joint that is only deleted stays at zero. At another angle the body's frame must be turned about the joint's anchor,
+and the joints that come before it in the same body turned back, for they act before it. Nothing is fused (fusestatic
+gives wrong inertias up to MuJoCo 3.10) and nothing is printed as XML (which has seven digits).
+"""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from .engine import Engine
+from .engine_file import ModelError, name_of
+
+
+def read(source) -> mujoco.MjSpec:
+    """The editable form of a file (a Path) or of MJCF text."""
+    return mujoco.MjSpec.from_file(str(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
+
+
+def locked(engine, angles: dict) -> Engine:
+    """The engine without the hinges that are named in `angles`, {name: rad}, with its gravity and damping."""
+    every = engine.locked | angles
+    hinges = [name for name in engine.hinges if name not in angles]
+    other = Engine(locked_model(engine.source, every), hinges, engine.carriers, engine.source, engine.bodies, every)
+    other.model.opt.gravity[:] = engine.model.opt.gravity
+    left = [engine.dofs[engine.hinges.index(name)] for name in hinges]
+    other.model.dof_damping[other.dofs] = engine.model.dof_damping[left]
+    return other
+
+
+def locked_model(source, angles: dict) -> mujoco.MjModel:
+    """The compiled model without the hinges that are named in `angles`, {name: rad}; every body keeps its number.
+
+    Keyframes go, and so do the actuators, sensors and equalities of a locked hinge. ModelError if more refers to it.
+    """
+    try:
+        return compiled_without(read(source), angles)
+    except ValueError as error:
+        raise ModelError(f"MuJoCo cannot compile {name_of(source)} with {', '.join(angles)} locked: {error}") from None
+
+
+def compiled_without(spec, angles) -> mujoco.MjModel:
+    """The model of a spec whose hinges at these angles have been taken out."""
+    spec.compiler.fusestatic = False
+    whole = spec.compile()  # anchors, axes and frames as they are after defaults, degrees and nested frames
+    bound = [a for a in spec.actuators if a.target in angles]
+    bound += [s for s in spec.sensors if s.objname in angles]
+    bound += [e for e in spec.equalities if {e.name1, e.name2} & set(angles)]
+    for element in (*spec.keys, *bound):  # a keyframe has an angle for every hinge
+        spec.delete(element)
+    for number, body in enumerate(spec.bodies):
+        joints = [whole.joint(joint.name) for joint in body.joints]
+        if not {joint.name for joint in joints} & set(angles):
+            continue
+        frame = whole.body_pos[number].copy(), whole.body_quat[number].copy()
+        moved = []  # anchor and axis of the joints that stay, those before a locked one moved by it
+        for joint in joints:
+            if joint.name not in angles:
+                moved.append((joint.name, joint.pos.copy(), joint.axis.copy()))
+                continue
+            angle = angles[joint.name] - float(whole.qpos0[joint.qposadr[0]])
+            if angle:
+                turn, back = np.zeros((2, 4))
+                mujoco.mju_axisAngle2Quat(turn, joint.axis, angle)
+                mujoco.mju_negQuat(back, turn)
+                frame = placed(*frame, joint.pos - turned(joint.pos, turn)), times(frame[1], turn)
+                moved = [
+                    (name, joint.pos + turned(pos - joint.pos, back), turned(axis, back)) for name, pos, axis in moved
+                ]
+        if body.frame is not None:
+            body.set_frame(body.parent.add_frame())  # what was a nested frame's part is in the compiled numbers
+        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        body.pos, body.quat = frame
+        for name, pos, axis in moved:
+            joint = spec.joint(name)
+            if joint.frame is not None:
+                joint.set_frame(body.add_frame())
+            joint.pos, joint.axis = pos, axis
+        for joint in joints:
+            if joint.name in angles:
+                spec.delete(spec.joint(joint.name))
+    return spec.compile()
+
+
+def placed(origin, quat, point):
+    """A point of a frame, where that frame is described."""
+    return origin + turned(point, quat)
+
+
+def turned(vector, quat):
+    """A vector turned by a quaternion."""
+    result = np.zeros(3)
+    mujoco.mju_rotVecQuat(result, vector, quat)
+    return result
+
+
+def times(first, second):
+    """The product of two quaternions."""
+    result = np.zeros(4)
+    mujoco.mju_mulQuat(result, first, second)
+    return result
