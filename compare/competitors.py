@@ -5,7 +5,7 @@ A competitor is a value: its engine, its method, its settings, and `prepare(scen
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from .engine import INTEGRATORS, Engine
 GRID = 64  # steps of the coarsest run, and of the grid on which runs are judged
 FINEST = {"RK4": 2**17}  # steps beyond which a run would take too long to be timed again and again
 FINEST_MUJOCO, FINEST_TMT = 2**16, 2**18
+QUICK = 5  # settings of a quick run
 TOLERANCES = tuple(10.0**-k for k in range(2, 15))
 SCIPY = {"RK45": 12, "DOP853": 13, "Radau": 7, "LSODA": 12}  # the finest tolerance, 10^-k
 ORDERS = {"RK4": 4, "RK45": 5, "DOP853": 8, "Radau": 5}  # of MuJoCo's integrators the others have order 1
@@ -51,8 +52,8 @@ class Competitor:
     prepare: Callable
 
 
-def competitors(engine: Engine) -> list[Competitor]:
-    """All that can take part here; heyoka where it is installed."""
+def competitors(engine: Engine, quick: bool = False) -> list[Competitor]:
+    """All that can take part here, heyoka where it is installed; of a quick run MuJoCo and tmt with coarse steps."""
     result = []
     for name in INTEGRATORS:
         settings = halvings(FINEST.get(name, FINEST_MUJOCO))
@@ -63,6 +64,8 @@ def competitors(engine: Engine) -> list[Competitor]:
             result.append(Competitor("tmt", name, None, settings, partial(tmt_run, name)))
         else:
             result.append(Competitor("tmt", name, stepping.order, halvings(FINEST_TMT), partial(tmt_run, name)))
+    if quick:
+        return [replace(competitor, settings=competitor.settings[:QUICK]) for competitor in result]
     for name, finest in SCIPY.items():
         settings = tuple(Setting(tolerance=10.0**-k) for k in range(2, finest + 1))
         result.append(Competitor("scipy", name, None, settings, partial(scipy_run, name)))

@@ -29,7 +29,7 @@ def costs(engine, quick) -> tuple[list[dict], list[str]]:
     states = rng.uniform(-3.0, 3.0, (3, most, 3))
     first = [np.ascontiguousarray(a[0]) for a in states]
     repeated = {(quantity, name, 1, 1): loop for name, (quantity, loop) in loops(engine, *first).items()}
-    repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(first)}
+    repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(first, quick)}
     calls = {key: counted(loop) for key, loop in repeated.items()}
     with ThreadPoolExecutor(2) as pool:
         for count in STATES[:1] if quick else STATES:
@@ -52,7 +52,7 @@ def counted(loop) -> tuple[Callable, int]:
     return lambda: loop(count), count
 
 
-def of_one_state(state):
+def of_one_state(state, quick):
     """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
     q, qd, tau = state
     floats = [a.tolist() for a in state]
@@ -73,8 +73,9 @@ def of_one_state(state):
         run(path[0, :, : count + 1].copy(), path[1, :, : count + 1].copy(), tau[None], 1e-4)
 
     yield FORWARD, "literal, Python floats", plain
-    yield FORWARD, "generic compiled loop", lambda count: looped()[0](tree, q, qd, tau, out, count)
-    yield TERMS, "generic compiled loop", lambda count: looped()[1](tree, q, qd, M, h, count)
+    if not quick:  # their loops are compiled anew in each run
+        yield FORWARD, "generic compiled loop", lambda count: looped()[0](tree, q, qd, tau, out, count)
+        yield TERMS, "generic compiled loop", lambda count: looped()[1](tree, q, qd, M, h, count)
     yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
     yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
     yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)

@@ -66,7 +66,7 @@ def rows(setup) -> Result:
     for scene, of_scene in zip(scenes, found):
         setup.tell(f"speed: timing {scene.name}")
         spread += take_times(of_scene, setup)
-    fixed = [(c.engine, c.method, c.order) for c in competitors(setup.engine) if c.order]
+    fixed = [(c.engine, c.method, c.order) for c in competitors(setup.engine, setup.is_quick) if c.order]
     result.tables["speed_orders"] = orders(result, [s.name for s in scenes], fixed)
     twins(result)
     rounding(result, floors)
@@ -88,10 +88,10 @@ def rows(setup) -> Result:
 def judge(scene, engine, known, quick) -> tuple[list[dict], float]:
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[scene.name]
-    found, field = [], competitors(engine)
+    found, field = [], competitors(engine, quick)
     for place, competitor in enumerate(field):
         best, last = np.inf, 0
-        for setting in competitor.settings[:5] if quick else competitor.settings:
+        for setting in competitor.settings:
             found.append(judged(scene, scene, competitor, setting, reference) | {"place": (place, scene, setting)})
             # one more run that cost more and gained nothing shows that rounding has taken over
             error = np.inf if found[-1]["diverged"] else found[-1]["worst_error_rad"]
@@ -142,7 +142,7 @@ def floor(scene) -> float:
 
 def take_times(rows, setup) -> list[float]:
     """Fill in the seconds of one scene's rows, all settings in turns; the median of each over its least."""
-    field = competitors(setup.engine)
+    field = competitors(setup.engine, setup.is_quick)
     timed = [row for row in rows if not row["diverged"]]
     runs = [field[place].prepare(scene, setting)[0] for place, scene, setting in (row["place"] for row in timed)]
     times = clock.in_turns(runs, rounds=2 if setup.is_quick else 5)
