@@ -130,7 +130,8 @@ def simulate(
     """Motion under constant torque: t (steps+1,) s, q and qd (..., steps+1, n), rad and rad/s.
 
     q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1;
-    method: a key of METHODS. States after a run has left the finite numbers are NaN. Assignment, part i.
+    method: a key of METHODS. States after a run has left the finite numbers are NaN, and so are those after Newton's
+    method has failed in an implicit one (METHODS[method].step then raises ArithmeticError). Assignment, part i.
     """
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"unknown method {method!r}; known are {', '.join(METHODS)}")

@@ -16,6 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
+from .implicit import ImplicitRungeKutta, step_source
 from .methods import METHODS
 from .trace import Tape
 
@@ -58,20 +59,24 @@ def slope_source(tree, method_name) -> tuple[str, int]:
 def source(tree, method_name) -> str:
     """The module for one model and one method: slope, step, and the loop over both."""
     n = len(tree.parent)
-    slope, _ = slope_source(tree, method_name)
     tape = Tape()
     q, qd, tau, dt = _inputs(tape, tree)
+    options = 'cache=CACHE, error_model="numpy"'
+    njit = f"@njit({options})\n"
 
     def traced(q, qd):
         return tape.call("slope", [*q, *qd, *tau, dt], n)
 
-    new_q, new_qd = METHODS[method_name].step(traced, q, qd, dt)
-    step, _ = tape.function("step", [*q, *qd, *tau, dt], [*new_q, *new_qd])
+    if isinstance(METHODS[method_name], ImplicitRungeKutta):
+        step = step_source(tree, METHODS[method_name], njit)
+    else:
+        new_q, new_qd = METHODS[method_name].step(traced, q, qd, dt)
+        slope = slope_source(tree, method_name)[0]
+        step = f"{njit}{slope}\n\n{njit}" + tape.function("step", [*q, *qd, *tau, dt], [*new_q, *new_qd])[0]
 
     def list_of(pattern, names=("q", "qd")):
         return ", ".join(pattern.format(name=name, i=i) for name in names for i in range(n))
 
-    options = 'cache=CACHE, error_model="numpy"'
     loop = LOOP.format(
         options=options,
         state=list_of("{name}{i}"),
@@ -81,8 +86,7 @@ def source(tree, method_name) -> str:
         store=list_of("{name}[b, k, {i}]"),
         sum=list_of("{name}{i}").replace(", ", " + "),
     )
-    njit = f"@njit({options})\n"
-    return f"{HEADER}\n{njit}{slope}\n\n{njit}{step}\n{loop}"
+    return f"{HEADER}\n{step}\n{loop}"
 
 
 def _inputs(tape, tree):
