@@ -106,15 +106,16 @@ def one_step(stepping, tree, q, qd, tau, dt):
 def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
     """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2n, 2n).
 
-    q, qd: states (..., n), rad and rad/s; tau: torque (n,), N m; dt: step, s. At an equilibrium it is what a step does
-    to a small deviation, and its eigenvalues are the growth of each mode per step. By dual numbers, all directions at
-    once; partitioned methods included.
+    q, qd: states (..., n), rad and rad/s; tau: torque (n,), N m; dt: step in s, one for all or (...). At an equilibrium
+    it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual numbers,
+    all directions at once; so it holds for partitioned and implicit methods too.
     """
-    q, qd = np.broadcast_arrays(np.asarray(q, dtype=float), qd)
-    n, batch = q.shape[-1], q.shape[:-1]
+    n = len(tree.parent)
+    batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
+    start = [np.broadcast_to(values, (*batch, n))[..., i] for values in (q, qd) for i in range(n)]
     directions = np.eye(2 * n).reshape(2 * n, 2 * n, *(1 for _ in batch))  # component, direction, state
-    state = seeded([*np.moveaxis(q, -1, 0), *np.moveaxis(qd, -1, 0)], directions)
-    new_q, new_qd = one_step(stepping, tree, state[:n], state[n:], [float(t) for t in tau], float(dt))
+    state = seeded(start, directions)
+    new_q, new_qd = one_step(stepping, tree, state[:n], state[n:], [float(t) for t in tau], dt)
     slopes = [np.broadcast_to(component.slope, (2 * n, *batch)) for component in (*new_q, *new_qd)]
     return np.moveaxis(np.array(slopes), (0, 1), (-2, -1)).copy()
 
