@@ -1,0 +1,149 @@
+"""How long a held arm stays: departure from ball catch, a saddle, and from zero, a marginal posture."""
+
+from itertools import product
+
+import numpy as np
+from scipy.integrate import quad
+
+import tmt
+from tmt import method
+from tmt.dual import seeded
+
+from .linear import held
+from .motion import LEFT, departure
+from .parties import Party
+from .scenes import posture
+
+LONGEST = 12.0  # s
+PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
+TORQUES = tuple(10.0**-k for k in (13, 14, 15))  # rad, as the error of torque that moves the equilibrium as far
+NEAR = 0.03  # s, or one step: how near the prediction an observed departure is to be
+SCHEMES = (
+    Party("TMT", "rk4"), Party("TMT", "semi_implicit_euler"), Party("TMT", "implicit"), Party("TMT", "implicit_midpoint"),
+    Party("TMT", "gauss_legendre_4"), Party("TMT", "explicit_euler"),
+    Party("MuJoCo", "Euler"), Party("MuJoCo", "implicit"), Party("MuJoCo", "RK4"),
+)  # fmt: skip
+ZERO_SIZES = tuple(10.0**-k for k in (2, 2.5, 3, 3.5, 4, 4.5, 5))  # rad
+
+
+def own_torque(party, mujoco, at) -> np.ndarray:
+    """The torque under which the compiled arithmetic of a party gives no acceleration at all at the posture, N m.
+
+    MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the one whose
+    first step from rest moves least; compiled code may regroup the sums.
+    """
+    if party.engine == "MuJoCo":
+        return mujoco.gravity_balance(at.q)
+    tau = variants(at.tau, 2)
+    _, qd = party.run(mujoco, at.model, at.q, np.zeros_like(tau), tau, 1.0, 1)
+    return tau[np.argmin(np.abs(qd[:, 1]).max(axis=1))]
+
+
+def variants(tau, reach=1) -> np.ndarray:
+    """The torques within so many ulps of each component, 27 for one ulp, (27, 3) N m; the middle one is tau itself."""
+    away = range(-reach, reach + 1)
+    return np.array(list(product(*([t + k * np.spacing(abs(t)) for k in away] for t in tau))))
+
+
+def offset(at, residual) -> np.ndarray:
+    """How far the posture is from the equilibrium of the held torque plus a small residual, rad (n,), N m (n,)."""
+    stiffness = at.matrix[3:, :3]
+    return np.linalg.solve(stiffness, np.linalg.solve(tmt.mass_matrix(at.q), residual))
+
+
+def predicted(at, scheme, dt, moved, residual, longest=LONGEST) -> float | None:
+    """When the method's own linear map has the arm 0.1 rad away, s; None: not within `longest`.
+
+    moved: angles at the start from the posture, rad; residual: torque beyond the one that holds, N m. The map carries
+    all six modes of the state about the equilibrium that the residual moves.
+    """
+    J = at.step(scheme, dt)
+    equilibrium = -offset(at, residual)
+    state = np.concatenate([moved - equilibrium, np.zeros(3)])
+    for k in range(1, round(longest / dt) + 1):
+        state = J @ state
+        if np.abs(state[:3] + equilibrium - moved).max() > LEFT:
+            return k * dt
+    return None
+
+
+def stuck(at, dt, moved, residual) -> float:
+    """For how long at most rounding keeps the arm in place, s: while dt qd is below half an ulp of every angle."""
+    push = at.matrix[3:, :3] @ (moved + offset(at, residual))
+    with np.errstate(divide="ignore"):
+        return float(np.min(0.5 * np.spacing(np.abs(at.q)) / np.abs(dt * push)))
+
+
+def examine(dt, mujoco, parties) -> list:
+    """Rows for tables/departure.csv: every party and perturbation at one dt, in one scene."""
+    at = held("ball catch", posture("ball catch"))
+    values, vectors = at.modes
+    shape = vectors[:3, 0].real / np.abs(vectors[:3, 0]).max()
+    steps = round(LONGEST / dt)
+    t = dt * np.arange(steps + 1)
+    rows = []
+    for party in parties:
+        own = own_torque(party, mujoco, at)
+        sizes = [(size, size * shape, own) for size in PERTURBATIONS]
+        # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
+        push = tmt.mass_matrix(at.q) @ shape * values[0].real ** 2
+        sizes += [(size, np.zeros(3), own + size * push) for size in TORQUES]
+        starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
+        with np.errstate(over="ignore", invalid="ignore"):
+            paths, _ = party.run(mujoco, at.model, at.q + starts, np.zeros_like(starts), torques, dt, steps)
+        for (size, moved, tau), path in zip(sizes, paths):
+            rows.append({
+                "scene": at.name + (", torque off" if size in TORQUES else ""), "engine": party.engine, "method": party.method,
+                "dt_s": dt, "perturbation_rad": size, "predicted_s": predicted(at, party.scheme, dt, moved, tau - own),
+                "observed_s": departure(t, path), "stuck_s": stuck(at, dt, moved, tau - own),
+            })  # fmt: skip
+    return rows
+
+
+def zero_law(mujoco, party) -> list:
+    """Rows of the same table at zero, a marginal posture: predicted from its cubic potential, not from a limit.
+
+    Along the mode without stiffness m q'' = c q^2 with c = -V'''/2, so t = sqrt(3 m/(2 c)) times the integral of
+    1/sqrt(q^3 - p^3) from p to 0.1 rad beyond: about 2.43 sqrt(3 m/(2 c p)) for small p.
+    """
+    at = held("zero", posture("zero"))
+    shape, slope = cubic(at)
+    dt, rows = 0.01, []
+    for sign, size in product((1.0, -1.0), ZERO_SIZES):
+        start = sign * size
+        expected = fall_time(slope, start)
+        steps = round(1.5 * expected / dt)
+        q, _ = party.run(mujoco, at.model, at.q + start * shape, np.zeros(3), own_torque(party, mujoco, at), dt, steps)
+        rows.append({
+            "scene": "zero", "engine": party.engine, "method": party.method, "dt_s": dt, "perturbation_rad": start,
+            "predicted_s": expected, "observed_s": departure(dt * np.arange(steps + 1), q), "stuck_s": 0.0,
+        })  # fmt: skip
+    return rows
+
+
+def cubic(at) -> tuple[np.ndarray, float]:
+    """The mode without stiffness, scaled to 1 rad and turned so that the arm falls along it, and c/m in q'' = c/m q^2.
+
+    c by nested dual numbers: the second derivative of the torque dV/dq along the mode.
+    """
+    values, vectors = np.linalg.eigh(-tmt.mass_matrix(at.q) @ at.matrix[3:, :3])
+    shape = vectors[:, np.argmin(np.abs(values))]
+    shape = shape / np.abs(shape).max()
+
+    def second(direction):
+        inner = seeded([float(a) for a in at.q], list(direction))
+        outer = seeded(inner, list(direction))
+        torque = method.bias(method.bodies(at.model, outer), at.model.gravity)
+        along = sum((component * float(d) for component, d in zip(torque, direction)), 0.0)
+        return float(inner[0].parts(outer[0].parts(along)[1])[1])
+
+    ratio = -0.5 * second(shape) / (shape @ tmt.mass_matrix(at.q) @ shape)
+    return (shape, ratio) if ratio > 0.0 else (-shape, -ratio)
+
+
+def fall_time(slope, start) -> float:
+    """Time from rest at `start` to 0.1 rad beyond it in q'' = slope q^2, s."""
+    end = start + LEFT
+    # q = start + u^2 takes the root out of the integrand at the start
+    value, _ = quad(lambda u: 2.0 / np.sqrt(u**4 + 3.0 * start * u**2 + 3.0 * start**2), 0.0, np.sqrt(end - start), limit=500)
+    return float(np.sqrt(1.5 / slope) * value)
