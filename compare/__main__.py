@@ -19,6 +19,7 @@ EXPERIMENTS = {
     "gravity": "the torque that holds the arm",
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
     "trajectory": "five seconds of motion, a twin for every integrator",
+    "stability": "step limits, departure from unstable postures, where each method fails",
 }
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest

@@ -69,6 +69,7 @@ class Result:
     curves: dict = field(default_factory=dict)
     notes: list = field(default_factory=list)  # sentences for the report
     shown: list | None = None  # columns of the table in the report, if not all
+    tables: dict = field(default_factory=dict)  # further tables: name -> rows
 
     def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False) -> Check:
         value = float(value) if np.isfinite(value) else None

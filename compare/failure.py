@@ -8,7 +8,7 @@ import tmt
 from tmt.methods import METHODS
 
 from .engine_linear import left_to_itself
-from .limits import growth, stiffest
+from .limits import ALLOWED, growth, stiffest
 from .linear import held
 from .motion import diverged_at
 from .parties import Party
@@ -75,12 +75,12 @@ def silent_gain(mujoco) -> dict:
         if count == 64:
             t, energy = dt * np.arange(count + 1), tmt.energy(run["q"], run["qd"])
             kept = {"t": t, "energy": energy, "smallest": smallest, "warnings": run["warnings"]}
-            kept |= {"caught_at_s": caught(BENT, t, run), "gain": float(energy.max() - energy[0])}
+            kept |= {"caught_in_it_s": caught(BENT, t, run), "gain": float(energy.max() - energy[0])}
     heights = tmt.potential_energy([posture("upright"), posture("hanging")])
     return kept | {"definite": definite, "range": float(np.ptp(heights))}
 
 
-def long_run(party, mujoco, dt) -> dict:
+def long_run(party, dt, mujoco) -> dict:
     """A minute of bent, free: the energy over time, and whether it stays bounded, drifts, or the run diverges.
 
     It drifts if its mean of the last fifth is off that of the first by more than three standard deviations of either.
@@ -128,3 +128,81 @@ def newton(name) -> list:
 
 IMPLICIT = tuple(name for name, stepping in METHODS.items() if hasattr(stepping, "newton"))
 EDGES = (Party("TMT", "implicit"), Party("TMT", "semi_implicit_euler"))
+
+
+def judge(result, mujoco, near, minutes, found) -> None:
+    """Checks, tables and sentences about the resonance, silent failure, a minute of motion and Newton's method."""
+    worst = {}
+    for party, grown in near.items():
+        worst[party.label] = grown.max(axis=1)
+        where = f"bent, {party.label}, omega dt near sqrt 3"
+        result.check(where, f"growth in 2000 steps from {SMALL:g} rad", grown[0].max(), ALLOWED, "fold")
+        if party.scheme == "implicit":
+            missing = max(0.0, ALLOWED - min(grown[1].max(), 1e300))
+            result.check(where, f"growth in 2000 steps from {LARGE:g} rad is less than 100-fold", missing, 0.0, "fold missing")
+    told = "; ".join(
+        f"{label} {'diverges' if not np.isfinite(large) else f'grows {large:.1e}-fold'}" for label, (_, large) in worst.items()
+    )
+    result.notes.append(
+        f"The nonlinear edge: at bent a perturbation of {LARGE:g} rad along the stiffest mode meets a 1:3 resonance at "
+        f"omega dt = sqrt 3 = {RESONANCE:.4f} (a swing takes three steps), below the linear limit of 2. There {told}, in 2000 "
+        f"steps; from {SMALL:g} rad all of them grow at most {max(small for small, _ in worst.values()):.2f}-fold."
+    )
+    result.curves["near"] = {party.label: grown for party, grown in near.items()}
+
+    reset, gain = own_reset(mujoco), silent_gain(mujoco)
+    for where, run in (("Euler, automatic reset on", reset), ("implicit", gain)):
+        missed = run["caught_in_it_s"] is None
+        result.check(f"bent, free, MuJoCo {where}, dt = 5/64 s", "failure that is not caught", missed, 0.0, "runs")
+    if reset["resets"]:
+        alpha, beta, gamma = np.degrees(reset["after_q"])
+        result.notes.append(
+            f"Silent failure, MuJoCo's default: bent, free, by Euler at 5/64 s with its automatic reset on. In {reset['t'][-1]:.0f} "
+            f"s it starts again {reset['resets']} times, first at {reset['first_reset_s']:.2f} s, from ({alpha:.1f}, {beta:.1f}, "
+            f"{gamma:.1f}) deg; every number is finite, and the counters of its warnings stand at {reset['warnings']}. Caught at "
+            f"{reset['caught_in_it_s']:.2f} s, by the bound on the energy; its clock that goes back would tell too. With the reset "
+            f"off, as everywhere else in this report, the run is found to have diverged at {reset['caught_at_s']:.2f} s."
+        )
+    least = ", ".join(f"{value:.4f} kg m2 at {count} steps" for count, value in gain["definite"].items())
+    result.notes.append(
+        f"Silent failure of `implicit`: the same at 5/64 s gains {gain['gain']:.0f} J in 5 s, on an arm whose whole potential "
+        f"range is {gain['range']:.1f} J, with {gain['warnings']} warnings. Its matrix Mbar + dt dh/dqd loses definiteness: the "
+        f"smallest eigenvalue of its symmetric part along 5 s is {least}. Caught at {gain['caught_in_it_s']:.2f} s by the energy."
+    )
+    result.curves["silent"] = {"reset": reset, "gain": gain}
+
+    table = [run["row"] for run in minutes]
+    result.tables["stability_energy"] = table
+    verdict = {(row["engine"], row["method"], row["dt_s"]): row["energy"] for row in table}
+    for party, dt in {(Party(row["engine"], row["method"]), row["dt_s"]) for row in table if row["engine"] == "MuJoCo"}:
+        other = verdict[("MuJoCo", party.method, dt)] != verdict[("TMT", party.scheme, dt)]
+        where = f"bent, free, 60 s, {party.label}, dt = {dt:.4g} s"
+        result.check(where, "energy does otherwise than its twin's", other, 0.0, "runs")
+    for dt in sorted({row["dt_s"] for row in table}, reverse=True):
+        of_kind = {
+            kind: [row["method"] for row in table if row["dt_s"] == dt and row["engine"] == "TMT" and row["energy"] == kind]
+            for kind in ("bounded", "drifts", "diverges")
+        }
+        told = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in of_kind.items() if names)
+        result.notes.append(f"Energy over a minute of bent, free, at dt = {dt:.4g} s: {told}.")
+    result.curves["minutes"] = minutes
+    newton_table = [row for rows in found for row in rows]
+    if newton_table:
+        result.tables["stability_newton"] = newton_table
+        result.notes.append(tell_newton(newton_table))
+
+
+def tell_newton(table) -> str:
+    """Up to which step Newton's method finds all stages of 2,000 steps, method by method and motion by motion."""
+    told = []
+    for name in dict.fromkeys(row["method"] for row in table):
+        limits = []
+        for motion in NEWTON_SIZES:
+            rows = [row for row in table if row["method"] == name and row["motion"] == motion]
+            failing = [row["dt_s"] for row in rows if row["steps_found"] < 2000]
+            limits.append(f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never to {NEWTON[-1]:g} s")
+        told.append(f"{name} ({'; '.join(limits)})")
+    return (
+        "The A-stable methods have no linear limit; what ends them is Newton's method, from the steps on at which it does not "
+        f"find a stage of 2000 at bent: {', '.join(told)}. The run is NaN from there, with finite and modest numbers before it."
+    )

@@ -15,6 +15,8 @@ COARSE = np.geomspace(1e-4, 1e2, 25)  # s: steps among which the observed limit 
 LAST = 150  # steps at the end of a run
 CLOSE = 1e-4  # to which it is then bisected
 GROWTH_STEPS = (1e-3, 1e-2, 5 / 64)  # s: where growth per step is compared, in scenes in which a method always fails
+AIM, AIM_DAMPED = 0.002, 0.005  # relative, of an observed limit to the predicted one
+GROWN = 1e-3  # relative, of the growth in all steps: the deviation reaches 1e-5 rad, and its square is not in a linear map
 TINY, TOTAL, MOST = 1e-8, 1e3, 200  # rad, of the deviation there; how much it may grow; in at most how many steps
 
 
@@ -118,3 +120,50 @@ def stiffest(at) -> tuple[float, np.ndarray]:
     k = int(np.argmax(values.imag))
     angles = (vectors[:3, k] / vectors[np.argmax(np.abs(vectors[:3, k])), k]).real
     return float(values[k].imag), angles / np.abs(angles).max()
+
+
+def judge(result, parts) -> None:
+    """The table of limits and that of growth per step, a check for each row, and what is not within the aim."""
+    aimed = explained = 0
+    for row in (row for part in parts for row in part["rows"]):
+        seen, expected = row.pop("seen"), row.pop("expected")
+        result.rows.append(row)
+        where = f"{row['scene']}, {row['engine']} {row['method']}, damping {row['damping']:g}"
+        result.check(where, f"limit is not {row['limit'].replace('_', ' ')}", seen != row["limit"], 0.0, "methods")
+        if row["limit"] != "finite" or seen != "finite":
+            continue
+        aim = AIM_DAMPED if row["damping"] else AIM
+        off, by_map = row["observed_dt_s"] / row["predicted_dt_s"] - 1.0, row["observed_dt_s"] / expected - 1.0
+        result.check(where, "limit, observed / the linear map's own 100-fold - 1", abs(by_map), AIM, "")
+        aimed += 1
+        if abs(expected / row["predicted_dt_s"] - 1.0) < 0.9 * aim:  # the criterion itself is that near to the limit
+            result.check(where, "limit, observed / predicted - 1", abs(off), aim, "")
+        else:
+            explained += 1
+            result.notes.append(
+                f"{where}: the observed limit is {100 * off:.1f} % above the predicted one, because growth per step rises so "
+                f"slowly beyond it that {ALLOWED:.0f}-fold in {STEPS} steps is reached at {expected:.5f} s only; observed "
+                f"{row['observed_dt_s']:.5f} s."
+            )
+    finite = [row for row in result.rows if row["limit"] == "finite" and row["observed_dt_s"]]
+    worst = {
+        damping: max(abs(r["observed_dt_s"] / r["predicted_dt_s"] - 1.0) for r in finite if r["damping"] == damping)
+        for damping in sorted({row["damping"] for row in finite})
+    }
+    told = ", ".join(f"{100 * off:.2f} % with damping {damping:g} N m s/rad" for damping, off in worst.items())
+    result.notes.insert(
+        0,
+        f"{aimed} finite limits, predicted without a run and observed without the prediction, differ by at most {told}; "
+        f"{aimed - explained} of them are within the aim of {100 * AIM:g} % undamped and {100 * AIM_DAMPED:g} % damped"
+        + (f", and of the other {explained} the cause is told below." if explained else "."),
+    )
+    growths = [row for part in parts for row in part["growths"]]
+    for row in growths:
+        where = f"{row['scene']}, {row['engine']} {row['method']}, dt = {row['dt_s']:.4g} s"
+        result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", row.pop("total_off"), GROWN, "")
+    result.tables["stability_growth"] = growths
+    off = max(abs(row["observed_growth"] / row["predicted_growth"] - 1.0) for row in growths)
+    result.notes.append(
+        f"Where a method always fails (a saddle; explicit Euler at an undamped centre) the growth of one step, {len(growths)} "
+        f"times measured, is the predicted one within {off:.1e}, relative."
+    )

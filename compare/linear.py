@@ -7,7 +7,7 @@ import numpy as np
 import tmt
 from tmt import method
 from tmt.dual import seeded
-from tmt.methods import METHODS, amplification
+from tmt.methods import METHODS, SemiImplicitEuler, amplification
 
 LONGEST, SHORTEST = 1e3, 1e-4  # s: steps among which a limit is sought
 SCANNED = 281  # steps between these, 40 for each power of ten
@@ -102,3 +102,25 @@ def held(name, q, damping=0.0) -> Held:
     """The posture q, rad, under TMT's own torque, with joint damping in N m s/rad."""
     model = tmt.Tree(**{**vars(tmt.ARM), "damping": (damping,) * len(q)})
     return Held(name, model, q, tmt.gravity_balance(q))
+
+
+def region(name, z: np.ndarray) -> np.ndarray:
+    """Growth in one step of a single hinge whose eigenvalues times dt are z and its conjugate, shape of z.
+
+    The step is taken on qdd = -|z|^2 q + 2 Re(z) qd with dt = 1; so it exists for partitioned methods too, whose growth
+    depends on the pair. At most 1: stable.
+    """
+    stepping = METHODS[name]
+    size, rate = np.abs(z) ** 2, 2.0 * z.real
+    inertia = 1.0 - rate if isinstance(stepping, SemiImplicitEuler) else 1.0  # these take damping implicitly
+
+    def slope(q, qd):
+        return [(qd[0] * rate - q[0] * size) / inertia]
+
+    state = seeded([np.zeros_like(size), np.zeros_like(size)], np.eye(2).reshape(2, 2, *(1 for _ in z.shape)))
+    with np.errstate(all="ignore"):
+        q, qd = stepping.step(slope, state[:1], state[1:], 1.0)
+        J = np.array([np.broadcast_to(part[0].slope, (2, *z.shape)) for part in (q, qd)])
+        half, determinant = 0.5 * (J[0, 0] + J[1, 1]), J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+        root = np.sqrt(half**2 - determinant + 0j)
+        return np.maximum(np.abs(half + root), np.abs(half - root))

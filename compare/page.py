@@ -57,6 +57,7 @@ def markdown(sections, origin, result) -> str:
         if len(failed):
             lines += ["**Checks that fail:**", md_table(failed)]
         lines += [md_table(table), f"All columns: [tables/{section.name}.csv](tables/{section.name}.csv)"]
+        lines += [f"More: [tables/{name}.csv](tables/{name}.csv)" for name in section.result.tables]
         lines += [f"- {note}" for note in section.result.notes]
         for name, caption in section.figures:
             lines += [f"![{name}](figures/{name}.png)", caption]

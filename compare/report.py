@@ -74,7 +74,8 @@ def write(folder, sections, origin, result) -> None:
     """All files of a report, the figures excepted, into a folder that has those."""
     (folder / "tables").mkdir()
     for section in sections:
-        pd.DataFrame(section.result.rows).to_csv(folder / "tables" / f"{section.name}.csv", index=False)
+        for name, rows in {section.name: section.result.rows, **section.result.tables}.items():
+            pd.DataFrame(rows).to_csv(folder / "tables" / f"{name}.csv", index=False)
     checks = [check.record() for section in sections for check in section.result.checks]
     (folder / "report.md").write_text(markdown(sections, origin, result), encoding="utf-8")
     (folder / "index.html").write_text(page(folder, sections, origin, result), encoding="utf-8")
