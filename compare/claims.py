@@ -170,7 +170,8 @@ def judge(result, torques, finer, printed, beyond) -> None:
         told.append(
             f"{party.engine}: {len(times)} leave, between {min(times):.2f} and {max(times):.2f} s, {up} to larger alpha, "
             f"{len(times) - up} to smaller, {27 - len(times)} never (under its own bias it "
-            f"{'never leaves' if own['observed_s'] is None else 'leaves'}); the direction is the sign of the residual on the unstable "
+            f"{'never leaves' if own['observed_s'] is None else 'leaves'}); the direction is the sign of the residual "
+            f"on the unstable "
             f"mode in all {len(clear)} cases where that residual is more than the bias is rounded by, {noise:.1e} rad/s2"
         )
     result.notes.append(
@@ -185,7 +186,8 @@ def judge(result, torques, finer, printed, beyond) -> None:
         result.check(where, "departure, observed - predicted", off, near(row["dt_s"]), "s")
     times = [row["observed_s"] for row in printed]
     result.notes.append(
-        f"The torque as printed, four decimals, lasts {min(times):.2f} to {max(times):.2f} s at ball catch, whatever the step and "
+        f"The torque as printed, four decimals, lasts {min(times):.2f} to {max(times):.2f} s at ball catch, whatever "
+        f"the step and "
         "the engine: the original cannot have used it for its Figure 2."
     )
     if beyond:
@@ -205,14 +207,19 @@ def tell_finer(result, finer) -> None:
         result.check(where, "departures against the sign of the torque's error", turned, 0.0, "runs")
     rows = [row for row in finer if row["engine"] == "TMT" and row["ulps_alpha"] == 1]
     times = ", ".join(
-        f"{round(5 / row['dt_s'])}: " + ("never" if row["observed_s"] is None else f"{row['observed_s']:.2f} s") for row in rows
+        f"{round(5 / row['dt_s'])}: " + ("never" if row["observed_s"] is None else f"{row['observed_s']:.2f} s")
+        for row in rows
     )
     last = rows[-1]
     result.notes.append(
-        "Claim 2, explained: with the torque one ulp off in alpha the arm leaves to the side of the error at every step in both "
-        "engines, so a smaller step reverses nothing; a reversal is another rounding of the torque, and luck. Steps in 5 s and "
-        f"time to leave (TMT, within {LONG:g} s): {times}. Fine steps delay: what a step adds to an angle, dt qd, is lost while "
-        f"it is below half a unit in its last place. At {round(5 / last['dt_s'])} steps it is {last['step_rad']:.1e} rad after 5 s, "
+        "Claim 2, explained: with the torque one ulp off in alpha the arm leaves to the side of the error at every "
+        "step in both "
+        "engines, so a smaller step reverses nothing; a reversal is another rounding of the torque, and luck. Steps "
+        "in 5 s and "
+        f"time to leave (TMT, within {LONG:g} s): {times}. Fine steps delay: what a step adds to an angle, dt qd, is "
+        f"lost while "
+        f"it is below half a unit in its last place. At {round(5 / last['dt_s'])} steps it is {last['step_rad']:.1e} "
+        f"rad after 5 s, "
         f"against {last['half_ulp_rad']:.1e} rad, and no angle has changed."
     )
     result.curves["finer"] = finer
@@ -225,7 +232,9 @@ def tell_bent(result, beyond) -> None:
     at = held("bent", posture("bent"))
     fastest = float(np.abs(at.modes[0]).max())
     limit = 2.0 * np.sqrt(2.0) / fastest
-    result.check("bent, rk4", "limit of the method's own step from 2 sqrt 2 / omega", abs(at.limit("rk4")[1] - limit), 1e-6, "s")
+    result.check(
+        "bent, rk4", "limit of the method's own step from 2 sqrt 2 / omega", abs(at.limit("rk4")[1] - limit), 1e-6, "s"
+    )
     for row in rows:
         if row["dt_s"] < limit:
             where = f"bent, {row['engine']} {row['method']}, dt = {row['dt_s']:.4g} s, torque {row['torque']}"
@@ -235,21 +244,29 @@ def tell_bent(result, beyond) -> None:
     result.check("hanging, bent's torque", "acceleration is less than 1 rad/s2", missing, 0.0, "rad/s2 missing")
     result.check("bent, free, rk4, 0.2 s", "from hanging after 2000 s", beyond["free_from_hanging"], 1e-9, "rad")
     ends = {torque: [n for (_, name), n in beyond["leaves_within_5_s"].items() if name == torque] for torque in TORQUES}
-    result.check("bent, rk4, torque one ulp off", "most steps in 5 s with which it leaves", max(ends[TORQUES[0]]), 0.0, "steps")
+    result.check(
+        "bent, rk4, torque one ulp off", "most steps in 5 s with which it leaves", max(ends[TORQUES[0]]), 0.0, "steps"
+    )
     ulp = [row for row in rows if row["torque"] == TORQUES[0] and row["observed_s"] is not None]
     soonest = min(ulp, key=lambda row: row["observed_s"])
     small = next(row for row in rows if row["largest_rad"] is not None and row["dt_s"] > limit)
     result.notes.append(
-        f"Claim 3, bounded: bent is a centre, and RK4 holds it up to 2 sqrt 2 / {fastest:.3f} = {limit:.4f} s. Just beyond, at "
-        f"{small['dt_s']:g} s, it swings by {small['largest_rad']:.3f} rad for ever; at {BEYOND[2]:.3f} s and more it diverges. "
-        f"With a torque one ulp off the soonest departure is at {soonest['observed_s']:.2f} s (dt = {soonest['dt_s']:g} s), and no "
-        f"number of steps from 1 to 64 lets it leave within 5 s; with a torque of four decimals it leaves in 5 s if these are "
+        f"Claim 3, bounded: bent is a centre, and RK4 holds it up to 2 sqrt 2 / {fastest:.3f} = {limit:.4f} s. Just "
+        f"beyond, at "
+        f"{small['dt_s']:g} s, it swings by {small['largest_rad']:.3f} rad for ever; at {BEYOND[2]:.3f} s and more it "
+        f"diverges. "
+        f"With a torque one ulp off the soonest departure is at {soonest['observed_s']:.2f} s (dt = "
+        f"{soonest['dt_s']:g} s), and no "
+        f"number of steps from 1 to 64 lets it leave within 5 s; with a torque of four decimals it leaves in 5 s if "
+        f"these are "
         f"{max(ends[TORQUES[1]])} steps or fewer. So the original ran for longer than 5 s, or with a rounded torque."
     )
     result.notes.append(
-        f"Its end state cannot be hanging while the torque acts: that accelerates a hanging arm by ({pushed[0]:.1f}, {pushed[1]:.1f}, "
+        f"Its end state cannot be hanging while the torque acts: that accelerates a hanging arm by ({pushed[0]:.1f}, "
+        f"{pushed[1]:.1f}, "
         f"{pushed[2]:.1f}) rad/s2. Without the torque it can: RK4 takes energy out of every swing, and the free arm at dt = "
-        f"{FREE_STEP:g} s hangs at rest after {FREE_TIME:g} s, {beyond['free_from_hanging']:.0e} rad off. So in the run that "
+        f"{FREE_STEP:g} s hangs at rest after {FREE_TIME:g} s, {beyond['free_from_hanging']:.0e} rad off. So in the "
+        f"run that "
         "the original describes the holding torque did not act to the end."
     )
     result.curves["bent"] = beyond

@@ -145,7 +145,9 @@ def fall_time(slope, start) -> float:
     """Time from rest at `start` to 0.1 rad beyond it in q'' = slope q^2, s."""
     end = start + LEFT
     # q = start + u^2 takes the root out of the integrand at the start
-    value, _ = quad(lambda u: 2.0 / np.sqrt(u**4 + 3.0 * start * u**2 + 3.0 * start**2), 0.0, np.sqrt(end - start), limit=500)
+    value, _ = quad(
+        lambda u: 2.0 / np.sqrt(u**4 + 3.0 * start * u**2 + 3.0 * start**2), 0.0, np.sqrt(end - start), limit=500
+    )
     return float(np.sqrt(1.5 / slope) * value)
 
 
@@ -155,9 +157,7 @@ def judge(result, rows, falls) -> None:
     for row in rows:
         waiting = row.pop("stuck_s", 0.0)
         result.tables.setdefault("departure", []).append(row)
-        where = (
-            f"{row['scene']}, {row['engine']} {row['method']}, dt = {row['dt_s']:.4g} s, {row['perturbation_rad']:.0e} rad"
-        )
+        where = f"{row['scene']}, {row['engine']} {row['method']}, dt = {row['dt_s']:.4g} s, {row['perturbation_rad']:.0e} rad"
         if row["predicted_s"] is None and row["observed_s"] is None:
             continue
         if row["predicted_s"] is None or row["observed_s"] is None:
@@ -169,8 +169,10 @@ def judge(result, rows, falls) -> None:
     if late:
         off, waiting, where = max(late)
         result.notes.append(
-            f"{len(rows) - len(late)} of {len(rows)} departures are within one step or {NEAR:g} s of the prediction. The other "
-            f"{len(late)} leave later, by at most {off:.2f} s ({where}): there dt qd stays below half a unit in the last place of "
+            f"{len(rows) - len(late)} of {len(rows)} departures are within one step or {NEAR:g} s of the prediction. "
+            f"The other "
+            f"{len(late)} leave later, by at most {off:.2f} s ({where}): there dt qd stays below half a unit in the "
+            f"last place of "
             f"every angle, which keeps the arm in place for up to {waiting:.2f} s, and no linear map knows of that."
         )
     else:
@@ -183,11 +185,15 @@ def judge(result, rows, falls) -> None:
                 small = [row for row in one if abs(row["perturbation_rad"]) <= 1e-4 * (1 + 1e-9)]
                 sizes, times = ([abs(row[key]) for row in small] for key in ("perturbation_rad", "observed_s"))
                 slopes.append(float(np.polyfit(np.log(sizes), np.log(times), 1)[0]))
-                result.check(f"zero, {engine}", "exponent of the time to leave, from -1/2", abs(slopes[-1] + 0.5), 0.02, "")
+                result.check(
+                    f"zero, {engine}", "exponent of the time to leave, from -1/2", abs(slopes[-1] + 0.5), 0.02, ""
+                )
         result.notes.append(
-            "Zero is marginal: two eigenvalues are zero, the potential along that mode is cubic, and the arm leaves algebraically: "
+            "Zero is marginal: two eigenvalues are zero, the potential along that mode is cubic, and the arm leaves "
+            "algebraically: "
             f"the time to leave goes with the perturbation to the power {min(slopes):.3f} to {max(slopes):.3f} (law: -1/2) "
-            f"below 1e-4 rad, {falls[0]['observed_s']:.2f} s from {falls[0]['perturbation_rad']:g} rad. There is no limit to show."
+            f"below 1e-4 rad, {falls[0]['observed_s']:.2f} s from {falls[0]['perturbation_rad']:g} rad. There is no "
+            f"limit to show."
         )
 
 

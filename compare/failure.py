@@ -139,13 +139,17 @@ def judge(result, mujoco, near, minutes, found) -> None:
         result.check(where, f"growth in 2000 steps from {SMALL:g} rad", grown[0].max(), ALLOWED, "fold")
         if party.scheme == "implicit":
             missing = max(0.0, ALLOWED - min(grown[1].max(), 1e300))
-            result.check(where, f"growth in 2000 steps from {LARGE:g} rad is less than 100-fold", missing, 0.0, "fold missing")
+            result.check(
+                where, f"growth in 2000 steps from {LARGE:g} rad is less than 100-fold", missing, 0.0, "fold missing"
+            )
     told = "; ".join(
-        f"{label} {'diverges' if not np.isfinite(large) else f'grows {large:.1e}-fold'}" for label, (_, large) in worst.items()
+        f"{label} {'diverges' if not np.isfinite(large) else f'grows {large:.1e}-fold'}"
+        for label, (_, large) in worst.items()
     )
     result.notes.append(
         f"The nonlinear edge: at bent a perturbation of {LARGE:g} rad along the stiffest mode meets a 1:3 resonance at "
-        f"omega dt = sqrt 3 = {RESONANCE:.4f} (a swing takes three steps), below the linear limit of 2. There {told}, in 2000 "
+        f"omega dt = sqrt 3 = {RESONANCE:.4f} (a swing takes three steps), below the linear limit of 2. There {told}, "
+        f"in 2000 "
         f"steps; from {SMALL:g} rad all of them grow at most {max(small for small, _ in worst.values()):.2f}-fold."
     )
     result.curves["near"] = {party.label: grown for party, grown in near.items()}
@@ -157,17 +161,24 @@ def judge(result, mujoco, near, minutes, found) -> None:
     if reset["resets"]:
         alpha, beta, gamma = np.degrees(reset["after_q"])
         result.notes.append(
-            f"Silent failure, MuJoCo's default: bent, free, by Euler at 5/64 s with its automatic reset on. In {reset['t'][-1]:.0f} "
-            f"s it starts again {reset['resets']} times, first at {reset['first_reset_s']:.2f} s, from ({alpha:.1f}, {beta:.1f}, "
-            f"{gamma:.1f}) deg; every number is finite, and the counters of its warnings stand at {reset['warnings']}. Caught at "
-            f"{reset['caught_in_it_s']:.2f} s, by the bound on the energy; its clock that goes back would tell too. With the reset "
+            f"Silent failure, MuJoCo's default: bent, free, by Euler at 5/64 s with its automatic reset on. In "
+            f"{reset['t'][-1]:.0f} "
+            f"s it starts again {reset['resets']} times, first at {reset['first_reset_s']:.2f} s, from ({alpha:.1f}, "
+            f"{beta:.1f}, "
+            f"{gamma:.1f}) deg; every number is finite, and the counters of its warnings stand at "
+            f"{reset['warnings']}. Caught at "
+            f"{reset['caught_in_it_s']:.2f} s, by the bound on the energy; its clock that goes back would tell too. "
+            f"With the reset "
             f"off, as everywhere else in this report, the run is found to have diverged at {reset['caught_at_s']:.2f} s."
         )
     least = ", ".join(f"{value:.4f} kg m2 at {count} steps" for count, value in gain["definite"].items())
     result.notes.append(
-        f"Silent failure of `implicit`: the same at 5/64 s gains {gain['gain']:.0f} J in 5 s, on an arm whose whole potential "
-        f"range is {gain['range']:.1f} J, with {gain['warnings']} warnings. Its matrix Mbar + dt dh/dqd loses definiteness: the "
-        f"smallest eigenvalue of its symmetric part along 5 s is {least}. Caught at {gain['caught_in_it_s']:.2f} s by the energy."
+        f"Silent failure of `implicit`: the same at 5/64 s gains {gain['gain']:.0f} J in 5 s, on an arm whose whole "
+        f"potential "
+        f"range is {gain['range']:.1f} J, with {gain['warnings']} warnings. Its matrix Mbar + dt dh/dqd loses "
+        f"definiteness: the "
+        f"smallest eigenvalue of its symmetric part along 5 s is {least}. Caught at {gain['caught_in_it_s']:.2f} s by "
+        f"the energy."
     )
     result.curves["silent"] = {"reset": reset, "gain": gain}
 
@@ -180,7 +191,9 @@ def judge(result, mujoco, near, minutes, found) -> None:
         result.check(where, "energy does otherwise than its twin's", other, 0.0, "runs")
     for dt in sorted({row["dt_s"] for row in table}, reverse=True):
         of_kind = {
-            kind: [row["method"] for row in table if row["dt_s"] == dt and row["engine"] == "TMT" and row["energy"] == kind]
+            kind: [
+                row["method"] for row in table if row["dt_s"] == dt and row["engine"] == "TMT" and row["energy"] == kind
+            ]
             for kind in ("bounded", "drifts", "diverges")
         }
         told = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in of_kind.items() if names)
@@ -200,9 +213,13 @@ def tell_newton(table) -> str:
         for motion in NEWTON_SIZES:
             rows = [row for row in table if row["method"] == name and row["motion"] == motion]
             failing = [row["dt_s"] for row in rows if row["steps_found"] < 2000]
-            limits.append(f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never to {NEWTON[-1]:g} s")
+            limits.append(
+                f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never to {NEWTON[-1]:g} s"
+            )
         told.append(f"{name} ({'; '.join(limits)})")
     return (
-        "The A-stable methods have no linear limit; what ends them is Newton's method, from the steps on at which it does not "
-        f"find a stage of 2000 at bent: {', '.join(told)}. The run is NaN from there, with finite and modest numbers before it."
+        "The A-stable methods have no linear limit; what ends them is Newton's method, from the steps on at which it "
+        "does not "
+        f"find a stage of 2000 at bent: {', '.join(told)}. The run is NaN from there, with finite and modest numbers "
+        f"before it."
     )

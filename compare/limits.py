@@ -16,7 +16,9 @@ LAST = 150  # steps at the end of a run
 CLOSE = 1e-4  # to which it is then bisected
 GROWTH_STEPS = (1e-3, 1e-2, 5 / 64)  # s: where growth per step is compared, in scenes in which a method always fails
 AIM, AIM_DAMPED = 0.002, 0.005  # relative, of an observed limit to the predicted one
-GROWN = 1e-3  # relative, of the growth in all steps: the deviation reaches 1e-5 rad, and its square is not in a linear map
+GROWN = (
+    1e-3  # relative, of the growth in all steps: the deviation reaches 1e-5 rad, and its square is not in a linear map
+)
 TINY, TOTAL, MOST = 1e-8, 1e3, 200  # rad, of the deviation there; how much it may grow; in at most how many steps
 
 
@@ -141,7 +143,8 @@ def judge(result, parts) -> None:
         else:
             explained += 1
             result.notes.append(
-                f"{where}: the observed limit is {100 * off:.1f} % above the predicted one, because growth per step rises so "
+                f"{where}: the observed limit is {100 * off:.1f} % above the predicted one, because growth per step "
+                f"rises so "
                 f"slowly beyond it that {ALLOWED:.0f}-fold in {STEPS} steps is reached at {expected:.5f} s only; observed "
                 f"{row['observed_dt_s']:.5f} s."
             )
@@ -160,10 +163,13 @@ def judge(result, parts) -> None:
     growths = [row for part in parts for row in part["growths"]]
     for row in growths:
         where = f"{row['scene']}, {row['engine']} {row['method']}, dt = {row['dt_s']:.4g} s"
-        result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", row.pop("total_off"), GROWN, "")
+        result.check(
+            where, f"growth in {row['steps']} steps, observed / predicted - 1", row.pop("total_off"), GROWN, ""
+        )
     result.tables["stability_growth"] = growths
     off = max(abs(row["observed_growth"] / row["predicted_growth"] - 1.0) for row in growths)
     result.notes.append(
-        f"Where a method always fails (a saddle; explicit Euler at an undamped centre) the growth of one step, {len(growths)} "
+        f"Where a method always fails (a saddle; explicit Euler at an undamped centre) the growth of one step, "
+        f"{len(growths)} "
         f"times measured, is the predicted one within {off:.1e}, relative."
     )

@@ -18,15 +18,19 @@ TITLE = "Stability: where methods fail"
 CLAIM = (
     "Every method fails somewhere, and where can be said beforehand. The equations of motion are linearised about each held "
     "posture by exact derivatives; what one step of a method does to a small deviation there, its amplification, gives its "
-    "limit of dt, its growth per step and the time at which an unstable posture is left. Runs of both engines do as predicted, "
+    "limit of dt, its growth per step and the time at which an unstable posture is left. Runs of both engines do as "
+    "predicted, "
     "and the assignment's observations follow from the same numbers."
 )
 BAR = (
-    "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central differences for "
+    "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
+    "differences for "
     "RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) max|J| / 1e-6. Limits: the "
     "largest dt at which a perturbation of 1e-6 rad grows less than 100-fold in 2000 steps, found by bisection without the "
-    "prediction, within 0.2 % of the dt at which the linear map of the method does so, and within 0.2 % (damped: 0.5 %) of the dt "
-    "at which growth begins. Growth: 0.1 % over all steps. Departure (a hinge 0.1 rad away): within one step or 0.03 s of the "
+    "prediction, within 0.2 % of the dt at which the linear map of the method does so, and within 0.2 % (damped: 0.5 "
+    "%) of the dt "
+    "at which growth begins. Growth: 0.1 % over all steps. Departure (a hinge 0.1 rad away): within one step or 0.03 "
+    "s of the "
     "first crossing of the method's linear map, more only by the time for which dt qd is below half an ulp of every angle."
 )
 CENTRES, SADDLES, DAMPINGS = ("bent", "hanging"), ("ball catch", "upright"), (0.0, 0.5, 50.0)
@@ -80,7 +84,9 @@ def rows(setup) -> Result:
     limits.judge(result, list(work["limits"]))
     falls = [row for part in work["zero"] for row in part]
     departure.judge(result, [row for part in work["departure"] for row in part] + falls, falls)
-    claims.judge(result, next(iter(work["torques"])), *(next(iter(work[k]), None) for k in ("finer", "printed", "bent")))
+    claims.judge(
+        result, next(iter(work["torques"])), *(next(iter(work[k]), None) for k in ("finer", "printed", "bent"))
+    )
     near = dict(zip(work["near"][0], work["near"][1]))
     failure.judge(result, setup.engine, near, list(work["minutes"]), list(work["newton"]))
     for name in ("map", "edge"):
@@ -114,7 +120,9 @@ def equilibria(result, setup) -> None:
         swings = [f"{v.imag:.3f} rad/s" for v in values if v.imag > 1e-3]
         grows = [f"{v.real:.3f} per second" for v in values if v.real > 1e-3]
         told = [f"grows by {' and '.join(grows)}"] * bool(grows) + [f"swings at {', '.join(swings)}"] * bool(swings)
-        result.notes.append(f"{name[0].upper()}{name[1:]}, held, is a {at.kind}: {'; '.join(told)}.".replace("a marg", "marg"))
+        result.notes.append(
+            f"{name[0].upper()}{name[1:]}, held, is a {at.kind}: {'; '.join(told)}.".replace("a marg", "marg")
+        )
         for damping, steps in CHECKED_STEPS.items():
             engine, at = setup.engine.variant(damping=damping), held(name, posture(name), damping)
             for dt, integrator in product(steps, INTEGRATORS):
