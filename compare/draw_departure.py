@@ -3,7 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from .claims import DT, TORQUES
+from .beyond import TORQUES
+from .claims import DT
 from .draw import BLUE, GREEN, GREY, ORANGE, RED, WIDTH
 from .draw_stability import style
 from .motion import LEFT
@@ -84,7 +85,7 @@ def torques(result):
             at = never if row["observed_s"] is None else row["observed_s"]
             stacks[at] = stacks.get(at, 0) + 1
             colour, mark, _ = sides[row["direction"]]
-            ax.plot(at, stacks[at], mark, color=colour, markersize=5)
+            ax.plot(at, stacks[at], mark, color=colour, markersize=5, fillstyle="full" if engine == "TMT" else "none")
         ax.set(ylabel=f"runs, {engine}", xlim=(min(observed) - 2 * DT, never + 2 * DT), ylim=(0, 15))
         ticks = [t for t in (4.6, 4.8, 5.0, 5.2, 5.4, 5.6) if min(observed) - 2 * DT < t < last + DT]
         ax.set_xticks([*ticks, never], [*(f"{t:g}" for t in ticks), "never"])
@@ -102,22 +103,24 @@ def torques(result):
     )
     ax.plot(*zip(*known), drawstyle="steps-mid", color="black", linewidth=0.8, label="predicted by the linear map")
     ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set(xlabel="push of the residual on the unstable mode, 1e-15 rad/s2", ylabel="time, s")
+    ax.set(xlabel="push on the unstable mode, 1e-15 rad/s2", ylabel="time, s")
     for colour, mark, text in sides.values():
         ax.plot([], [], mark, color=colour, label=text)
     ax.plot([], [], "^", color="black", fillstyle="none", label="open: MuJoCo")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
-    span = {
-        engine: [row["observed_s"] for row in rows if row["engine"] == engine and row["observed_s"] is not None]
-        for engine in PARTY
-    }
-    told = ", ".join(f"{engine} {min(t):.2f} to {max(t):.2f} s ({27 - len(t)} never)" for engine, t in span.items())
+    told = []
+    for engine in PARTY:
+        mine = [row for row in rows if row["engine"] == engine]
+        at = [row["observed_s"] for row in mine if row["observed_s"] is not None]
+        up, down = (sum(row["direction"] == side for row in mine) for side in (1, -1))
+        told.append(
+            f"{engine} after {min(at):.2f} to {max(at):.2f} s, {up} to larger α, {down} to smaller, {len(mine) - len(at)} never"
+        )
     caption = (
-        f"Held at ball catch, RK4, dt = 5/64 s, under all 27 torques within one unit in the last place of TMT's: "
-        f"{told}. Right: the "
-        "side to which the arm leaves is the sign of what the last bits push on the unstable mode; TMT's bits are "
-        "near balance and go "
-        "both ways, MuJoCo's own bias is a few units off, and all go one way."
+        "Held at ball catch, RK4, dt = 5/64 s, under all 27 torques within one unit in the last place of TMT's. They leave: "
+        f"{'; '.join(told)}. Right: when and to which side is decided by what the last bits of the torque, less those "
+        f"of the engine's "
+        "own bias, push on the unstable mode."
     )
     return "stability_torques", fig, caption
 

@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-from . import claims, departure, failure, limits
+from . import beyond, claims, departure, failure, limits
 from .agreement import EPS, Result
 from .engine import INTEGRATORS
 from .engine_linear import NUDGE, transition
@@ -63,7 +63,7 @@ def begin(setup) -> None:
         "torques": setup.map(claims.holding_torques, engine),
         "finer": setup.map(claims.finer_steps, [] if quick else engine),
         "printed": setup.map(claims.four_decimals, engine),
-        "bent": setup.map(claims.bent, [] if quick else engine),
+        "bent": setup.map(beyond.bent, [] if quick else engine),
         "map": (mapped, ask(limits.map_of_growth, mapped, steps=MAP_STEPS)),
         "near": (near, ask(failure.edge, near, sizes=[failure.SMALL, failure.LARGE], swings=failure.NEAR)),
         "edge": (edges, ask(failure.edge, edges, sizes=failure.EDGE_SIZES, swings=failure.EDGE)),
@@ -84,9 +84,9 @@ def rows(setup) -> Result:
     limits.judge(result, list(work["limits"]))
     falls = [row for part in work["zero"] for row in part]
     departure.judge(result, [row for part in work["departure"] for row in part] + falls, falls)
-    claims.judge(
-        result, next(iter(work["torques"])), *(next(iter(work[k]), None) for k in ("finer", "printed", "bent"))
-    )
+    claims.judge(result, *(next(iter(work[name]), None) for name in ("torques", "finer", "printed")))
+    for found in work["bent"]:
+        beyond.judge(result, found)
     near = dict(zip(work["near"][0], work["near"][1]))
     failure.judge(result, setup.engine, near, list(work["minutes"]), list(work["newton"]))
     for name in ("map", "edge"):
@@ -98,7 +98,7 @@ def rows(setup) -> Result:
 
 def planes(result, schemes) -> None:
     """The stability region of each method in the plane of eigenvalue times dt, and where the postures are in it."""
-    x, y = np.linspace(-4.4, 1.4, 146), np.linspace(-3.3, 3.3, 166)
+    x, y = np.linspace(-5.2, 1.4, 166), np.linspace(-3.3, 3.3, 166)
     z = x[None, :] + 1j * y[:, None]
     result.curves["regions"] = {name: (x, y, region(name, z)) for name in schemes}
     result.curves["points"] = {
@@ -136,17 +136,17 @@ def equilibria(result, setup) -> None:
 
 def figures(result):
     """Limits, the map of growth, regions, the nonlinear edge; departures; the claims; silent failure; a minute."""
-    from . import draw_departure, draw_stability  # matplotlib is for the processes that draw
+    from . import draw_departure, draw_failure, draw_stability  # matplotlib is for the processes that draw
 
     yield draw_stability.limits(result)
     yield draw_stability.regions(result)
     yield draw_departure.times(result)
     yield draw_departure.torques(result)
-    yield draw_stability.silent(result)
+    yield draw_failure.silent(result)
     if result.curves["map"]:  # all but a quick run
         yield draw_stability.growth_map(result)
-        yield draw_stability.edge(result)
+        yield draw_failure.edge(result)
         yield draw_departure.finer(result)
         yield draw_departure.bent(result)
         yield draw_departure.zero(result)
-        yield draw_stability.minutes(result)
+        yield draw_failure.minutes(result)
