@@ -86,21 +86,17 @@ def judge(result, beyond) -> None:
     small = next(row for row in rows if row["largest_rad"] is not None and row["dt_s"] > limit)
     result.notes.append(
         f"Claim 3, bounded: bent is a centre, and RK4 holds it up to 2 sqrt 2 / {fastest:.3f} = {limit:.4f} s. Just "
-        f"beyond, at "
-        f"{small['dt_s']:g} s, it swings by {small['largest_rad']:.3f} rad for ever; at {BEYOND[2]:.3f} s and more it "
-        f"diverges. "
-        f"With a torque one ulp off the soonest departure is at {soonest['observed_s']:.2f} s (dt = "
-        f"{soonest['dt_s']:g} s), and no "
-        f"number of steps from 1 to 64 lets it leave within 5 s; with a torque of four decimals it leaves in 5 s if "
-        f"these are "
-        f"{max(ends[TORQUES[1]])} steps or fewer. So the original ran for longer than 5 s, or with a rounded torque."
+        f"beyond, at {small['dt_s']:g} s, it swings by {small['largest_rad']:.3f} rad for ever; at {BEYOND[2]:.3f} s "
+        f"and more it diverges. With a torque one ulp off the soonest departure is at {soonest['observed_s']:.2f} s "
+        f"(dt = {soonest['dt_s']:g} s), and no number of steps from 1 to 64 lets it leave within 5 s; with a torque of "
+        f"four decimals it leaves in 5 s if these are {max(ends[TORQUES[1]])} steps or fewer. So the original ran for "
+        "longer than 5 s, or with a rounded torque."
     )
     result.notes.append(
         f"Its end state cannot be hanging while the torque acts: that accelerates a hanging arm by ({pushed[0]:.1f}, "
-        f"{pushed[1]:.1f}, "
-        f"{pushed[2]:.1f}) rad/s2. Without the torque it can: RK4 takes energy out of every swing, and the free arm at dt = "
-        f"{FREE_STEP:g} s hangs at rest after {FREE_TIME:g} s, {beyond['free_from_hanging']:.0e} rad off. So in the "
-        f"run that "
-        "the original describes the holding torque did not act to the end."
+        f"{pushed[1]:.1f}, {pushed[2]:.1f}) rad/s2. Without the torque it can: RK4 takes energy out of every swing, "
+        f"and the free arm at dt = {FREE_STEP:g} s hangs at rest after {FREE_TIME:g} s, "
+        f"{beyond['free_from_hanging']:.0e} rad off. So in the run that the original describes the holding torque did "
+        "not act to the end."
     )
     result.curves["bent"] = beyond

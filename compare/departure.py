@@ -170,14 +170,13 @@ def judge(result, rows, falls) -> None:
         off, waiting, where = max(late)
         result.notes.append(
             f"{len(rows) - len(late)} of {len(rows)} departures are within one step or {NEAR:g} s of the prediction. "
-            f"The other "
-            f"{len(late)} leave later, by at most {off:.2f} s ({where}): there dt qd stays below half a unit in the "
-            f"last place of "
-            f"every angle, which keeps the arm in place for up to {waiting:.2f} s, and no linear map knows of that."
+            f"The other {len(late)} leave later, by at most {off:.2f} s ({where}): there dt qd stays below half a unit "
+            f"in the last place of every angle, which keeps the arm in place for up to {waiting:.2f} s, and no linear "
+            "map knows of that."
         )
     else:
         result.notes.append(f"All {len(rows)} departures are within one step or {NEAR:g} s of the prediction.")
-    if falls:
+    if falls and all(row["observed_s"] is not None for row in falls):
         slopes = []
         for engine in dict.fromkeys(row["engine"] for row in falls):
             for sign in (1.0, -1.0):
@@ -190,10 +189,9 @@ def judge(result, rows, falls) -> None:
                 )
         result.notes.append(
             "Zero is marginal: two eigenvalues are zero, the potential along that mode is cubic, and the arm leaves "
-            "algebraically: "
-            f"the time to leave goes with the perturbation to the power {min(slopes):.3f} to {max(slopes):.3f} (law: -1/2) "
-            f"below 1e-4 rad, {falls[0]['observed_s']:.2f} s from {falls[0]['perturbation_rad']:g} rad. There is no "
-            f"limit to show."
+            f"algebraically: the time to leave goes with the perturbation to the power {min(slopes):.3f} to "
+            f"{max(slopes):.3f} (law: -1/2) below 1e-4 rad, {falls[0]['observed_s']:.2f} s from "
+            f"{falls[0]['perturbation_rad']:g} rad. There is no limit to show."
         )
 
 

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from .draw import BLUE, GREEN, ORANGE, RED, WIDTH
 from .draw_stability import style
-from .failure import COARSE, EDGE, EDGE_SIZES, LARGE, NEAR, RESONANCE
+from .failure import COARSE, EDGE, EDGE_SIZES, LARGE, NEAR, RESONANCE, at_time
 from .limits import STEPS
 from .motion import TWINS
 
@@ -43,13 +43,11 @@ def edge(result):
     ax.legend(loc="upper left")
     worst = max(grown[1].max() for label, grown in near.items() if label.endswith(" implicit"))
     caption = (
-        f"The nonlinear edge at bent. Above: growth over ω dt and the size of the perturbation. The linear limit is "
-        f"2, but at √3 a "
-        f"swing takes three steps, and the cubic part of the potential pushes it at each: a tongue of failure that "
-        f"widens with the "
-        f"perturbation. Below: from {LARGE:g} rad `implicit` grows up to {worst:.1e}-fold there in both engines; from "
-        f"1e-6 rad "
-        f"nothing grows {near[next(iter(near))][0].max():.2f}-fold or more. Divergence is drawn at 1e9."
+        "The nonlinear edge at bent. Above: growth over ω dt and the size of the perturbation. The linear limit is 2, "
+        "but at √3 a swing takes three steps, and the cubic part of the potential pushes it at each: a tongue of "
+        f"failure that widens with the perturbation. Below: from {LARGE:g} rad `implicit` grows up to {worst:.1e}-fold "
+        "there in both engines; from 1e-6 rad growth is at most "
+        f"{max(grown[0].max() for grown in near.values()):.2f}-fold. Divergence is drawn at 1e9."
     )
     return "stability_edge", fig, caption
 
@@ -67,7 +65,8 @@ def silent(result):
     left.set_yticks([0, 1e1, 1e4, 1e7, 1e10, 1e13])
     for k, t in enumerate(reset["t"][1:][np.diff(reset["clock"]) <= 0.0]):
         left.axvline(t, color=ORANGE, linewidth=1.5, label="reset by MuJoCo" if k == 0 else None)
-    left.axvline(reset["caught_in_it_s"], color=RED, linestyle="--", label="caught here")
+    if reset["caught_in_it_s"] is not None:
+        left.axvline(reset["caught_in_it_s"], color=RED, linestyle="--", label="caught here")
     left.axhline(gain["range"], color="black", linewidth=0.8, linestyle=":", label="range of the potential")
     left.set(xlabel="time, s", ylabel="energy gained, J", xlim=(0, reset["t"][-1]), title="Euler, automatic reset on")
     right.plot(gain["t"], gain["energy"] - gain["energy"][0], ".-", color=BLUE, markersize=4, linewidth=0.8)
@@ -78,15 +77,15 @@ def silent(result):
     under.axhline(0.0, color="black", linewidth=0.6)
     under.set(xlabel="time, s", ylabel="smallest eigen-\nvalue, kg m2", xlim=(0, gain["t"][-1]))
     for ax in (right, under):
-        ax.axvline(gain["caught_in_it_s"], color=RED, linestyle="--")
+        if gain["caught_in_it_s"] is not None:
+            ax.axvline(gain["caught_in_it_s"], color=RED, linestyle="--")
     fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     caption = (
-        f"Finite nonsense: bent, free, by MuJoCo at dt = 5/64 s. Left: Euler diverges and MuJoCo starts it again at zero, "
-        f"{reset['resets']} times in {reset['t'][-1]:.0f} s. Right: `implicit` gains {gain['gain']:.0f} J without a "
-        f"warning where "
-        f"its matrix is indefinite (smallest eigenvalue of the symmetric part down to {low:.2f} kg m2). The bound on "
-        f"the energy "
-        f"catches them at {reset['caught_in_it_s']:.2f} s and {gain['caught_in_it_s']:.2f} s."
+        "Finite nonsense: bent, free, by MuJoCo at dt = 5/64 s. Left: Euler diverges and MuJoCo starts it again at "
+        f"zero, {reset['resets']} times in {reset['t'][-1]:.0f} s. Right: `implicit` gains {gain['gain']:.0f} J "
+        "without a warning where its matrix is indefinite (smallest eigenvalue of the symmetric part down to "
+        f"{low:.2f} kg m2). The bound on the energy catches them at {at_time(reset['caught_in_it_s'])} and "
+        f"{at_time(gain['caught_in_it_s'])}."
     )
     return "stability_silent", fig, caption
 
@@ -131,6 +130,6 @@ def minutes(result):
     )  # fmt: skip
     caption = (
         f"A minute of bent, free: how far the energy is from where it started. {told}. Crosses: the run has diverged, "
-        f"its gain beyond its bound."
+        "its gain beyond its bound."
     )
     return "stability_energy", fig, caption

@@ -71,10 +71,9 @@ def limits(result):
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
     off = [abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) for row in rows if row["limit"] == "finite"]
     caption = (
-        f"The largest dt at which a perturbation of 1e-6 rad grows less than {ALLOWED:.0f}-fold in {STEPS} steps, found by "
-        "bisection, beside the limit predicted from the amplification of one step. The "
-        f"{len(off)} pairs differ by {100 * float(np.median(off)):.3f} % in the middle and by at most "
-        f"{100 * max(off):.2f} %."
+        f"The largest dt at which a perturbation of 1e-6 rad grows less than {ALLOWED:.0f}-fold in {STEPS} steps, "
+        f"found by bisection, beside the limit predicted from the amplification of one step. The {len(off)} pairs "
+        f"differ by {100 * float(np.median(off)):.3f} % in the middle and by at most {100 * max(off):.2f} %."
     )
     return "stability_limits", fig, caption
 
@@ -123,12 +122,9 @@ def regions(result):
     fig.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=4)
     caption = (
         "Stability regions (grey: one step lets neither of a pair of conjugate eigenvalues grow) with the eigenvalues "
-        "of the held "
-        "arm times dt = 5/64 s. Ball catch has two positive ones, outside every region. Crosses: the fastest mode of "
-        "bent at the "
-        f"limit, omega dt = {', '.join(outside)}. Of partitioned methods two different real eigenvalues do not have a "
-        f"region; their "
-        "marks are a guide."
+        "of the held arm times dt = 5/64 s. Ball catch has two positive ones, outside every region. Crosses: the "
+        f"fastest mode of bent at the limit, omega dt = {', '.join(outside)}. Of partitioned methods two different "
+        "real eigenvalues do not have a region; their marks are a guide."
     )
     return "stability_regions", fig, caption
 
@@ -173,17 +169,15 @@ def growth_map(result):
         for party, row in zip(parties, grown)
     }
     kinds = {
-        "no edge, growth at every step": [name for name, dt in at.items() if dt == MAP_STEPS[0]],
-        "no edge, no growth at any step": [name for name, dt in at.items() if dt is None],
+        "Growth at every step": [name for name, dt in at.items() if dt == MAP_STEPS[0]],
+        "Less at every step": [name for name, dt in at.items() if dt is None],
     }
     edges = [dt for dt in at.values() if dt not in (None, MAP_STEPS[0])]
-    told = "; ".join(f"{text}: {', '.join(names)}" for text, names in kinds.items() if names)
+    told = ". ".join(f"{text}: {', '.join(names)}" for text, names in kinds.items() if names)
     caption = (
-        f"How much a perturbation of 1e-6 rad grows at bent, undamped, in {STEPS} steps. The edge is sharp, within "
-        f"one of the "
-        f"{len(MAP_STEPS)} steps drawn, {100 * (MAP_STEPS[1] / MAP_STEPS[0] - 1):.1f} % apart: the first of them at "
-        f"which growth is "
-        f"{ALLOWED:.0f}-fold or more is from {min(edges):.3f} s to {max(edges):.3f} s, just above the predicted "
-        f"limit. {told}."
+        f"How much a perturbation of 1e-6 rad grows at bent, undamped, in {STEPS} steps. The edge is sharp: of "
+        f"{len(MAP_STEPS)} steps drawn, {100 * (MAP_STEPS[1] / MAP_STEPS[0] - 1):.1f} % apart, the first at which "
+        f"growth is {ALLOWED:.0f}-fold or more is at {min(edges):.3f} to {max(edges):.3f} s, and the predicted limit "
+        f"lies just before it. {told}."
     )
     return "stability_map", fig, caption

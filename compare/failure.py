@@ -149,8 +149,8 @@ def judge(result, mujoco, near, minutes, found) -> None:
     result.notes.append(
         f"The nonlinear edge: at bent a perturbation of {LARGE:g} rad along the stiffest mode meets a 1:3 resonance at "
         f"omega dt = sqrt 3 = {RESONANCE:.4f} (a swing takes three steps), below the linear limit of 2. There {told}, "
-        f"in 2000 "
-        f"steps; from {SMALL:g} rad all of them grow at most {max(small for small, _ in worst.values()):.2f}-fold."
+        f"in 2000 steps; from {SMALL:g} rad all of them grow at most "
+        f"{max(small for small, _ in worst.values()):.2f}-fold."
     )
     result.curves["near"] = {party.label: grown for party, grown in near.items()}
 
@@ -161,24 +161,20 @@ def judge(result, mujoco, near, minutes, found) -> None:
     if reset["resets"]:
         alpha, beta, gamma = np.degrees(reset["after_q"])
         result.notes.append(
-            f"Silent failure, MuJoCo's default: bent, free, by Euler at 5/64 s with its automatic reset on. In "
-            f"{reset['t'][-1]:.0f} "
-            f"s it starts again {reset['resets']} times, first at {reset['first_reset_s']:.2f} s, from ({alpha:.1f}, "
-            f"{beta:.1f}, "
-            f"{gamma:.1f}) deg; every number is finite, and the counters of its warnings stand at "
-            f"{reset['warnings']}. Caught at "
-            f"{reset['caught_in_it_s']:.2f} s, by the bound on the energy; its clock that goes back would tell too. "
-            f"With the reset "
-            f"off, as everywhere else in this report, the run is found to have diverged at {reset['caught_at_s']:.2f} s."
+            "Silent failure, MuJoCo's default: bent, free, by Euler at 5/64 s with its automatic reset on. In "
+            f"{reset['t'][-1]:.0f} s it starts again {reset['resets']} times, first at {reset['first_reset_s']:.2f} s, "
+            f"from ({alpha:.1f}, {beta:.1f}, {gamma:.1f}) deg; "
+            f"{'every number' if reset['finite'] else 'not every number'} is finite, and the counters of its warnings "
+            f"stand at {reset['warnings']}. Caught at {at_time(reset['caught_in_it_s'])}, by the bound on the energy "
+            "or its clock that goes back. With the reset off, as everywhere else in this report, the run is found to "
+            f"have diverged at {at_time(reset['caught_at_s'])}."
         )
     least = ", ".join(f"{value:.4f} kg m2 at {count} steps" for count, value in gain["definite"].items())
     result.notes.append(
         f"Silent failure of `implicit`: the same at 5/64 s gains {gain['gain']:.0f} J in 5 s, on an arm whose whole "
-        f"potential "
-        f"range is {gain['range']:.1f} J, with {gain['warnings']} warnings. Its matrix Mbar + dt dh/dqd loses "
-        f"definiteness: the "
-        f"smallest eigenvalue of its symmetric part along 5 s is {least}. Caught at {gain['caught_in_it_s']:.2f} s by "
-        f"the energy."
+        f"potential range is {gain['range']:.1f} J, with {gain['warnings']} warnings. Its matrix Mbar + dt dh/dqd "
+        f"loses definiteness: the smallest eigenvalue of its symmetric part along 5 s is {least}. Caught at "
+        f"{at_time(gain['caught_in_it_s'])} by the energy."
     )
     result.curves["silent"] = {"reset": reset, "gain": gain}
 
@@ -205,6 +201,11 @@ def judge(result, mujoco, near, minutes, found) -> None:
         result.notes.append(tell_newton(newton_table))
 
 
+def at_time(seconds) -> str:
+    """A time in words."""
+    return "no time" if seconds is None else f"{seconds:.2f} s"
+
+
 def tell_newton(table) -> str:
     """Up to which step Newton's method finds all stages of 2,000 steps, method by method and motion by motion."""
     told = []
@@ -217,9 +218,9 @@ def tell_newton(table) -> str:
                 f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never to {NEWTON[-1]:g} s"
             )
         told.append(f"{name} ({'; '.join(limits)})")
+    fastest = max(row["last_rad_per_s"] for row in table)
     return (
         "The A-stable methods have no linear limit; what ends them is Newton's method, from the steps on at which it "
-        "does not "
-        f"find a stage of 2000 at bent: {', '.join(told)}. The run is NaN from there, with finite and modest numbers "
-        f"before it."
+        f"does not find a stage of 2000 at bent: {', '.join(told)}. The run is NaN from there; its last rates are at "
+        f"most {fastest:.1e} rad/s, so it has not overflowed."
     )

@@ -144,9 +144,8 @@ def judge(result, parts) -> None:
             explained += 1
             result.notes.append(
                 f"{where}: the observed limit is {100 * off:.1f} % above the predicted one, because growth per step "
-                f"rises so "
-                f"slowly beyond it that {ALLOWED:.0f}-fold in {STEPS} steps is reached at {expected:.5f} s only; observed "
-                f"{row['observed_dt_s']:.5f} s."
+                f"rises so slowly beyond it that {ALLOWED:.0f}-fold in {STEPS} steps is reached at {expected:.5f} s "
+                f"only; observed {row['observed_dt_s']:.5f} s."
             )
     finite = [row for row in result.rows if row["limit"] == "finite" and row["observed_dt_s"]]
     worst = {
@@ -156,9 +155,9 @@ def judge(result, parts) -> None:
     told = ", ".join(f"{100 * off:.2f} % with damping {damping:g} N m s/rad" for damping, off in worst.items())
     result.notes.insert(
         0,
-        f"{aimed} finite limits, predicted without a run and observed without the prediction, differ by at most {told}; "
-        f"{aimed - explained} of them are within the aim of {100 * AIM:g} % undamped and {100 * AIM_DAMPED:g} % damped"
-        + (f", and of the other {explained} the cause is told below." if explained else "."),
+        f"{aimed} finite limits, predicted without a run and observed without the prediction, differ by at most "
+        f"{told}; {aimed - explained} of them are within the aim of {100 * AIM:g} % undamped and {100 * AIM_DAMPED:g} "
+        "% damped" + (f", and of the other {explained} the cause is told below." if explained else "."),
     )
     growths = [row for part in parts for row in part["growths"]]
     for row in growths:
@@ -169,7 +168,6 @@ def judge(result, parts) -> None:
     result.tables["stability_growth"] = growths
     off = max(abs(row["observed_growth"] / row["predicted_growth"] - 1.0) for row in growths)
     result.notes.append(
-        f"Where a method always fails (a saddle; explicit Euler at an undamped centre) the growth of one step, "
-        f"{len(growths)} "
-        f"times measured, is the predicted one within {off:.1e}, relative."
+        "Where a method always fails (a saddle; explicit Euler at an undamped centre) the growth of one step, "
+        f"{len(growths)} times measured, is the predicted one within {off:.1e}, relative."
     )
