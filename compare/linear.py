@@ -1,6 +1,7 @@
 """The equations of motion linearised about a held posture: modes, and what one step of a method does to them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -24,7 +25,12 @@ class Held:
     q: np.ndarray  # (n,) rad
     tau: np.ndarray  # (n,) N m
 
-    @property
+    @cached_property
+    def steps(self) -> dict:
+        """What `step` found, by method and dt."""
+        return {}
+
+    @cached_property
     def matrix(self) -> np.ndarray:
         """d(qd, qdd)/d(q, qd), (2n, 2n): exact derivatives of the right-hand side of TMT, by dual numbers."""
         n = len(self.q)
@@ -32,7 +38,7 @@ class Held:
         qdd = method.acceleration(self.model, state[:n], state[n:], list(self.tau))
         return np.vstack([np.eye(2 * n)[n:], [component.slope for component in qdd]])
 
-    @property
+    @cached_property
     def modes(self) -> tuple[np.ndarray, np.ndarray]:
         """Eigenvalues, 1/s, of `matrix`, the largest real part first, and their eigenvectors in columns, q before qd."""
         values, vectors = np.linalg.eig(self.matrix)
@@ -51,7 +57,11 @@ class Held:
 
     def step(self, name, dt) -> np.ndarray:
         """What one step of a method of tmt does to a small deviation, (..., 2n, 2n) for dt of shape (...)."""
-        return amplification(METHODS[name], self.model, self.q, np.zeros_like(self.q), self.tau, dt)
+        if np.ndim(dt):
+            return amplification(METHODS[name], self.model, self.q, np.zeros_like(self.q), self.tau, dt)
+        if (METHODS[name], dt) not in self.steps:  # the same step is asked for many perturbations
+            self.steps[METHODS[name], dt] = self.step(name, np.array([dt]))[0]
+        return self.steps[METHODS[name], dt]
 
     def growth(self, name, dt) -> np.ndarray:
         """Growth of the fastest-growing mode in one step: the spectral radius of `step`."""
