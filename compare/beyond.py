@@ -8,7 +8,7 @@ from .claims import PAIR
 from .departure import own_torque
 from .linear import held
 from .motion import LEFT, departure
-from .parties import farthest
+from .parties import farthest, finite
 from .scenes import posture
 
 TORQUES = ("one ulp off", "four decimals")
@@ -40,7 +40,7 @@ def bent(mujoco) -> dict:
                     "growth": float(at.growth(party.scheme, dt)), "observed_s": left,
                     "steps": None if left is None else round(left / dt),
                     "diverged_at_s": float(dt * np.argmax(fast)) if fast.any() else None,
-                    "largest_rad": None if fast.any() else farthest(q, at.q),
+                    "largest_rad": None if fast.any() else finite(farthest(q, at.q)),
                 })  # fmt: skip
                 paths[(party.engine, name, dt)] = np.abs(np.where(fast[:, None], np.nan, q) - at.q).max(axis=1)[:200]
             leave = []
@@ -82,8 +82,8 @@ def judge(result, beyond) -> None:
         "bent, rk4, torque one ulp off", "most steps in 5 s with which it leaves", max(ends[TORQUES[0]]), 0.0, "steps"
     )
     ulp = [row for row in rows if row["torque"] == TORQUES[0] and row["observed_s"] is not None]
-    soonest = min(ulp, key=lambda row: row["observed_s"])
-    small = next(row for row in rows if row["largest_rad"] is not None and row["dt_s"] > limit)
+    soonest = min(ulp, key=lambda row: row["observed_s"], default={"observed_s": np.inf, "dt_s": np.inf})
+    small = next((row for row in rows if row["largest_rad"] is not None and row["dt_s"] > limit), rows[0])
     result.notes.append(
         f"Claim 3, bounded: bent is a centre, and RK4 holds it up to 2 sqrt 2 / {fastest:.3f} = {limit:.4f} s. Just "
         f"beyond, at {small['dt_s']:g} s, it swings by {small['largest_rad']:.3f} rad for ever; at {BEYOND[2]:.3f} s "

@@ -195,6 +195,12 @@ def judge(result, rows, falls) -> None:
         )
 
 
+def span(times) -> str:
+    """The first and the last of some times in words; None among them stands for never."""
+    times = [time for time in times if time is not None]
+    return f"{min(times):.2f} to {max(times):.2f} s" if times else "no time within reach"
+
+
 def near(dt) -> float:
     """How near a prediction an observed departure is to be, s: one step or 0.03 s."""
     return max(NEAR, dt * (1.0 + 1e-9))

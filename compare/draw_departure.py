@@ -5,10 +5,11 @@ from matplotlib.figure import Figure
 
 from .beyond import TORQUES
 from .claims import DT
-from .departure import NEAR, near
+from .departure import NEAR, near, span
 from .draw import BLUE, GREEN, GREY, ORANGE, RED, WIDTH
 from .draw_stability import style
 from .motion import LEFT
+from .parties import value
 
 MARKS = {"rk4": "o", "explicit_euler": "v", "semi_implicit_euler": "s", "implicit": "D", "implicit_midpoint": "^",
          "gauss_legendre_4": "P", "Euler": "+", "RK4": "x"}  # fmt: skip
@@ -33,8 +34,7 @@ def times(result):
                 (r for r in here if (r["engine"], r["method"]) == (engine, method)), key=lambda r: r["perturbation_rad"]
             )
             p, predicted, observed = (
-                [np.nan if r[key] is None else r[key] for r in mine]
-                for key in ("perturbation_rad", "predicted_s", "observed_s")
+                [value(r[key]) for r in mine] for key in ("perturbation_rad", "predicted_s", "observed_s")
             )
             late = np.abs(np.subtract(observed, predicted))
             off += [(value, value <= near(dt)) for value in late if np.isfinite(value)]
@@ -74,7 +74,8 @@ def torques(result):
     grid = fig.add_gridspec(2, 2, width_ratios=(1.35, 1))
     sides = {1: (BLUE, "^", "to larger α"), -1: (RED, "v", "to smaller α"), None: (GREY, "o", "never")}
     observed = [row["observed_s"] for row in rows if row["observed_s"] is not None]
-    last, never = max(observed), max(observed) + 4 * DT
+    first, last = min(observed), max(observed)
+    never = last + 4 * DT
     first_axis = None
     for k, engine in enumerate(PARTY):
         ax = fig.add_subplot(grid[k, 0], sharex=first_axis)
@@ -86,8 +87,8 @@ def torques(result):
             stacks[at] = stacks.get(at, 0) + 1
             colour, mark, _ = sides[row["direction"]]
             ax.plot(at, stacks[at], mark, color=colour, markersize=5, fillstyle="full" if engine == "TMT" else "none")
-        ax.set(ylabel=f"runs, {engine}", xlim=(min(observed) - 2 * DT, never + 2 * DT), ylim=(0, 15))
-        ticks = [t for t in (4.6, 4.8, 5.0, 5.2, 5.4, 5.6) if min(observed) - 2 * DT < t < last + DT]
+        ax.set(ylabel=f"runs, {engine}", xlim=(first - 2 * DT, never + 2 * DT), ylim=(0, 15))
+        ticks = [t for t in np.arange(0.0, 10.0, 0.2 if last - first < 1.5 else 1.0) if first - 2 * DT < t < last + DT]
         ax.set_xticks([*ticks, never], [*(f"{t:g}" for t in ticks), "never"])
         if k == 0:
             ax.tick_params(labelbottom=False)
@@ -113,9 +114,7 @@ def torques(result):
         mine = [row for row in rows if row["engine"] == engine]
         at = [row["observed_s"] for row in mine if row["observed_s"] is not None]
         up, down = (sum(row["direction"] == side for row in mine) for side in (1, -1))
-        told.append(
-            f"{engine} after {min(at):.2f} to {max(at):.2f} s, {up} to larger α, {down} to smaller, {len(mine) - len(at)} never"
-        )
+        told.append(f"{engine} after {span(at)}, {up} to larger α, {down} to smaller, {len(mine) - len(at)} never")
     caption = (
         "Held at ball catch, RK4, dt = 5/64 s, under all 27 torques within one unit in the last place of TMT's. They "
         f"leave: {'; '.join(told)}. Right: when and to which side is decided by what the last bits of the torque, less "
@@ -135,12 +134,12 @@ def finer(result):
             counts = [5 / row["dt_s"] for row in mine]
             label = f"{engine}, {'+' if sign > 0 else '-'}1 ulp"
             options = {"color": colour, "marker": mark, "linestyle": dash, "fillstyle": fill, "markersize": 4.5}
-            left.plot(
-                counts, [np.nan if r["observed_s"] is None else r["observed_s"] for r in mine], **options, label=label
-            )
-            right.plot(counts, [max(r["moved_rad"], 1e-17) for r in mine], **options)
+            left.plot(counts, [value(r["observed_s"]) for r in mine], **options, label=label)
+            right.plot(counts, [max(value(r["moved_rad"]), 1e-17) for r in mine], **options)
     mine = [row for row in rows if row["engine"] == "TMT" and row["ulps_alpha"] == 1]
-    left.plot([5 / r["dt_s"] for r in mine], [r["predicted_s"] for r in mine], ":", color="black", label="linear map")
+    left.plot(
+        [5 / r["dt_s"] for r in mine], [value(r["predicted_s"]) for r in mine], ":", color="black", label="linear map"
+    )
     left.set(xscale="log", xlabel="steps in 5 s", ylabel="time until a hinge is 0.1 rad away, s", ylim=(4, 10.2))
     right.set(yscale="log", xlabel="steps in 5 s", ylabel="largest movement after 5 s, rad", ylim=(3e-18, 10))
     right.text(16384, 2.2e-17, "none", ha="right", va="bottom", fontsize=8)
@@ -149,7 +148,7 @@ def finer(result):
         ax.minorticks_off()
     fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
     last = rows[len(rows) // 2 - 1]
-    still = min(round(5 / row["dt_s"]) for row in rows if row["moved_rad"] == 0.0)
+    still = min((round(5 / row["dt_s"]) for row in rows if row["moved_rad"] == 0.0), default="no number of")
     caption = (
         "Held at ball catch by RK4, the torque one unit in the last place off in alpha: finer steps delay the "
         f"departure, and from {still} steps on nothing moves in 5 s (drawn at 1e-17). There dt qd, "
@@ -207,7 +206,7 @@ def zero(result):
             if engine == "TMT":
                 ax.loglog(p, [row["predicted_s"] for row in mine], dash, color="black", label=f"predicted, {text}")
             size, fill = (9, "none") if engine == "MuJoCo" else (4.5, "full")
-            observed = [row["observed_s"] for row in mine]
+            observed = [value(row["observed_s"]) for row in mine]
             label = engine if sign == 1 else None
             ax.loglog(p, observed, mark, color=colour, fillstyle=fill, markersize=size, label=label)
     anchor = rows[6]
@@ -217,7 +216,7 @@ def zero(result):
     ax.set_yticks([5, 10, 20, 50, 100, 200], ["5", "10", "20", "50", "100", "200"])
     ax.minorticks_off()
     fig.legend(loc="outside upper center", ncols=5)
-    off = max(abs(row["observed_s"] - row["predicted_s"]) for row in rows)
+    off = max(abs(value(row["observed_s"]) - row["predicted_s"]) for row in rows)
     caption = (
         "Zero, held, is marginal: along γ the potential is cubic, and the arm leaves after a time that goes with one "
         "over the square root of the perturbation, not with its logarithm. Predicted from the cubic coefficient "

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from .departure import span
 from .draw import BLUE, GREEN, GREY, ORANGE, RED, WIDTH
 from .failure import COARSE
 from .limits import ALLOWED, STEPS
@@ -46,10 +47,12 @@ def limits(result):
             if row["limit"] != "finite" and not theirs:
                 text = {"never_fails": "no limit", "always_fails": "fails at every step"}[row["limit"]]
                 ax.text(low * 1.1, place, text, va="center", fontsize=8, color=GREY)
-            elif row["limit"] == "finite" and theirs:
+            elif row["observed_dt_s"] is None or row["limit"] != "finite":
+                continue
+            elif theirs:
                 mark = {"color": "black", "marker": "|", "markersize": 9, "markeredgewidth": 1.6, "linestyle": "none"}
                 ax.plot(row["observed_dt_s"], place + 0.2, **mark)
-            elif row["limit"] == "finite":
+            else:
                 for shift, key, colour in ((-0.2, "predicted_dt_s", ORANGE), (0.2, "observed_dt_s", BLUE)):
                     ax.barh(place + shift, row[key] - low, left=low, height=0.36, color=colour)
         ax.set(xscale="log", xlim=(low, high), ylim=(len(schemes) - 0.4, -0.6))
@@ -69,7 +72,8 @@ def limits(result):
         *axes[0, 0].plot([], [], "|", color="black", markersize=9, markeredgewidth=1.6, label="observed, MuJoCo"),
     ]
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
-    off = [abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) for row in rows if row["limit"] == "finite"]
+    pairs = [(row["observed_dt_s"], row["predicted_dt_s"]) for row in rows if row["limit"] == "finite"]
+    off = [abs(observed / predicted - 1.0) for observed, predicted in pairs if observed is not None]
     caption = (
         f"The largest dt at which a perturbation of 1e-6 rad grows less than {ALLOWED:.0f}-fold in {STEPS} steps, "
         f"found by bisection, beside the limit predicted from the amplification of one step. The {len(off)} pairs "
@@ -177,7 +181,7 @@ def growth_map(result):
     caption = (
         f"How much a perturbation of 1e-6 rad grows at bent, undamped, in {STEPS} steps. The edge is sharp: of "
         f"{len(MAP_STEPS)} steps drawn, {100 * (MAP_STEPS[1] / MAP_STEPS[0] - 1):.1f} % apart, the first at which "
-        f"growth is {ALLOWED:.0f}-fold or more is at {min(edges):.3f} to {max(edges):.3f} s, and the predicted limit "
-        f"lies just before it. {told}."
+        f"growth is {ALLOWED:.0f}-fold or more is at {span(edges)}, and the predicted limit lies just before it. "
+        f"{told}."
     )
     return "stability_map", fig, caption

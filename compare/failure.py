@@ -11,7 +11,7 @@ from .engine_linear import left_to_itself
 from .limits import ALLOWED, growth, stiffest
 from .linear import held
 from .motion import diverged_at
-from .parties import Party
+from .parties import Party, finite
 from .scenes import SCENES, posture
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
@@ -121,7 +121,7 @@ def newton(name) -> list:
             found = int(np.isfinite(q).all(axis=1).sum()) - 1
             rows.append({
                 "method": name, "motion": motion, "dt_s": dt, "steps_found": found,
-                "last_rad_per_s": float(np.abs(qd[found]).max()),
+                "last_rad_per_s": finite(np.abs(qd[found]).max()),
             })  # fmt: skip
     return rows
 

@@ -49,3 +49,13 @@ def farthest(q, start) -> float:
     """The largest deviation of any hinge from where it started, rad; inf if the run diverged."""
     away = np.abs(q - start).max()
     return float(away) if np.isfinite(away) else np.inf
+
+
+def finite(number) -> float | None:
+    """A number for a table: None if it is not finite."""
+    return float(number) if np.isfinite(number) else None
+
+
+def value(number) -> float:
+    """A number from a table: NaN, which leaves a gap in a figure and fails a check, where there is none."""
+    return np.nan if number is None else number
