@@ -89,6 +89,7 @@ def rows(setup) -> Result:
     for name in ("map", "edge"):
         result.curves[name] = dict(zip(*work[name]))
     result.notes = first + result.notes
+    result.tables = {name: table for name, table in result.tables.items() if table}
     planes(result, tuple(dict.fromkeys(party.scheme for party in (FEW if len(setup.steps) == 1 else PARTIES))))
     return result
 
