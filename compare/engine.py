@@ -7,6 +7,8 @@ MuJoCo's derived fields belong to the state of the last mj_forward, not to that 
 quantity here is evaluated with mj_forward at the state that is asked for.
 """
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 from mujoco.rollout import rollout
@@ -189,25 +191,39 @@ class Engine:
 
         From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
         """
+        shape = np.broadcast_shapes(np.shape(q), np.shape(qd), np.shape(tau))
+        starts, run = self.runner(q, qd, tau, dt, steps, integrator)
+        states = np.concatenate([starts[:, None], run()], axis=1)
+        ran = np.isfinite(states).all(axis=2) & (np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0)
+        states[np.cumsum(~ran, axis=1) > 0] = np.nan
+        paths = states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs]
+        return dt * np.arange(steps + 1), *(path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
+
+    def runner(self, q, qd, tau, dt, steps, integrator) -> tuple[np.ndarray, Callable]:
+        """The first states, and a call that follows the motion from them in MuJoCo's C loop, again and again.
+
+        States are MuJoCo's, time first; the call returns those after each step, (runs, steps, ...), without a copy.
+        """
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         model.opt.disableflags |= int(FLAGS["autoreset"])  # a reset would hide the divergence
         q, qd, tau = np.broadcast_arrays(q, qd, tau)
-        batch, n = q.shape[:-1], q.shape[-1]
-        spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        starts = np.zeros((q.size // n, mujoco.mj_stateSize(model, spec)))
+        runs, spec = q.size // q.shape[-1], mujoco.mjtState.mjSTATE_FULLPHYSICS
+        starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
-        torques = np.zeros((len(starts), 1, model.nv))
-        for start, torque, *state in zip(starts, torques, *(a.reshape(-1, n) for a in (q, qd, tau))):
-            data.qpos[self.qpos], data.qvel[self.dofs], torque[0, self.dofs] = state
+        torques = np.zeros((runs, steps, model.nv))
+        for start, torque, *state in zip(starts, torques, *(a.reshape(runs, -1) for a in (q, qd, tau))):
+            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
+        states, sensors = np.empty((runs, steps, starts.shape[1])), np.empty((runs, steps, model.nsensordata))
         applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-        states, _ = rollout(model, data, starts, torques, control_spec=applied, nstep=steps)
-        states = np.concatenate([starts[:, None], states], axis=1)
-        ran = np.isfinite(states).all(axis=2) & (np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0)
-        states[np.cumsum(~ran, axis=1) > 0] = np.nan
-        paths = states[:, :, 1 + self.qpos], states[:, :, 1 + model.nq + self.dofs]
-        return dt * np.arange(steps + 1), *(path.reshape(*batch, steps + 1, n) for path in paths)
+        options = {"control_spec": applied, "nstep": steps, "state": states, "sensordata": sensors, "skip_checks": True}
+
+        def run():
+            rollout([model] * runs, [data], starts, torques, **options)
+            return states
+
+        return starts, run
 
     def implicit_derivative(self, q, qd, dt=1e-3) -> np.ndarray:
         """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (n, n): qDeriv."""

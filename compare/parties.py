@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import tmt
-from tmt.methods import METHODS
+from tmt.methods import METHODS, AdaptiveRungeKutta
 
 from .engine import INTEGRATORS
 from .motion import TWINS
@@ -37,7 +37,7 @@ class Party:
         return mujoco.variant(damping=model.damping[0]).trajectory(q, qd, tau, dt, steps, self.method)[1:]
 
 
-TMT_METHODS = tuple(name for name, stepping in METHODS.items() if hasattr(stepping, "step"))  # those with a fixed step
+TMT_METHODS = tuple(name for name, stepping in METHODS.items() if not isinstance(stepping, AdaptiveRungeKutta))
 PARTIES = tuple(Party("TMT", name) for name in TMT_METHODS) + tuple(Party("MuJoCo", name) for name in INTEGRATORS)
 FEW = tuple(Party("TMT", name) for name in ("rk4", "explicit_euler", "semi_implicit_euler", "implicit_midpoint")) + (
     Party("MuJoCo", "Euler"),

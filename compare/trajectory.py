@@ -91,7 +91,7 @@ def pair(result, scene, engine, steps, twin, integrators) -> None:
     width = band(stepping, model, *ours, tau, dt, every)
     ours_end = motion.diverged_at(scene, t, *ours)
     recorded = [path[::every] for path in ours]
-    alive = np.isfinite(np.concatenate(recorded, axis=1)).all(axis=1)
+    alive = t[::every] < (np.inf if ours_end is None else ours_end)
     states = [path[alive] for path in recorded]
     derivative = tmt.acceleration(*states, tau, model)
     derivative_bar = slope_rounding(METHODS["rk4"], model, *states, tau, dt)[2]

@@ -86,11 +86,16 @@ def test_numbers_of_steps(steps):
 
 def test_unknown_method_and_model():
     with pytest.raises(
-        ValueError, match="unknown method 'rk5'; known are rk4, explicit_euler, semi_implicit_euler, implicit"
+        ValueError, match="unknown method 'rk5'; known are rk4, dopri8, dopri8_adaptive, explicit_euler"
     ):
         tmt.simulate(REST, REST, REST, 0.1, 1, "rk5")
     with pytest.raises(ValueError, match="unknown method"):
         tmt.simulate(REST, REST, REST, 0.1, 1, ["rk4"])
+    with pytest.raises(ValueError, match="method 'rk4' has a fixed step and takes no tolerance"):
+        tmt.simulate(REST, REST, REST, 0.1, 1, tolerance=1e-6)
+    for wrong in (0.0, -1.0, np.nan, np.inf, "1e-6", True):
+        with pytest.raises(ValueError, match=r"tolerance is .*; a number above 0 is expected"):
+            tmt.simulate(REST, REST, REST, 0.1, 1, "dopri8_adaptive", tolerance=wrong)
     with pytest.raises(ValueError, match=r"a tmt\.Tree is expected"):
         tmt.mass_matrix(REST, model="arm")
 

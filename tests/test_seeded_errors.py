@@ -142,11 +142,11 @@ class Altered(SemiImplicitEuler):
 
     drop: str = ""
 
-    def matrix(self, tree, q, qd, dt):
+    def matrix(self, tree, *arguments):
         if self.drop == "damping":
             tree = dataclasses.replace(tree, damping=(0.0, 0.0, 0.0))
         wanted = dataclasses.replace(self, implicit_bias=self.implicit_bias and self.drop != "bias")
-        return SemiImplicitEuler.matrix(wanted, tree, q, qd, dt)
+        return SemiImplicitEuler.matrix(wanted, tree, *arguments)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 
 from . import method as _method
 from .arm import ARM
-from .methods import METHODS
+from .implicit import ImplicitRungeKutta
+from .methods import METHODS, AdaptiveRungeKutta
 from .tree import Tree
 
 __all__ = [
@@ -125,34 +126,58 @@ def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
 
 def simulate(
-    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
+    tolerance: float | None = None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """Motion under constant torque: t (steps+1,) s, q and qd (..., steps+1, n), rad and rad/s.
 
-    q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1;
-    method: a key of METHODS. States after a run has left the finite numbers are NaN, and so are those after Newton's
-    method has failed in an implicit one (METHODS[method].step then raises ArithmeticError). Assignment, part i.
+    q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1; method: a key of
+    METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units
+    of 1 + |value|. States after a run has left the finite numbers, or has turned by 2^50 rad, are NaN, and so are those
+    after Newton's method has failed in an implicit one (its `step` then raises ArithmeticError). Assignment, part i.
     """
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
     if not isinstance(steps, numbers.Integral) or isinstance(steps, bool) or steps < 1:
         raise ValueError(f"steps is {steps!r}; a whole number of at least 1 is expected")
-    try:
-        seconds = float(dt) if isinstance(dt, numbers.Real) and not isinstance(dt, bool) else math.nan
-    except OverflowError:
-        seconds = math.inf
-    if not 0.0 < seconds < math.inf:
-        raise ValueError(f"dt is {reprlib.repr(dt)}; a step in s above 0 is expected")
-    steps, dt = int(steps), seconds
+    steps, dt = int(steps), _positive("dt", dt, "a step in s")
+    adaptive = isinstance(METHODS[method], AdaptiveRungeKutta)
+    if tolerance is not None and not adaptive:
+        raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     q, qd, tau = (np.stack(state, axis=-1) for state in _states(model, q=q, qd=qd, tau=tau))
     batch, n = q.shape[:-1], q.shape[-1]
-    path_q, path_qd = np.full((2, q.size // n, steps + 1, n), np.nan)
+    runs = q.size // n
+    path_q, path_qd = np.full((2, runs, steps + 1, n), np.nan)
     path_q[:, 0], path_qd[:, 0] = q.reshape(-1, n), qd.reshape(-1, n)
+    paths = path_q, path_qd, np.ascontiguousarray(tau.reshape(-1, n))
 
-    from .kernels import stepper  # here, so that `import tmt` need not wait for numba
+    from . import kernels  # here, so that `import tmt` need not wait for numba
 
-    stepper(model, method)(path_q, path_qd, np.ascontiguousarray(tau.reshape(-1, n)), dt)
+    if adaptive:
+        tolerance = 1e-9 if tolerance is None else _positive("tolerance", tolerance, "a number")
+        kernels.stepper(model, method)(*paths, dt, tolerance)
+    else:
+        worth = (
+            runs * steps >= kernels.WORTH
+            and n <= kernels.TRACED
+            and not isinstance(METHODS[method], ImplicitRungeKutta)
+        )
+        in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
+        if in_lanes:
+            kernels.lane_stepper(model, method)(*(array[:in_lanes] for array in paths), dt)
+        kernels.stepper(model, method)(*(array[in_lanes:] for array in paths), dt)
     return dt * np.arange(steps + 1), path_q.reshape(*batch, steps + 1, n), path_qd.reshape(*batch, steps + 1, n)
+
+
+def _positive(name, value, kind) -> float:
+    """The value as a finite float above 0."""
+    try:
+        number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        number = math.inf
+    if not 0.0 < number < math.inf:
+        raise ValueError(f"{name} is {reprlib.repr(value)}; {kind} above 0 is expected")
+    return number
 
 
 def _states(model, **arrays):

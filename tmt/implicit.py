@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import method
 from .dual import Dual, jacobian
+from .method import acceleration, mass_matrix_and_bias
 from .space import solve_any
 from .trace import Tape
 
@@ -19,15 +19,15 @@ CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size:
 STEP = '''
 def step({state}, {torque}, dt):
     """The state one dt later; NaN where Newton's method does not find the stages."""
-    {unknown} = ({zeros},)
+    {unknown}, = ({zeros},)
     for _ in range({iterations}):
-        {change} = newton({state}, {torque}, dt, {unknown})
+        {change}, = newton({state}, {torque}, dt, {unknown})
         {update}
-        size = max({unknown_sizes})
-        change = max({change_sizes})
+        size = max(0.0, {unknown_sizes})
+        change = max(0.0, {change_sizes})
         if change <= {close!r} * (1.0 + size):
             return finish({state}, dt, {unknown})
-        if not isfinite(size):
+        if not math.isfinite(size):
             break
     return ({nothing},)
 '''
@@ -55,9 +55,9 @@ class ImplicitRungeKutta:
         if abs(sum(self.b) - 1.0) > 1e-14:
             raise ValueError(f"b sums to {sum(self.b)}, not to 1")
 
-    def slope(self, tree, q, qd, tau, dt):
+    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
         """qdd from Mbar qdd = tau - D qd - h."""
-        return method.acceleration(tree, q, qd, tau)
+        return acceleration(tree, q, qd, tau, terms)
 
     def step(self, slope, q, qd, dt):
         """The state (q, qd) one dt later, on floats, arrays and dual numbers of them.
@@ -133,23 +133,24 @@ def largest(values) -> float:
     return float(np.max([plain(value) for value in values]))
 
 
-def step_source(tree, stepping, njit) -> str:
-    """Source of the compiled `step` of an implicit method: straight-line code inside, Newton's loop around it."""
+def step_source(tree, stepping, terms) -> str:
+    """Source of the compiled `step` of an implicit method: straight-line code inside, Newton's loop around it.
+
+    terms: the form of the dynamics that is traced.
+    """
     n = len(tree.parent)
-    names = {"q": "q", "qd": "qd", "tau": "tau"}
 
     def fresh():
         tape = Tape()
-        q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(n))) for name in names)
+        q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau"))
         a = tape.inputs(*(f"a{i}" for i in range(n * len(stepping.b))))
         return tape, q, qd, tau, tape.inputs("dt")[0], a
 
     tape, q, qd, tau, dt, _ = fresh()
-    value = stepping.slope(tree, q, qd, tau, dt)
-    rows = jacobian(lambda x: stepping.slope(tree, x[:n], x[n:], tau, dt), [*q, *qd])
-    both, _ = tape.function(
-        "slope_and_jacobian", [*q, *qd, *tau, dt], [*value, *(entry for row in rows for entry in row)]
-    )
+    value = stepping.slope(tree, q, qd, tau, dt, terms)
+    rows = jacobian(lambda x: stepping.slope(tree, x[:n], x[n:], tau, dt, terms), [*q, *qd])
+    outputs = [*value, *(entry for row in rows for entry in row)]
+    functions = [tape.function("slope_and_jacobian", [*q, *qd, *tau, dt], outputs)]
 
     tape, q, qd, tau, dt, a = fresh()
 
@@ -158,10 +159,11 @@ def step_source(tree, stepping, njit) -> str:
         rows = [found[n + 2 * n * k : n + 2 * n * (k + 1)] for k in range(n)]
         return found[:n], [row[:n] for row in rows], [row[n:] for row in rows]
 
-    newton, _ = tape.function("newton", [*q, *qd, *tau, dt, *a], stepping.newton(called, q, qd, dt, a))
+    change = stepping.newton(called, q, qd, dt, a)
+    functions.append(tape.function("newton", [*q, *qd, *tau, dt, *a], change))
     tape, q, qd, tau, dt, a = fresh()
     new_q, new_qd = stepping.finish(q, qd, dt, a)
-    finish, _ = tape.function("finish", [*q, *qd, dt, *a], [*new_q, *new_qd])
+    functions.append(tape.function("finish", [*q, *qd, dt, *a], [*new_q, *new_qd]))
 
     count = len(a)
 
@@ -179,6 +181,7 @@ def step_source(tree, stepping, njit) -> str:
         unknown_sizes=list_of("abs(a{i})"),
         change_sizes=list_of("abs(d{i})"),
         close=CLOSE,
-        nothing=list_of("nan", 2 * n),
+        nothing=list_of("np.nan", 2 * n),
     )
-    return "\n\n".join(["from math import nan\n", *(njit + text.lstrip("\n") for text in (both, newton, finish, step))])
+    texts = [*(function.text for function in functions), step]
+    return "\n\n".join('@njit(error_model="numpy")\n' + text.lstrip("\n") for text in texts)

@@ -122,21 +122,26 @@ def bias(parts, gravity) -> list:
     return [total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in zip(parts, newton, euler)) for i in range(n)]
 
 
-def bias_rates(tree, q, qd) -> list:
+def mass_matrix_and_bias(tree, q, qd) -> tuple[list, list]:
+    """Mbar and h at angles q and rates qd."""
+    parts = bodies(tree, q, qd)
+    return mass_matrix(parts), bias(parts, tree.gravity)
+
+
+def bias_rates(tree, q, qd, terms=mass_matrix_and_bias) -> list:
     """dh/dqd (n rows of n, N m s/rad): the exact derivative of the bias by the rates, by dual numbers."""
-    return jacobian(lambda rates: bias(bodies(tree, q, rates), tree.gravity), qd)
+    return jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 
 
-def reduced_force(tree, parts, qd, tau) -> list:
-    """Qbar = tau - D qd - h (n, N m) of the bodies."""
-    h = bias(parts, tree.gravity)
+def reduced_force(tree, h, qd, tau) -> list:
+    """Qbar = tau - D qd - h (n, N m)."""
     return [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
 
 
-def acceleration(tree, q, qd, tau) -> list:
+def acceleration(tree, q, qd, tau, terms=mass_matrix_and_bias) -> list:
     """qdd (n, rad/s2) from Mbar qdd = Qbar = tau - D qd - h."""
-    parts = bodies(tree, q, qd)
-    return solve(mass_matrix(parts), reduced_force(tree, parts, qd, tau))
+    M, h = terms(tree, q, qd)
+    return solve(M, reduced_force(tree, h, qd, tau))
 
 
 def potential(parts, gravity):

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import method
+from . import dop853
 from .dual import seeded
 from .implicit import ImplicitRungeKutta
+from .method import acceleration, bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
 
 
@@ -39,23 +40,47 @@ class RungeKutta:
         if abs(sum(self.b) - 1.0) > 1e-14:
             raise ValueError(f"b sums to {sum(self.b)}, not to 1")
 
-    def matrix(self, tree, q, qd, dt):
+    def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
         """The matrix of the linear system for the slope: Mbar."""
-        return method.mass_matrix(method.bodies(tree, q))
+        return terms(tree, q, [0.0] * len(q))[0]
 
-    def slope(self, tree, q, qd, tau, dt):
+    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
         """qdd from Mbar qdd = tau - D qd - h."""
-        return method.acceleration(tree, q, qd, tau)
+        return acceleration(tree, q, qd, tau, terms)
 
     def step(self, slope, q, qd, dt):
         """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
-        stages = []
+        return self.combined(self.stages(slope, q, qd, dt), q, qd, dt)
+
+    def stages(self, slope, q, qd, dt):
+        """The rates and the accelerations of all stages."""
+        rates, changes = [], []
         for row in self.A:
-            q_i = advance(q, dt, row, [rate for rate, _ in stages])
-            qd_i = advance(qd, dt, row, [change for _, change in stages])
-            stages.append((qd_i, slope(q_i, qd_i)))
-        rates, changes = zip(*stages)
+            q_i, qd_i = advance(q, dt, row, rates), advance(qd, dt, row, changes)
+            rates.append(qd_i)
+            changes.append(slope(q_i, qd_i))
+        return rates, changes
+
+    def combined(self, stages, q, qd, dt):
+        rates, changes = stages
         return advance(q, dt, self.b, rates), advance(qd, dt, self.b, changes)
+
+
+@dataclass(frozen=True)
+class AdaptiveRungeKutta(RungeKutta):
+    """A Runge-Kutta method that chooses its own steps, by two embedded estimates of the error of each.
+
+    Between two recorded states it takes steps for which the error, in units of tolerance * (1 + |value|), stays below 1;
+    the estimates e5 and e3 combine to e5^2 / sqrt(e5^2 + 0.01 e3^2) (Hairer, Norsett, Wanner, section II.10).
+    """
+
+    errors: tuple = ()  # weights of the stages in the two estimates
+
+    def attempt(self, slope, q, qd, dt):
+        """A step, and the two estimates of its error, each for q and qd."""
+        stages = self.stages(slope, q, qd, dt)
+        estimates = [[*advance([0.0] * len(q), dt, e, rates)] for e in self.errors for rates in stages]
+        return *self.combined(stages, q, qd, dt), *estimates
 
 
 @dataclass(frozen=True)
@@ -69,19 +94,20 @@ class SemiImplicitEuler:
     implicit_bias: bool
     order: int = 1
 
-    def matrix(self, tree, q, qd, dt):
+    def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
         """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd]."""
         n = len(q)
-        matrix = method.mass_matrix(method.bodies(tree, q))
+        matrix = terms(tree, q, [0.0] * n)[0]
         matrix = [[matrix[i][j] + (dt * tree.damping[i] if i == j else 0.0) for j in range(n)] for i in range(n)]
         if self.implicit_bias:
-            rates = method.bias_rates(tree, q, qd)
+            rates = bias_rates(tree, q, qd, terms)
             matrix = [[matrix[i][j] + dt * rates[i][j] for j in range(n)] for i in range(n)]
         return matrix
 
-    def slope(self, tree, q, qd, tau, dt):
+    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
         """a from the linear system above."""
-        return solve_any(self.matrix(tree, q, qd, dt), method.reduced_force(tree, method.bodies(tree, q, qd), qd, tau))
+        force = reduced_force(tree, terms(tree, q, qd)[1], qd, tau)
+        return solve_any(self.matrix(tree, q, qd, dt, terms), force)
 
     def step(self, slope, q, qd, dt):
         """The state (q, qd) one dt later."""
@@ -128,6 +154,8 @@ METHODS = {
         b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
         c=(0.0, 0.5, 0.5, 1.0),
     ),
+    "dopri8": RungeKutta(order=8, A=dop853.A, b=dop853.B, c=dop853.C),  # Dormand and Prince, fixed step
+    "dopri8_adaptive": AdaptiveRungeKutta(8, dop853.A, dop853.B, dop853.C, (dop853.ERROR_5, dop853.ERROR_3)),
     "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),
     "semi_implicit_euler": SemiImplicitEuler(implicit_bias=False),
     "implicit": SemiImplicitEuler(implicit_bias=True),

@@ -38,7 +38,7 @@ def exact(tree, q, qd, tau) -> Truth:
         q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd, tau))
         parts = method.bodies(tree, q, qd)
         at_rest = [b._replace(omega=ZERO, v_conv=ZERO, w_conv=ZERO) for b in parts]
-        mass_matrix = method.mass_matrix(parts)
+        mass_matrix, h = method.mass_matrix(parts), method.bias(parts, tree.gravity)
         potential = method.potential(parts, tree.gravity)
         return Truth(
             com_positions=_array(b.x for b in parts),
@@ -48,9 +48,9 @@ def exact(tree, q, qd, tau) -> Truth:
             v_conv=_array(b.v_conv for b in parts),
             w_conv=_array(b.w_conv for b in parts),
             mass_matrix=_array(mass_matrix),
-            bias=_array(method.bias(parts, tree.gravity)),
+            bias=_array(h),
             gravity_balance=_array(method.bias(at_rest, tree.gravity)),
-            acceleration=_array(solve(mass_matrix, method.reduced_force(tree, parts, qd, tau))),
+            acceleration=_array(solve(mass_matrix, method.reduced_force(tree, h, qd, tau))),
             potential_energy=_array(potential),
             energy=_array(potential + method.kinetic(parts, qd)),
         )

@@ -74,6 +74,12 @@ class Matrix:
     def __iter__(self):
         return iter(self.rows)
 
+    def __add__(self, other):
+        return Matrix([row + more for row, more in zip(self, other)])
+
+    def __sub__(self, other):
+        return Matrix([row - less for row, less in zip(self, other)])
+
     def __matmul__(self, other):
         if isinstance(other, Vector):
             return Vector(*(row.dot(other) for row in self.rows))
@@ -107,23 +113,24 @@ def rotation(axis, angle):
 def solve(matrix, right):
     """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows.
 
-    Factorised as L D L' without square roots or pivots (none are needed: it is positive definite).
+    Factorised as U D U' from the last row to the first, without square roots or pivots (none are needed: it is positive
+    definite). In that order a hinge meets only its ancestors: zeros between branches stay zeros, as in MuJoCo.
     """
     n = len(right)
-    lower = [[None] * n for _ in range(n)]
-    diagonal = [None] * n
-    for j in range(n):
-        scaled = [lower[j][k] * diagonal[k] for k in range(j)]
-        diagonal[j] = matrix[j][j] - total(lower[j][k] * scaled[k] for k in range(j))
-        for i in range(j + 1, n):
-            lower[i][j] = (matrix[i][j] - total(lower[i][k] * scaled[k] for k in range(j))) / diagonal[j]
+    scaled = [[None] * n for _ in range(n)]  # U D
+    upper = [[None] * n for _ in range(n)]
+    inverse = [None] * n  # of D
+    for j in reversed(range(n)):
+        behind = range(j + 1, n)
+        inverse[j] = 1.0 / (matrix[j][j] - total(scaled[j][k] * upper[j][k] for k in behind))
+        for i in range(j):
+            scaled[i][j] = matrix[i][j] - total(scaled[i][k] * upper[j][k] for k in behind)
+            upper[i][j] = scaled[i][j] * inverse[j]
     x = list(right)
-    for i in range(n):
-        x[i] = x[i] - total(lower[i][k] * x[k] for k in range(i))
-    for i in range(n):
-        x[i] = x[i] / diagonal[i]
     for i in reversed(range(n)):
-        x[i] = x[i] - total(lower[k][i] * x[k] for k in range(i + 1, n))
+        x[i] = x[i] - total(upper[i][k] * x[k] for k in range(i + 1, n))
+    for i in range(n):
+        x[i] = x[i] * inverse[i] - total(upper[k][i] * x[k] for k in range(i))
     return x
 
 

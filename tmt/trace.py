@@ -1,30 +1,47 @@
 """A scalar that records arithmetic: run the method once on it, and it yields straight-line code.
 
-The parameters of a model are plain numbers and fold in; terms with a zero or a one disappear; equal
-subexpressions are computed once. What remains is the arithmetic of this one model.
+The parameters of a model are plain numbers and fold in; terms with a zero or a one disappear; equal subexpressions are
+computed once; signs are carried outward until a sum takes them up; numbers that meet in a sum or a product become one.
+What remains is the arithmetic of this one model.
 """
 
 import math
 import operator
+from collections import Counter
+from collections.abc import Callable
+from decimal import Decimal
 from numbers import Real
+from typing import NamedTuple
 
 from .space import cos, sin
 
-COMMUTATIVE = {"+", "*"}
 FOLD = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
     "/": operator.truediv,
-    "sin": math.sin,
-    "cos": math.cos,
+    "neg": operator.neg,
+    "sin": lambda x: math.sin(x) if isinstance(x, float) else sin(x),
+    "cos": lambda x: math.cos(x) if isinstance(x, float) else cos(x),
 }
 
 
-class Tape:
-    """The expressions of one trace, each held once, in an order in which they can be computed."""
+class Code(NamedTuple):
+    """Straight-line Python source of one function."""
 
-    def __init__(self):
+    text: str
+    operations: int  # + - * / and changes of sign; a sine and a cosine count as one each
+    constants: dict  # numbers by the names that stand for them in the text, where they are no floats
+
+
+class Tape:
+    """The expressions of one trace, each held once, in an order in which they can be computed.
+
+    number: the type of the model's numbers: float, or an exact one that can be made from a float.
+    """
+
+    def __init__(self, number: Callable = float):
+        self.number_type = number
         self.nodes = []  # (operation, arguments): arguments are indices, but a number or a name for a leaf
         self.index = {}
 
@@ -46,75 +63,156 @@ class Tape:
     def lift(self, value) -> "Expression":
         if isinstance(value, Expression):
             return value
-        return self.node("number", float(value))
+        return self.node("number", self.number_type(value))
+
+    # one rule for each way in which an operation can become simpler
+
+    def add(self, a, b):
+        if 0.0 in (a.number, b.number):
+            return a if b.number == 0.0 else b
+        if b.negated is not None:
+            return self.subtract(a, b.negated)
+        if a.negated is not None:
+            return self.subtract(b, a.negated)
+        if a.i == b.i:
+            return self.multiply(self.lift(2.0), a)
+        return self.merged("+", a, b) or self.node("+", *sorted((a.i, b.i)))
+
+    def subtract(self, a, b):
+        if a.i == b.i:
+            return self.lift(0.0)
+        if b.number == 0.0:
+            return a
+        if b.negated is not None:
+            return self.add(a, b.negated)
+        if a.number == 0.0:
+            return self.negative(b)
+        if a.negated is not None:
+            return self.negative(self.add(a.negated, b))
+        return self.node("-", a.i, b.i)
+
+    def multiply(self, a, b):
+        if 0.0 in (a.number, b.number):
+            return self.lift(0.0)
+        if 1.0 in (a.number, b.number):
+            return b if a.number == 1.0 else a
+        for one, other in ((a, b), (b, a)):
+            if one.negated is not None:
+                return self.negative(self.multiply(one.negated, other))
+            if one.number is not None and one.number < 0.0:
+                return self.negative(self.multiply(self.lift(-one.number), other))
+        return self.merged("*", a, b) or self.node("*", *sorted((a.i, b.i)))
+
+    def divide(self, a, b):
+        if b.number == 1.0 or a.number == 0.0:
+            return a
+        if a.negated is not None:
+            return self.negative(self.divide(a.negated, b))
+        if b.negated is not None:
+            return self.negative(self.divide(a, b.negated))
+        return self.node("/", a.i, b.i)
+
+    def negative(self, a):
+        if a.number is not None:
+            return self.lift(-a.number)
+        return self.node("neg", a.i) if a.negated is None else a.negated
+
+    def merged(self, operation, a, b):
+        """c1 o (c2 o x) as (c1 o c2) o x for numbers c1, c2: else None."""
+        for one, other in ((a, b), (b, a)):
+            if one.number is not None and self.nodes[other.i][0] == operation:
+                inner = [Expression(self, i) for i in self.nodes[other.i][1]]
+                inner.sort(key=lambda part: part.number is None)
+                if inner[0].number is not None:
+                    return self.apply(operation, self.apply(operation, one, inner[0]), inner[1])
+        return None
 
     def apply(self, operation, *values) -> "Expression":
-        """The expression for one operation, simplified where an argument is a number."""
+        """The expression for one operation, simplified."""
         values = [self.lift(v) for v in values]
         numbers = [v.number for v in values]
         if None not in numbers:
             return self.lift(FOLD[operation](*numbers))
-        a, b = numbers if len(numbers) == 2 else (None, None)
-        if operation == "*":
-            if 0.0 in numbers:
-                return self.lift(0.0)
-            if 1.0 in numbers:
-                return values[1 - numbers.index(1.0)]
-        elif operation == "+" and 0.0 in numbers:
-            return values[1 - numbers.index(0.0)]
-        elif operation == "-":
-            if b == 0.0:
-                return values[0]
-            if values[0].i == values[1].i:
-                return self.lift(0.0)
-        elif operation == "/":
-            if b == 1.0:
-                return values[0]
-            if a == 0.0:
-                return self.lift(0.0)
-        indices = [v.i for v in values]
-        return self.node(operation, *(sorted(indices) if operation in COMMUTATIVE else indices))
+        if operation in ("sin", "cos"):
+            return self.node("item", self.node("sincos", values[0].i).i, ("sin", "cos").index(operation))
+        rule = {"+": self.add, "-": self.subtract, "*": self.multiply, "/": self.divide, "neg": self.negative}
+        return rule[operation](*values)
 
-    def function(self, name, inputs, outputs) -> tuple[str, int]:
-        """Python source of `name(inputs) -> outputs`, and the number of operations in it."""
+    def function(self, name, inputs, outputs) -> Code:
+        """Source of `name(inputs) -> outputs`.
+
+        It takes sines from sincos(x) -> (sin x, cos x), and a product that only goes into a sum from fma(a, b, c) = a b + c,
+        rounded once: so every compiler does the same arithmetic.
+        """
         outputs = [self.lift(o) for o in outputs]
-        needed = set()
-        open_ = [o.i for o in outputs]
+        order = self.needed(outputs)
+        fused = self.fused(order, outputs)
+        text = {i.i: i.name for i in inputs}
+        lines, constants, operations = [], {}, 0
+        for i in order:
+            operation, arguments = self.nodes[i]
+            operations += operation in FOLD or (operation == "item" and self.nodes[arguments[0]][0] == "sincos")
+            if operation == "input":
+                text[i] = arguments[0]
+            elif operation == "number":
+                text[i] = repr(arguments[0]) if self.number_type is float else f"c{i}"
+                if self.number_type is not float:
+                    constants[text[i]] = arguments[0]
+            elif operation == "item":
+                text[i] = f"t{arguments[0]}_{arguments[1]}"
+            elif operation == "sincos":
+                lines.append(f"t{i}_0, t{i}_1 = sincos({text[arguments[0]]})")
+            elif operation == "call":
+                count = 1 + max(a[1] for o, a in self.nodes if o == "item" and a[0] == i)
+                results = ", ".join(f"t{i}_{k}" for k in range(count))
+                lines.append(f"{results}, = {arguments[0]}({', '.join(text[a] for a in arguments[1:])})")
+            elif i not in fused.values():
+                text[i] = f"t{i}"
+                lines.append(f"t{i} = {self.written(operation, arguments, fused.get(i), text)}")
+        names = ", ".join(i.name for i in inputs)
+        returns = ", ".join(text[o.i] for o in outputs)
+        body = "".join(f"    {line}\n" for line in [*lines, f"return {returns},"])
+        return Code(f"def {name}({names}):\n{body}", operations, constants)
+
+    def written(self, operation, arguments, product, text) -> str:
+        """The right-hand side for one operation; product: the operand that is fused into it, or None."""
+        if product is None:
+            operands = [text[a] for a in arguments]
+            return f"-{operands[0]}" if operation == "neg" else f" {operation} ".join(operands)
+        x, y = (text[a] for a in self.nodes[product][1])
+        (other,) = (text[a] for a in arguments if a != product)
+        if operation == "+":
+            return f"fma({x}, {y}, {other})"
+        return f"fma({x}, {y}, -{other})" if arguments[0] == product else f"fma(-{x}, {y}, {other})"
+
+    def fused(self, order, outputs) -> dict[int, int]:
+        """For each sum or difference that takes one up, a product that is used nowhere else."""
+        uses = Counter(o.i for o in outputs)
+        for i in order:
+            uses.update(self.operands(i))
+        chosen = {}
+        for i in order:
+            operation, arguments = self.nodes[i]
+            if operation in ("+", "-"):
+                products = [a for a in arguments if self.nodes[a][0] == "*" and uses[a] == 1]
+                if products:
+                    chosen[i] = products[-1]  # the later one: the other is ready earlier
+        return chosen
+
+    def needed(self, outputs) -> list[int]:
+        """The nodes on which the outputs depend, in order."""
+        needed, open_ = set(), [o.i for o in outputs]
         while open_:
             i = open_.pop()
             if i not in needed:
                 needed.add(i)
-                open_.extend(self._operands(i))
-        text = {}
-        lines = []
-        operations = 0
-        for i in sorted(needed):
-            operation, arguments = self.nodes[i]
-            if operation in ("input", "number"):
-                text[i] = arguments[0] if operation == "input" else repr(arguments[0])
-                continue
-            text[i] = f"t{i}"
-            if operation == "call":
-                value = f"{arguments[0]}({', '.join(text[a] for a in arguments[1:])})"
-            elif operation == "item":
-                value = f"{text[arguments[0]]}[{arguments[1]}]"
-            elif operation in ("sin", "cos"):
-                value = f"{operation}({text[arguments[0]]})"
-            else:
-                value = f"{text[arguments[0]]} {operation} {text[arguments[1]]}"
-            operations += operation in FOLD
-            lines.append(f"    {text[i]} = {value}")
-        names = ", ".join(text.get(i.i, i.name) for i in inputs)
-        returns = ", ".join(text[o.i] for o in outputs)
-        return "\n".join([f"def {name}({names}):", *lines, f"    return {returns},", ""]), operations
+                open_ += self.operands(i)
+        return sorted(needed)
 
-    def _operands(self, i):
+    def operands(self, i) -> tuple:
         operation, arguments = self.nodes[i]
-        if operation in ("input", "number"):
-            return []
-        if operation == "call":
-            return arguments[1:]
-        return arguments[:1] if operation == "item" else arguments
+        kept = {"input": slice(0), "number": slice(0), "call": slice(1, None), "item": slice(1)}
+        return arguments[kept.get(operation, slice(None))]
 
 
 class Expression:
@@ -133,15 +231,24 @@ class Expression:
         return arguments[0] if operation == "number" else None
 
     @property
+    def negated(self):
+        """x, if this is -x: else None."""
+        operation, arguments = self.tape.nodes[self.i]
+        return Expression(self.tape, arguments[0]) if operation == "neg" else None
+
+    @property
     def name(self):
         """The name of an input."""
         return self.tape.nodes[self.i][1][0]
 
     def apply(self, operation, *values):
         """The expression for an operation; NotImplemented if another kind of scalar takes part, which then decides."""
-        if all(isinstance(value, (Expression, Real)) for value in values):
+        if all(isinstance(value, (Expression, Real, Decimal)) for value in values):
             return self.tape.apply(operation, *values)
         return NotImplemented
+
+    def __neg__(self):
+        return self.apply("neg", self)
 
     def __add__(self, other):
         return self.apply("+", self, other)

@@ -1,0 +1,37 @@
+"""The compiled loop for any tree: the same numbers as the method, and as straight-line code."""
+
+import numpy as np
+import pytest
+from trees import random_tree
+
+import tmt
+from tmt import generic, kernels
+
+
+@pytest.mark.parametrize("bodies", [0, 1, 4, 9])
+def test_generic_loop_is_the_method(rng, bodies):
+    tree = random_tree(rng, bodies=bodies, damping=0.3) if bodies else tmt.ARM
+    n = len(tree.parent)
+    for q, qd, tau in rng.uniform(-3, 3, (5, 3, n)):
+        M, h, qdd = np.zeros((n, n)), np.empty(n), np.empty(n)
+        generic.mass_matrix_and_bias(generic.arrays(tree), q, qd, M, h)
+        expected = tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree)
+        assert np.allclose(M, np.tril(expected[0]), rtol=0, atol=1e-13 * np.abs(expected[0]).max())
+        assert np.allclose(h, expected[1], rtol=0, atol=1e-12 * np.abs(expected[1]).max())
+        generic.forward_dynamics(generic.arrays(tree), q, qd, tau, qdd)
+        assert np.allclose(qdd, tmt.acceleration(q, qd, tau, tree), rtol=1e-9, atol=1e-9)
+
+
+def test_large_trees_take_the_generic_loop(rng, monkeypatch):
+    tree = random_tree(rng, bodies=3)
+    q, qd, tau = rng.uniform(-1, 1, (3, 4, len(tree.parent)))
+    qd[1] = 1e200  # diverges
+    kernels.stepper.cache_clear()
+    _, *traced = tmt.simulate(q, qd, tau, 0.01, 20, "rk4", tree)
+    monkeypatch.setattr(kernels, "TRACED", 2)
+    kernels.stepper.cache_clear()
+    _, *looped = tmt.simulate(q, qd, tau, 0.01, 20, "rk4", tree)
+    kernels.stepper.cache_clear()
+    for a, b in zip(traced, looped):
+        assert np.allclose(a, b, rtol=1e-9, atol=1e-9, equal_nan=True) and not np.array_equal(a, b, equal_nan=True)
+    assert np.isnan(looped[0][1, -1]).all()
