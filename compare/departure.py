@@ -15,6 +15,7 @@ from .parties import Party
 from .scenes import posture
 
 LONGEST = 12.0  # s
+SHORT = 1e-6  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
 TORQUES = tuple(10.0**-k for k in (13, 14, 15))  # rad, as the error of torque that moves the equilibrium as far
 NEAR = 0.03  # s, or one step: how near the prediction an observed departure is to be
@@ -30,13 +31,21 @@ def own_torque(party, mujoco, at) -> np.ndarray:
     """The torque under which the compiled arithmetic of a party gives no acceleration at all at the posture, N m.
 
     MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the one whose
-    first step from rest moves least; compiled code may regroup the sums.
+    residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
     """
     if party.engine == "MuJoCo":
         return mujoco.gravity_balance(at.q)
     tau = variants(at.tau, 2)
-    _, qd = party.run(mujoco, at.model, at.q, np.zeros_like(tau), tau, 1.0, 1)
-    return tau[np.argmin(np.abs(qd[:, 1]).max(axis=1))]
+    return tau[np.argmin(np.abs(residual(party, mujoco, at, tau)).max(axis=1))]
+
+
+def residual(party, mujoco, at, tau) -> np.ndarray:
+    """The torque by which tau, (..., n) N m, fails to hold the posture in the arithmetic of a party, to less than an ulp.
+
+    Read from the first of its steps, which is so short that the arm does not move: Mbar qd / dt.
+    """
+    _, qd = party.run(mujoco, at.model, at.q + np.zeros_like(tau), np.zeros_like(tau), tau, SHORT, 1)
+    return qd[..., 1, :] @ tmt.mass_matrix(at.q) / SHORT
 
 
 def variants(tau, reach=1) -> np.ndarray:
@@ -45,20 +54,20 @@ def variants(tau, reach=1) -> np.ndarray:
     return np.array(list(product(*([t + k * np.spacing(abs(t)) for k in away] for t in tau))))
 
 
-def offset(at, residual) -> np.ndarray:
-    """How far the posture is from the equilibrium of the held torque plus a small residual, rad (n,), N m (n,)."""
+def offset(at, off) -> np.ndarray:
+    """How far the posture is from the equilibrium of the held torque plus a small torque, rad (n,), N m (n,)."""
     stiffness = at.matrix[3:, :3]
-    return np.linalg.solve(stiffness, np.linalg.solve(tmt.mass_matrix(at.q), residual))
+    return np.linalg.solve(stiffness, np.linalg.solve(tmt.mass_matrix(at.q), off))
 
 
-def predicted(at, scheme, dt, moved, residual, longest=LONGEST) -> float | None:
+def predicted(at, scheme, dt, moved, off, longest=LONGEST) -> float | None:
     """When the method's own linear map has the arm 0.1 rad away, s; None: not within `longest`.
 
-    moved: angles at the start from the posture, rad; residual: torque beyond the one that holds, N m. The map carries
-    all six modes of the state about the equilibrium that the residual moves.
+    moved: angles at the start from the posture, rad; off: torque beyond the one that holds, N m. The map carries all six
+    modes of the state about the equilibrium that this torque moves.
     """
     J = at.step(scheme, dt)
-    equilibrium = -offset(at, residual)
+    equilibrium = -offset(at, off)
     state = np.concatenate([moved - equilibrium, np.zeros(3)])
     for k in range(1, round(longest / dt) + 1):
         state = J @ state
@@ -67,9 +76,9 @@ def predicted(at, scheme, dt, moved, residual, longest=LONGEST) -> float | None:
     return None
 
 
-def stuck(at, dt, moved, residual) -> float:
+def stuck(at, dt, moved, off) -> float:
     """For how long at most rounding keeps the arm in place, s: while dt qd is below half an ulp of every angle."""
-    push = at.matrix[3:, :3] @ (moved + offset(at, residual))
+    push = at.matrix[3:, :3] @ (moved + offset(at, off))
     with np.errstate(divide="ignore"):
         return float(np.min(0.5 * np.spacing(np.abs(at.q)) / np.abs(dt * push)))
 
@@ -91,11 +100,12 @@ def examine(dt, mujoco, parties) -> list:
         starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
         with np.errstate(over="ignore", invalid="ignore"):
             paths, _ = party.run(mujoco, at.model, at.q + starts, np.zeros_like(starts), torques, dt, steps)
-        for (size, moved, tau), path in zip(sizes, paths):
+        left = residual(party, mujoco, at, torques)
+        for (size, moved, _), off, path in zip(sizes, left, paths):
             rows.append({
                 "scene": at.name + (", torque off" if size in TORQUES else ""), "engine": party.engine, "method": party.method,
-                "dt_s": dt, "perturbation_rad": size, "predicted_s": predicted(at, party.scheme, dt, moved, tau - own),
-                "observed_s": departure(t, path), "stuck_s": stuck(at, dt, moved, tau - own),
+                "dt_s": dt, "perturbation_rad": size, "predicted_s": predicted(at, party.scheme, dt, moved, off),
+                "observed_s": departure(t, path), "stuck_s": stuck(at, dt, moved, off),
             })  # fmt: skip
     return rows
 

@@ -69,7 +69,7 @@ def times(result):
 
 def torques(result):
     """Departure from ball catch under the 27 torques that differ in the last bit: when, and to which side."""
-    rows = [row for row in result.tables["stability_torques"] if row["torque"] != "own bias"]
+    rows = [row for row in result.tables["stability_torques"] if row["torque"].startswith("variant")]
     fig = Figure(figsize=(WIDTH, 4.0), layout="constrained")
     grid = fig.add_gridspec(2, 2, width_ratios=(1.35, 1))
     sides = {1: (BLUE, "^", "to larger α"), -1: (RED, "v", "to smaller α"), None: (GREY, "o", "never")}
@@ -128,25 +128,32 @@ def finer(result):
     rows = result.tables["stability_finer_steps"]
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     left, right = fig.subplots(1, 2, sharex=True)
-    for engine, (colour, mark) in PARTY.items():
+    for engine, (colour, _) in PARTY.items():
         for sign, dash, fill in ((1, "-", "full"), (-1, "--", "none")):
             mine = [row for row in rows if row["engine"] == engine and row["ulps_alpha"] == sign]
             counts = [5 / row["dt_s"] for row in mine]
             label = f"{engine}, {'+' if sign > 0 else '-'}1 ulp"
-            options = {"color": colour, "marker": mark, "linestyle": dash, "fillstyle": fill, "markersize": 4.5}
+            options = {"color": colour, "linestyle": dash, "fillstyle": fill, "markersize": 5.5}
             left.plot(counts, [value(r["observed_s"]) for r in mine], **options, label=label)
+            for side, mark in ((1, "^"), (-1, "v")):
+                gone = [(5 / r["dt_s"], r["observed_s"]) for r in mine if r["direction"] == side]
+                left.plot(
+                    [n for n, _ in gone], [t for _, t in gone], mark, color=colour, fillstyle=fill, markersize=5.5
+                )
             right.plot(counts, [max(value(r["moved_rad"]), 1e-17) for r in mine], **options)
     mine = [row for row in rows if row["engine"] == "TMT" and row["ulps_alpha"] == 1]
     left.plot(
         [5 / r["dt_s"] for r in mine], [value(r["predicted_s"]) for r in mine], ":", color="black", label="linear map"
     )
+    left.plot([], [], "^", color="black", label="to larger α")
+    left.plot([], [], "v", color="black", label="to smaller α")
     left.set(xscale="log", xlabel="steps in 5 s", ylabel="time until a hinge is 0.1 rad away, s", ylim=(4, 10.2))
     right.set(yscale="log", xlabel="steps in 5 s", ylabel="largest movement after 5 s, rad", ylim=(3e-18, 10))
     right.text(16384, 2.2e-17, "none", ha="right", va="bottom", fontsize=8)
     for ax in (left, right):
         ax.set_xticks([32, 128, 512, 2048, 8192], ["32", "128", "512", "2048", "8192"])
         ax.minorticks_off()
-    fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
+    fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=7, fontsize=7.5, columnspacing=1.0)
     last = rows[len(rows) // 2 - 1]
     still = min((round(5 / row["dt_s"]) for row in rows if row["moved_rad"] == 0.0), default="no number of")
     caption = (
