@@ -96,7 +96,7 @@ def judge(result, beyond) -> None:
         f"Its end state cannot be hanging while the torque acts: that accelerates a hanging arm by ({pushed[0]:.1f}, "
         f"{pushed[1]:.1f}, {pushed[2]:.1f}) rad/s2. Without the torque it can: RK4 takes energy out of every swing, "
         f"and the free arm at dt = {FREE_STEP:g} s hangs at rest after {FREE_TIME:g} s, "
-        f"{beyond['free_from_hanging']:.0e} rad off. So in the run that the original describes the holding torque did "
+        f"{beyond['free_from_hanging']:.1e} rad off. So in the run that the original describes the holding torque did "
         "not act to the end."
     )
     result.curves["bent"] = beyond

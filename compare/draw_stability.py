@@ -18,13 +18,13 @@ SCHEME = {  # colour, dash, name
     "implicit": (RED, "-.", "implicit"),
     "implicit_midpoint": (ORANGE, (0, (5, 1)), "implicit midpoint"),
     "gauss_legendre_4": (PINK, (0, (3, 1, 1, 1, 1, 1)), "Gauss-Legendre 4"),
+    "dopri8": (SKY, (0, (4, 2)), "Dormand-Prince 8"),
 }
-OTHERS = (SKY, "black", "#F0E442")  # colours of methods that are not named above
 
 
 def style(name):
     """Colour, dash and printed name of a method."""
-    return SCHEME.get(name, (OTHERS[sum(map(ord, name)) % len(OTHERS)], "-", name))
+    return SCHEME.get(name, ("black", "-", name))
 
 
 def limits(result):
@@ -87,15 +87,16 @@ def regions(result):
     drawn = result.curves["regions"]
     columns = 2 if len(drawn) == 4 else 3
     lines = -(-len(drawn) // columns)
-    fig = Figure(figsize=(WIDTH, 0.8 + 2.55 * lines), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
     axes = fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     marks = {  # marker, colour, size, filled: marks that come to lie on each other differ in size
         ("bent", 0.0): ("o", BLUE, 7, "none"),
         ("bent", 0.5): ("s", GREEN, 4, "full"),
         ("ball catch", 0.0): ("^", RED, 3.5, "full"),
     }
+    titles = {names: " and ".join(style(name)[2] for name in names) for names in drawn}
     outside = []
-    for ax, (name, (x, y, growth)) in zip(axes.flat, drawn.items()):
+    for ax, (names, (x, y, growth)) in zip(axes.flat, drawn.items()):
         ax.contourf(x, y, np.where(np.isfinite(growth), growth, 99.0), levels=[0.0, 1.0 + 1e-9], colors=["#dddddd"])
         ax.contour(
             x, y, np.where(np.isfinite(growth), growth, 99.0), levels=[1.0 + 1e-3], colors=[GREY], linewidths=0.8
@@ -106,15 +107,15 @@ def regions(result):
             z = COARSE * values
             ax.plot(z.real, z.imag, mark, color=colour, markersize=size, fillstyle=fill, label=label)
         for row in result.rows:
-            if (row["engine"], row["method"], row["scene"], row["damping"]) == ("TMT", name, "bent", 0.0):
+            if (row["engine"], row["method"], row["scene"], row["damping"]) == ("TMT", names[0], "bent", 0.0):
                 at = row["predicted_dt_s"]
                 if at is not None:
                     swing = at * np.abs(result.curves["points"]["bent", 0.0]).max()
-                    ax.plot([0, 0], [-swing, swing], "x", color="black", markersize=6, label="bent at its limit")
-                    outside.append(f"{swing:.3f} ({style(name)[2]})")
+                    ax.plot(0, swing, "x", color="black", markersize=6, label="bent at its limit")
+                    outside.append(f"{swing:.3f} ({titles[names]})")
         ax.axhline(0, color="black", linewidth=0.5)
         ax.axvline(0, color="black", linewidth=0.5)
-        ax.set(title=style(name)[2], xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+        ax.set(title=titles[names], xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
         ax.set_aspect("equal")
     for ax in axes.flat[len(drawn) :]:
         ax.set_visible(False)
@@ -125,10 +126,10 @@ def regions(result):
         handles |= dict(zip(*reversed(ax.get_legend_handles_labels())))
     fig.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=4)
     caption = (
-        "Stability regions (grey: one step lets neither of a pair of conjugate eigenvalues grow) with the eigenvalues "
-        "of the held arm times dt = 5/64 s. Ball catch has two positive ones, outside every region. Crosses: the "
-        f"fastest mode of bent at the limit, omega dt = {', '.join(outside)}. Of partitioned methods two different "
-        "real eigenvalues do not have a region; their marks are a guide."
+        "The upper half of the stability regions (grey: one step lets neither of a pair of conjugate eigenvalues "
+        "grow) with the eigenvalues of the held arm times dt = 5/64 s. Ball catch has two positive ones, outside "
+        f"every region. Crosses: the fastest mode of bent at the limit, omega dt = {', '.join(outside)}. Of "
+        "partitioned methods two different real eigenvalues do not have a region; their marks are a guide."
     )
     return "stability_regions", fig, caption
 

@@ -186,10 +186,9 @@ def judge(result, mujoco, near, minutes, found) -> None:
         where = f"bent, free, 60 s, {party.label}, dt = {dt:.4g} s"
         result.check(where, "energy does otherwise than its twin's", other, 0.0, "runs")
     for dt in sorted({row["dt_s"] for row in table}, reverse=True):
+        mine = [row for row in table if row["dt_s"] == dt and row["engine"] == "TMT"]
         of_kind = {
-            kind: [
-                row["method"] for row in table if row["dt_s"] == dt and row["engine"] == "TMT" and row["energy"] == kind
-            ]
+            kind: [f"{row['method']} ({how_far(row)})" for row in mine if row["energy"] == kind]
             for kind in ("bounded", "drifts", "diverges")
         }
         told = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in of_kind.items() if names)
@@ -199,6 +198,13 @@ def judge(result, mujoco, near, minutes, found) -> None:
     if newton_table:
         result.tables["stability_newton"] = newton_table
         result.notes.append(tell_newton(newton_table))
+
+
+def how_far(row) -> str:
+    """How the energy of a minute behaves, in words."""
+    if row["energy"] == "diverges":
+        return f"at {row['diverged_at_s']:.2f} s"
+    return f"within {row['largest_j']:.2g} J" if row["energy"] == "bounded" else f"by {row['change_j']:+.2g} J"
 
 
 def at_time(seconds) -> str:
