@@ -136,7 +136,7 @@ def test_own_bias_holds_for_ever(engine):
             assert not qd.any()
     tau = departure.own_torque(RK4, engine, BALL) + 1e-12
     q, _ = RK4.run(engine, tmt.ARM, BALL.q, np.zeros(3), tau, 5 / 64, 100)
-    assert np.abs(q[-1] - BALL.q).max() > 0.1
+    assert np.nanmax(np.abs(q - BALL.q)) > 0.1
 
 
 def test_resonance_needs_a_large_perturbation():
