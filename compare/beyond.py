@@ -50,12 +50,11 @@ def bent(mujoco) -> dict:
                 leave += [count] if not farthest(q, at.q) < LEFT else []
             stays[(party.engine, name)] = max(leave, default=0)
     hanging = posture("hanging")
-    _, free, rates = tmt.simulate(at.q, np.zeros(3), np.zeros(3), FREE_STEP, round(FREE_TIME / FREE_STEP))
+    _, free, _ = tmt.simulate(at.q, np.zeros(3), np.zeros(3), FREE_STEP, round(FREE_TIME / FREE_STEP))
     return {
         "rows": rows, "paths": paths, "leaves_within_5_s": stays,
         "acceleration_at_hanging": tmt.acceleration(hanging, np.zeros(3), at.tau),
         "free_from_hanging": float(np.abs(np.remainder(free[-1] - hanging + np.pi, 2 * np.pi) - np.pi).max()),
-        "free_rate": float(np.abs(rates[-1]).max()), "tau": at.tau,
     }  # fmt: skip
 
 

@@ -204,4 +204,3 @@ def tell_finer(result, finer) -> None:
         f"below half a unit in its last place. At {round(5 / last['dt_s'])} steps it is {value(last['step_rad']):.1e} "
         f"rad after 5 s, against {last['half_ulp_rad']:.1e} rad, and no angle has changed."
     )
-    result.curves["finer"] = finer
