@@ -20,6 +20,7 @@ EXPERIMENTS = {
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
     "trajectory": "five seconds of motion, a twin for every integrator",
     "speed": "time against error: every method, every step, and what to use",
+    "stability": "step limits, departure from unstable postures, where each method fails",
     "reduction": "what each scene needs of the model, and what the rest costs",
 }
 EXAMPLES = """examples:

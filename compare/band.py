@@ -2,25 +2,12 @@
 
 import numpy as np
 
-from tmt.dual import seeded
-from tmt.methods import one_step
+from tmt.methods import amplification
 
 from .agreement import EPS, FACTOR, bias_scale
 
 SAMPLED = 16  # states of a block at which the bound of a step is taken
 NARROW = 1e-3  # rad: while the band of the angles is below, a run is judged
-
-
-def step_jacobians(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> np.ndarray:
-    """Exact Jacobians of the method's own step at states q, qd (steps, n): (steps, 2n, 2n).
-
-    The step is taken on dual numbers, all states and all directions at once.
-    """
-    n = q.shape[1]
-    state = seeded([*q.T, *qd.T], np.eye(2 * n)[:, :, None])  # slopes: direction, state
-    new_q, new_qd = one_step(stepping, model, state[:n], state[n:], tau, dt)
-    slopes = [np.broadcast_to(component.slope, (2 * n, len(q))) for component in (*new_q, *new_qd)]
-    return np.array(slopes).transpose(2, 0, 1)
 
 
 def slope_rounding(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
@@ -72,7 +59,7 @@ def band(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: fl
     if ran <= 0:
         return widths
     q, qd = q[: ran * every], qd[: ran * every]
-    jacobians = step_jacobians(stepping, model, q, qd, tau, dt).reshape(ran, every, size, size)
+    jacobians = amplification(stepping, model, q, qd, tau, dt).reshape(ran, every, size, size)
     # the bound varies slowly: at fine steps it is taken at some of the states, and holds for those that follow
     stride = max(1, every // SAMPLED)
     delta = step_rounding(stepping, model, q[::stride], qd[::stride], tau, dt)
@@ -102,7 +89,7 @@ def growth(stepping, model, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: 
     The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled on the way so that it may grow without limit.
     """
     product, scale, result = np.eye(2 * q.shape[1]), 0.0, [0.0]
-    for k, J in enumerate(step_jacobians(stepping, model, q[:-1], qd[:-1], tau, dt)):
+    for k, J in enumerate(amplification(stepping, model, q[:-1], qd[:-1], tau, dt)):
         product = J @ product
         if (k + 1) % every == 0:
             size = np.linalg.norm(product, 2)

@@ -108,9 +108,8 @@ def tmt_run(method, scene, setting):
     run = partial(kernels.stepper(scene.model, method), *arguments)
 
     def read(evaluations):
-        count = steps * len(getattr(stepping, "b", "1")) if evaluations is None else evaluations
-        taken = steps if evaluations is None else evaluations // len(stepping.b)
-        return Outcome(*paths[:, 0, :: steps // GRID], taken, count)
+        taken = steps if setting.steps else evaluations // len(stepping.b)
+        return Outcome(*paths[:, 0, :: steps // GRID], taken, evaluations)
 
     return run, read
 

@@ -46,7 +46,9 @@ def test_all_writes_the_files_that_are_promised_and_nothing_else(ran):
     assert [p.name for p in folder.iterdir()] == ["reports"]
     report = folder / "reports" / "latest"
     assert {p.name for p in report.iterdir()} == {"report.md", "index.html", "results.json", "tables", "figures"}
-    assert {p.stem for p in (report / "tables").iterdir()} >= {*EXPERIMENTS, "reduction_subsets", "cost_in_mujoco"}
+    assert {p.stem for p in (report / "tables").iterdir()} >= {
+        *EXPERIMENTS, "evaluations", "departure", "stability_growth", "reduction_subsets", "cost_in_mujoco",
+    }  # fmt: skip
     assert all(p.suffix == ".png" and p.stat().st_size > 5000 for p in (report / "figures").iterdir())
 
 
@@ -73,6 +75,12 @@ def test_tables_are_tidy(ran):
     assert {
         "scene", "engine_integrator", "twin", "dt_s", "level", "worst_difference", "band", "judged_until_s", "diverged_at_s",
     } <= columns  # fmt: skip
+    promised = {
+        "stability": "scene engine method damping mode_per_s predicted_dt_s observed_dt_s limit criterion",
+        "departure": "scene engine method dt_s perturbation_rad predicted_s observed_s",
+    }
+    for name, columns in promised.items():
+        assert " ".join(pd.read_csv(folder / f"reports/latest/tables/{name}.csv").columns) == columns
 
 
 def test_page_is_one_file_and_markdown_finds_its_figures(ran):

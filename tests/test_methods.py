@@ -8,7 +8,8 @@ import pytest
 
 import tmt
 from compare.band import band
-from tmt.methods import METHODS, AdaptiveRungeKutta, RungeKutta, one_step
+from tmt.implicit import ImplicitRungeKutta
+from tmt.methods import METHODS, AdaptiveRungeKutta, RungeKutta, amplification, one_step
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
@@ -28,6 +29,22 @@ def test_a_wrong_tableau_cannot_be_built(changes, says):
     RungeKutta(**midpoint)
     with pytest.raises(ValueError, match=says):
         RungeKutta(**midpoint | changes)
+
+
+@pytest.mark.parametrize(
+    "changes, says",
+    [
+        ({"b": (1.0, 0.5)}, "A must be square"),
+        ({"b": (0.9,)}, "b sums to 0.9"),
+        ({"c": (0.4,)}, "row 0 of A sums to 0.5"),
+        ({"A": ((),)}, "A must be square"),
+    ],
+)
+def test_a_wrong_implicit_tableau_cannot_be_built(changes, says):
+    midpoint = {"order": 2, "A": ((0.5,),), "b": (1.0,), "c": (0.5,)}
+    ImplicitRungeKutta(**midpoint)
+    with pytest.raises(ValueError, match=says):
+        ImplicitRungeKutta(**midpoint | changes)
 
 
 FIXED = [name for name, stepping in METHODS.items() if not isinstance(stepping, AdaptiveRungeKutta)]
@@ -53,7 +70,7 @@ def test_order(name):
 def test_energy_drift_falls_with_the_order(name):
     drifts = []
     order = METHODS[name].order
-    for steps in {1: (1024, 2048, 4096), 4: (128, 256, 512), 8: (32, 64, 128)}[order]:
+    for steps in {1: (1024, 2048, 4096), 2: (128, 256, 512), 4: (128, 256, 512), 8: (32, 64, 128)}[order]:
         _, q, qd = tmt.simulate(BENT, REST, REST, 1.0 / steps, steps, name)
         energy = tmt.energy(q, qd)
         assert np.ptp(tmt.potential_energy(q)) > 0.5
@@ -114,3 +131,29 @@ def test_the_assignments_bent_posture_holds():
     _, q, qd = tmt.simulate(BENT, REST, tau, 5 / 64, 64)
     width = band(METHODS["rk4"], tmt.ARM, q, qd, tau, 5 / 64)
     assert (np.abs(q - BENT) <= width[:, :3]).all()
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_amplification_is_what_a_step_does_to_a_small_deviation(name, rng):
+    q, qd, tau = rng.uniform(-1, 1, (3, 3))
+    J = amplification(METHODS[name], tmt.ARM, q, qd, tau, 0.1)
+    for column, direction in zip(J.T, 1e-5 * np.eye(6)):
+        ends = [
+            np.concatenate(
+                [
+                    path[0, 1]
+                    for path in tmt.simulate([q + s * direction[:3]], [qd + s * direction[3:]], tau, 0.1, 1, name)[1:]
+                ]
+            )
+            for s in (1, -1)
+        ]
+        assert np.abs((ends[0] - ends[1]) / 2e-5 - column).max() < 1e-7
+    assert np.array_equal(amplification(METHODS[name], tmt.ARM, np.stack([q, -q]), qd, tau, 0.1)[0], J)
+
+
+def test_where_newton_fails_the_run_is_nan_and_the_step_says_so():
+    _, q, qd = tmt.simulate(BENT, REST, REST, 0.5, 20, "implicit_midpoint")
+    last = np.isfinite(q).all(axis=1).sum() - 1
+    assert 0 < last < 20 and np.abs(qd[last]).max() < 1e3  # finite and modest until there
+    with pytest.raises(ArithmeticError, match=r"dt = 0\.5 s"):
+        one_step(METHODS["implicit_midpoint"], tmt.ARM, list(q[last]), list(qd[last]), [0.0] * 3, 0.5)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from . import method as _method
 from .arm import ARM
+from .implicit import ImplicitRungeKutta
 from .methods import METHODS, AdaptiveRungeKutta
 from .tree import Tree
 
@@ -132,7 +133,8 @@ def simulate(
 
     q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1; method: a key of
     METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units
-    of 1 + |value|. States after a run has left the finite numbers, or has turned by 2^50 rad, are NaN. Assignment, part i.
+    of 1 + |value|. States after a run has left the finite numbers, or has turned by 2^50 rad, are NaN, and so are those
+    after Newton's method has failed in an implicit one (its `step` then raises ArithmeticError). Assignment, part i.
     """
     if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
@@ -155,7 +157,11 @@ def simulate(
         tolerance = 1e-9 if tolerance is None else _positive("tolerance", tolerance, "a number")
         kernels.stepper(model, method)(*paths, dt, tolerance)
     else:
-        worth = runs * steps >= kernels.WORTH and n <= kernels.TRACED
+        worth = (
+            runs * steps >= kernels.WORTH
+            and n <= kernels.TRACED
+            and not isinstance(METHODS[method], ImplicitRungeKutta)
+        )
         in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
         if in_lanes:
             kernels.lane_stepper(model, method)(*(array[:in_lanes] for array in paths), dt)

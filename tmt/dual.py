@@ -50,6 +50,9 @@ class Dual:
         value, slope = self.parts(other)
         return self.new(self.value - value, self.slope - slope)
 
+    def __neg__(self):
+        return self.new(-self.value, -self.slope)
+
     def __rsub__(self, other):
         return self * -1.0 + other
 

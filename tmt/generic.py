@@ -175,7 +175,8 @@ def forward_dynamics(tree, q, qd, tau, qdd):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def run_tableau(tree, A, b, q, qd, tau, dt):
-    """Fill q and qd (batch, steps + 1, n) from their first state by an explicit Runge-Kutta method, while finite."""
+    """Fill q and qd (batch, steps + 1, n) by an explicit Runge-Kutta method, while finite; evaluations of the dynamics."""
+    evaluations = 0
     stages, n = len(b), q.shape[2]
     rates, changes = np.empty((stages, n)), np.empty((stages, n))
     angles = np.empty(n)
@@ -188,6 +189,7 @@ def run_tableau(tree, A, b, q, qd, tau, dt):
                         angles[j] += dt * A[s, r] * rates[r, j]
                         rates[s, j] += dt * A[s, r] * changes[r, j]
                 forward_dynamics(tree, angles, rates[s], tau[i], changes[s])
+            evaluations += stages
             size = 0.0
             for j in range(n):
                 q[i, k, j], qd[i, k, j] = q[i, k - 1, j], qd[i, k - 1, j]
@@ -198,6 +200,7 @@ def run_tableau(tree, A, b, q, qd, tau, dt):
             if not size < np.inf:
                 q[i, k], qd[i, k] = np.nan, np.nan
                 break
+    return evaluations
 
 
 def stepper(tree, stepping) -> Callable:

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 from . import composite
 from .cache import load
+from .implicit import ImplicitRungeKutta, step_source
 from .method import acceleration
 from .methods import METHODS, AdaptiveRungeKutta, RungeKutta
 from .trace import Code, Tape
@@ -33,17 +34,20 @@ def library_sincos(x):
 '''
 
 RUN = '''
-@njit("void(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64)", cache=CACHE, error_model="numpy")
+@njit("int64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64)", cache=CACHE, error_model="numpy")
 def run(q, qd, tau, dt):
-    """Fill q and qd (batch, steps + 1, n) from their first state, until one is not finite."""
+    """Fill q and qd (batch, steps + 1, n) from their first state, until one is not finite; evaluations of the dynamics."""
+    evaluations = 0
     for b in range(q.shape[0]):
         {state} = {first}
         {torque} = {given}
         for k in range(1, q.shape[1]):
-            {state} = step({state}, {torque}, dt)
+            {state}{used} = step({state}, {torque}, dt)
+            evaluations += {cost}
             if not {sound}:
                 break
             {store} = {state}
+    return evaluations
 '''
 
 ADAPTIVE = '''
@@ -173,7 +177,8 @@ def rate(y, tau):
 def stepper(tree, method_name):
     """Compiled `run(q, qd, tau, dt)` of a Tree and one of METHODS, for arrays of shape (batch, ...).
 
-    An adaptive method takes its tolerance too, `run(q, qd, tau, dt, tolerance)`, and returns its evaluations.
+    It returns how often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes
+    its tolerance too: `run(q, qd, tau, dt, tolerance)`.
     For many hinges an explicit method of fixed step takes the generic loop, which needs no compilation.
     """
     if len(tree.parent) > TRACED and type(METHODS[method_name]) is RungeKutta:
@@ -185,7 +190,7 @@ def stepper(tree, method_name):
 
 @lru_cache(maxsize=64)
 def lane_stepper(tree, method_name):
-    """`run(q, qd, tau, dt)` for a batch that is a multiple of LANES; the same bits. Not for adaptive methods."""
+    """`run(q, qd, tau, dt)` for a batch that is a multiple of LANES; the same bits. Not for adaptive and implicit methods."""
     return load(lanes_source(tree, method_name)).run
 
 
@@ -211,6 +216,9 @@ def slope_source(tree, method_name, terms=composite.mass_matrix_and_bias) -> Cod
 def source(tree, method_name) -> str:
     """The module that follows one state at a time: slope, step, and the loop over both."""
     stepping, n = METHODS[method_name], len(tree.parent)
+    if isinstance(stepping, ImplicitRungeKutta):
+        loop = RUN.format(**_words(n), used=", used", cost=f"used * {len(stepping.b)}")
+        return HEADER + step_source(tree, stepping, composite.mass_matrix_and_bias) + loop
     tape = Tape()
     q, qd, tau, dt = _inputs(tape, tree)
 
@@ -235,7 +243,7 @@ def _loop(stepping, n) -> str:
     """The loop of `source` over the states of n hinges."""
     words = _words(n)
     if not isinstance(stepping, AdaptiveRungeKutta):
-        return RUN.format(**words)
+        return RUN.format(**words, used="", cost=len(getattr(stepping, "b", "1")))
     states = [f"{name}{i}" for name in ("q", "qd") for i in range(n)]
 
     def squares(error):

@@ -7,7 +7,11 @@ scalars, and `slope(q, qd) -> qdd`, and returns the state one dt later. The same
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from . import dop853
+from .dual import seeded
+from .implicit import ImplicitRungeKutta
 from .method import acceleration, bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
 
@@ -125,6 +129,24 @@ def one_step(stepping, tree, q, qd, tau, dt):
     return stepping.step(lambda q, qd: stepping.slope(tree, q, qd, tau, dt), q, qd, dt)
 
 
+def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
+    """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2n, 2n).
+
+    q, qd: states (..., n), rad and rad/s; tau: torque (n,), N m; dt: step in s, one for all or (...). At an equilibrium
+    it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual numbers,
+    all directions at once; so it holds for partitioned and implicit methods too.
+    """
+    n = len(tree.parent)
+    batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
+    start = [np.broadcast_to(values, (*batch, n))[..., i] for values in (q, qd) for i in range(n)]
+    directions = np.eye(2 * n).reshape(2 * n, 2 * n, *(1 for _ in batch))  # component, direction, state
+    state = seeded(start, directions)
+    new_q, new_qd = one_step(stepping, tree, state[:n], state[n:], [float(t) for t in tau], dt)
+    slopes = [np.broadcast_to(component.slope, (2 * n, *batch)) for component in (*new_q, *new_qd)]
+    return np.moveaxis(np.array(slopes), (0, 1), (-2, -1)).copy()
+
+
+ROOT = 3**0.5 / 6
 METHODS = {
     "rk4": RungeKutta(  # the classical method of Kutta (1901), the assignment's part i
         order=4,
@@ -137,4 +159,11 @@ METHODS = {
     "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),
     "semi_implicit_euler": SemiImplicitEuler(implicit_bias=False),
     "implicit": SemiImplicitEuler(implicit_bias=True),
+    "implicit_midpoint": ImplicitRungeKutta(order=2, A=((0.5,),), b=(1.0,), c=(0.5,)),
+    "gauss_legendre_4": ImplicitRungeKutta(  # Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7
+        order=4,
+        A=((1 / 4, 1 / 4 - ROOT), (1 / 4 + ROOT, 1 / 4)),
+        b=(1 / 2, 1 / 2),
+        c=(1 / 2 - ROOT, 1 / 2 + ROOT),
+    ),
 }

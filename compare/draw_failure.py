@@ -1,0 +1,135 @@
+"""Figures of failures beyond the linear limits: the resonance, silent failure, a minute of motion."""
+
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from .draw import BLUE, GREEN, ORANGE, RED, WIDTH
+from .draw_stability import style
+from .failure import COARSE, EDGE, EDGE_SIZES, LARGE, NEAR, RESONANCE, at_time
+from .limits import STEPS
+from .motion import TWINS
+
+
+def edge(result):
+    """The nonlinear edge: tongues of growth over omega dt and the size of the perturbation; the resonance close up."""
+    maps, near = result.curves["edge"], result.curves["near"]
+    fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
+    above, below = fig.subfigures(2, 1, height_ratios=(1.2, 1))
+    axes = above.subplots(1, len(maps), sharey=True)
+    for ax, (party, grown) in zip(axes, maps.items()):
+        shown = np.clip(np.where(np.isfinite(grown), grown, 1e6), 1.0, 1e6)
+        image = ax.pcolormesh(
+            EDGE, EDGE_SIZES, shown, norm=LogNorm(1, 1e6), cmap="cividis", shading="nearest", rasterized=True
+        )
+        ax.set(yscale="log", xlabel="ω dt of the stiffest mode", title=style(party.method)[2])
+        ax.set_xticks([1.0, 1.25, 1.5, RESONANCE, 2.0], ["1", "1.25", "1.5", "√3", "2"])
+        ax.grid(visible=False)
+    axes[0].set_ylabel("perturbation, rad")
+    above.colorbar(image, ax=axes, label=f"growth in {STEPS} steps", extend="max").ax.minorticks_off()
+    ax = below.subplots()
+    looks = ((RED, "-", ""), (BLUE, "--", ""), (RED, "", "o"), (BLUE, "", "s"))
+    for (label, grown), (colour, dash, mark) in zip(near.items(), looks):
+        values = np.clip(np.where(np.isfinite(grown[1]), grown[1], 1e9), 1.0, 1e9)
+        name = label.replace("semi_implicit_euler", "semi-implicit Euler")
+        ax.semilogy(
+            NEAR, values, linestyle=dash or "none", marker=mark, mfc="none", markersize=5, color=colour, label=name
+        )
+    ax.semilogy(NEAR, next(iter(near.values()))[0], ":", color="black", label="all, from 1e-6 rad")
+    ax.set(
+        xlabel="ω dt", ylabel=f"growth in {STEPS} steps,\nfrom {LARGE:g} rad", xlim=(NEAR[0], NEAR[-1]), ylim=(0.5, 5e9)
+    )
+    ax.set_xticks([1.72, RESONANCE, 1.74, 1.75], ["1.72", "√3", "1.74", "1.75"])
+    ax.legend(loc="upper left")
+    worst = max(grown[1].max() for label, grown in near.items() if label.endswith(" implicit"))
+    caption = (
+        "The nonlinear edge at bent. Above: growth over ω dt and the size of the perturbation. The linear limit is 2, "
+        "but at √3 a swing takes three steps, and the cubic part of the potential pushes it at each: a tongue of "
+        f"failure that widens with the perturbation. Below: from {LARGE:g} rad `implicit` grows up to {worst:.1e}-fold "
+        "there in both engines; from 1e-6 rad growth is at most "
+        f"{max(grown[0].max() for grown in near.values()):.2f}-fold. Divergence is drawn at 1e9."
+    )
+    return "stability_edge", fig, caption
+
+
+def silent(result):
+    """Runs that fail without a word: reset by MuJoCo, and `implicit` gaining energy."""
+    reset, gain = (result.curves["silent"][key] for key in ("reset", "gain"))
+    low = gain["smallest"].min()
+    fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    grid = fig.add_gridspec(2, 2, height_ratios=(1.5, 1))
+    left, right = fig.add_subplot(grid[:, 0]), fig.add_subplot(grid[0, 1])
+    under = fig.add_subplot(grid[1, 1], sharex=right)
+    left.plot(reset["t"], reset["energy"] - reset["energy"][0], ".-", color=BLUE, markersize=3, linewidth=0.8)
+    left.set_yscale("symlog", linthresh=10.0)
+    left.set_yticks([0, 1e1, 1e4, 1e7, 1e10, 1e13])
+    for k, t in enumerate(reset["t"][1:][np.diff(reset["clock"]) <= 0.0]):
+        left.axvline(t, color=ORANGE, linewidth=1.5, label="reset by MuJoCo" if k == 0 else None)
+    if reset["caught_in_it_s"] is not None:
+        left.axvline(reset["caught_in_it_s"], color=RED, linestyle="--", label="caught here")
+    left.axhline(gain["range"], color="black", linewidth=0.8, linestyle=":", label="range of the potential")
+    left.set(xlabel="time, s", ylabel="energy gained, J", xlim=(0, reset["t"][-1]), title="Euler, automatic reset on")
+    right.plot(gain["t"], gain["energy"] - gain["energy"][0], ".-", color=BLUE, markersize=4, linewidth=0.8)
+    right.axhline(gain["range"], color="black", linewidth=0.8, linestyle=":")
+    right.set(ylabel="energy gained, J", title="implicit")
+    right.tick_params(labelbottom=False)
+    under.plot(gain["t"], gain["smallest"], ".-", color=GREEN, markersize=3, linewidth=0.8)
+    under.axhline(0.0, color="black", linewidth=0.6)
+    under.set(xlabel="time, s", ylabel="smallest eigen-\nvalue, kg m2", xlim=(0, gain["t"][-1]))
+    for ax in (right, under):
+        if gain["caught_in_it_s"] is not None:
+            ax.axvline(gain["caught_in_it_s"], color=RED, linestyle="--")
+    fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    caption = (
+        "Finite nonsense: bent, free, by MuJoCo at dt = 5/64 s. Left: Euler diverges and MuJoCo starts it again at "
+        f"zero, {reset['resets']} times in {reset['t'][-1]:.0f} s. Right: `implicit` gains {gain['gain']:.0f} J "
+        "without a warning where its matrix is indefinite (smallest eigenvalue of the symmetric part down to "
+        f"{low:.2f} kg m2). The bound on the energy catches them at {at_time(reset['caught_in_it_s'])} and "
+        f"{at_time(gain['caught_in_it_s'])}."
+    )
+    return "stability_silent", fig, caption
+
+
+def minutes(result):
+    """Energy over a minute of free motion, method by method, at a coarse and a fine step."""
+    runs = result.curves["minutes"]
+    steps = sorted({run["row"]["dt_s"] for run in runs}, reverse=True)
+    fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    axes = fig.subplots(1, len(steps), sharex=True, squeeze=False)[0]
+    bound = result.curves["silent"]["gain"]["range"]
+    for run in runs:
+        row = run["row"]
+        ax = axes[steps.index(row["dt_s"])]
+        swing = max(1, round(2.0 / (run["t"][1] - run["t"][0])))  # the largest of 2 s: swings would fill the figure
+        starts = np.arange(1, len(run["t"]), swing)
+        top = np.fmax.reduceat(np.abs(run["off"]), starts)
+        at = run["t"][starts]
+        if row["engine"] == "TMT":
+            colour, dash, name = style(row["method"])
+            ax.semilogy(at, top, linestyle=dash, color=colour, label=name)
+            if row["diverged_at_s"] is not None:
+                ax.plot(row["diverged_at_s"], bound, "x", color=colour)
+        elif row["method"] in ("Euler", "implicit", "RK4"):
+            colour = style(TWINS[row["method"]])[0]
+            label = "MuJoCo's twin" if row["method"] == "RK4" else None
+            ax.semilogy(at[::3], top[::3], "o", mfc="none", markersize=3.5, color=colour, label=label)
+    for ax, dt in zip(axes, steps):
+        ax.set(xlabel="time, s", xlim=(0, 60), title="dt = 5/64 s" if dt == COARSE else f"dt = {dt:g} s")
+    axes[0].set_ylabel("largest |energy - energy at start|, J")
+    fig.legend(*axes[-1].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    verdict = {
+        (row["dt_s"], kind): [style(r["method"])[2] for r in (run["row"] for run in runs)
+                              if r["engine"] == "TMT" and r["dt_s"] == row["dt_s"] and r["energy"] == kind]
+        for row in (run["row"] for run in runs) for kind in ("bounded", "drifts", "diverges")
+    }  # fmt: skip
+    told = ". ".join(
+        f"At dt = {dt:.3g} s "
+        f"" + "; ".join(f"{kind}: {', '.join(verdict[dt, kind])}" for kind in ("bounded", "drifts", "diverges")
+                                          if verdict[dt, kind])
+        for dt in steps
+    )  # fmt: skip
+    caption = (
+        f"A minute of bent, free: how far the energy is from where it started. {told}. Crosses: the run has diverged, "
+        "its gain beyond its bound."
+    )
+    return "stability_energy", fig, caption

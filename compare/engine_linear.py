@@ -1,0 +1,50 @@
+"""What MuJoCo says of its own steps: their derivatives, and what becomes of a run that it resets by itself."""
+
+import mujoco
+import numpy as np
+
+from .engine import FLAGS, INTEGRATORS, Engine
+
+NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/s
+
+
+def transition(engine: Engine, q, tau, dt, integrator) -> np.ndarray:
+    """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, (2n, 2n).
+
+    q, tau: (n,) rad, N m. By mjd_transitionFD, central differences of 1e-6; it refuses RK4, whose steps are
+    differenced here.
+    """
+    n = len(engine.hinges)
+    if integrator == "RK4":
+        ends = []
+        for sign in (1.0, -1.0):
+            start = np.concatenate([q, np.zeros(n)]) + sign * NUDGE * np.eye(2 * n)
+            _, *paths = engine.trajectory(start[:, :n], start[:, n:], tau, dt, 1, integrator)
+            ends.append(np.concatenate([path[:, 1] for path in paths], axis=1))
+        return (ends[0] - ends[1]).T / (2.0 * NUDGE)
+    model, data = mujoco.MjModel.__copy__(engine.model), mujoco.MjData(engine.model)
+    model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+    data.qpos[engine.qpos], data.qvel[engine.dofs], data.qfrc_applied[engine.dofs] = q, 0.0, tau
+    A = np.zeros((2 * model.nv, 2 * model.nv))
+    mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
+    order = np.concatenate([engine.dofs, model.nv + engine.dofs])
+    return A[np.ix_(order, order)]
+
+
+def left_to_itself(engine: Engine, q, qd, tau, dt, steps, integrator) -> dict:
+    """A run with MuJoCo's defaults, automatic reset included, and what MuJoCo says of it.
+
+    q, qd: (steps + 1, n); time: (steps + 1,) s, of MuJoCo's own clock; warnings: their number at the end.
+    """
+    model, data = mujoco.MjModel.__copy__(engine.model), mujoco.MjData(engine.model)
+    model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+    model.opt.disableflags &= ~int(FLAGS["autoreset"])
+    data.qpos[engine.qpos], data.qvel[engine.dofs], data.qfrc_applied[engine.dofs] = q, qd, tau
+    states = []
+    for k in range(steps + 1):
+        states.append([data.time, *data.qpos[engine.qpos], *data.qvel[engine.dofs]])
+        if k < steps:
+            mujoco.mj_step(model, data)
+    time, n = np.array(states), len(engine.hinges)
+    warnings = sum(int(warning.number) for warning in data.warning)
+    return {"time": time[:, 0], "q": time[:, 1 : 1 + n], "qd": time[:, 1 + n :], "warnings": warnings}

@@ -1,0 +1,187 @@
+"""Implicit Runge-Kutta methods: their stages solve an equation, by Newton's method with exact Jacobians.
+
+The unknowns are the accelerations a_i of the stages, a_i = qdd(q_i, qd_i), at
+q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .dual import Dual, jacobian
+from .method import acceleration, mass_matrix_and_bias
+from .space import solve_any
+from .trace import Tape
+
+ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
+CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
+
+STEP = '''
+def step({state}, {torque}, dt):
+    """The state one dt later and how often Newton's method was applied; NaN where it does not find the stages."""
+    {unknown}, = ({zeros},)
+    for used in range(1, {iterations} + 1):
+        {change}, = newton({state}, {torque}, dt, {unknown})
+        {update}
+        size = max(0.0, {unknown_sizes})
+        change = max(0.0, {change_sizes})
+        if change <= {close!r} * (1.0 + size):
+            return finish({state}, dt, {unknown}) + (used,)
+        if not math.isfinite(size):
+            break
+    return ({nothing}, used)
+'''
+
+
+@dataclass(frozen=True)
+class ImplicitRungeKutta:
+    """An implicit Runge-Kutta method, given by its Butcher tableau, applied to (q, qd) as one first-order system.
+
+    Raises ValueError if A is not square, a row of A does not sum to c, or b does not sum to 1.
+    """
+
+    order: int
+    A: tuple  # row i: the weights of all stages in stage i
+    b: tuple  # the weights of the stages in the step
+    c: tuple  # the time of each stage in units of dt
+
+    def __post_init__(self):
+        stages = len(self.b)
+        if not len(self.A) == stages == len(self.c) or any(len(row) != stages for row in self.A):
+            raise ValueError("A must be square, and b and c must have one entry for each of its rows")
+        for i, (row, c) in enumerate(zip(self.A, self.c)):
+            if abs(sum(row) - c) > 1e-14:
+                raise ValueError(f"row {i} of A sums to {sum(row)}, not to c = {c}")
+        if abs(sum(self.b) - 1.0) > 1e-14:
+            raise ValueError(f"b sums to {sum(self.b)}, not to 1")
+
+    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
+        """qdd from Mbar qdd = tau - D qd - h."""
+        return acceleration(tree, q, qd, tau, terms)
+
+    def step(self, slope, q, qd, dt):
+        """The state (q, qd) one dt later, on floats, arrays and dual numbers of them.
+
+        Raises ArithmeticError where Newton's method does not find the stages (the compiled loop gives NaN there).
+        """
+        n = len(q)
+
+        def evaluate(q, qd):
+            rows = jacobian(lambda x: slope(x[:n], x[n:]), [*q, *qd])
+            return slope(q, qd), [row[:n] for row in rows], [row[n:] for row in rows]
+
+        a, last = [0.0] * (n * len(self.b)), False
+        for _ in range(ITERATIONS):
+            change = self.newton(evaluate, q, qd, dt, a)
+            a = [old + new for old, new in zip(a, change)]
+            if last:  # once more after the values are found: only then are their derivatives exact
+                return self.finish(q, qd, dt, a)
+            last = largest(change) <= CLOSE * (1.0 + largest(a))
+        raise ArithmeticError(f"Newton's method does not find the stages at dt = {dt} s")
+
+    def stages(self, q, qd, dt, a):
+        """The states (q_i, qd_i) of the stages with accelerations a, all of them in one list."""
+        n, s = len(q), range(len(self.b))
+        for i in s:
+            twice = [sum(self.A[i][k] * self.A[k][j] for k in s) for j in s]
+            yield (
+                [q[k] + dt * (self.c[i] * qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
+                [qd[k] + dt * weighted(self.A[i], a[k::n]) for k in range(n)],
+            )
+
+    def newton(self, evaluate, q, qd, dt, a):
+        """The change of the accelerations a by one step of Newton's method.
+
+        evaluate(q, qd): qdd and its exact derivatives by q and by qd, n rows of n each.
+        """
+        n, s = len(q), range(len(self.b))
+        matrix, right = [], []
+        for i, (q_i, qd_i) in zip(s, self.stages(q, qd, dt, a)):
+            f, by_q, by_qd = evaluate(q_i, qd_i)
+            for k in range(n):
+                row = []
+                for j in s:
+                    twice = sum(self.A[i][m] * self.A[m][j] for m in s)
+                    own = [1.0 if (j, l) == (i, k) else 0.0 for l in range(n)]
+                    row += [own[l] - dt * (self.A[i][j] * by_qd[k][l] + dt * (twice * by_q[k][l])) for l in range(n)]
+                matrix.append(row)
+                right.append(f[k] - a[i * n + k])
+        return solve_any(matrix, right)
+
+    def finish(self, q, qd, dt, a):
+        """The state (q, qd) one dt later, from the accelerations of the stages."""
+        n, s = len(q), range(len(self.b))
+        twice = [sum(self.b[k] * self.A[k][j] for k in s) for j in s]
+        return (
+            [q[k] + dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
+            [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)],
+        )
+
+
+def weighted(weights, values):
+    """Sum of weights * values."""
+    terms = [w * v for w, v in zip(weights, values)]
+    return sum(terms[1:], terms[0])
+
+
+def largest(values) -> float:
+    """The largest absolute value; of dual numbers that of their values."""
+
+    def plain(value):
+        return plain(value.value) if isinstance(value, Dual) else np.max(np.abs(value))
+
+    return float(np.max([plain(value) for value in values]))
+
+
+def step_source(tree, stepping, terms) -> str:
+    """Source of the compiled `step` of an implicit method: straight-line code inside, Newton's loop around it.
+
+    terms: the form of the dynamics that is traced.
+    """
+    n = len(tree.parent)
+
+    def fresh():
+        tape = Tape()
+        q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau"))
+        a = tape.inputs(*(f"a{i}" for i in range(n * len(stepping.b))))
+        return tape, q, qd, tau, tape.inputs("dt")[0], a
+
+    tape, q, qd, tau, dt, _ = fresh()
+    value = stepping.slope(tree, q, qd, tau, dt, terms)
+    rows = jacobian(lambda x: stepping.slope(tree, x[:n], x[n:], tau, dt, terms), [*q, *qd])
+    outputs = [*value, *(entry for row in rows for entry in row)]
+    functions = [tape.function("slope_and_jacobian", [*q, *qd, *tau, dt], outputs)]
+
+    tape, q, qd, tau, dt, a = fresh()
+
+    def called(q, qd):
+        found = tape.call("slope_and_jacobian", [*q, *qd, *tau, dt], n + 2 * n * n)
+        rows = [found[n + 2 * n * k : n + 2 * n * (k + 1)] for k in range(n)]
+        return found[:n], [row[:n] for row in rows], [row[n:] for row in rows]
+
+    change = stepping.newton(called, q, qd, dt, a)
+    functions.append(tape.function("newton", [*q, *qd, *tau, dt, *a], change))
+    tape, q, qd, tau, dt, a = fresh()
+    new_q, new_qd = stepping.finish(q, qd, dt, a)
+    functions.append(tape.function("finish", [*q, *qd, dt, *a], [*new_q, *new_qd]))
+
+    count = len(a)
+
+    def list_of(pattern, count=count):
+        return ", ".join(pattern.format(i=i) for i in range(count))
+
+    step = STEP.format(
+        state=", ".join([list_of("q{i}", n), list_of("qd{i}", n)]),
+        torque=list_of("tau{i}", n),
+        unknown=list_of("a{i}"),
+        zeros=list_of("0.0"),
+        iterations=ITERATIONS,
+        change=list_of("d{i}"),
+        update="; ".join(f"a{i} += d{i}" for i in range(count)),
+        unknown_sizes=list_of("abs(a{i})"),
+        change_sizes=list_of("abs(d{i})"),
+        close=CLOSE,
+        nothing=list_of("np.nan", 2 * n),
+    )
+    texts = [*(function.text for function in functions), step]
+    return "\n\n".join('@njit(error_model="numpy")\n' + text.lstrip("\n") for text in texts)
