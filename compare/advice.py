@@ -55,7 +55,11 @@ def why_not(rows, target, theirs, ours, floor) -> str | None:
         if row is None:
             errors = [row["worst_error_rad"] for row in rows if row["engine"] == engine]
             least = min(errors, default=np.inf)
-            cause = f"rounding leaves {floor:.0e} rad here" if target < 10 * floor else "its steps end before"
+            cause = (
+                f"rounding, of the size of {floor:.0e} rad, has taken over"
+                if target < 10 * floor
+                else "its steps end before"
+            )
             reasons.append(f"{party}'s least error is {least:.1e} rad: {cause}")
     return "; ".join(reasons) or None
 

@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable
 
-ENOUGH = 0.03  # s: what has taken so long in all is timed no more than twice
-LONG = 0.2  # s: what takes so long is timed once; interruptions are short beside it
+ENOUGH = 0.02  # s: what has taken so long in all is timed no more than twice
+LONG = 0.1  # s: what takes so long is timed once; interruptions are short beside it
 WARM = 0.02  # s: a first call that takes longer needs no other before it counts
 
 

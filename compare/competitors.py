@@ -12,16 +12,17 @@ from typing import NamedTuple
 import numpy as np
 
 from tmt import kernels
+from tmt.implicit import ImplicitRungeKutta
 from tmt.methods import METHODS, AdaptiveRungeKutta
 
 from .engine import INTEGRATORS, Engine
 
 GRID = 64  # steps of the coarsest run, and of the grid on which runs are judged
 FINEST = {"RK4": 2**17}  # steps beyond which a run would take too long to be timed again and again
-FINEST_MUJOCO, FINEST_TMT = 2**16, 2**18
+FINEST_MUJOCO, FINEST_TMT, FINEST_IMPLICIT = 2**16, 2**18, 2**15
 QUICK = 5  # settings of a quick run
 TOLERANCES = tuple(10.0**-k for k in range(2, 15))
-SCIPY = {"RK45": 12, "DOP853": 13, "Radau": 7, "LSODA": 12}  # the finest tolerance, 10^-k
+SCIPY = {"RK45": 12, "DOP853": 13, "Radau": 6, "LSODA": 12}  # the finest tolerance, 10^-k
 ORDERS = {"RK4": 4, "RK45": 5, "DOP853": 8, "Radau": 5}  # of MuJoCo's integrators the others have order 1
 
 
@@ -63,7 +64,8 @@ def competitors(engine: Engine, quick: bool = False) -> list[Competitor]:
             settings = tuple(Setting(tolerance=tolerance) for tolerance in TOLERANCES)
             result.append(Competitor("tmt", name, None, settings, partial(tmt_run, name)))
         else:
-            result.append(Competitor("tmt", name, stepping.order, halvings(FINEST_TMT), partial(tmt_run, name)))
+            finest = FINEST_IMPLICIT if isinstance(stepping, ImplicitRungeKutta) else FINEST_TMT
+            result.append(Competitor("tmt", name, stepping.order, halvings(finest), partial(tmt_run, name)))
     if quick:
         return [replace(competitor, settings=competitor.settings[:QUICK]) for competitor in result]
     for name, finest in SCIPY.items():

@@ -21,7 +21,8 @@ def curves(result, scene) -> dict:
 
 
 def scenes(result) -> list[str]:
-    return list(dict.fromkeys(row["scene"] for row in result.rows))
+    """The scenes with all their methods, not those of smaller models."""
+    return list(result.curves["floors"])
 
 
 def marker(method) -> str:

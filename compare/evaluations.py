@@ -107,13 +107,14 @@ def of_many_states(states, pool) -> dict:
     runs = {}
     for quantity, columns in ((FORWARD, 3), (TERMS, 9)):
         compiled, out = kernels.evaluator(tmt.ARM, quantity), np.empty((count, columns))
-        halves = [slice(None, count // 2), slice(count // 2, None)]
+        wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
+        halves = [[np.ascontiguousarray(part) for part in np.array_split(a, 2, axis=1)] for a in wide]
 
-        def both(compiled=compiled, out=out, halves=halves):
-            list(pool.map(lambda part: compiled.lanes(q[part], qd[part], tau[part], out[part]), halves))
+        def both(compiled=compiled, halves=halves):
+            list(pool.map(compiled.lanes, *halves))
 
         runs[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
-        runs[quantity, LANES, count, 1] = lambda compiled=compiled, out=out: compiled.lanes(q, qd, tau, out)
+        runs[quantity, LANES, count, 1] = lambda compiled=compiled, wide=wide: compiled.lanes(*wide)
         runs[quantity, LANES, count, 2] = both
     if count <= 1000:
         runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.acceleration(q, qd, tau)

@@ -75,7 +75,7 @@ def rows(setup) -> Result:
     result.tables["evaluations"], told = evaluations.costs(setup.engine, setup.is_quick)
     result.notes += told
     result.notes.append(
-        "Each time is the least of up to five runs (one, if it takes longer than 0.2 s), in turns with all of its scene; the "
+        "Each time is the least of up to five runs (one, if it takes longer than 0.1 s), in turns with all of its scene; the "
         f"median of a setting's runs is {np.median(spread) - 1:.1%} above its least, for one in ten more than "
         f"{np.quantile(spread, 0.9) - 1:.0%}. Errors come from runs of their own."
     )
@@ -177,8 +177,8 @@ def rounding(result, floors) -> None:
                 )
     told = "; ".join(f"{scene}: {left:.1e} rad" for scene, left in floors.items())
     result.notes.append(
-        f"What rounding leaves, eps times the growth of a small difference up to the end: {told}. Below that no double can go, "
-        "whatever the method; a smaller step then only adds roundings."
+        f"The size of what rounding leaves, eps times the growth of a small difference on the way: {told}. Where errors come "
+        "near it they stop falling, and smaller steps only add roundings; a method of few steps gets some way below."
     )
 
 

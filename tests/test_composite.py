@@ -80,18 +80,19 @@ def test_lanes_give_the_bits_of_one_state_at_a_time(rng):
     q[7, 0] = 1e17  # beyond the limit: by the library
     q[-1, 2] = -1e18
     compiled = kernels.evaluator(tmt.ARM, "forward_dynamics")
-    one, many = np.empty_like(q), np.empty_like(q)
+    one, many = np.empty_like(q), np.empty(q.T.shape)
     compiled.each(q, qd, tau, one)
-    compiled.lanes(q, qd, tau, many)
-    assert np.array_equal(one, many)
+    compiled.lanes(*(np.ascontiguousarray(a.T) for a in (q, qd, tau)), many)
+    assert np.array_equal(one, many.T)
     expected = tmt.acceleration(q, qd, tau)
     assert np.allclose(one, expected, rtol=1e-11, atol=1e-11) and not np.array_equal(one, expected)
 
 
 def test_compiled_mass_matrix_and_bias(rng):
     q, qd, tau = states(rng, kernels.LANES + 1)
-    out = np.empty((len(q), 9))
-    kernels.evaluator(tmt.ARM, "mass_matrix_and_bias").lanes(q, qd, tau, out)
+    out = np.empty((9, len(q)))
+    kernels.evaluator(tmt.ARM, "mass_matrix_and_bias").lanes(*(np.ascontiguousarray(a.T) for a in (q, qd, tau)), out)
+    out = out.T
     rows, columns = np.triu_indices(3)
     assert np.allclose(out[:, :6], tmt.mass_matrix(q)[:, rows, columns], rtol=0, atol=1e-14)
     assert np.allclose(out[:, 6:], tmt.bias(q, qd), rtol=0, atol=1e-12)

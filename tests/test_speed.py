@@ -137,7 +137,7 @@ def test_the_advice_is_the_cheapest_that_reaches():
     assert line["why_not"] is None
     assert table[1e-9]["mujoco"] is None and "its steps end before" in table[1e-9]["why_not"]
     left = advice.advice(rows, ["s"], {"s": 1e-9})[3]
-    assert "rounding leaves 1e-09 rad" in left["why_not"]
+    assert "rounding, of the size of 1e-09 rad" in left["why_not"]
 
 
 def test_mujocos_calls_in_compiled_loops_do_the_work(engine):

@@ -145,20 +145,25 @@ def chain(q, qd, tau, count):
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])", cache=CACHE, nogil=True, error_model="numpy")
 def lanes(q, qd, tau, out):
-    """{W} states side by side; the rest one at a time."""
-    flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
+    """{W} states side by side, the rest one at a time: columns of q, qd, tau (n, N) to columns of out (m, N)."""
     x, y = np.empty({size_x}), np.empty({size_y})
-    full = q.shape[0] // {W} * {W}
-    for b in range(0, full, {W}):
-        for l in range({W}):
+    flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
+    count = q.shape[1]
+    for b in range(0, count - {W} + 1, {W}):
+        {begins}
+        for l in range(np.uint64({W})):
             {gather}
         for l in range(np.uint64({W})):
             {results} = quantity({arguments})
-        for l in range({W}):
+        for l in range(np.uint64({W})):
             {scatter}
+        for l in range({W}):
             if not abs(y[np.uint64(l)]) < np.inf:
                 {lane_out} = by_library({lane_in})
-    each(q[full:], qd[full:], tau[full:], out[full:])
+    for i in range(count // {W} * {W}, count):
+        {column_out} = quantity({column_in})
+        if not abs(out[0, i]) < np.inf:
+            {column_out} = by_library({column_in})
 '''
 
 RATE = '''
@@ -196,11 +201,11 @@ def lane_stepper(tree, method_name):
 
 @lru_cache(maxsize=64)
 def evaluator(tree, quantity, terms=composite.mass_matrix_and_bias, sine="sincos"):
-    """Compiled evaluation of many states: a module with `each`, `lanes` (q, qd, tau, out) and `chain`.
+    """Compiled evaluation of many states: a module with `each(q, qd, tau, out)`, `lanes(q, qd, tau, out)` and `chain`.
 
-    quantity: "forward_dynamics", qdd to out (N, n), and besides `rate(y, tau)` for solvers; or "mass_matrix_and_bias", the
-    rows of the upper triangle of Mbar, then h, to out (N, n (n + 1) / 2 + n). Arrays are contiguous, q, qd, tau of shape
-    (N, n); rad, s, kg, m, N m.
+    quantity: "forward_dynamics", the n of qdd, and besides `rate(y, tau)` for solvers; or "mass_matrix_and_bias", the rows of
+    the upper triangle of Mbar, then h. Arrays are contiguous: for each of shape (N, n), out (N, m); for lanes, component by
+    component as registers want them, (n, N) and (m, N). rad, s, kg, m, N m.
     terms: the form of the dynamics that is traced; sine: "sincos" or "library_sincos".
     """
     return load(evaluator_source(tree, quantity, terms, sine))
@@ -334,14 +339,15 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
         "any_out": "out[i, 0]",
         "chained": ", ".join(f"{name}[{k}] + 1e-300 * last" for name, k in inputs),
         "last": " + ".join(f"results[{k}]" for k in range(m)),
-        "gather": "; ".join(
-            f"{_row('x', r)} = flat_{a}[np.uint64((b + l) * {n} + {k})]" for r, (a, k) in enumerate(inputs)
-        ),
+        "gather": "; ".join(f"{_lane('x', r)} = flat_{a}[b{k} + l]" for r, (a, k) in enumerate(inputs)),
         "results": sequence(lambda k: _lane("y", k), m),
         "arguments": sequence(lambda k: _lane("x", k), 3 * n),
-        "scatter": "; ".join(f"flat_out[np.uint64((b + l) * {m} + {k})] = {_row('y', k)}" for k in range(m)),
-        "lane_in": ", ".join(f"{name}[b + l, {k}]" for name, k in inputs),
-        "lane_out": sequence(lambda k: f"out[b + l, {k}]", m),
+        "scatter": "; ".join(f"flat_out[b{k} + l] = {_lane('y', k)}" for k in range(m)),
+        "lane_in": ", ".join(f"{name}[{k}, b + l]" for name, k in inputs),
+        "lane_out": sequence(lambda k: f"out[{k}, b + l]", m),
+        "begins": "; ".join(f"b{k} = np.uint64({k} * count + b)" for k in range(max(m, n))),
+        "column_in": ", ".join(f"{name}[{k}, i]" for name, k in inputs),
+        "column_out": sequence(lambda k: f"out[{k}, i]", m),
     }
     fast = '@njit(forceinline=True, error_model="numpy")\n' + text.replace("sincos(", f"{sine}(")
     sure = '@njit(error_model="numpy")\n' + text.replace("def quantity(", "def by_library(").replace(
