@@ -31,6 +31,7 @@ BAR = (
     "the same error where rounding plays no part; and that the smallest errors are explained by rounding, at most 64 eps "
     "times the growth of a small difference along the scene."
 )
+NEAR = 30  # times the error of rounding: an error below has come to it
 GOOD_DIGITS = 1e-20  # rad, rad/s
 SAME = 1e-3  # twins: difference of their errors, relative
 # who follows the smaller model of a scene too, where there is one
@@ -88,7 +89,7 @@ def rows(setup) -> Result:
 def judge(scene, engine, known, quick) -> tuple[list[dict], float]:
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[scene.name]
-    found, field = [], competitors(engine, quick)
+    found, field, left = [], competitors(engine, quick), floor(scene)
     for place, competitor in enumerate(field):
         best, last = np.inf, 0
         for setting in competitor.settings:
@@ -96,7 +97,7 @@ def judge(scene, engine, known, quick) -> tuple[list[dict], float]:
             # one more run that cost more and gained nothing shows that rounding has taken over
             error = np.inf if found[-1]["diverged"] else found[-1]["worst_error_rad"]
             work = found[-1]["evaluations"] or found[-1]["steps"]
-            if best < 1e-6 and work > 1.2 * last and not error < 0.7 * best:
+            if best < NEAR * left and work > 1.2 * last and not error < 0.7 * best:
                 break
             best, last = min(best, error), work
     smaller = reduced(scene)
@@ -104,7 +105,7 @@ def judge(scene, engine, known, quick) -> tuple[list[dict], float]:
         if (competitor.engine, competitor.method) in SMALLER:
             setting = Setting(steps=SMALLER_STEPS)
             found.append(judged(smaller, scene, competitor, setting, reference) | {"place": (place, smaller, setting)})
-    return found, floor(scene)
+    return found, left
 
 
 def judged(scene, whole, competitor, setting, reference) -> dict:
