@@ -26,7 +26,13 @@ def advice(rows, scenes, floors) -> list[dict]:
 
             theirs, ours, best = cheapest(engine="mujoco"), cheapest(engine="tmt"), cheapest()
             rk4 = cheapest(engine="mujoco", method="RK4"), cheapest(engine="tmt", method="rk4")
-            line = {"scene": scene, "worst_error_rad": target}
+            line = {
+                "scene": scene,
+                "worst_error_rad": target,
+                "ratio": theirs["seconds"] / ours["seconds"] if theirs and ours else None,
+                "kernel_part": rk4[0]["seconds"] / rk4[1]["seconds"] if all(rk4) else None,
+                "method_part": rk4[1]["seconds"] / ours["seconds"] if rk4[1] and ours else None,
+            }
             for party, row in (("mujoco", theirs), ("tmt", ours), ("of_all", best)):
                 line |= {
                     party: named(row) if row else None,
@@ -34,9 +40,6 @@ def advice(rows, scenes, floors) -> list[dict]:
                     f"{party}_ms": row and 1e3 * row["seconds"],
                     f"{party}_evaluations": row and row["evaluations"],
                 }
-            line["ratio"] = theirs["seconds"] / ours["seconds"] if theirs and ours else None
-            line["kernel_part"] = rk4[0]["seconds"] / rk4[1]["seconds"] if all(rk4) else None
-            line["method_part"] = rk4[1]["seconds"] / ours["seconds"] if rk4[1] and ours else None
             line["why_not"] = why_not(of_scene, target, theirs, ours, floors[scene])
             table.append(line)
     return table

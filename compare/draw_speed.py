@@ -194,7 +194,7 @@ def panels(result):
 def line(ax, engine, method, errors, costs) -> None:
     name, colour = ENGINES[engine]
     dash = "-" if engine in ("mujoco", "tmt") else "--"
-    wide = 3.5 if engine == "mujoco" else 0.9  # seen where tmt's twin lies on it
+    wide = 2.5 if engine == "mujoco" else 0.9  # seen where tmt's twin lies on it
     label = f"{name}: {'Euler, implicitfast, discrete' if engine == 'mujoco' and method == 'Euler' else method}"
     ax.plot(
         errors,

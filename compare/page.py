@@ -27,7 +27,9 @@ def shown(table, columns=None) -> pd.DataFrame:
 
     def text(value, digits):
         if isinstance(value, float):
-            return f"{value:.{digits}g}" if math.isfinite(value) else ""
+            if not math.isfinite(value):
+                return ""
+            return f"{value:.0f}" if value.is_integer() and 1.0 <= abs(value) < 1e7 else f"{value:.{digits}g}"
         return "" if value is None else str(value)
 
     columns = {c: [text(v, DIGITS.get(c, 3)) for v in table[c].astype(object)] for c in table.columns}
@@ -69,7 +71,7 @@ def markdown(sections, origin, result) -> str:
 
 def heading(name) -> str:
     """A table's name as words."""
-    return name.replace("_", " ").capitalize()
+    return {"what_should_i_use": "What should I use?"}.get(name, name.replace("_", " ").capitalize())
 
 
 def link(name) -> str:

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from .agreement import SEED
@@ -67,13 +68,15 @@ def write(folder, sections, origin, result) -> None:
     (folder / "tables").mkdir()
     for section in sections:
         for name, rows in {section.name: section.result.rows, **section.result.tables}.items():
-            table = pd.DataFrame(rows)
-            for column in table.select_dtypes(bool):
-                table[column] = table[column].map({True: "true", False: "false"})
-            table.to_csv(folder / "tables" / f"{name}.csv", index=False)
+            plain(pd.DataFrame(rows, dtype=object)).to_csv(folder / "tables" / f"{name}.csv", index=False)
     checks = [check.record() for section in sections for check in section.result.checks]
     (folder / "report.md").write_text(markdown(sections, origin, result), encoding="utf-8")
     (folder / "index.html").write_text(page(folder, sections, origin, result), encoding="utf-8")
     origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
     results = {"passed": passed(sections), "checks": checks, "provenance": origin}
     (folder / "results.json").write_text(json.dumps(results, indent=1, allow_nan=False) + "\n")
+
+
+def plain(table) -> pd.DataFrame:
+    """A table of objects for a CSV file: true and false in small letters, whole numbers whole beside empty cells."""
+    return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)

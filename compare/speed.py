@@ -68,10 +68,11 @@ def rows(setup) -> Result:
         setup.tell(f"speed: timing {scene.name}")
         spread += take_times(of_scene, setup)
     fixed = [(c.engine, c.method, c.order) for c in competitors(setup.engine, setup.is_quick) if c.order]
-    result.tables["speed_orders"] = orders(result, [s.name for s in scenes], fixed)
+    measured = orders(result, [s.name for s in scenes], fixed)
     twins(result)
     rounding(result, floors)
     result.tables["what_should_i_use"] = advice(result.rows, [s.name for s in scenes], floors)
+    result.tables["speed_orders"] = measured
     setup.tell("speed: one evaluation")
     result.tables["evaluations"], told = evaluations.costs(setup.engine, setup.is_quick)
     result.notes += told

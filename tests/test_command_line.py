@@ -162,7 +162,11 @@ def started(cwd, *arguments):
     """A run in a process group of its own, as a terminal's."""
     command = [sys.executable, "-m", "compare", *arguments, "--quick"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, cwd=cwd, env=ENVIRONMENT, start_new_session=True, **pipes)
+
+    def hearing():  # a shell starts what runs in its background deaf to Ctrl-C
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    return subprocess.Popen(command, cwd=cwd, env=ENVIRONMENT, start_new_session=True, preexec_fn=hearing, **pipes)
 
 
 @pytest.mark.parametrize(
