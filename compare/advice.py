@@ -16,7 +16,7 @@ def advice(rows, scenes, floors) -> list[dict]:
     """
     table = []
     for scene in scenes:
-        of_scene = [row for row in rows if row["scene"] == scene and row["seconds"] is not None]
+        of_scene = [row for row in rows if row["scene"] == scene and not row["diverged"]]
         for target in TARGETS:
             reach = [row for row in of_scene if row["worst_error_rad"] <= target]
 

@@ -9,6 +9,7 @@ PURPLE = "#CC79A7"
 ENGINES = {"mujoco": ("MuJoCo", ORANGE), "tmt": ("tmt", BLUE), "scipy": ("SciPy", GREEN), "heyoka": ("heyoka", PURPLE)}
 MARKS = "osD^v<>PXph*"
 LEFT, RIGHT = 3.0, 3e-16  # rad: the axis of errors runs from coarse to fine
+LOST = 30.0  # where what has diverged is drawn
 
 
 def curves(result, scene) -> dict:
@@ -39,9 +40,7 @@ def marker(method) -> str:
 def pareto(rows, of) -> list[dict]:
     """The rows that nothing beats in both error and cost, from the cheapest to the most exact."""
     front, least = [], np.inf
-    for row in sorted(
-        (r for r in rows if r[of] is not None and not r["diverged"]), key=lambda r: (r[of], r["worst_error_rad"])
-    ):
+    for row in sorted((r for r in rows if not r["diverged"]), key=lambda r: (r[of], r["worst_error_rad"])):
         if row["worst_error_rad"] < least:
             front.append(row)
             least = row["worst_error_rad"]
@@ -83,16 +82,22 @@ def times(result):
         ax.set(
             xscale="log",
             yscale="log",
-            xlim=(LEFT * 2, RIGHT / 30),
+            xlim=(LOST * 3, RIGHT / 30),
             xlabel="worst error on the way, rad (finer to the right)",
         )
         ax.set_ylabel("time for 5 s of motion, ms")
         labelled(ax, ends)
-        diverged = [f"{r['method']} ({r['steps']} steps)" for rows in by_method.values() for r in rows if r["diverged"]]
+        lost = [
+            (ENGINES[r["engine"]][1], 1e3 * r["seconds"]) for rows in by_method.values() for r in rows if r["diverged"]
+        ]
+        for colour, time in lost:
+            ax.plot(LOST, time, "x", color=colour, markersize=6)
+        if lost:
+            ax.plot([], [], "x", color="black", label="diverged (no error)")
         fig.legend(loc="outside upper center", ncols=3, fontsize=8)
         caption = f"{scene[0].upper()}{scene[1:]}: {spoken(result, scene)}"
-        if diverged:
-            caption += f" Diverged, not drawn: {', '.join(dict.fromkeys(diverged))}."
+        if lost:
+            caption += f" {len(lost)} settings with coarse steps diverge (crosses at the left)."
         yield "speed_" + scene.replace(", ", "_").replace(" ", "_"), fig, caption
 
 

@@ -145,10 +145,9 @@ def floor(scene) -> float:
 def take_times(rows, setup) -> list[float]:
     """Fill in the seconds of one scene's rows, all settings in turns; the median of each over its least."""
     field = competitors(setup.engine, setup.is_quick)
-    timed = [row for row in rows if not row["diverged"]]
-    runs = [field[place].prepare(scene, setting)[0] for place, scene, setting in (row["place"] for row in timed)]
+    runs = [field[place].prepare(scene, setting)[0] for place, scene, setting in (row["place"] for row in rows)]
     times = clock.in_turns(runs, rounds=2 if setup.is_quick else 5)
-    for row, of_row in zip(timed, times):
+    for row, of_row in zip(rows, times):
         row["seconds"] = min(of_row)
     return [float(np.median(of_row)) / min(of_row) for of_row in times]
 
