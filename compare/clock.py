@@ -4,8 +4,7 @@ import time
 from collections.abc import Callable
 
 ENOUGH = 0.02  # s: what has taken so long in all is timed no more than twice
-LONG = 0.1  # s: what takes so long is timed once; interruptions are short beside it
-WARM = 0.02  # s: a first call that takes longer needs no other before it counts
+LONG = 0.1  # s: what takes so long is timed once, without a call to warm up: both weigh little beside it
 
 
 def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
@@ -17,7 +16,7 @@ def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
                 begin = time.perf_counter()
                 run()
                 taken.append(time.perf_counter() - begin)
-                if k == 0 and taken[0] < WARM:
+                if k == 0 and taken[0] < LONG:
                     taken.clear()
     return times
 

@@ -75,7 +75,7 @@ def competitors(engine: Engine, quick: bool = False) -> list[Competitor]:
         from .taylor import taylor_run
     except ImportError:
         return result
-    settings = tuple(Setting(tolerance=10.0**-k) for k in range(4, 17, 3))
+    settings = tuple(Setting(tolerance=10.0**-k) for k in range(4, 17))
     return [*result, Competitor("heyoka", "Taylor", None, settings, taylor_run)]
 
 

@@ -173,8 +173,9 @@ def judge(result, rows, falls) -> None:
         if row["predicted_s"] is None or row["observed_s"] is None:
             result.check(where, "departure, observed - predicted", np.nan, 0.0, "s")
             continue
-        off, aim = abs(row["observed_s"] - row["predicted_s"]), near(row["dt_s"])
-        result.check(where, "departure, observed - predicted", off, aim + waiting, "s")
+        late_by, aim = row["observed_s"] - row["predicted_s"], near(row["dt_s"])
+        off = abs(late_by)
+        result.check(where, "departure, observed - predicted", off, aim + (waiting if late_by > 0.0 else 0.0), "s")
         late += [(off, waiting, where)] if off > aim else []
     if late:
         off, waiting, where = max(late)

@@ -157,8 +157,8 @@ def finer(result):
     last = rows[len(rows) // 2 - 1]
     still = min((round(5 / row["dt_s"]) for row in rows if row["moved_rad"] == 0.0), default="no number of")
     caption = (
-        "Held at ball catch by RK4, the torque one unit in the last place off in alpha: finer steps delay the "
-        f"departure, and from {still} steps on nothing moves in 5 s (drawn at 1e-17). There dt qd, "
+        "Held at ball catch by RK4, the torque one unit in the last place off in alpha: the finest steps delay "
+        f"the departure, and from {still} steps on nothing moves in 5 s (drawn at 1e-17). There dt qd, "
         f"{last['step_rad']:.1e} rad at {round(5 / last['dt_s'])} steps, is below half a unit in the last place of the "
         f"angle, {last['half_ulp_rad']:.1e} rad, and is lost in the sum. The linear map, which does not round, leaves "
         f"after {span(row['predicted_s'] for row in mine)} at every step. Triangles: to which side the arm leaves."
@@ -191,9 +191,10 @@ def bent(result):
         r["predicted_dt_s"] for r in result.rows if (r["scene"], r["method"], r["damping"]) == ("bent", "rk4", 0.0)
     )
     few = max(n for (_, name), n in data["leaves_within_5_s"].items() if name == TORQUES[1])
+    just = min(row["dt_s"] for row in data["rows"] if row["dt_s"] > limit)
     caption = (
-        f"Held at bent by RK4, from just below its limit of {limit:.4f} s on. At 0.3125 s the arm swings and stays "
-        "within reach; beyond, it leaves and diverges. With a torque one unit in the last place off nothing leaves in "
+        f"Held at bent by RK4, from just below its limit of {limit:.4f} s on. Just above, at {just:g} s, the arm swings and "
+        "stays within reach; with longer steps it leaves. With a torque one unit in the last place off nothing leaves in "
         f"5 s (grey line); with four decimals it does, at {few} steps or fewer. Black line: 0.1 rad."
     )
     return "stability_bent", fig, caption

@@ -228,7 +228,8 @@ class Engine:
         for start, torque, *state in zip(starts, torques, *(a.reshape(runs, -1) for a in (q, qd, tau))):
             data.qpos[self.qpos], data.qvel[self.dofs], torque[:, self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
-        states, sensors = np.empty((runs, steps, starts.shape[1])), np.empty((runs, steps, model.nsensordata))
+        # filled, so that the first run does not have to fetch the memory
+        states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
         applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
         options = {"control_spec": applied, "nstep": steps, "state": states, "sensordata": sensors, "skip_checks": True}
 

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 import tmt
 from tmt import generic, kernels, method
@@ -29,7 +27,7 @@ def costs(engine, quick) -> tuple[list[dict], list[str]]:
     states = rng.uniform(-3.0, 3.0, (3, most, 3))
     first = [np.ascontiguousarray(a[0]) for a in states]
     repeated = {(quantity, name, 1, 1): loop for name, (quantity, loop) in loops(engine, *first).items()}
-    repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(first, quick)}
+    repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(first)}
     calls = {key: counted(loop) for key, loop in repeated.items()}
     with ThreadPoolExecutor(2) as pool:
         for count in STATES[:1] if quick else STATES:
@@ -52,7 +50,7 @@ def counted(loop) -> tuple[Callable, int]:
     return lambda: loop(count), count
 
 
-def of_one_state(state, quick):
+def of_one_state(state):
     """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
     q, qd, tau = state
     floats = [a.tolist() for a in state]
@@ -73,31 +71,14 @@ def of_one_state(state, quick):
         run(path[0, :, : count + 1].copy(), path[1, :, : count + 1].copy(), tau[None], 1e-4)
 
     yield FORWARD, "literal, Python floats", plain
-    if not quick:  # their loops are compiled anew in each run
-        yield FORWARD, "generic compiled loop", lambda count: looped()[0](tree, q, qd, tau, out, count)
-        yield TERMS, "generic compiled loop", lambda count: looped()[1](tree, q, qd, M, h, count)
+    loops = generic.compiled()
+    yield FORWARD, "generic compiled loop", lambda count: loops.repeat_forward_dynamics(tree, q, qd, tau, out, count)
+    yield TERMS, "generic compiled loop", lambda count: loops.repeat_mass_matrix_and_bias(tree, q, qd, M, h, count)
     yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
     yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
     yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)
     yield TERMS, WAITING, lambda count: terms.chain(q, qd, tau, count)
     yield STEP, EACH, steps
-
-
-@lru_cache
-def looped():
-    """Compiled loops over the generic functions."""
-
-    @njit
-    def forward(tree, q, qd, tau, out, count):
-        for _ in range(count):
-            generic.forward_dynamics(tree, q, qd, tau, out)
-
-    @njit
-    def terms(tree, q, qd, M, h, count):
-        for _ in range(count):
-            generic.mass_matrix_and_bias(tree, q, qd, M, h)
-
-    return forward, terms
 
 
 def of_many_states(states, pool) -> dict:
@@ -106,7 +87,7 @@ def of_many_states(states, pool) -> dict:
     count = len(q)
     runs = {}
     for quantity, columns in ((FORWARD, 3), (TERMS, 9)):
-        compiled, out = kernels.evaluator(tmt.ARM, quantity), np.empty((count, columns))
+        compiled, out = kernels.evaluator(tmt.ARM, quantity), np.ones((count, columns))
         wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
         halves = [[np.ascontiguousarray(part) for part in np.array_split(a, 2, axis=1)] for a in wide]
 

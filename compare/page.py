@@ -59,7 +59,7 @@ def markdown(sections, origin, result) -> str:
         if len(failed):
             lines += ["**Checks that fail:**", md_table(failed)]
         lines += [md_table(table)] if len(table.columns) else []
-        lines += [f"All columns, {len(table)} rows: {link(section.name)}"]
+        lines += [f"All columns, {len(section.result.rows)} rows: {link(section.name)}"]
         for name, rows in section.result.tables.items():
             lines += [f"**{heading(name)}**", md_table(shown(pd.DataFrame(rows))), f"In full: {link(name)}"]
         lines += [f"- {note}" for note in section.result.notes]

@@ -13,6 +13,7 @@ from .agreement import Result
 from .band import NARROW, band
 from .clock import fastest
 from .cost import INTEGRATORS, QUICK_ROUNDS, ROUNDS, TIMED, costs
+from .engine_file import ModelError
 from .motion import TWINS, farthest, step
 from .scenes import HINGES, SCENES
 from .smallest import needed, reduced
@@ -41,6 +42,15 @@ MOVES = 0.1  # rad: a run without a torque that holds shows nothing if it moves 
 def rows(setup, scenes=SCENES) -> Result:
     """Sub-blocks for every subset; for each scene what it needs, runs and times; exact solutions; costs in MuJoCo."""
     result = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}})
+    try:
+        fill(result, setup, scenes)
+    except ModelError as error:  # another model, with something that cannot be taken out with its hinge
+        result.check("every subset", f"cannot be locked: {error}", 1.0, 0.0, "models")
+    return result
+
+
+def fill(result, setup, scenes) -> None:
+    """All parts of `rows`, one after the other."""
     quick = setup.is_quick
     sub_blocks.compare(result, setup.engine, angles=3 if quick else 10)
     models = [model for scene in scenes for model in of_scene(result, scene, setup.engine)]
@@ -49,7 +59,6 @@ def rows(setup, scenes=SCENES) -> Result:
     setup.quiet()
     timed(result, models, setup.engine, QUICK_ROUNDS if quick else ROUNDS)
     costs(result, setup)
-    return result
 
 
 def of_scene(result, scene, engine) -> list:
@@ -155,12 +164,12 @@ def timed(result, models, engine, rounds) -> None:
                         "scene": name,
                         "hinges": " ".join(hinges) or "none",
                         "engine": party,
-                        "integrator": integrator,
                         "nv": len(hinges),
                         "operations": count if party == "TMT" else None,
                         "ns_per_step": 1e9 * taken if taken else None,
                         "speedup": seconds[name, HINGES, party, integrator] / taken if taken else None,
                         "max_difference_rad": apart,
+                        "integrator": integrator,
                     }
                 )
 
@@ -176,6 +185,8 @@ def figures(result):
     """What each scene needs and how fast that is; the exact swing; small oscillations; costs in MuJoCo."""
     from . import draw_reduction  # matplotlib is for the process that draws
 
+    if not result.rows:  # a model that cannot be locked
+        return
     yield draw_reduction.needs(result)
     for scene in result.curves["swings"]:
         yield draw_reduction.swing(result, scene)

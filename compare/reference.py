@@ -54,15 +54,20 @@ def references(map: Callable = map, tell: Callable = print) -> dict[str, Referen
     scenes = [scene for scene in SCENES if scene.name in STEPS]
     rows = read(TABLE)
     missing = [scene for scene in scenes if key(scene) not in rows]
-    kept = {scene.name: cache_folder() / f"reference_{key(scene)}.csv" for scene in missing}
     for scene in missing:
-        rows |= read(kept[scene.name])
+        with suppress(OSError, RuntimeError):  # no folder, no home: it only costs time
+            rows |= read(kept(scene))
     missing = [scene for scene in missing if key(scene) not in rows]
     for scene, made in zip(missing, remade(missing, map, tell)):
         rows[key(scene)] = made
-        with suppress(OSError):  # a folder that cannot be written only costs time
-            write(kept[scene.name], made)
+        with suppress(OSError, RuntimeError):
+            write(kept(scene), made)
     return {scene.name: reference(rows[key(scene)]) for scene in scenes}
+
+
+def kept(scene: Scene) -> Path:
+    """Where the reference of a scene is kept that the committed table does not have."""
+    return cache_folder() / f"reference_{key(scene)}.csv"
 
 
 def remade(scenes: list[Scene], map: Callable, tell: Callable) -> list[list[dict]]:

@@ -20,7 +20,7 @@ from .page import markdown, page
 from .verdict import passed
 
 OURS = "arm-tmt-mujoco"
-PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich")
+PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich", "heyoka")
 
 
 def provenance(command, model, seconds) -> dict:
@@ -78,5 +78,7 @@ def write(folder, sections, origin, result) -> None:
 
 
 def plain(table) -> pd.DataFrame:
-    """A table of objects for a CSV file: true and false in small letters, whole numbers whole beside empty cells."""
+    """A table of objects for a CSV file: engines, true and false in small letters, whole numbers beside empty cells."""
+    if "engine" in table:
+        table["engine"] = table["engine"].str.lower()
     return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)

@@ -58,7 +58,12 @@ def test_the_arm_folds_to_fewer_operations_than_the_literal_method():
     assert 100 < kernels.slope_source(tmt.ARM, "rk4").operations < 140 < 400 < literal < 600
 
 
-@given(st.floats(-LIMIT, LIMIT) | st.floats(-10.0, 10.0) | st.integers(-1000, 1000).map(lambda n: n * np.pi / 4))
+@given(
+    st.floats(LIMIT / 2, LIMIT)
+    | st.floats(-LIMIT, LIMIT)
+    | st.floats(-10.0, 10.0)
+    | st.integers(-1000, 1000).map(lambda n: n * np.pi / 4)
+)
 def test_sine_and_cosine_to_the_last_digit(x):
     with mpmath.workdps(60):
         exact = mpmath.sin(mpmath.mpf(x)), mpmath.cos(mpmath.mpf(x))
@@ -86,6 +91,36 @@ def test_lanes_give_the_bits_of_one_state_at_a_time(rng):
     assert np.array_equal(one, many.T)
     expected = tmt.acceleration(q, qd, tau)
     assert np.allclose(one, expected, rtol=1e-11, atol=1e-11) and not np.array_equal(one, expected)
+
+
+def test_every_quantity_of_every_tree_falls_back_beyond_the_limit(rng):
+    """An angle that is too large for our sine may leave the first component as it is."""
+    tree = random_tree(rng, bodies=3)
+    n = len(tree.parent)
+    for model, hinge in ((tmt.ARM, 0), *((tree, k) for k in range(n))):
+        q, qd, tau = rng.uniform(-1, 1, (3, 1, len(model.parent)))
+        q[0, hinge] = 1e17
+        for quantity, expected in (
+            ("forward_dynamics", tmt.acceleration(q, qd, tau, model)),
+            ("mass_matrix_and_bias", tmt.bias(q, qd, model)),
+        ):
+            compiled = kernels.evaluator(model, quantity)
+            size = expected.shape[1] + (len(model.parent) * (len(model.parent) + 1) // 2) * (
+                quantity != "forward_dynamics"
+            )
+            one, many = np.empty((1, size)), np.empty((size, 1))
+            compiled.each(q, qd, tau, one)
+            compiled.lanes(q.T.copy(), qd.T.copy(), tau.T.copy(), many)
+            assert np.array_equal(one[0], many[:, 0])
+            assert np.allclose(one[0, -expected.shape[1] :], expected[0], rtol=1e-9, atol=1e-9)
+
+
+def test_wrong_shapes_are_refused_by_compiled_code():
+    compiled, three = kernels.evaluator(tmt.ARM, "forward_dynamics"), np.zeros((3, 40))
+    with pytest.raises(ValueError, match="out of shape"):
+        compiled.lanes(three, three, three, np.zeros((3, 39)))
+    with pytest.raises(ValueError, match="out of shape"):
+        compiled.each(three, three, three, three)
 
 
 def test_compiled_mass_matrix_and_bias(rng):

@@ -14,11 +14,11 @@ def test_generic_loop_is_the_method(rng, bodies):
     n = len(tree.parent)
     for q, qd, tau in rng.uniform(-3, 3, (5, 3, n)):
         M, h, qdd = np.zeros((n, n)), np.empty(n), np.empty(n)
-        generic.mass_matrix_and_bias(generic.arrays(tree), q, qd, M, h)
+        generic.compiled().mass_matrix_and_bias(generic.arrays(tree), q, qd, M, h)
         expected = tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree)
         assert np.allclose(M, np.tril(expected[0]), rtol=0, atol=1e-13 * np.abs(expected[0]).max())
         assert np.allclose(h, expected[1], rtol=0, atol=1e-12 * np.abs(expected[1]).max())
-        generic.forward_dynamics(generic.arrays(tree), q, qd, tau, qdd)
+        generic.compiled().forward_dynamics(generic.arrays(tree), q, qd, tau, qdd)
         assert np.allclose(qdd, tmt.acceleration(q, qd, tau, tree), rtol=1e-9, atol=1e-9)
 
 

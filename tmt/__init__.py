@@ -133,7 +133,7 @@ def simulate(
 
     q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1; method: a key of
     METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units
-    of 1 + |value|. States after a run has left the finite numbers, or has turned by 2^50 rad, are NaN, and so are those
+    of 1 + |value|. States after a run has left the finite numbers, or has turned by 2^49 rad, are NaN, and so are those
     after Newton's method has failed in an implicit one (its `step` then raises ArithmeticError). Assignment, part i.
     """
     if not isinstance(method, str) or method not in METHODS:

@@ -177,7 +177,11 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
         "size_y": m * LANES,
         "row_in": places,
         "row_out": sequence(lambda k: f"out[i, {k}]", m),
-        "any_out": "out[i, 0]",
+        "n": n,
+        "m": m,
+        "sound_row": " + ".join(f"abs(out[i, {k}])" for k in range(m)) + " < np.inf",
+        "sound_lane": " + ".join(f"abs({_row('y', k)})" for k in range(m)) + " < np.inf",
+        "sound_column": " + ".join(f"abs(out[{k}, i])" for k in range(m)) + " < np.inf",
         "chained": ", ".join(f"{name}[{k}] + 1e-300 * last" for name, k in inputs),
         "last": " + ".join(f"results[{k}]" for k in range(m)),
         "gather": "; ".join(f"{_lane('x', r)} = flat_{a}[b{k} + l]" for r, (a, k) in enumerate(inputs)),
@@ -198,7 +202,9 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     if quantity != "forward_dynamics":
         return text
     given = sequence(lambda k: f"y[{k}]", 2 * n) + ", " + sequence(lambda k: f"tau[{k}]", n)
-    return text + RATE.format(n=n, twice=2 * n, rates=sequence(lambda k: f"result[{n + k}]", n), given=given)
+    rates = sequence(lambda k: f"result[{n + k}]", n)
+    sound = " + ".join(f"abs(result[{n + k}])" for k in range(n)) + " < np.inf"
+    return text + RATE.format(n=n, twice=2 * n, rates=rates, given=given, sound_rates=sound)
 
 
 def _inputs(tape, tree):

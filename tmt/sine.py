@@ -2,15 +2,15 @@
 
 x is reduced to r = x - n pi/2 in [-pi/4, pi/4] by two fused multiply-adds (pi/2 as the sum of two doubles: the first
 difference is rounded once, however large n is), then the minimax polynomials of fdlibm (Sun, 1993), then n modulo 4 swaps
-the two and sets their signs by bits. Off by at most 2.2e-16 up to |x| = LIMIT. Beyond, where neighbouring doubles are a
-quarter of a radian apart, both are NaN, so that a caller can take the library's.
+the two and sets their signs by bits. Off by at most 2.2e-16 up to |x| = LIMIT. Beyond, where neighbouring doubles are
+an eighth of a radian apart, both are NaN, so that a caller can take the library's.
 """
 
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-LIMIT = 2.0**50  # rad
+LIMIT = 2.0**49  # rad
 NAN = float("nan")
 
 

@@ -112,10 +112,12 @@ STAGE = """\
 EVALUATE = '''
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])", cache=CACHE, nogil=True, error_model="numpy")
 def each(q, qd, tau, out):
-    """One state at a time: rows of q, qd, tau (N, n) to rows of out (N, m)."""
+    """One state at a time: rows of q, qd, tau (N, {n}) to rows of out (N, {m})."""
+    if not (q.shape == qd.shape == tau.shape == (len(q), {n}) and out.shape == (len(q), {m})):
+        raise ValueError("q, qd and tau of shape (N, {n}) and out of shape (N, {m}) are expected")
     for i in range(q.shape[0]):
         {row_out} = quantity({row_in})
-        if not abs({any_out}) < np.inf:
+        if not {sound_row}:
             {row_out} = by_library({row_in})
 
 
@@ -131,7 +133,9 @@ def chain(q, qd, tau, count):
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])", cache=CACHE, nogil=True, error_model="numpy")
 def lanes(q, qd, tau, out):
-    """{W} states side by side, the rest one at a time: columns of q, qd, tau (n, N) to columns of out (m, N)."""
+    """{W} states side by side, the rest one at a time: columns of q, qd, tau ({n}, N) to columns of out ({m}, N)."""
+    if not (q.shape == qd.shape == tau.shape == ({n}, q.shape[1]) and out.shape == ({m}, q.shape[1])):
+        raise ValueError("q, qd and tau of shape ({n}, N) and out of shape ({m}, N) are expected")
     x, y = np.empty({size_x}), np.empty({size_y})
     flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
     count = q.shape[1]
@@ -144,11 +148,11 @@ def lanes(q, qd, tau, out):
         for l in range(np.uint64({W})):
             {scatter}
         for l in range({W}):
-            if not abs(y[np.uint64(l)]) < np.inf:
+            if not {sound_lane}:
                 {lane_out} = by_library({lane_in})
     for i in range(count // {W} * {W}, count):
         {column_out} = quantity({column_in})
-        if not abs(out[0, i]) < np.inf:
+        if not {sound_column}:
             {column_out} = by_library({column_in})
 '''
 
@@ -160,5 +164,7 @@ def rate(y, tau):
     result = np.empty({twice})
     result[:{n}] = y[{n}:]
     {rates} = quantity({given})
+    if not {sound_rates}:
+        {rates} = by_library({given})
     return result
 '''

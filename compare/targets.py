@@ -1,0 +1,47 @@
+"""What was aimed at for speed, and what is reached: ratios of one run. They make no checks."""
+
+from .evaluations import EACH, EQUAL, FORWARD, LANES, MJ_STEP, STEP, WAITING, WHOLE
+
+AIMS = {  # (scene, rad): MuJoCo's cheapest setting over tmt's
+    ("zero, free", 1e-6): 50, ("zero, free", 1e-9): 200, ("zero, free", 1e-12): 500,
+    ("bent, free", 1e-6): 50, ("bent, free", 1e-9): 200, ("bent, free", 1e-12): 500,
+    ("ball catch, free", 1e-6): 50, ("ball catch, free", 1e-9): 200,
+}  # fmt: skip
+LANES_AIM = {"AVX-512": 300}  # over lanes, by the width of the vectors; 120 for AVX2
+
+
+def targets(result, floors, vectors) -> list[dict]:
+    """A row for each aim: what is compared, the ratio that was aimed at, the ratio that is reached."""
+    ns = {(row["quantity"], row["implementation"], row["states"], row["threads"]): row["ns_per_state"]
+          for row in result.tables["evaluations"]}  # fmt: skip
+    most = max(states for _, _, states, _ in ns)
+    wide = next((aim for name, aim in LANES_AIM.items() if name in vectors), 120)
+    rows = []
+
+    def add(what, aim, slow, fast):
+        reached = slow / fast if slow and fast else None
+        rows.append({"what": what, "aim": aim, "reached": reached, "met": None if reached is None else reached >= aim})
+
+    def of(quantity, name, states=1):
+        return ns.get((quantity, name, states, 1))
+
+    for name, how in ((WAITING, "each evaluation waits for the last"), (EACH, "independent states")):
+        fast = of(FORWARD, name, 1 if name == WAITING else 1000)
+        add(f"forward dynamics, {how}: mj_forward over the kernel", 40, of(FORWARD, WHOLE), fast)
+        add(f"forward dynamics, {how}: equal work over the kernel", 12, of(FORWARD, EQUAL), fast)
+    add("forward dynamics: mj_forward over lanes", wide, of(FORWARD, WHOLE), of(FORWARD, LANES, most))
+    add("RK4 step: mj_step over the kernel", 20, of(STEP, MJ_STEP), of(STEP, EACH))
+    for line in result.tables["what_should_i_use"]:
+        aim = AIMS.get((line["scene"], line["worst_error_rad"]))
+        if aim:
+            what = f"{line['scene']}, {line['worst_error_rad']:.0e} rad: MuJoCo's cheapest over tmt's"
+            add(what, aim, line["ratio"], 1.0)
+    for scene, floor in floors.items():
+        good = [row for row in result.rows if row["scene"] == scene and not row["diverged"]]
+        ours = [row for row in good if row["engine"] == "tmt"]
+        for row in good:
+            if row["engine"] == "heyoka" and row["worst_error_rad"] > floor:
+                reach = [r["seconds"] for r in ours if r["worst_error_rad"] <= row["worst_error_rad"]]
+                what = f"{scene}, {row['worst_error_rad']:.0e} rad: heyoka's Taylor over tmt's cheapest"
+                add(what, 1, row["seconds"], min(reach, default=None))
+    return rows
