@@ -36,7 +36,7 @@ def advice(rows, scenes, floors) -> list[dict]:
 
             line = {
                 "scene": scene,
-                "worst_error_rad": target,
+                "target_rad": target,
                 "ratio": part(theirs, ours),
                 "integrator_part": part(theirs, rk4),
                 "kernel_part": part(rk4, twin),

@@ -30,7 +30,9 @@ def held(result, scene, name):
     over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]), hinges)
     ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, curve["t"][-1]))
     fig.legend(loc="outside upper center", ncols=4)
-    left = {p: "does not leave" if at is None else f"is 0.1 rad away at {at:.2f} s" for p, at in curve["left"].items()}
+    left = {
+        p: "stays within 0.1 rad" if at is None else f"is 0.1 rad away at {at:.2f} s" for p, at in curve["left"].items()
+    }
     number = name.removeprefix("assignment_figure_")
     caption = (
         f"The assignment's Figure {number} redrawn: {scene} with TMT's torque in both engines, RK4, dt = 5/64 s. "

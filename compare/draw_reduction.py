@@ -52,7 +52,7 @@ def needs(result):
             right.plot(smallest, y + offset, markersize=3.5, **style)
             if len(times) > 1:
                 right.text(smallest / 1.15, y + offset, f"×{whole / smallest:.2f}", ha="right", va="center", fontsize=8)
-    right.set(xscale="log", xlabel="time of an RK4 step, ns", xlim=(40, 100000))
+    right.set(xscale="log", xlabel="time of an RK4 step, ns", xlim=(15, 100000))
     right.set_xticks([100, 1000, 10000], ["100", "1000", "10000"])
     handles = [Line2D([], [], linestyle="none", label=kind, markersize=7, **style) for kind, style in marks.items()]
     above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "handletextpad": 0.2, "columnspacing": 1.0}

@@ -2,13 +2,16 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from .draw import BLUE, GREEN, GREY, ORANGE, WIDTH
 
 PURPLE = "#CC79A7"
 ENGINES = {"mujoco": ("MuJoCo", ORANGE), "tmt": ("tmt", BLUE), "scipy": ("SciPy", GREEN), "heyoka": ("heyoka", PURPLE)}
+SAME_BITS = ("implicitfast", "discrete")  # as Euler's
 MARKS = "osD^v<>PXph*"
 LEFT, RIGHT = 3.0, 3e-16  # rad: the axis of errors runs from coarse to fine
+WRONG = 1.0  # rad: a run that is farther off is no result
 LOST = 30.0  # where what has diverged is drawn
 
 
@@ -40,7 +43,8 @@ def marker(method) -> str:
 def pareto(rows, of) -> list[dict]:
     """The rows that nothing beats in both error and cost, from the cheapest to the most exact."""
     front, least = [], np.inf
-    for row in sorted((r for r in rows if not r["diverged"]), key=lambda r: (r[of], r["worst_error_rad"])):
+    good = (r for r in rows if not r["diverged"] and r["worst_error_rad"] < WRONG)
+    for row in sorted(good, key=lambda r: (r[of], r["worst_error_rad"])):
         if row["worst_error_rad"] < least:
             front.append(row)
             least = row["worst_error_rad"]
@@ -68,10 +72,12 @@ def times(result):
             )
             if good:
                 k = int(np.argmin(errors))
-                ends.append([errors[k], 1e3 * good[k]["seconds"], method, colour])
+                if engine != "mujoco" or method not in SAME_BITS:
+                    name = ", ".join([method, *SAME_BITS]) if (engine, method) == ("mujoco", "Euler") else method
+                    ends.append([errors[k], 1e3 * good[k]["seconds"], name, colour])
         front = pareto([r for rows in by_method.values() for r in rows], "seconds")
         ax.plot(
-            [max(r["worst_error_rad"], RIGHT) for r in front], [1e3 * r["seconds"] for r in front],
+            np.clip([r["worst_error_rad"] for r in front], RIGHT, LEFT), [1e3 * r["seconds"] for r in front],
             "o", markersize=9, markerfacecolor="none", markeredgecolor="black", label="nothing is both faster and more exact",
         )  # fmt: skip
         for name, colour in ENGINES.values():
@@ -112,6 +118,7 @@ def labelled(ax, ends) -> None:
         placed.append((error, y))
         ax.annotate(
             name, (error, time), (error / 1.8, 10**y), fontsize=7, color=colour, va="center",
+            path_effects=[withStroke(linewidth=2, foreground="white")],
             arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.4} if 10**y > 1.3 * time else None,
         )  # fmt: skip
 
@@ -119,7 +126,7 @@ def labelled(ax, ends) -> None:
 def spoken(result, scene) -> str:
     """The message of a scene: how many times faster at the errors asked for."""
     lines = [line for line in result.tables["what_should_i_use"] if line["scene"] == scene and line["ratio"]]
-    told = ", ".join(f"{line['ratio']:.0f} times as long for {line['worst_error_rad']:.0e} rad" for line in lines)
+    told = ", ".join(f"{line['ratio']:.0f} times as long for {line['target_rad']:.0e} rad" for line in lines)
     return (
         f"MuJoCo's cheapest setting takes {told} as tmt's."
         if told
@@ -133,7 +140,7 @@ def evaluations(result):
     for ax, scene in zip(axes, scenes(result)):
         for (engine, method), rows in curves(result, scene).items():
             good = [r for r in rows if not r["diverged"] and r["evaluations"]]
-            if good and not (engine == "mujoco" and method in ("implicitfast", "discrete")):
+            if good and not (engine == "mujoco" and method in SAME_BITS):
                 errors = np.clip([r["worst_error_rad"] for r in good], RIGHT, LEFT)
                 line(ax, engine, method, errors, [r["evaluations"] for r in good])
         ax.set(xlim=(LEFT * 2, 2e-16), ylim=(40, 2e6))
@@ -167,7 +174,7 @@ def energy(result):
     for ax, scene in zip(axes, scenes(result)):
         for (engine, method), rows in curves(result, scene).items():
             good = [r for r in rows if not r["diverged"]]
-            if good and not (engine == "mujoco" and method in ("implicitfast", "discrete")):
+            if good and not (engine == "mujoco" and method in SAME_BITS):
                 line(
                     ax,
                     engine,

@@ -12,6 +12,9 @@ from .verdict import answers, outcome, passed
 
 TITLE = "TMT and MuJoCo, held against each other on a human arm"
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
+DIGITS |= dict.fromkeys(
+    ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
+)
 LONG = 30  # rows: a longer table is folded in the HTML
 INTRO = (
     "A human arm, two rigid bodies on three hinges, modelled twice: as MJCF, run by MuJoCo, and by the TMT method in a "

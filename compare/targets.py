@@ -32,9 +32,9 @@ def targets(result, floors, vectors) -> list[dict]:
     add("forward dynamics: mj_forward over lanes", wide, of(FORWARD, WHOLE), of(FORWARD, LANES, most))
     add("RK4 step: mj_step over the kernel", 20, of(STEP, MJ_STEP), of(STEP, EACH))
     for line in result.tables["what_should_i_use"]:
-        aim = AIMS.get((line["scene"], line["worst_error_rad"]))
+        aim = AIMS.get((line["scene"], line["target_rad"]))
         if aim:
-            what = f"{line['scene']}, {line['worst_error_rad']:.0e} rad: MuJoCo's cheapest over tmt's"
+            what = f"{line['scene']}, {line['target_rad']:.0e} rad: MuJoCo's cheapest over tmt's"
             add(what, aim, line["ratio"], 1.0)
     for scene, floor in floors.items():
         good = [row for row in result.rows if row["scene"] == scene and not row["diverged"]]

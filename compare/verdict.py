@@ -109,4 +109,17 @@ def answers(sections) -> pd.DataFrame:
             apart("trajectory", "RK4, angles", level="open loop", twin="rk4"),
         ),
     )
-    return pd.DataFrame(parts, columns=["part", "asked", "answered in", "answer"])
+    return pd.DataFrame([*parts, *choice(results)], columns=["part", "asked", "answered in", "answer"])
+
+
+def choice(results) -> list[tuple]:
+    """What a user of MuJoCo asks: which integrator, which step; one line of the table that answers it."""
+    lines = results["speed"].tables["what_should_i_use"] if "speed" in results else []
+    line = next((line for line in lines if line["target_rad"] == 1e-6 and line["mujoco"] and line["tmt"]), None)
+    if line is None:
+        return []
+    answer = (
+        f"What should I use? For {line['target_rad']:.0e} rad over five seconds ({line['scene']}): {line['mujoco']} "
+        f"({line['mujoco_ms']:.2g} ms), or {line['tmt']} ({line['tmt_ms']:.2g} ms); more in the table of that name."
+    )
+    return [("", "which integrator and which step", "speed", answer)]

@@ -132,7 +132,7 @@ def test_a_wrong_twin_is_seen():
 
 def test_the_advice_is_the_cheapest_that_reaches():
     rows = runs(4.0) + runs(4.0, "mujoco", "RK4") + runs(8.0, "tmt", "dopri8")
-    table = {line["worst_error_rad"]: line for line in advice.advice(rows, ["s"], {"s": 1e-16})}
+    table = {line["target_rad"]: line for line in advice.advice(rows, ["s"], {"s": 1e-16})}
     line = table[1e-6]
     assert line["mujoco"] == "mujoco RK4, 16 steps" and line["tmt"] == line["of_all"] == "tmt dopri8, 4 steps"
     assert line["ratio"] == pytest.approx(80.0) == pytest.approx(line["kernel_part"] * line["method_part"])
