@@ -148,7 +148,7 @@ def told(ns) -> list[str]:
         )
     call, loop = simulate_overhead()
     sentences.append(
-        f"Those are compiled loops. tmt.simulate of 64 steps takes {1e6 * call:.0f} us, its loop {1e6 * loop:.0f} us of them: the "
+        f"Those are compiled loops. tmt.simulate of 64 steps takes {1e6 * call:.0f} us, its loop {1e6 * loop:.0f} us of it: the "
         "rest checks arguments and makes room, once a call."
     )
     literal, composite = (
