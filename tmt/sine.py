@@ -47,7 +47,7 @@ def from_bits(typingctx, i):
 @njit(forceinline=True, error_model="numpy")
 def sincos(x):
     """(sin x, cos x) for |x| <= LIMIT, x in rad; else NaN."""
-    one, sixth = (1.0, -1.66666666666666324348e-01) if abs(x) <= LIMIT else (NAN, NAN)
+    one = 1.0 if abs(x) <= LIMIT else NAN
     # the sum with 1.5 * 2^52 rounds to an integer, which is then in the last bits
     shifted = fma(x, 0.6366197723675814, 6755399441055744.0)
     n = shifted - 6755399441055744.0
@@ -56,8 +56,8 @@ def sincos(x):
     w = z * z
     s = fma(fma(w, fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08),
                 fma(z, 2.75573137070700676789e-06, -1.98412698298579493134e-04)), w,
-            fma(z, 8.33333333332248946124e-03, sixth))  # fmt: skip
-    s = fma(s, z * r, r)
+            fma(z, 8.33333333332248946124e-03, -1.66666666666666324348e-01))  # fmt: skip
+    s = fma(s, z * r, r * one)
     c = fma(fma(w, fma(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09),
                 fma(z, -2.75573143513906633035e-07, 2.48015872894767294178e-05)), w,
             fma(z, -1.38888888888741095749e-03, 4.16666666666666019037e-02))  # fmt: skip
