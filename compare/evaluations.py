@@ -11,7 +11,7 @@ from tmt import generic, kernels, method
 from . import clock, machine
 from .agreement import SEED
 
-STATES = (1000, 1_000_000)
+STATES = (1, 1000, 1_000_000)
 TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
 FORWARD, TERMS, STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
@@ -30,7 +30,7 @@ def costs(engine, quick) -> tuple[list[dict], list[str]]:
     repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(first)}
     calls = {key: counted(loop) for key, loop in repeated.items()}
     with ThreadPoolExecutor(2) as pool:
-        for count in STATES[:1] if quick else STATES:
+        for count in STATES[:2] if quick else STATES:
             for key, run in of_many_states(states[:, :count], pool).items():
                 calls[key] = run, count
         taken = clock.in_turns([run for run, _ in calls.values()], rounds=5 if quick else 12)
@@ -94,9 +94,12 @@ def of_many_states(states, pool) -> dict:
         def both(compiled=compiled, halves=halves):
             list(pool.map(compiled.lanes, *halves))
 
-        runs[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
         runs[quantity, LANES, count, 1] = lambda compiled=compiled, wide=wide: compiled.lanes(*wide)
-        runs[quantity, LANES, count, 2] = both
+        if count > 1:
+            runs[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
+            runs[quantity, LANES, count, 2] = both
+    if count == 1:  # a call from Python for one state: what it costs is the call
+        return runs
     if count <= 1000:
         runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.acceleration(q, qd, tau)
     in_lanes = count // kernels.LANES * kernels.LANES
