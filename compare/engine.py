@@ -53,43 +53,6 @@ class Engine:
         self._at(np.zeros(len(joints)))
         self.zero_axes = self._turns(self.data.xmat)
 
-    # where the compiled model differs from its file: read back in project symbols
-
-    def parameters(self) -> dict:
-        """What the compiler made of the file: arrays per hinge and per body, at q = 0, in world axes."""
-        m, d = self.model, self.data
-        self._at(np.zeros(len(self.hinges)))
-        anchors = d.xanchor[self.joints].copy()
-        carrier = [int(m.jnt_bodyid[j]) for j in self.joints]
-        last = [max(i for i, owner in enumerate(carrier) if owner == body) for body in self.bodies]
-        turns = self._turns(d.ximat)
-        return {
-            "axis": d.xaxis[self.joints].copy(),
-            "anchor": anchors,
-            "damping": m.dof_damping[self.dofs],
-            "armature": m.dof_armature[self.dofs],
-            "frictionloss": m.dof_frictionloss[self.dofs],
-            "stiffness": m.jnt_stiffness[self.joints],
-            "limited": m.jnt_limited[self.joints].astype(float),
-            "order": np.argsort(np.argsort(self.joints)).astype(float),
-            "mass": m.body_mass[self.bodies],
-            "com": d.xipos[self.bodies] - anchors[last],
-            "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[self.bodies])]),
-            "gravcomp": m.body_gravcomp[self.bodies],
-            "gravity": m.opt.gravity * self.enabled("gravity"),
-            "tendon armature": m.tendon_armature.sum(),
-            "other mass": m.body_subtreemass[0] - m.body_mass[self.bodies].sum(),
-        }
-
-    def options(self) -> dict:
-        """Flags, integrator and counts that say what else the file asks of MuJoCo."""
-        m = self.model
-        flags = {f"flag {name}": "enable" if self.enabled(name) else "disable" for name in FLAGS}
-        counts = ("ngeom", "nu", "nsensor", "neq", "ntendon")
-        integrator = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-        refs = {f"ref {name}": f"{m.qpos0[i]:g}" for name, i in zip(self.hinges, self.qpos)}
-        return flags | refs | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}
-
     def enabled(self, flag) -> bool:
         return not self.model.opt.disableflags & int(FLAGS[flag])
 
@@ -238,17 +201,6 @@ class Engine:
             return states
 
         return starts, run
-
-    def implicit_derivative(self, q, qd, dt=1e-3) -> np.ndarray:
-        """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (n, n): qDeriv."""
-        model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
-        model.opt.integrator, model.opt.timestep = INTEGRATORS["implicit"], dt
-        data.qpos[self.qpos], data.qvel[self.dofs] = q, qd
-        mujoco.mj_step(model, data)
-        dense = np.zeros((model.nv, model.nv))
-        for row, (start, count) in enumerate(zip(model.D_rowadr, model.D_rownnz)):
-            dense[row, model.D_colind[start : start + count]] = data.qDeriv[start : start + count]
-        return dense[np.ix_(self.dofs, self.dofs)]
 
     # how the fields are read
 

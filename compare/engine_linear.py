@@ -48,3 +48,15 @@ def left_to_itself(engine: Engine, q, qd, tau, dt, steps, integrator) -> dict:
     time, n = np.array(states), len(engine.hinges)
     warnings = sum(int(warning.number) for warning in data.warning)
     return {"time": time[:, 0], "q": time[:, 1 : 1 + n], "qd": time[:, 1 + n :], "warnings": warnings}
+
+
+def implicit_derivative(engine, q, qd, dt=1e-3) -> np.ndarray:
+    """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (n, n): qDeriv."""
+    model, data = mujoco.MjModel.__copy__(engine.model), mujoco.MjData(engine.model)
+    model.opt.integrator, model.opt.timestep = INTEGRATORS["implicit"], dt
+    data.qpos[engine.qpos], data.qvel[engine.dofs] = q, qd
+    mujoco.mj_step(model, data)
+    dense = np.zeros((model.nv, model.nv))
+    for row, (start, count) in enumerate(zip(model.D_rowadr, model.D_rownnz)):
+        dense[row, model.D_colind[start : start + count]] = data.qDeriv[start : start + count]
+    return dense[np.ix_(engine.dofs, engine.dofs)]

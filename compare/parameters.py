@@ -5,6 +5,7 @@ import numpy as np
 import tmt
 
 from .agreement import EPS, FACTOR, Result
+from .engine_parameters import options, parameters
 
 TITLE = "Parameters: is MuJoCo's compiled arm the stated arm?"
 CLAIM = (
@@ -49,7 +50,7 @@ def stated(model=tmt.ARM) -> dict:
 def rows(setup) -> Result:
     """One row for each number; one check for each quantity of each hinge or body."""
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
-    compiled = setup.engine.parameters()
+    compiled = parameters(setup.engine)
     owners = {len(tmt.ARM.hinge_names): tmt.ARM.hinge_names, len(tmt.ARM.body_names): tmt.ARM.body_names}
     for quantity, expected in stated().items():
         expected, found = np.asarray(expected, dtype=float), np.asarray(compiled[quantity], dtype=float)
@@ -73,7 +74,7 @@ def rows(setup) -> Result:
     sample = setup.random
     for source, force in setup.engine.other_forces(sample.q, sample.qd).items():
         result.check(sample.name, f"forces of {source}", np.abs(force).max(), 0.0, "N m")
-    for option, value in setup.engine.options().items():
+    for option, value in options(setup.engine).items():
         result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
     result.curves["com"] = compiled["com"]
     return result

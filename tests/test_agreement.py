@@ -11,6 +11,7 @@ import tmt
 from compare.__main__ import EXPERIMENTS
 from compare.agreement import EPS, FACTOR, Check, bias_scale, reaches
 from compare.engine_file import parse
+from compare.engine_parameters import parameters
 from compare.parameters import stated
 
 
@@ -23,7 +24,7 @@ def test_experiment_agrees(experiment, setup):
 
 def test_the_two_sets_of_numbers_are_one(engine):
     """tmt/arm.py and mjcf/arm.xml hold the arm twice; this ties them."""
-    compiled = engine.parameters()
+    compiled = parameters(engine)
     for quantity, value in stated().items():
         assert np.allclose(compiled[quantity], value, rtol=1e-15, atol=1e-16), quantity
 
