@@ -5,10 +5,8 @@ import numpy as np
 TARGETS = (1e-2, 1e-3, 1e-6, 1e-9, 1e-12)  # rad, worst on the way
 EARLY = 1.0  # s: up to here chaos has not yet grown, and errors fall regularly
 REGULAR, CLEAR = 3e-2, 2e-12  # rad, in that time: an error in between falls with its order, and rounding is far below
-MARGIN, LEAST = (
-    0.15,
-    {8: 7.0},
-)  # of the measured order; for order 8 only the least, as rounding comes before it has settled
+MARGIN = 0.15  # of the measured order
+LEAST = {8: 7.0}  # of order 8 only the least, as rounding comes before it has settled
 
 
 def advice(rows, scenes, floors) -> list[dict]:
