@@ -24,9 +24,19 @@ SHOWN = ["scene", "quantity", "unit", "states", "largest_difference", "worst_dif
          "tmt_from_exact_eps", "mujoco_from_exact_eps"]  # fmt: skip
 
 
+RULES = {  # of a verdict: the words between a value and its tolerance, and what passes
+    "at most": lambda value, tolerance: value <= tolerance,
+    "at least": lambda value, tolerance: value >= tolerance,
+    "equal": lambda value, tolerance: value == tolerance,
+}
+
+
 @dataclass(frozen=True)
 class Check:
-    """One verdict: passed if value <= tolerance; value None where a run diverged."""
+    """One verdict, named by what holds when it passes: the value is at most, at least or equal to the tolerance.
+
+    value None where a run diverged, or there is no number: that never passes.
+    """
 
     experiment: str
     scene: str
@@ -35,28 +45,33 @@ class Check:
     tolerance: float
     unit: str
     note: str = ""
-    rounding: bool = False  # the tolerance is a bar of rounding, not a printed digit or a count
+    rounding: bool = False  # the tolerance is a bound of rounding, not a printed digit or a count
+    rule: str = "at most"
+
+    def __post_init__(self):
+        if self.rule not in RULES or not np.isfinite(self.tolerance):
+            raise ValueError(f"{self.quantity!r}: {self.rule!r} {self.tolerance} is no rule with a finite tolerance")
 
     @property
     def passed(self) -> bool:
-        return self.value is not None and bool(self.value <= self.tolerance)
+        return self.value is not None and bool(RULES[self.rule](self.value, self.tolerance))
 
     @property
     def over_bar(self) -> float | None:
-        """How much of a bar of rounding is used; None if it is no such bar, or zero, or there is no value."""
+        """How much of a tolerance of rounding is used; None if it is no such tolerance, or zero, or there is no value."""
         return self.value / self.tolerance if self.rounding and self.tolerance and self.value is not None else None
 
     def record(self) -> dict:
-        names = ("experiment", "scene", "quantity", "value", "tolerance", "unit", "passed", "note")
+        names = ("experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note")
         return {name: getattr(self, name) for name in names}
 
     def __str__(self):
-        if self.tolerance == 0.0 and self.value is not None:
-            found = f"{self.value:.6g} {self.unit}".rstrip() + ", none allowed"
-        else:
-            value = "diverged" if self.value is None else f"off by {self.value:.3g} {self.unit}".rstrip()
-            found = f"{value}, bar {self.tolerance:.3g} {self.unit}".rstrip()
-        return f"{self.experiment}: {self.quantity}, {self.scene}: {found}" + (f" ({self.note})" if self.note else "")
+        found = "no number" if self.value is None else f"{self.value:.3g} {self.unit}".rstrip()
+        wanted = f"{self.tolerance:.3g} {self.unit}".rstrip()
+        where = f", {self.scene}" if self.scene else ""
+        note = f" ({self.note})" if self.note else ""
+        rule = self.rule.replace("equal", "equal to")
+        return f"{self.experiment}: {self.quantity}{where}: {found}, must be {rule} {wanted}{note}"
 
 
 @dataclass
@@ -71,16 +86,17 @@ class Result:
     shown: list | None = None  # columns of the table in the report, if not all; none: only in its file
     tables: dict = field(default_factory=dict)  # further tables by name: lists of rows
 
-    def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False) -> Check:
-        value = float(value) if np.isfinite(value) else None
-        self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding))
+    def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most") -> Check:
+        """Add a check; a value that is None or not finite stands for a run that gave no number, and fails."""
+        value = None if value is None or not np.isfinite(value) else float(value)
+        self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule))
         return self.checks[-1]
 
     def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, truth=None) -> None:
         """A row and a check: the worst difference of two parties over the states, the closest to its bar.
 
         tmt_values, mujoco_values: (states, ...); scale: a number or (states,); truth: the name of a field of
-        tmt.reference.Truth, for the distance of each party from the exact value in eps x scale.
+        tmt.reference.Truth, for one more check of each engine: its distance from the exact value, 64 eps x scale too.
         """
         states = len(sample.q)
         scale = np.broadcast_to(scale, states)
@@ -92,8 +108,16 @@ class Result:
                 apart[f"{party} to exact"] = largest(distance(values[: len(known)], known))
         in_eps = {name: d / (EPS * scale[: len(d)]) for name, d in apart.items()}
         difference = apart["TMT to MuJoCo"]
-        worst = int(np.argmax(np.where(np.isfinite(difference), difference / bar, np.inf)))
-        check = self.check(sample.name, quantity, difference[worst], bar[worst], unit, sample.describe(worst), True)
+
+        def closest(quantity, difference):
+            """A check of the state that comes closest to its bar, and which one that is."""
+            share = np.where(np.isfinite(difference), difference / bar[: len(difference)], np.inf)
+            k = int(np.argmax(share))
+            return self.check(sample.name, quantity, difference[k], bar[k], unit, sample.describe(k), True), k
+
+        check, worst = closest(quantity, difference)
+        for name in list(apart)[1:]:
+            closest(f"{quantity}, {name}", apart[name])
         self.rows.append(
             {
                 "scene": sample.name,
@@ -175,15 +199,25 @@ class Setup:
     tell: Callable = lambda text: None  # says how far long work has come
     background: dict = field(default_factory=dict)  # work under way, by its name
     steps: tuple = (64, 1024, 8192)  # of a trajectory: the assignment's dt = 5/64 s, and finer
+    size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
 
     @property
     def is_quick(self) -> bool:
-        return len(self.steps) == 1
+        return self.size == "quick"
+
+    def of(self, full, quick, small):
+        """What a run of this size takes."""
+        return {"full": full, "quick": quick, "small": small}[self.size]
 
     @classmethod
     def quick(cls, engine, **more) -> "Setup":
         """Fewer of everything, for a first answer in seconds."""
-        return cls(engine, states=1000, exact_states=20, steps=(64,), **more)
+        return cls(engine, states=1000, exact_states=20, steps=(64,), size="quick", **more)
+
+    @classmethod
+    def small(cls, engine, **more) -> "Setup":
+        """Every path of a full run with few states and steps: for tests."""
+        return cls(engine, states=50, exact_states=2, steps=(64, 128), size="small", **more)
 
     @cached_property
     def named(self) -> Sample:

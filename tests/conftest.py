@@ -18,7 +18,7 @@ def engine():
 @pytest.fixture
 def setup(engine):
     """A setup with few states, enough to see any error that is not rounding."""
-    return Setup(engine, states=200, exact_states=5, steps=(64,))
+    return Setup(engine, states=200, exact_states=5, steps=(64,), size="quick")
 
 
 @pytest.fixture

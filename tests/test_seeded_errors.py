@@ -116,7 +116,7 @@ def assert_named(setup, expected):
 
 
 def small(engine):
-    return Setup(engine, states=50, exact_states=2, steps=(64,))
+    return Setup(engine, states=50, exact_states=2, steps=(64,), size="quick")
 
 
 @pytest.mark.parametrize("old, new, expected", IN_THE_MJCF.values(), ids=IN_THE_MJCF)
