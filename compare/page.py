@@ -120,7 +120,7 @@ def page(folder, sections, origin, result) -> str:
             body.append("<ul>" + "".join(f"<li>{html.escape(note)}</li>" for note in section.result.notes) + "</ul>")
     body += ['<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
     links = [("questions", "questions"), *((s.name, s.name) for s in sections), ("provenance", "provenance")]
-    return Template((Path(__file__).parent / "report.html").read_text()).substitute(
+    return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
         title=TITLE,
         colour="#009E73" if passed(sections) else "#D55E00",
         verdict=html.escape(result),
