@@ -63,18 +63,25 @@ def commit() -> str | None:
     return told[0] + (" with uncommitted changes" if told[1] else "")
 
 
-def write(folder, sections, origin, result) -> None:
-    """All files of a report, the figures excepted, into a folder that has those."""
+def write(folder, sections, origin, result, causes=()) -> None:
+    """All files of a report, the figures excepted, into a folder that has those; `result`: the verdict in words."""
     (folder / "tables").mkdir()
     for section in sections:
-        for name, rows in {section.name: section.result.rows, **section.result.tables}.items():
-            plain(pd.DataFrame(rows, dtype=object)).to_csv(folder / "tables" / f"{name}.csv", index=False)
+        for name, rows in section.tables.items():
+            table = plain(pd.DataFrame(rows, dtype=object))
+            table.to_csv(folder / "tables" / f"{name}.csv", index=False, encoding="utf-8")
     checks = [check.record() for section in sections for check in section.result.checks]
-    (folder / "report.md").write_text(markdown(sections, origin, result), encoding="utf-8")
-    (folder / "index.html").write_text(page(folder, sections, origin, result), encoding="utf-8")
+    (folder / "report.md").write_text(markdown(sections, origin, result, causes), encoding="utf-8")
+    (folder / "index.html").write_text(page(folder, sections, origin, result, causes), encoding="utf-8")
     origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
-    results = {"passed": passed(sections), "checks": checks, "provenance": origin}
-    (folder / "results.json").write_text(json.dumps(results, indent=1, allow_nan=False) + "\n")
+    results = {
+        "passed": passed(sections),
+        "checks": checks,
+        "causes": [{name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in causes],
+        "skipped": [],  # every experiment serves this arm
+        "provenance": origin,
+    }
+    (folder / "results.json").write_text(json.dumps(results, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def plain(table) -> pd.DataFrame:
