@@ -1,6 +1,6 @@
 """Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
 
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
@@ -147,7 +147,6 @@ def follow(scene, whole, competitor, setting, reference) -> dict:
     }  # fmt: skip
 
 
-@lru_cache
 def floor(scene) -> float:
     """What rounding leaves of the angles: eps times the largest growth of a small difference up to each time, rad."""
     steps = 1024
