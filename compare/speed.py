@@ -69,11 +69,10 @@ def rows(setup, timed=True) -> Result:
         begin(setup)
     which = "all" if timed else "same schemes"
     scenes, found = setup.background.pop("speed") if timed else measured(setup, (LEAST,), which)
-    floors, of_scenes = {}, []
-    for scene, (of_scene, floors[scene.name]) in zip(scenes, found):
-        of_scenes.append(of_scene)
-        result.rows += of_scene
-    names = list(floors)
+    of_scenes, lefts = zip(*found)
+    result.rows += [row for of_scene in of_scenes for row in of_scene]
+    names = [scene.name for scene in scenes]
+    floors = dict(zip(names, lefts))
     fixed = [(c.engine, c.method, c.order) for c in competitors(setup.engine, setup.size, which) if c.order]
     regular = names if setup.of(timed, timed, False) else [LEAST]  # with coarse steps no other scene shows all orders
     result.tables["speed_orders"] = orders(result, regular, fixed, complete=not (timed and setup.is_quick))
@@ -186,6 +185,8 @@ def figures(result):
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
     from . import draw_speed
 
+    if "what_should_i_use" not in result.tables:  # nothing was timed
+        return
     for scene in draw_speed.scenes(result):
         yield partial(draw_speed.times, result, scene)
     yield partial(draw_speed.evaluations, result)
