@@ -9,6 +9,7 @@ from .motion import TWINS
 NEAR = 30  # times the error of rounding: an error below has come to it
 NEAR_ENOUGH = 0.1  # rad: an error below is a small deviation, which rounding changes no more than the growth says
 FAR = 0.1  # rad: a run that is farther off is another motion
+ALIKE = 0.01  # of an error: two that differ by less are the same in a sentence
 
 
 def same_schemes(result, floors) -> None:
@@ -75,15 +76,16 @@ def true_errors_told(rows) -> list[str]:
     errors = true_error(rows)
     if not errors:
         return []
-    pairs = "; ".join(f"{scene}: TMT {in_rad(ours)}, MuJoCo {in_rad(theirs)}" for scene, (ours, theirs) in errors.items())
-    far = [scene for scene, pair in errors.items() if any(value is None or value > FAR for value in pair)]
-    meaning = (
-        f"Farther off than {FAR:g} rad: {'; '.join(far)}. Engines that agree there agree in the error of the method too, which "
-        "is not the arm's motion."
-        if far
-        else f"None is farther off than {FAR:g} rad."
-    )
-    return [f"At the assignment's step, {GRID} steps of RK4, the worst errors against the true motion are: {pairs}. {meaning}"]
+    pairs = "; ".join(f"{scene}: TMT {in_rad(a)}, MuJoCo {in_rad(b)}" for scene, (a, b) in errors.items())
+    text = f"At the assignment's step, {GRID} steps of RK4, the worst errors against the true motion are: {pairs}."
+    far = {s: pair for s, pair in errors.items() if any(value is None or value > FAR for value in pair)}
+    alike = [s for s, pair in far.items() if None not in pair and abs(pair[0] - pair[1]) < ALIKE * pair[0]]
+    other = [s for s in far if s not in alike]
+    if alike:
+        text += f" {'; '.join(alike)}: both engines make this error. That they agree says nothing of the arm's motion there."
+    if other:
+        text += f" {'; '.join(other)}: the errors are not the same."
+    return [text]
 
 
 def in_rad(value) -> str:

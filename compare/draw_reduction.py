@@ -69,7 +69,7 @@ def needs(result):
     fewer = [name for name, found in scenes.items() if found["stays"] and name not in held]
     told = [f"Nothing for {'; '.join(held)}: the exact solution stays."] if held else []
     told += [f"Fewer than all {len(HINGES)} hinges, proved, for {'; '.join(fewer)}."] if fewer else []
-    return "reduction_needs", fig, " ".join(["What each scene needs.", *told, gain(result.rows)])
+    return "reduction_needs", fig, " ".join(["What each scene of the stated arm needs.", *told, gain(result.rows)])
 
 
 def gain(rows) -> str:
@@ -136,9 +136,9 @@ def small_oscillations(result):
     powers = " and ".join(f"{small['powers'][party]:.3f} ({party})" for party in off)
     least = " and ".join(f"{off[party][-1]:.1e} ({party})" for party in off)
     caption = (
-        f"Small oscillations about hanging against the linear modes ({modes} rad/s): the relative distance in "
-        f"{small['duration']:g} s goes with the amplitude to the power {powers}; 2 is that of the arm with these modes. It is {least} "
-        f"at {amplitude[-1]:g} rad."
+        f"Small oscillations about hanging against the linear modes of the stated arm ({modes} rad/s): the relative distance in "
+        f"{small['duration']:g} s goes with the amplitude to the power {powers}, where the same arm has 2. It is {least} at "
+        f"{amplitude[-1]:g} rad."
     )
     return "reduction_modes", fig, caption
 
