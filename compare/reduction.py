@@ -126,7 +126,7 @@ def runs(result, scene, smaller, engine, integrator) -> None:
         if smaller:
             free = [scene.hinges.index(name) for name in smaller.hinges]
             reference[:, free + [n + i for i in free]] = references[party]
-            result.check(where, "movement", farthest(path[:, :n] - path[0, :n]), MOVES, "rad", rule="at least")
+            judge_movement(result, where, path[:, :n])
         apart = np.abs(path - reference)[::FINER]
         until = judge_run(result, where, scene.hinges, t, apart, width, scene.required(method, dt))
         result.curves["apart"][scene.name, party, integrator] = float(apart[t <= until, :n].max())
@@ -138,6 +138,11 @@ def runs(result, scene, smaller, engine, integrator) -> None:
             f"{scene.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the largest angle "
             f"moves: {told}."
         )
+
+
+def judge_movement(result, where, q) -> None:
+    """A check: a run without a torque that holds moves. q: (times, n) rad."""
+    result.check(where, "movement", farthest(q - q[0]), MOVES, "rad", rule="at least")
 
 
 def judge_run(result, where, hinges, t, apart, width, required) -> float:
@@ -169,19 +174,18 @@ def both(scene, engine, integrator) -> dict:
 
 def times(result, models, engine, rounds) -> None:
     """The table: all models of all scenes, timed in turn, against the whole model of the same scene."""
-    calls, steps = {}, {"TMT": TIMED_TMT, "MuJoCo": TIMED}
+    calls = {}
     for name, scene in models:
         for integrator in INTEGRATORS if scene else ():
             state = *scene.start, scene.tau, scene.duration / scene.steps / FINER
             calls[name, scene.hinges, "TMT", integrator] = tmt_run(scene.model, TWINS[integrator], *state)
             calls[name, scene.hinges, "MuJoCo", integrator] = scene.engine(engine).runner(*state, TIMED, integrator)[1]
-    seconds = {key: taken / steps[key[2]] for key, taken in fastest(calls, rounds).items()}
-    result.rows += table(models, seconds, result.curves["apart"])
+    result.rows += table(models, fastest(calls, rounds), result.curves["apart"])
 
 
 def table(models, seconds, apart) -> list[dict]:
-    """The rows: models as (scene's name, Scene or None), seconds of a step by (name, hinges, engine, integrator)."""
-    rows = []
+    """The rows: models as (scene's name, Scene or None), seconds of a timed run by (name, hinges, engine, integrator)."""
+    rows, steps = [], {"TMT": TIMED_TMT, "MuJoCo": TIMED}
     for name, scene in models:
         hinges = scene.hinges if scene else ()
         for party in ("TMT", "MuJoCo"):
@@ -195,7 +199,7 @@ def table(models, seconds, apart) -> list[dict]:
                         "engine": party,
                         "nv": len(hinges),
                         "operations": count if party == "TMT" else None,
-                        "ns_per_step": 1e9 * taken if taken else None,
+                        "ns_per_step": 1e9 * taken / steps[party] if taken else None,
                         "speedup": seconds[name, HINGES, party, integrator] / taken if taken else None,
                         "max_difference_rad": None if hinges == HINGES else apart.get((name, party, integrator)),
                         "integrator": integrator,
