@@ -63,7 +63,7 @@ def source(tree, method_name) -> str:
     """The module that follows one state at a time: slope, step, and the loop over both."""
     stepping, n = METHODS[method_name], len(tree.parent)
     if isinstance(stepping, ImplicitRungeKutta):
-        loop = RUN.format(**_words(n), used=", used", cost=f"used * {len(stepping.b)}")
+        loop = RUN.format(**_words(n), used=", used", cost=f"1 + used * {len(stepping.b)}")
         return HEADER + step_source(tree, stepping, composite.mass_matrix_and_bias) + loop
     tape = Tape()
     q, qd, tau, dt = _inputs(tape, tree)
