@@ -13,6 +13,7 @@ from .dual import Dual, jacobian
 from .method import acceleration, mass_matrix_and_bias
 from .space import solve_any
 from .trace import Tape
+from .tree import shown
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
@@ -47,6 +48,7 @@ class ImplicitRungeKutta:
     c: tuple  # the time of each stage in units of dt
 
     def __post_init__(self):
+        as_tuples(self, "A", "b", "c")
         stages = len(self.b)
         if not len(self.A) == stages == len(self.c) or any(len(row) != stages for row in self.A):
             raise ValueError("A must be square, and b and c must have one entry for each of its rows")
@@ -132,6 +134,16 @@ class ImplicitRungeKutta:
             [q[k] + dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
             [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)],
         )
+
+
+def as_tuples(method, *names) -> None:
+    """Make the parts of a tableau nested tuples of float: a method is a value, and a key of what is compiled for it."""
+    for name in names:
+        try:
+            rows = [tuple(map(float, row)) if np.iterable(row) else float(row) for row in getattr(method, name)]
+        except (TypeError, ValueError):
+            raise ValueError(f"{name} of the method is {shown(getattr(method, name))}; numbers are expected") from None
+        object.__setattr__(method, name, tuple(rows))
 
 
 def weighted(weights, values):
