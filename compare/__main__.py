@@ -3,13 +3,23 @@
 Every experiment is the module of its name: `rows(setup)` computes, `figures(result)` draws.
 """
 
+from . import interrupt, streams
+
+if __name__ == "__main__":
+    streams.prepare()
+    interrupt.answer()  # before anything that takes its time
+
 import argparse
 import importlib
 import os
 import shlex
-import signal
 import sys
 import time
+from contextlib import suppress
+
+from .crash import described
+
+SHOWN = 5  # checks of an experiment that fail, on the terminal
 
 EXPERIMENTS = {
     "parameters": "MuJoCo's compiled model read back beside the stated numbers",
@@ -35,7 +45,7 @@ exit status: 0 all checks pass; 1 a check failed; 2 the request could not be car
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        self.exit(2, f"{self.prog}: {message}\n")
+        self.exit(2, f"{self.prog}: {' '.join(message.split())}\n")
 
 
 def not_empty(text):
@@ -71,19 +81,18 @@ def main(arguments=None) -> int:
     )
     options = parser.parse_args(arguments)
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return run(options, command)
-    except KeyboardInterrupt:
-        print("interrupted; a report that was there is unchanged", file=sys.stderr)
     except Refused as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
+        line = str(error)
     except OSError as error:
-        print(f"{parser.prog}: cannot go on: {' '.join(str(error).split())}", file=sys.stderr)
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+        name = "" if error.filename is None else f"{error.filename}: "
+        line = f"cannot go on: {name}{error.strerror or error}"
+    except Exception as error:
+        line = f"cannot go on: {described(error)}"
+    interrupt.settle()
+    with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
+        print(" ".join(f"{parser.prog}: {line}".split()), file=sys.stderr, flush=True)
     return 2
 
 
@@ -94,84 +103,115 @@ class Refused(ValueError):
 def run(options, command) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
-    from concurrent.futures import BrokenExecutor
-
     from .engine_file import ARM_XML, ModelError, load
     from .folder import FolderError, new_report
     from .terminal import Terminal
-    from .workers import start_workers  # imports are here, so that --help and a wrong word answer at once
+    from .workers import WorkerEnded, start_workers  # imports are here, so that --help and a wrong word answer at once
 
-    terminal, progress = Terminal(), Terminal(stderr=True)
+    terminal = Terminal()
     path = options.mjcf or ARM_XML
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
         engine = load(path)
         with new_report(options.out) as folder:
-            with start_workers() as workers, progress.status("imports") as status:
+            with start_workers() as workers, terminal.progress("imports"):
                 from . import report, verdict
                 from .agreement import Setup
 
-                of_run = {"map": workers.map, "quiet": workers.quiet, "tell": status.update}
+                of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
                 setup = (Setup.quick if options.quick else Setup)(engine, **of_run)
-                sections = examine(names, setup, folder, terminal, workers, status)
+                sections = examine(names, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS))
             seconds = time.perf_counter() - started
             report.write(folder, sections, report.provenance(command, path, seconds), words)
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # from here on the new report is there
-    except (ModelError, FolderError) as error:
+    except (ModelError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
-    except BrokenExecutor:
-        raise Refused("a process that draws figures was ended from outside; the old report is unchanged") from None
-    terminal.line("")
-    terminal.line(words, "bold green" if verdict.passed(sections) else "bold red")
-    terminal.line(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
+    terminal.say()
+    terminal.say(words, "bold green" if verdict.passed(sections) else "bold red")
+    terminal.say(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
     return 0 if verdict.passed(sections) else 1
 
 
-def examine(names, setup, folder, terminal, workers, status) -> list:
-    """The section of each experiment, its figures drawn."""
+def examine(names, setup, folder, terminal, workers) -> list:
+    """The section of each experiment, its figures drawn. One that raises is one failed check; the others go on."""
     from .verdict import Section
     from .workers import draw
 
     (folder / "figures").mkdir()
     sections, drawings = [], []
     modules = {name: importlib.import_module(f".{name}", __package__) for name in names}
-    for module in modules.values():
-        if hasattr(module, "begin"):
-            module.begin(setup)
+    crashed = {name: attempt(name, module.begin, setup)[1] for name, module in modules.items() if hasattr(module, "begin")}
     for name, module in modules.items():
         setup.tell(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})")
         started = time.perf_counter()
-        result = module.rows(setup)
-        sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, result))
-        drawings.append(workers.submit(draw, name, result, folder / "figures"))
-        status.stop()
+        result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, module.rows, setup)
+        sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, crash or result))
+        drawings.append(None if crash else workers.submit(draw, name, result, folder / "figures"))
         tell(terminal, sections[-1], time.perf_counter() - started)
-        status.start()
     setup.tell("figures")
-    for section, drawn in zip(sections, drawings):
-        section.figures = drawn.result()
+    for section, drawing in zip(sections, drawings):
+        if drawing is not None:
+            take_figures(terminal, section, drawing)
     return sections
 
 
-def tell(terminal, section, seconds):
-    """One line for an experiment, one more for each check that failed."""
+def attempt(name, act, setup) -> tuple:
+    """What an experiment's function returns, and None; if it raises, None and a Result with one failed check."""
+    from .agreement import Result
+    from .workers import WorkerEnded
+
+    try:
+        return act(setup), None
+    except WorkerEnded:
+        raise
+    except Exception as error:
+        result = Result(name, shown=[])
+        result.check("", "runs to its end", None, 0.0, "", described(error), rule="equal")
+        return None, result
+
+
+def take_figures(terminal, section, drawing) -> None:
+    """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
+    from .workers import WorkerEnded
+
+    try:
+        section.figures, failed = drawing.result()
+    except (WorkerEnded, OSError):
+        raise
+    except Exception as error:  # the result cannot be sent to where it is drawn
+        failed = [("number 1", described(error))]
+    for name, line in failed:
+        quantity = f"figure {name} is drawn"
+        terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
+
+
+def tell(terminal, section, seconds) -> None:
+    """One line for an experiment, and for each of the first checks that failed."""
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
     used = [check.over_bar for check in checks if check.over_bar is not None]
     most = f"worst {max(used):.2g} of its bar" if used else ""
     word = f"{len(failed)} FAILED" if failed else "ok"
-    terminal.line(
-        f"{section.name:<13} {word:<10} {len(checks):>3} checks  {most:<26} {seconds:5.1f} s",
-        "red" if failed else "",
-    )
-    for check in failed:
-        terminal.line(f"  FAIL {check}", "red")
+    many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
+    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
+    for check in failed[:SHOWN]:
+        terminal.say(f"  FAIL {check}", "red")
+    if len(failed) > SHOWN:
+        terminal.say(f"  and {len(failed) - SHOWN} more: in the report", "red")
+
+
+def run_and_leave() -> None:
+    """The command line as a process: nothing but `main` decides its exit status."""
+    try:
+        status = main()
+    except SystemExit as stop:  # --help, or a wrong word
+        status = stop.code
+    interrupt.settle()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(status)  # what comes after this could end with another status
 
 
 if __name__ == "__main__":
-    status = main()
-    if status == 2:  # sys.exit would end by the signal, not with 2, if Ctrl-C came inside an exec()
-        sys.stderr.flush()
-        os._exit(2)
-    sys.exit(status)
+    run_and_leave()

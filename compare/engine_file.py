@@ -1,5 +1,6 @@
 """From a file to an Engine: MJCF is read, compiled and refused in one line where it cannot be this arm."""
 
+import os
 from pathlib import Path
 
 import mujoco
@@ -21,11 +22,11 @@ class ModelError(ValueError):
 def load(path=ARM_XML) -> Engine:
     """The Engine for an MJCF file; ModelError if it cannot be read or does not have these hinges."""
     try:
-        text = Path(path).read_text(errors="replace")
+        text = Path(path).read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise ModelError(f"cannot read {path}: {error.strerror}; an MJCF file is expected") from None
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        model = mujoco.MjModel.from_xml_path(os.fsencode(path))  # bytes: any name, in any locale
     except ValueError as error:
         if "<mujoco" not in text:
             raise ModelError(f"{path} is not MJCF: MuJoCo says {error}") from None

@@ -5,6 +5,7 @@ and the joints that come before it in the same body turned back, for they act be
 gives wrong inertias up to MuJoCo 3.10) and nothing is printed as XML (which has seven digits).
 """
 
+import os
 from pathlib import Path
 
 import mujoco
@@ -16,7 +17,7 @@ from .engine_file import ModelError, name_of
 
 def read(source) -> mujoco.MjSpec:
     """The editable form of a file (a Path) or of MJCF text."""
-    return mujoco.MjSpec.from_file(str(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
+    return mujoco.MjSpec.from_file(os.fsencode(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
 
 
 def locked(engine, angles: dict) -> Engine:

@@ -14,9 +14,10 @@ import pandas as pd
 
 from .agreement import SEED
 from .engine_file import ARM_XML
-from .folder import files
+from .folder import files, save
 from .machine import vectors
 from .page import markdown, page
+from .streams import readable
 from .verdict import passed
 
 OURS = "arm-tmt-mujoco"
@@ -26,8 +27,8 @@ PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath
 def provenance(command, model, seconds) -> dict:
     """What a reader needs to repeat the run: command, model, versions, machine, commit, seed."""
     return {
-        "command": command,
-        "model": "mjcf/arm.xml" if model == ARM_XML else str(model),
+        "command": readable(command),
+        "model": "mjcf/arm.xml" if model == ARM_XML else readable(str(model)),
         "model_sha256": hashlib.sha256(Path(model).read_bytes()).hexdigest(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "seconds": round(seconds, 1),
@@ -55,10 +56,10 @@ def commit() -> str | None:
         return None
     try:
         told = [
-            subprocess.run(["git", "-C", root, *words], capture_output=True, text=True, check=True).stdout.strip()
+            subprocess.run(["git", "-C", root, *words], capture_output=True, check=True).stdout.decode().strip()
             for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", ":/", ":!/reports"])
         ]
-    except (OSError, subprocess.CalledProcessError):
+    except (OSError, ValueError, subprocess.CalledProcessError):
         return None
     return told[0] + (" with uncommitted changes" if told[1] else "")
 
@@ -68,11 +69,10 @@ def write(folder, sections, origin, result, causes=()) -> None:
     (folder / "tables").mkdir()
     for section in sections:
         for name, rows in section.tables.items():
-            table = plain(pd.DataFrame(rows, dtype=object))
-            table.to_csv(folder / "tables" / f"{name}.csv", index=False, encoding="utf-8")
+            save(folder / "tables" / f"{name}.csv", plain(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
     checks = [check.record() for section in sections for check in section.result.checks]
-    (folder / "report.md").write_text(markdown(sections, origin, result, causes), encoding="utf-8")
-    (folder / "index.html").write_text(page(folder, sections, origin, result, causes), encoding="utf-8")
+    save(folder / "report.md", markdown(sections, origin, result, causes))
+    save(folder / "index.html", page(folder, sections, origin, result, causes))
     origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
     results = {
         "passed": passed(sections),
@@ -81,7 +81,7 @@ def write(folder, sections, origin, result, causes=()) -> None:
         "skipped": [],  # every experiment serves this arm
         "provenance": origin,
     }
-    (folder / "results.json").write_text(json.dumps(results, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
 
 
 def plain(table) -> pd.DataFrame:

@@ -1,18 +1,76 @@
-"""Printing on a terminal, in a pipe, and to a reader who has gone."""
+"""What a run says while it lasts: lines on stdout, and on a terminal what is under way."""
 
 import os
+import re
 import sys
+from contextlib import contextmanager, suppress
 
 from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
+
+from . import interrupt
+from .streams import Stream, readable
+
+CLEAR, CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
 
-class Terminal(Console):
-    """Prints as rich does; if the reader has gone (| head -1) the work goes on in silence."""
+class Terminal:
+    """Says lines on stdout; where stderr is a terminal, shows there what is under way."""
 
-    def on_broken_pipe(self):
-        self.quiet = True
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    def __init__(self):
+        self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
+        self.lines, self.beside = (
+            Console(file=stream, force_terminal=stream.isatty(), width=80, height=25) for stream in (self.out, self.err)
+        )
+        self.status = None
 
-    def line(self, text, style=""):
-        self.print(escape(text), style=style, highlight=False, soft_wrap=True)
+    def say(self, text="", style="") -> None:
+        """A line; on a terminal broken between words, with columns closed up where it is narrow."""
+        columns = self.out.columns()
+        self.lines.width = max(columns or 80, 20)
+        if columns and len(text) > columns:
+            text = text[: len(text) - len(text.lstrip())] + re.sub(" {2,}", "  ", text.strip())
+        with self.paused():
+            self.lines.print(Text(readable(text), style=style), soft_wrap=columns is None, highlight=False)
+
+    def show(self, text) -> None:
+        """What is under way, in one line."""
+        if self.status:
+            self.beside.width = max(self.err.columns() or 80, 20)
+            room = self.beside.width - 6  # the spinner, and what a terminal shows of Ctrl-C
+            self.status.update(Text(text if len(text) <= room else text[: room - 3] + "..."))
+
+    @contextmanager
+    def progress(self, text):
+        """The block's progress is shown, if that is possible."""
+        if not self.beside.is_terminal or self.beside.is_dumb_terminal:
+            yield
+            return
+        spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
+        interrupt.undo.append(clear)
+        self.status = self.beside.status("", spinner=spinner)
+        self.show(text)
+        try:
+            with self.status:
+                yield
+        finally:
+            self.status = None
+            interrupt.undo.remove(clear)
+
+    @contextmanager
+    def paused(self):
+        """In this block nothing moves on the terminal."""
+        if self.status:
+            self.status.stop()
+        try:
+            yield
+        finally:
+            if self.status:
+                self.status.start()
+
+
+def clear() -> None:
+    """Take what is in progress from the terminal, at an early end."""
+    Stream.silent = True
+    with suppress(OSError):
+        os.write(2, (CLEAR + CURSOR).encode())

@@ -2,58 +2,178 @@
 
 import importlib
 import os
+import pickle
 import signal
 import threading
-from concurrent.futures import ProcessPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context, parent_process, resource_tracker
+from queue import SimpleQueue
+
+from . import interrupt
+from .crash import described, place
+from .folder import writing
 
 
-class Workers(ProcessPoolExecutor):
-    """A pool of processes that knows when nothing is under way."""
+class WorkerEnded(RuntimeError):
+    """One of the processes is no longer there."""
 
-    def __init__(self, *arguments):
-        super().__init__(*arguments)
-        self.futures = []
 
-    def submit(self, *arguments, **named):
-        self.futures.append(super().submit(*arguments, **named))
+class Workers(ThreadPoolExecutor):
+    """Processes, and a thread for each that hands it one call after the other.
+
+    Without multiprocessing's locks, which an early end would leave behind in the system.
+    """
+
+    def __init__(self, count):
+        super().__init__(count)
+        self.futures, self.processes, self.idle = [], [], SimpleQueue()
+        context = get_context("spawn")
+        with interrupt.held(), deaf():
+            interrupt.undo.append(self.kill)
+            for _ in range(count):
+                here, there = context.Pipe()
+                self.processes.append(context.Process(target=serve, args=(there,), daemon=True))
+                self.processes[-1].start()
+                there.close()
+                self.idle.put(here)
+
+    def submit(self, function, /, *arguments, **named):
+        self.futures.append(super().submit(self.ask, function, arguments, named))
         return self.futures[-1]
+
+    def ask(self, *call):
+        """What a call returns or raises in one of the processes."""
+        connection = self.idle.get()
+        try:
+            connection.send(call)
+            returned, value = connection.recv()
+        except (EOFError, OSError):
+            text = "a process that computes beside was ended from outside; a report that was there is unchanged"
+            raise WorkerEnded(text) from None
+        finally:
+            self.idle.put(connection)
+        if returned:
+            return value
+        raise value
 
     def quiet(self):
         """Wait until all that was submitted is done: a timing needs the machine for itself."""
         wait(self.futures)
 
+    def kill(self):
+        for process in self.processes:
+            process.kill()
+
 
 @contextmanager
 def start_workers():
     """Yields a pool of two processes, for `draw` and for scenes that can run side by side."""
-    with Workers(2, get_context("spawn"), watch_parent) as pool:
-        # Ctrl-C is this process's business: the others are started deaf to it
-        hearing = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    pool = Workers(2)
+    try:
         for _ in range(2):
-            pool.submit(importlib.import_module, ".draw", __package__)  # matplotlib loads meanwhile
-        signal.signal(signal.SIGINT, hearing)
+            pool.submit(warm_up)
+        yield pool
+    finally:
+        pool.kill()
+        pool.shutdown(cancel_futures=True)
+        for process in pool.processes:
+            process.join()
+        interrupt.undo.remove(pool.kill)
+
+
+@contextmanager
+def deaf():
+    """Processes that are started in this block hear no Ctrl-C: that is the business of the one that started them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # its start would end the blocking
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, interrupt.NUMBERS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# in a worker
+
+
+def serve(connection) -> None:
+    """Answer one call after the other."""
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    while True:
         try:
-            yield pool
-        finally:
-            pool.shutdown(cancel_futures=True)
+            function, arguments, named = connection.recv()
+            answer = True, function(*arguments, **named)
+        except EOFError:
+            return
+        except Exception as error:
+            answer = False, portable(error)
+        try:
+            connection.send(answer)
+        except BrokenPipeError:
+            return
+        except Exception as error:  # a value that cannot be sent
+            connection.send((False, portable(error)))
 
 
-def watch_parent():
+def end_with_parent() -> None:
     """End with the main process, however that ends."""
-
-    def wait():
-        parent_process().join()
-        os._exit(1)
-
-    threading.Thread(target=wait, daemon=True).start()
+    parent_process().join()
+    os._exit(1)
 
 
-def draw(experiment, result, folder) -> list:
-    """The figures of an experiment on disk; their names and captions."""
-    drawn = []
-    for name, figure, caption in importlib.import_module(f".{experiment}", __package__).figures(result):
-        figure.savefig(folder / f"{name}.png")
-        drawn.append((name, caption))
-    return drawn
+def portable(error) -> Exception:
+    """An exception that can be sent, and knows where it was raised."""
+    error.place = place(error)
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        text, where = described(error, with_place=False), error.place
+        error = RuntimeError(text)
+        error.place = where
+    return error
+
+
+def warm_up() -> None:
+    """Load matplotlib while others compute."""
+    importlib.import_module(".draw", __package__)
+
+
+def draw(experiment, result, folder) -> tuple[list, list]:
+    """The figures of an experiment on disk: names and captions; and of those that could not be drawn: names and why.
+
+    `figures(result)` of the experiment's module yields (name, figure, caption), or functions that return it: then one that
+    raises leaves the later ones alone. An error of the disk is raised.
+    """
+    drawn, failed = [], []
+    try:
+        for item in importlib.import_module(f".{experiment}", __package__).figures(result):
+            name, path = called(item), None
+            try:
+                name, figure, caption = item() if callable(item) else item
+                path = folder / f"{name}.png"
+                with writing(path):
+                    figure.savefig(path)
+                drawn.append((name, caption))
+            except OSError:
+                raise
+            except Exception as error:
+                if path:
+                    path.unlink(missing_ok=True)
+                failed.append((name, described(error)))
+    except OSError:
+        raise
+    except Exception as error:
+        failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
+    return drawn, failed
+
+
+def called(item) -> str:
+    """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
+    if not callable(item):
+        return item[0]
+    more = [getattr(value, "name", value) for value in getattr(item, "args", ())]
+    more = [value for value in more if isinstance(value, str)]
+    return " ".join([getattr(getattr(item, "func", item), "__name__", "without a name"), *more])
