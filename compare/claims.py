@@ -6,7 +6,7 @@ import numpy as np
 
 import tmt
 
-from .departure import near, own_torque, predicted, residual, span, stuck, variants
+from .departure import near, own_torque, predicted, residual, span, variants
 from .linear import held
 from .motion import departure
 from .parties import Party, farthest, finite, value
