@@ -20,6 +20,7 @@ PUBLISHED, WITHIN = 4.5, 1.0  # s: when the assignment's arm leaves, and how nea
 CLEAR = 16  # ulps of each component: a push that rounding of the bias on the way cannot turn round
 NAMES = (*(f"variant {k}" for k in range(1, 28)), "nearest to own bias", f"{CLEAR} ulps up", f"{CLEAR} ulps down")
 STEP_COUNTS = (32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384)  # over 5 s
+PRINTED_COUNTS = (64, 256, 1024, 4096)
 SIDES = {1: "larger alpha", -1: "smaller alpha", 0: "neither side", None: "no side"}
 
 
@@ -103,7 +104,7 @@ def finer_steps(mujoco, counts=STEP_COUNTS) -> list:
     return rows
 
 
-def four_decimals(mujoco, counts=(64, 256, 1024, 4096)) -> list:
+def four_decimals(mujoco, counts=PRINTED_COUNTS) -> list:
     """Departure from ball catch under the torque as it is printed, to four decimals, against the step."""
     at = held("ball catch", posture("ball catch"))
     tau = np.array(next(item.values for item in ITEMS if item.item == "h"))
