@@ -57,7 +57,9 @@ def verdict(sections, experiments, causes=()) -> str:
         text = f"The two models do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
         if causes:
             more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
-            text += f"Cause: {causes[0]['text']}{more}."
+            further = sum(check.experiment != "parameters" for check in differing)
+            follow = f" {further} further checks fail as a consequence." if further else ""
+            text += f"Cause: {causes[0]['text']}{more}.{follow}"
         else:
             text += f"First: {differing[0]}."
         return f"{text} {stopped}" if broke else text
