@@ -120,10 +120,10 @@ def run(options, command) -> int:
 
                 of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
                 setup = (Setup.quick if options.quick else Setup)(engine, **of_run)
-                sections = examine(names, setup, folder, terminal, workers)
-            words = verdict.verdict(sections, len(EXPERIMENTS))
+                sections, causes = examine(names, setup, folder, terminal, workers)
+            words = verdict.verdict(sections, len(EXPERIMENTS), causes)
             seconds = time.perf_counter() - started
-            report.write(folder, sections, report.provenance(command, path, seconds), words)
+            report.write(folder, sections, report.provenance(command, path, seconds), words, causes)
     except (ModelError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()
@@ -132,13 +132,16 @@ def run(options, command) -> int:
     return 0 if verdict.passed(sections) else 1
 
 
-def examine(names, setup, folder, terminal, workers) -> list:
-    """The section of each experiment, its figures drawn. One that raises is one failed check; the others go on."""
-    from .verdict import Section
+def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
+    """The section of each experiment, its figures drawn, and the causes of what fails.
+
+    An experiment that raises is one failed check; the others go on.
+    """
+    from .verdict import Section, failures
     from .workers import draw
 
     (folder / "figures").mkdir()
-    sections, drawings = [], []
+    sections, drawings, causes = [], [], []
     modules = {name: importlib.import_module(f".{name}", __package__) for name in names}
     crashed = {name: attempt(name, module.begin, setup)[1] for name, module in modules.items() if hasattr(module, "begin")}
     for name, module in modules.items():
@@ -147,12 +150,22 @@ def examine(names, setup, folder, terminal, workers) -> list:
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, module.rows, setup)
         sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, crash or result))
         drawings.append(None if crash else workers.submit(draw, name, result, folder / "figures"))
-        tell(terminal, sections[-1], time.perf_counter() - started)
+        new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
+        causes += new
+        tell(terminal, sections[-1], time.perf_counter() - started, new)
     setup.tell("figures")
     for section, drawing in zip(sections, drawings):
         if drawing is not None:
             take_figures(terminal, section, drawing)
-    return sections
+    return sections, causes
+
+
+def find_causes(setup) -> list:
+    """What of the model explains that checks fail: each number, as stated and as compiled; the gravest first."""
+    from . import parameters
+
+    result, _ = attempt("parameters", parameters.rows, setup)
+    return result.curves["causes"] if result else []
 
 
 def attempt(name, act, setup) -> tuple:
@@ -185,19 +198,22 @@ def take_figures(terminal, section, drawing) -> None:
         terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
 
 
-def tell(terminal, section, seconds) -> None:
-    """One line for an experiment, and for each of the first checks that failed."""
+def tell(terminal, section, seconds, causes) -> None:
+    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks."""
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
     used = [check.over_bar for check in checks if check.over_bar is not None]
-    most = f"worst {max(used):.2g} of its bar" if used else ""
+    most = f"uses {max(used):.2g} of a tolerance" if used else ""
     word = f"{len(failed)} FAILED" if failed else "ok"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
-    for check in failed[:SHOWN]:
-        terminal.say(f"  FAIL {check}", "red")
-    if len(failed) > SHOWN:
-        terminal.say(f"  and {len(failed) - SHOWN} more: in the report", "red")
+    lines = [f"  CAUSE {cause['text']}" for cause in causes]
+    if not (causes and section.name == "parameters"):  # there the causes are the checks
+        lines += [f"  FAIL {check}" for check in failed]
+    for line in lines[:SHOWN]:
+        terminal.say(line, "red")
+    if len(lines) > SHOWN:
+        terminal.say(f"  and {len(lines) - SHOWN} more: in the report", "red")
 
 
 def run_and_leave() -> None:

@@ -1,6 +1,7 @@
 """Bias in motion, forward and inverse dynamics, energy and power."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from .agreement import Result, acceleration_scale, bias_scale, condition, gravit
 
 TITLE = "Accelerations: the same equations in motion?"
 CLAIM = (
-    "Bias and accelerations agree at random states under random torque; the acceleration of one party put into the "
+    "Bias and accelerations agree at random states under random torque; the acceleration of one engine put into the "
     "inverse dynamics of the other gives the torque back; energy agrees with MuJoCo's; the power of the torque is the "
     "rate of the energy; and without gravity and torque the angular momentum about the first hinge is constant."
 )
@@ -20,7 +21,7 @@ BAR = (
     "With S the sum of the absolute convective, Euler and gravity terms and |tau|: bias 64 eps x S; accelerations "
     "64 eps x (cond(Mbar) + 1) x |Mbar^-1| S; inverse dynamics 64 eps x cond(Mbar) x S; power the same times the sum of "
     "|rates|; momentum 64 eps x cond(Mbar) x the largest entry of Mbar x the square of the sum of |rates|; "
-    "energy 64 eps x (9.42 J + |qd|' |Mbar| |qd| / 2)."
+    f"energy 64 eps x ({gravity_scale():.2f} J + |qd|' |Mbar| |qd| / 2)."
 )
 
 
@@ -88,4 +89,4 @@ def alpha_momentum(q, qd):
 def figures(result):
     from . import draw  # matplotlib is for the process that draws
 
-    yield draw.distances(result, "random states", ["bias", "qdd", "energy", "potential energy"])
+    yield partial(draw.distances, result, "random states", ["bias", "qdd", "energy", "potential energy"])

@@ -5,6 +5,7 @@ A competitor is a value: its engine, its method, its settings, and `prepare(scen
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -16,11 +17,13 @@ from tmt.implicit import ImplicitRungeKutta
 from tmt.methods import METHODS, AdaptiveRungeKutta
 
 from .engine import INTEGRATORS, Engine
+from .motion import SCHEMES, TWINS
 
 GRID = 64  # steps of the coarsest run, and of the grid on which runs are judged
 FINEST = {"RK4": 2**17}  # steps beyond which a run would take too long to be timed again and again
 FINEST_MUJOCO, FINEST_TMT, FINEST_IMPLICIT = 2**16, 2**18, 2**15
-QUICK = 5  # settings of a quick run
+FEW = {"quick": 5, "small": 7}  # settings of a run that is not full: the coarsest
+NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
 TOLERANCES = tuple(10.0**-k for k in range(2, 15))
 SCIPY = {"RK45": 12, "DOP853": 13, "Radau": 6, "LSODA": 12}  # the finest tolerance, 10^-k
 ORDERS = {"RK4": 4, "RK45": 5, "DOP853": 8, "Radau": 5}  # of MuJoCo's integrators the others have order 1
@@ -53,8 +56,12 @@ class Competitor:
     prepare: Callable
 
 
-def competitors(engine: Engine, quick: bool = False) -> list[Competitor]:
-    """All that can take part here, heyoka where it is installed; of a quick run MuJoCo and tmt with coarse steps."""
+def competitors(engine: Engine, size: str = "full", which: str = "all") -> list[Competitor]:
+    """All that can take part here, heyoka where it is installed; of a run that is not full with coarse settings only.
+
+    A quick run takes MuJoCo and tmt; "same schemes" are one integrator of MuJoCo for each scheme and the same in tmt, with
+    a few settings whatever the size.
+    """
     result = []
     for name in INTEGRATORS:
         settings = halvings(FINEST.get(name, FINEST_MUJOCO))
@@ -66,17 +73,28 @@ def competitors(engine: Engine, quick: bool = False) -> list[Competitor]:
         else:
             finest = FINEST_IMPLICIT if isinstance(stepping, ImplicitRungeKutta) else FINEST_TMT
             result.append(Competitor("tmt", name, stepping.order, halvings(finest), partial(tmt_run, name)))
-    if quick:
-        return [replace(competitor, settings=competitor.settings[:QUICK]) for competitor in result]
+    if which == "same schemes":
+        names = [*SCHEMES, *map(TWINS.get, SCHEMES)]
+        return [replace(c, settings=c.settings[NEARER]) for c in result if c.method in names]
+    if size != "quick":
+        result += others()
+    if size == "full":
+        return result
+    return [replace(competitor, settings=competitor.settings[: FEW[size]]) for competitor in result]
+
+
+def others() -> list[Competitor]:
+    """SciPy's methods, and heyoka's where it is installed."""
+    result = []
     for name, finest in SCIPY.items():
         settings = tuple(Setting(tolerance=10.0**-k) for k in range(2, finest + 1))
         result.append(Competitor("scipy", name, None, settings, partial(scipy_run, name)))
-    try:
+    with suppress(ImportError):
         from .taylor import taylor_run
-    except ImportError:
-        return result
-    settings = tuple(Setting(tolerance=10.0**-k) for k in range(4, 17))
-    return [*result, Competitor("heyoka", "Taylor", None, settings, taylor_run)]
+
+        settings = tuple(Setting(tolerance=10.0**-k) for k in range(4, 17))
+        result.append(Competitor("heyoka", "Taylor", None, settings, taylor_run))
+    return result
 
 
 def halvings(finest) -> tuple[Setting, ...]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 import tmt
 from tmt import arm, method
 
-from .agreement import FACTOR
+from .agreement import EPS, FACTOR, gravity_scale
 from .scenes import posture
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
@@ -61,14 +61,27 @@ def sketch():
         ax.view_init(elev=20, azim=-70)
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
     caption = (
-        "The arm and its hinges, drawn from the method's own kinematics: α about y, then β about x, at the shoulder; "
-        "γ about y at the elbow. Dots: centres of mass of the upper arm (1) and the forearm (2)."
+        f"The arm and its hinges, drawn from the method's own kinematics: {', then '.join(hinges())}. Dots: centres of mass "
+        f"of the {tmt.ARM.body_names[0]} (1) and the {tmt.ARM.body_names[1]} (2)."
     )
     return "arm", fig, caption
 
 
+def hinges() -> list[str]:
+    """What each hinge turns about and where it is, in words, outward from the shoulder."""
+    rest = [0.0] * len(HINGES)
+    joints = dict(zip(("shoulder", "elbow", "hand"), map(list, arm.points(rest))))
+    words = []
+    for (hinge, *_), frame in zip(HINGES, method.hinge_frames(tmt.ARM, rest)):
+        axis, origin = [float(v) for v in frame.axis], list(frame.origin)
+        about = "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else f"({', '.join(f'{v:g}' for v in axis)})"
+        place = next((name for name, point in joints.items() if np.allclose(point, origin)), "neither shoulder nor elbow")
+        words.append(f"{GREEK[hinge]} about {about} at the {place}")
+    return words
+
+
 def distances(result, sample, quantities=None):
-    """How far apart the parties are over all states, and how far each is from the exact value."""
+    """How far apart the engines are over all states, and how far each is from the exact value."""
     curves = result.curves[sample]
     quantities = quantities or [name for name, c in curves.items() if "TMT to exact" in c]
     columns = 2 if len(quantities) == 4 else min(3, len(quantities))
@@ -81,7 +94,7 @@ def distances(result, sample, quantities=None):
             values = np.maximum(curves[quantity][name], FLOOR)
             share = np.arange(1, len(values) + 1) / len(values)
             ax.step(values, share, where="post", color=colour, linestyle=dash, label=name)
-        ax.axvline(FACTOR, color=RED, linewidth=2, label=f"bar, {FACTOR} eps")
+        ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
         ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
     for ax in axes.flat[len(quantities) :]:
         ax.set_visible(False)
@@ -93,7 +106,7 @@ def distances(result, sample, quantities=None):
     ours, theirs = (max(curves[q][f"{p} to exact"][-1] for q in quantities) for p in ("TMT", "MuJoCo"))
     known = len(curves[quantities[0]]["TMT to exact"])
     caption = (
-        f"Share of the {sample} whose difference is at most so many eps. The parties are at most {worst[0]:.3g} eps apart "
+        f"Share of the {sample} whose difference is at most so many eps. The engines are at most {worst[0]:.3g} eps apart "
         f"({worst[1]}). Against the exact value, at the first {known} of the states, TMT is at most {ours:.3g} eps off and "
         f"MuJoCo at most {theirs:.3g}. Differences of exactly zero are drawn at {FLOOR:g}."
     )
@@ -104,8 +117,7 @@ def condition_map(result):
     """The condition number of Mbar over beta and gamma."""
     beta, gamma, values = result.curves["condition"]
     beta, gamma = np.degrees(beta), np.degrees(gamma)
-    (ours, worst), (theirs, _) = (result.curves["worst"][party] for party in ("TMT", "MuJoCo"))
-    worst = np.degrees(worst)
+    worst = np.degrees(result.curves["worst"]["TMT"][1])
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     ax = fig.subplots()
     image = ax.pcolormesh(beta, gamma, values, cmap="viridis", shading="nearest", rasterized=True)
@@ -114,10 +126,12 @@ def condition_map(result):
     ax.plot(*worst, marker="o", color=RED, markersize=8, markeredgecolor="white")
     ax.set(xlabel="β, deg", ylabel="γ, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
     fig.colorbar(image, label="condition number of Mbar")
-    caption = (
-        f"Condition number of TMT's Mbar over β and γ (α has no part in it). Its maximum, {ours:.2f} for TMT and "
-        f"{theirs:.2f} for MuJoCo, is at β = {worst[0]:.1f}°, γ = {worst[1]:.1f}° (dot) and, by symmetry, at -β."
-    )
+    told = []
+    for engine, (value, at, mirrored) in result.curves["worst"].items():
+        beta, gamma = np.degrees(at)
+        other = "the same at -β" if abs(mirrored - value) <= 1e-6 * value else f"{mirrored:.2f} at -β"
+        told.append(f"{engine}'s is {value:.2f} at β = {beta:.1f}°, γ = {gamma:.1f}°, and {other}")
+    caption = f"Condition number of TMT's Mbar over β and γ, α = 0. The maximum (dot: TMT's): {'; '.join(told)}."
     return "mass_condition", fig, caption
 
 
@@ -139,6 +153,17 @@ def holding_torques(result):
     apart = max(np.abs(ours - theirs).max() for ours, theirs in postures.values())
     caption = (
         f"Torque that holds each named posture: TMT (bars) and MuJoCo (black marks), at most {apart:.1e} N m apart. "
-        "Hanging and upright need none."
+        + needless(postures)
     )
     return "gravity_postures", fig, caption
+
+
+def needless(postures) -> str:
+    """Which postures need no torque, but for rounding, in both engines or in one, in words."""
+    zero = FACTOR * EPS * gravity_scale()
+    rest = {
+        engine: [name for name, pair in postures.items() if np.abs(pair[k]).max() <= zero]
+        for k, engine in enumerate(("TMT", "MuJoCo"))
+    }
+    told = [f"{engine} needs none, but for rounding, at: {', '.join(names) or 'no posture'}." for engine, names in rest.items()]
+    return " ".join(told) if rest["TMT"] != rest["MuJoCo"] else told[0].replace("TMT needs", "Both need")

@@ -1,10 +1,16 @@
 """Figures of runs: angles and rates against time, differences in their bands, drift, growth of errors."""
 
+from itertools import cycle
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from .draw import BLUE, GREEK, GREEN, GREY, HINGES, ORANGE, RED, WIDTH
-from .motion import DRIFT, DRIFT_STEPS, step
+from .drift import DURATION, found_order
+from .horizon import FEW
+from .leaving import words
+from .motion import step
+from .told import agreement, rad
 
 TWINS = (("semi_implicit_euler", "Euler"), ("implicit", "implicit"), ("rk4", "RK4"))
 DASHES = {"Euler": (BLUE, "-"), "implicit": (RED, "--"), "RK4": (GREEN, "-.")}
@@ -30,19 +36,19 @@ def held(result, scene, name):
     over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]), hinges)
     ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, curve["t"][-1]))
     fig.legend(loc="outside upper center", ncols=4)
-    left = {
-        p: "stays within 0.1 rad" if at is None else f"is 0.1 rad away at {at:.2f} s" for p, at in curve["left"].items()
-    }
     number = name.removeprefix("assignment_figure_")
+    ours, theirs = result.curves["errors"][scene]
     caption = (
-        f"The assignment's Figure {number} redrawn: {scene} with TMT's torque in both engines, RK4, dt = 5/64 s. "
-        f"In five seconds the arm of TMT {left['TMT']}, that of MuJoCo {left['MuJoCo']}."
+        f"The assignment's Figure {number} redrawn: {scene} with TMT's torque in both engines, RK4, dt = 5/64 s. In "
+        f"{curve['t'][-1]:g} s the arm of TMT {words(curve['left']['TMT'])}, that of MuJoCo {words(curve['left']['MuJoCo'])}. "
+        f"The true motion is rest: of that TMT is at most {rad(ours)} off, MuJoCo {rad(theirs)}; while judged, to "
+        f"{curve['judged_until_s']:.2f} s, they are {agreement(curve):.1e} rad apart."
     )
     return name, fig, caption
 
 
 def run(result, scene):
-    """One scene under each twin: angles, rates, and the difference under its band."""
+    """One scene under each scheme: angles, rates, and the difference under its band; grey: not judged."""
     steps = max((n for name, _, n in result.curves["runs"] if name == scene.name and n <= 16 * scene.steps))
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     fig.subplots_adjust(left=0.105, right=0.985, bottom=0.075, top=0.87, hspace=0.12, wspace=0.08)
@@ -70,58 +76,77 @@ def run(result, scene):
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
     fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=4)
     rows = [row for row in result.rows if row["scene"] == scene.name and row["level"] == "open loop"]
-    ended = sorted({f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in rows if row["diverged_at_s"]})
+    diverged = [row for row in rows if row["diverged_at_s"] is not None]
+    ended = sorted({f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in diverged})
     used = [row["difference_over_band"] for row in rows if row["difference_over_band"] is not None]
+    most = f"at most {max(used):.1e}" if used else "no measured part"
+    errors = result.curves["errors"].get(scene.name)
     caption = (
-        f"{scene.name[0].upper()}{scene.name[1:]}. While judged ({', '.join(until)}; grey: not judged) the twins use at most "
-        f"{max(used, default=float('inf')):.1e} of the band, over all steps and integrators. "
-        + (f"Diverged: {', '.join(ended)}. " if ended else "")
+        f"{scene.name[0].upper()}{scene.name[1:]}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
+        f"is {most} of the band, over all steps and integrators. "
+        + (f"With {scene.steps} steps of RK4 TMT is {rad(errors[0])} and MuJoCo {rad(errors[1])} from the true motion. " if errors
+           else "")
+        + (f"MuJoCo's run diverged: {', '.join(ended)}. " if ended else "")
         + f"Differences of exactly zero are drawn at {ZERO:g}."
     )
     return "trajectory_" + scene.name.replace(", ", "_").replace(" ", "_"), fig, caption
 
 
 def drift(result):
-    """Drift of energy and momentum against the step size, both parties."""
-    drifts = result.curves["drift"]
+    """Drift of energy and momentum against the step size, both engines."""
+    drifts, steps = (result.curves["drift"][key] for key in ("drifts", "steps"))
     lines = -(-len(drifts) // 3)
     fig = Figure(figsize=(WIDTH, 0.8 + 1.8 * lines), layout="constrained")
     axes = fig.subplots(lines, 3, sharex=True, sharey=True, squeeze=False)
     for ax in axes.flat[len(drifts) :]:
         ax.set_visible(False)
     for ax, ((scene, quantity, unit), of_scene) in zip(axes.flat, drifts.items()):
-        for integrator, parties in of_scene.items():
+        for integrator, engines in of_scene.items():
             colour, dash = DASHES[integrator]
-            dt = DRIFT / np.array(DRIFT_STEPS[integrator])
-            ax.loglog(dt, parties["TMT"], dash, color=colour, label=f"{integrator}, TMT")
+            dt = DURATION / np.array(steps[integrator])
+            ax.loglog(dt, engines["TMT"], dash, color=colour, label=f"{integrator}, TMT")
             label = "MuJoCo" if integrator == "Euler" else None
-            ax.loglog(dt, parties["MuJoCo"], "o", mfc="none", color=colour, label=label)
+            ax.loglog(dt, engines["MuJoCo"], "o", mfc="none", color=colour, label=label)
         ax.set_title(f"{scene}: {quantity}, {unit}", fontsize=8)
         ax.set_xticks([2e-4, 1e-3, 4e-3], ["2e-4", "1e-3", "4e-3"])
         ax.minorticks_off()
-    fig.supylabel("largest drift in 1 s", fontsize=9)
+    fig.supylabel(f"largest drift in {DURATION:g} s", fontsize=9)
     fig.supxlabel("dt, s", fontsize=9)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    worst = {
-        integrator: max(
-            of_scene[integrator]["TMT"][-1] for (_, quantity, _), of_scene in drifts.items() if quantity == "energy"
-        )
-        for integrator in DASHES
-    }
-    caption = (
-        f"Drift of what should be constant: it falls with dt for Euler and implicit, with dt^4 for RK4. Worst of energy: "
-        f"{worst['Euler']:.1e} J for Euler at dt = 1/{DRIFT_STEPS['Euler'][-1]} s, {worst['RK4']:.1e} J for RK4 at "
-        f"1/{DRIFT_STEPS['RK4'][-1]} s. TMT (lines) and MuJoCo (marks) drift alike."
+    return "trajectory_drift", fig, drift_caption(drifts, steps)
+
+
+def drift_caption(drifts, steps) -> str:
+    """At which order the drift falls, how large that of the energy is, and how alike the engines are in it."""
+    orders, worst = [], []
+    for integrator in DASHES:
+        of_engine = {name: [of[integrator][name] for of in drifts.values()] for name in ("TMT", "MuJoCo")}
+        spans = [f"{name} {span([found_order(v) for v in values], '.2f')}" for name, values in of_engine.items()]
+        orders.append(f"{integrator}: {', '.join(spans)}")
+        energy = {name: max(of[integrator][name][-1] for (_, what, _), of in drifts.items() if what == "energy")
+                  for name in of_engine}  # fmt: skip
+        told = ", ".join(f"{name} {value:.1e} J" for name, value in energy.items())
+        worst.append(f"{integrator} at dt = 1/{steps[integrator][-1] / DURATION:g} s: {told}")
+    pairs = [pair for of in drifts.values() for engines in of.values() for pair in zip(engines["TMT"], engines["MuJoCo"])]
+    ratios = [theirs / ours if ours else np.nan for ours, theirs in pairs]
+    return (
+        "Drift of what should be constant (lines: TMT; marks: MuJoCo). The order at which it falls at the finest step, "
+        f"{'; '.join(orders)}. Largest of energy, {'; '.join(worst)}. MuJoCo's drift is {span(ratios, '.3g')} times TMT's."
     )
-    return "trajectory_drift", fig, caption
+
+
+def span(values, digits) -> str:
+    """The least and the largest of some numbers in words."""
+    values = [value for value in values if np.isfinite(value)]
+    return f"{min(values):{digits}} to {max(values):{digits}}" if values else "no number"
 
 
 def growth(result):
-    """Growth of a small difference over a minute, scene by scene."""
+    """Growth of a small difference over the whole time, scene by scene."""
     t, curves = (result.curves["growth"][key] for key in ("t", "curves"))
     fig = Figure(figsize=(WIDTH, 3.2), layout="constrained")
     ax = fig.subplots()
-    colours = (BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9", GREY, "black")
+    colours = cycle((BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9", GREY, "black"))
     ends = sorted(curves, key=lambda name: curves[name][-1])
     places = {}
     for name in ends:  # labels at the ends of the curves, not over each other
@@ -133,10 +158,10 @@ def growth(result):
         ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")
         ax.text(0.5, digits + 0.8, text, fontsize=8)
     ax.set(xlabel="time, s", ylabel="log10 of the growth", xlim=(0, t[-1]), ylim=(-20, 65))
-    free = curves["ball catch, free"]
-    five = np.searchsorted(t, 5.0)
+    few = int(np.searchsorted(t, FEW))
+    told = "; ".join(f"{name}: 10^{curves[name][few]:.1f} and 10^{curves[name][-1]:.0f}" for name in reversed(ends))
     caption = (
-        f"How much a small difference of the state grows: from ball catch, free, by 10^{free[five]:.1f} in 5 s and "
-        f"10^{free[-1]:.0f} in 60 s. Where a curve crosses a dotted line, numbers of so many digits know nothing of the state."
+        f"How much a small difference of the state grows in {t[few]:g} s and in {t[-1]:g} s: {told}. Where a curve crosses a "
+        "dotted line, numbers of so many digits know nothing of the state."
     )
     return "trajectory_growth", fig, caption

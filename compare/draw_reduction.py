@@ -43,6 +43,8 @@ def needs(result):
     for party, (offset, style) in parties.items():
         for y, name in enumerate(scenes):
             times = [row["ns_per_step"] for row in rows_of(result, name, party)]
+            if not times:
+                continue
             whole, smallest = times[0], times[-1]
             right.plot(whole, y + offset, mfc="none", **style)
             if smallest is None:
@@ -60,19 +62,26 @@ def needs(result):
     handles = [
         Line2D([], [], linestyle="none", label=f"{party}, {model}", **style | more)
         for party, (_, style) in parties.items()
-        for model, more in (("three hinges", {"mfc": "none"}), ("smallest model", {"markersize": 3.5}))
+        for model, more in (("whole model", {"mfc": "none"}), ("smallest model", {"markersize": 3.5}))
     ]
     right.legend(handles=handles, ncols=2, **above)
     held = [name for name, found in scenes.items() if not found["locked"] and len(found["stays"]) == len(HINGES)]
     fewer = [name for name, found in scenes.items() if found["stays"] and name not in held]
-    best = max((row for row in result.rows if row["speedup"]), key=lambda row: row["speedup"])
     told = [f"Nothing for {'; '.join(held)}: the exact solution stays."] if held else []
-    told += [f"Fewer than three hinges, proved, for {'; '.join(fewer)}."] if fewer else []
-    caption = (
-        f"What each scene needs. {' '.join(told)} The largest gain is that of {best['engine']} in {best['scene']}, "
-        f"{best['integrator']}: a step is {best['speedup']:.2g} times faster with {best['nv']} of three hinges."
+    told += [f"Fewer than all {len(HINGES)} hinges, proved, for {'; '.join(fewer)}."] if fewer else []
+    return "reduction_needs", fig, " ".join(["What each scene of the stated arm needs.", *told, gain(result.rows)])
+
+
+def gain(rows) -> str:
+    """The largest gain of a smaller model, in words."""
+    smaller = [row for row in rows if row["speedup"] and row["nv"] < len(HINGES)]
+    best = max(smaller, key=lambda row: row["speedup"], default=None)
+    if best is None:
+        return "No smaller model was timed."
+    return (
+        f"The largest gain is that of {best['engine']} in {best['scene']}, {best['integrator']}: with {best['nv']} of "
+        f"{len(HINGES)} hinges a step takes {1 / best['speedup']:.2f} of the time of the whole model's."
     )
-    return "reduction_needs", fig, caption
 
 
 def rows_of(result, scene, party):
@@ -123,11 +132,13 @@ def small_oscillations(result):
     ax.set_xticks(amplitude, [f"{a:g}" for a in amplitude])
     ax.minorticks_off()
     fig.legend(loc="outside upper center", ncols=3)
-    power = np.log2(off["MuJoCo"][-2] / off["MuJoCo"][-1])
     modes = ", ".join(f"{f:.3f}" for f in small["frequencies"])
+    powers = " and ".join(f"{small['powers'][party]:.3f} ({party})" for party in off)
+    least = " and ".join(f"{off[party][-1]:.1e} ({party})" for party in off)
     caption = (
-        f"Small oscillations about hanging against the linear modes ({modes} rad/s): the relative distance in five seconds falls "
-        f"with the amplitude to the power {power:.3f} (MuJoCo), to {off['MuJoCo'][-1]:.1e} at {amplitude[-1]:g} rad."
+        f"Small oscillations about hanging against the linear modes of the stated arm ({modes} rad/s): the relative distance in "
+        f"{small['duration']:g} s goes with the amplitude to the power {powers}, where the same arm has 2. It is {least} at "
+        f"{amplitude[-1]:g} rad."
     )
     return "reduction_modes", fig, caption
 
@@ -138,7 +149,7 @@ def costs(result):
     names = [name for name in dict.fromkeys(row["added"] for row in table) if name != NOTHING]
     fig = Figure(figsize=(WIDTH, 0.9 + 0.32 * len(names)), layout="constrained")
     ax = fig.subplots()
-    most = max(row["ratio"] for row in table)
+    most = max((row["ratio"] for row in table), default=1.0)
     for offset, integrator, colour in ((-0.19, "Euler", BLUE), (0.19, "RK4", GREEN)):
         rows = {row["added"]: row for row in table if row["integrator"] == integrator}
         for y, name in enumerate(names):
@@ -168,10 +179,12 @@ def costs(result):
     told = [
         f"{ratio[name, 'Euler']:.2f} and {ratio[name, 'RK4']:.2f} with {name}"
         for name in ("default flags", "default flags + capsules", CONTACT)
+        if (name, "Euler") in ratio
     ]
+    same = len({row["added"] for row in table} - changing - {NOTHING, AGAIN})
     caption = (
         "What each addition costs in MuJoCo, a step of Euler and of RK4 as ratios to the minimal model: "
-        f"{'; '.join(told)}. The minimal model timed again differs by {100 * max(again):.1f} %. The motion is changed by: "
-        f"{'; '.join(sorted(changing)) or 'none'}; all else leaves the same bits."
+        f"{'; '.join(told)}. The minimal model timed again differs by {100 * max(again, default=np.nan):.1f} %. The motion is "
+        f"changed by: {'; '.join(sorted(changing)) or 'none'}; {same} additions leave the same bits."
     )
     return "reduction_cost_in_mujoco", fig, caption

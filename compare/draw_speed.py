@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from .draw import BLUE, GREEN, GREY, ORANGE, WIDTH
+from .evaluations import WHOLE
 
 PURPLE = "#CC79A7"
 ENGINES = {"mujoco": ("MuJoCo", ORANGE), "tmt": ("tmt", BLUE), "scipy": ("SciPy", GREEN), "heyoka": ("heyoka", PURPLE)}
@@ -26,7 +27,7 @@ def curves(result, scene) -> dict:
 
 def scenes(result) -> list[str]:
     """The scenes with all their methods, not those of smaller models."""
-    return list(result.curves["floors"])
+    return list(result.curves.get("floors", ()))
 
 
 def marker(method) -> str:
@@ -51,60 +52,55 @@ def pareto(rows, of) -> list[dict]:
     return front
 
 
-def times(result):
-    """One figure for each scene: worst error against time, a curve for each method, the Pareto front marked."""
-    for scene in scenes(result):
-        fig = Figure(figsize=(WIDTH, 5.2), layout="constrained")
-        ax = fig.subplots()
-        by_method = curves(result, scene)
-        ends = []
-        for (engine, method), rows in by_method.items():
-            _, colour = ENGINES[engine]
-            good = [r for r in rows if not r["diverged"]]
-            errors = np.clip([r["worst_error_rad"] for r in good], RIGHT, LEFT)
-            ax.plot(
-                errors,
-                [1e3 * r["seconds"] for r in good],
-                marker=marker(method),
-                markersize=3.5,
-                linewidth=1,
-                color=colour,
-            )
-            if good:
-                k = int(np.argmin(errors))
-                if engine != "mujoco" or method not in SAME_BITS:
-                    name = ", ".join([method, *SAME_BITS]) if (engine, method) == ("mujoco", "Euler") else method
-                    ends.append([errors[k], 1e3 * good[k]["seconds"], name, colour])
-        front = pareto([r for rows in by_method.values() for r in rows], "seconds")
-        ax.plot(
-            np.clip([r["worst_error_rad"] for r in front], RIGHT, LEFT), [1e3 * r["seconds"] for r in front],
-            "o", markersize=9, markerfacecolor="none", markeredgecolor="black", label="nothing is both faster and more exact",
-        )  # fmt: skip
-        for name, colour in ENGINES.values():
-            if any(e == name for e, _ in (ENGINES[engine] for engine, _ in by_method)):
-                ax.plot([], [], color=colour, linewidth=3, label=name)
-        floor = result.curves["floors"][scene]
-        ax.axvline(floor, color=GREY, linestyle=":", label="rounding: eps × growth")
-        ax.set(
-            xscale="log",
-            yscale="log",
-            xlim=(LOST * 3, RIGHT / 30),
-            xlabel="worst error on the way, rad (finer to the right)",
-        )
-        ax.set_ylabel("time for 5 s of motion, ms")
-        labelled(ax, ends)
-        lost = [
-            (ENGINES[r["engine"]][1], 1e3 * r["seconds"]) for rows in by_method.values() for r in rows if r["diverged"]
-        ]
-        for colour, time in lost:
-            ax.plot(LOST, time, "x", color=colour, markersize=6)
-        if lost:
-            ax.plot([], [], "x", color="black", label="diverged (no error)")
-        fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-        caption = f"{scene[0].upper()}{scene[1:]}: {spoken(result, scene)}"
-        if lost:
-            caption += f" {len(lost)} settings with coarse steps diverge (crosses at the left)."
-        yield "speed_" + scene.replace(", ", "_").replace(" ", "_"), fig, caption
+def times(result, scene):
+    """One scene: worst error against time, a curve for each method, the Pareto front marked."""
+    fig = Figure(figsize=(WIDTH, 5.2), layout="constrained")
+    ax = fig.subplots()
+    by_method = curves(result, scene)
+    ends = []
+    for (engine, method), rows in by_method.items():
+        _, colour = ENGINES[engine]
+        good = [r for r in rows if not r["diverged"]]
+        errors, spent = visible(good), [1e3 * r["seconds"] for r in good]
+        ax.plot(errors, spent, marker=marker(method), markersize=3.5, linewidth=1, color=colour)
+        if good:
+            k = int(np.argmin(errors))
+            if engine != "mujoco" or method not in SAME_BITS:
+                name = ", ".join([method, *SAME_BITS]) if (engine, method) == ("mujoco", "Euler") else method
+                ends.append([errors[k], spent[k], name, colour])
+    front = pareto([r for rows in by_method.values() for r in rows], "seconds")
+    ax.plot(
+        visible(front), [1e3 * r["seconds"] for r in front], "o", markersize=9, markerfacecolor="none",
+        markeredgecolor="black", label="nothing is both faster and more exact",
+    )  # fmt: skip
+    for key, (name, colour) in ENGINES.items():
+        if any(engine == key for engine, _ in by_method):
+            ax.plot([], [], color=colour, linewidth=3, label=name)
+    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label="rounding: eps × growth")
+    ax.set(xscale="log", yscale="log", xlim=(LOST * 3, RIGHT / 30))
+    ax.set(xlabel="worst error on the way, rad (finer to the right)", ylabel=f"time for {motion(result)} of motion, ms")
+    labelled(ax, ends)
+    lost = [r for rows in by_method.values() for r in rows if r["diverged"]]
+    for row in lost:
+        ax.plot(LOST, 1e3 * row["seconds"], "x", color=ENGINES[row["engine"]][1], markersize=6)
+    if lost:
+        ax.plot([], [], "x", color="black", label="diverged (no error)")
+    fig.legend(loc="outside upper center", ncols=3, fontsize=8)
+    caption = f"{scene[0].upper()}{scene[1:]}: {spoken(result, scene)}"
+    if lost:
+        caption += f" {len(lost)} {'settings diverge' if len(lost) > 1 else 'setting diverges'} (crosses at the left)."
+    return "speed_" + scene.replace(", ", "_").replace(" ", "_"), fig, caption
+
+
+def visible(rows) -> np.ndarray:
+    """The worst errors of rows, as far as the axis goes, rad."""
+    return np.clip([r["worst_error_rad"] for r in rows], RIGHT, LEFT)
+
+
+def motion(result) -> str:
+    """How long the motion is that was timed."""
+    times = {round(r["dt_s"] * r["steps"], 9) for r in result.rows if r["dt_s"]}
+    return " or ".join(f"{t:g} s" for t in sorted(times)) or "the scene"
 
 
 def labelled(ax, ends) -> None:
@@ -130,7 +126,7 @@ def spoken(result, scene) -> str:
     return (
         f"MuJoCo's cheapest setting takes {told} as tmt's."
         if told
-        else "no error asked for is reached by both parties."
+        else "no error asked for is reached by both MuJoCo and tmt."
     )
 
 
@@ -146,14 +142,23 @@ def evaluations(result):
         ax.set(xlim=(LEFT * 2, 2e-16), ylim=(40, 2e6))
     fig.supylabel("evaluations of the right-hand side", fontsize=9)
     finish(fig, axes, "worst error on the way, rad")
-    ratio = fewest(result, "bent, free", 1e-9)
-    alike = [check.passed for check in result.checks if "twin" in check.quantity]
-    same = "MuJoCo and its twins lie on one curve." if all(alike) else "MuJoCo and its twins do not lie on one curve."
     caption = (
-        f"The same errors against evaluations of the equations of motion, which do not depend on the machine. {same} {ratio} Of "
-        "an implicit method an evaluation with its derivatives counts once; heyoka's Taylor method has none and is not drawn."
+        "The same errors against evaluations of the equations of motion, which do not depend on the machine. "
+        f"{agreeing(result.checks)}{fewest(result, 'bent, free', 1e-9)}Of an implicit method an evaluation with its derivatives "
+        "counts once; a method without evaluations, as heyoka's Taylor, is not drawn."
     )
     return "speed_evaluations", fig, caption
+
+
+def agreeing(checks) -> str:
+    """For how many settings MuJoCo and the same scheme in tmt make the same error, in words."""
+    alike = [check.passed for check in checks if check.quantity.startswith("the same error as tmt's")]
+    if not alike:
+        return ""
+    return (
+        f"Of {len(alike)} settings of MuJoCo near the reference {sum(alike)} have the error of the same scheme in tmt, but for "
+        "rounding. "
+    )
 
 
 def fewest(result, scene, target) -> str:
@@ -165,7 +170,7 @@ def fewest(result, scene, target) -> str:
         counts[method] = min(good, default=None)
     if None in counts.values():
         return ""
-    return f"For {target:.0e} rad ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}."
+    return f"For {target:.0e} rad ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
 
 
 def energy(result):
@@ -175,24 +180,18 @@ def energy(result):
         for (engine, method), rows in curves(result, scene).items():
             good = [r for r in rows if not r["diverged"]]
             if good and not (engine == "mujoco" and method in SAME_BITS):
-                line(
-                    ax,
-                    engine,
-                    method,
-                    np.clip([r["energy_error_J"] for r in good], 1e-15, 10),
-                    [1e3 * r["seconds"] for r in good],
-                )
+                errors = np.clip([r["energy_error_J"] for r in good], 1e-15, 10)
+                line(ax, engine, method, errors, [1e3 * r["seconds"] for r in good])
         ax.set(xlim=(20, 3e-16))
-    fig.supylabel("time for 5 s of motion, ms", fontsize=9)
+    fig.supylabel(f"time for {motion(result)} of motion, ms", fontsize=9)
     finish(fig, axes, "largest energy error on the grid, J")
-    errors = {}
-    for method in ("semi_implicit_euler", "rk4"):
-        rows = [r for s in scenes(result) for r in curves(result, s).get(("tmt", method), []) if not r["diverged"]]
-        errors[method] = min(r["energy_error_J"] for r in rows)
-    caption = (
-        f"Largest error of the energy against time. The least that semi_implicit_euler reaches in any scene is "
-        f"{errors['semi_implicit_euler']:.1e} J, rk4 {errors['rk4']:.1e} J."
-    )
+    told = []
+    for engine, method in (("tmt", "semi_implicit_euler"), ("tmt", "rk4"), ("mujoco", "Euler"), ("mujoco", "RK4")):
+        rows = [r for s in scenes(result) for r in curves(result, s).get((engine, method), []) if not r["diverged"]]
+        if rows:
+            told.append(f"{ENGINES[engine][0]} {method} {min(r['energy_error_J'] for r in rows):.1e} J")
+    caption = "Largest error of the energy against time."
+    caption += f" The least in any scene: {'; '.join(told)}." if told else ""
     return "speed_energy", fig, caption
 
 
@@ -200,7 +199,7 @@ def panels(result):
     """One panel for each scene."""
     names = scenes(result)
     columns = 2 if len(names) > 1 else 1
-    lines = -(-len(names) // columns)
+    lines = max(1, -(-len(names) // columns))
     fig = Figure(figsize=(WIDTH, 1.2 + 2.6 * lines), layout="constrained")
     axes = list(fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).flat)
     for ax, name in zip(axes, names):
@@ -211,18 +210,10 @@ def panels(result):
 def line(ax, engine, method, errors, costs) -> None:
     name, colour = ENGINES[engine]
     dash = "-" if engine in ("mujoco", "tmt") else "--"
-    wide = 2.5 if engine == "mujoco" else 0.9  # seen where tmt's twin lies on it
+    wide = 2.5 if engine == "mujoco" else 0.9  # seen where the same scheme of tmt lies on it
     label = f"{name}: {'Euler, implicitfast, discrete' if engine == 'mujoco' and method == 'Euler' else method}"
-    ax.plot(
-        errors,
-        costs,
-        dash,
-        marker=marker(method),
-        markersize=3 + (engine == "mujoco"),
-        linewidth=wide,
-        color=colour,
-        label=label,
-    )
+    size = 3 + (engine == "mujoco")
+    ax.plot(errors, costs, dash, marker=marker(method), markersize=size, linewidth=wide, color=colour, label=label)
 
 
 def finish(fig, axes, label) -> None:
@@ -241,16 +232,23 @@ def cost_of_one(result):
     colours = [ORANGE if r["implementation"].startswith("MuJoCo") else BLUE for r in rows]
     ax.barh(range(len(rows)), values, color=colours, height=0.7)
     for k, value in enumerate(values):
-        ax.text(value * 1.1, k, f"{value:,.0f}" if value >= 100 else f"{value:.1f}", va="center", fontsize=8)
+        ax.text(value * 1.1, k, spelled(value), va="center", fontsize=8)
     ax.set_yticks(range(len(rows)), names, fontsize=8)
-    ax.set(xscale="log", xlabel="ns per state", xlim=(min(values) / 2, max(values) * 5))
+    ax.set(xscale="log", xlabel="ns per state")
     ax.grid(axis="y", visible=False)
-    fastest, whole = (
-        min(values),
-        next((r["ns_per_state"] for r in rows if r["implementation"] == "MuJoCo, mj_forward"), None),
-    )
-    caption = (
-        f"Forward dynamics of the arm for one state: from {max(values):,.0f} ns in plain Python to {fastest:.1f} ns"
-    )
-    caption += f"; MuJoCo's mj_forward takes {whole:,.0f} ns." if whole else "."
+    caption = "Forward dynamics of the arm for one state."
+    if rows:
+        ax.set_xlim(min(values) / 2, max(values) * 5)
+        slow, fast = (names[values.index(pick(values))] for pick in (max, min))
+        caption = (
+            f"Forward dynamics of the arm for one state: from {spelled(max(values))} ns ({slow}) to {spelled(min(values))} ns "
+            f"({fast})."
+        )
+    whole = next((r["ns_per_state"] for r in rows if r["implementation"] == WHOLE), None)
+    caption += f" MuJoCo's mj_forward takes {spelled(whole)} ns." if whole else ""
     return "speed_evaluation_cost", fig, caption
+
+
+def spelled(value) -> str:
+    """Nanoseconds in three digits or so."""
+    return f"{value:,.0f}" if value >= 100 else f"{value:.1f}"

@@ -25,7 +25,8 @@ def transition(engine: Engine, q, tau, dt, integrator) -> np.ndarray:
     model, data = mujoco.MjModel.__copy__(engine.model), mujoco.MjData(engine.model)
     model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
     data.qpos[engine.qpos], data.qvel[engine.dofs], data.qfrc_applied[engine.dofs] = q, 0.0, tau
-    A = np.zeros((2 * model.nv, 2 * model.nv))
+    size = 2 * model.nv + model.na  # activations come last
+    A = np.zeros((size, size))
     mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
     order = np.concatenate([engine.dofs, model.nv + engine.dofs])
     return A[np.ix_(order, order)]

@@ -5,16 +5,28 @@ import numpy as np
 
 from .engine import FLAGS
 
+STATED_FLAGS = {  # flags that the equations of motion depend on, by the names that MuJoCo's versions give them
+    "flag gravity": ("GRAVITY",),
+    "flag damper": ("DAMPER", "PASSIVE"),
+    "flag eulerdamp": ("EULERDAMP",),
+}
+
 
 def parameters(engine) -> dict:
-    """What the compiler made of the file: arrays per hinge and per body, at q = 0, in world axes."""
+    """What the compiler made of the file: arrays per hinge, per body, or one number of the file, in world axes.
+
+    Read in the file's own configuration (qpos0): there every frame lies as the file says, whatever a hinge's `ref` is.
+    """
     m, d = engine.model, engine.data
-    engine._at(np.zeros(len(engine.hinges)))
+    engine._at(m.qpos0[engine.qpos])
     anchors = d.xanchor[engine.joints].copy()
     carrier = [int(m.jnt_bodyid[j]) for j in engine.joints]
     last = [max(i for i, owner in enumerate(carrier) if owner == body) for body in engine.bodies]
     turns = engine._turns(d.ximat)
     return {
+        **{name: float(not m.opt.disableflags & bit(members)) for name, members in STATED_FLAGS.items()},
+        "order": np.argsort(np.argsort(engine.joints)).astype(float),
+        "ref": m.qpos0[engine.qpos],
         "axis": d.xaxis[engine.joints].copy(),
         "anchor": anchors,
         "damping": m.dof_damping[engine.dofs],
@@ -22,22 +34,30 @@ def parameters(engine) -> dict:
         "frictionloss": m.dof_frictionloss[engine.dofs],
         "stiffness": m.jnt_stiffness[engine.joints],
         "limited": m.jnt_limited[engine.joints].astype(float),
-        "order": np.argsort(np.argsort(engine.joints)).astype(float),
         "mass": m.body_mass[engine.bodies],
         "com": d.xipos[engine.bodies] - anchors[last],
         "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[engine.bodies])]),
         "gravcomp": m.body_gravcomp[engine.bodies],
-        "gravity": m.opt.gravity * engine.enabled("gravity"),
+        "gravity": m.opt.gravity.copy(),
         "tendon armature": m.tendon_armature.sum(),
         "other mass": m.body_subtreemass[0] - m.body_mass[engine.bodies].sum(),
+        "density": m.opt.density,
+        "viscosity": m.opt.viscosity,
     }
+
+
+def bit(members) -> int:
+    """The bit of the first of these disable flags that the installed MuJoCo has; 0 if it has none of them."""
+    for member in members:
+        if hasattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"):
+            return int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"))
+    return 0
 
 
 def options(engine) -> dict:
     """Flags, integrator and counts that say what else the file asks of MuJoCo."""
     m = engine.model
-    flags = {f"flag {name}": "enable" if engine.enabled(name) else "disable" for name in FLAGS}
+    flags = {f"flag {name}": "enable" if engine.enabled(name) else "disable" for name in FLAGS if name != "gravity"}
     counts = ("ngeom", "nu", "nsensor", "neq", "ntendon")
     integrator = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-    refs = {f"ref {name}": f"{m.qpos0[i]:g}" for name, i in zip(engine.hinges, engine.qpos)}
-    return flags | refs | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}
+    return flags | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}

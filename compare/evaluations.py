@@ -19,28 +19,38 @@ WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_
 WAITING, EACH, LANES = "traced kernel, each waits for the last", "traced kernel", "lanes"
 
 
-def costs(engine, quick) -> tuple[list[dict], list[str]]:
+def costs(setup) -> tuple[list[dict], list[str]]:
     """The rows of evaluations.csv, and sentences about them."""
     from .engine_calls import loops
 
     rng = np.random.default_rng([SEED, 2])
-    most = 10_000 if quick else max(STATES)
+    most = setup.of(max(STATES), 10_000, 1000)
     states = rng.uniform(-3.0, 3.0, (3, most, 3))
     first = [np.ascontiguousarray(a[0]) for a in states]
-    repeated = {(quantity, name, 1, 1): loop for name, (quantity, loop) in loops(engine, *first).items()}
+    repeated = {(quantity, name, 1, 1): loop for name, (quantity, loop) in loops(setup.engine, *first).items()}
     repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(first)}
     calls = {key: counted(loop) for key, loop in repeated.items()}
     with ThreadPoolExecutor(2) as pool:
-        for count in STATES[:2] if quick else STATES:
+        for count in STATES[: setup.of(3, 2, 2)]:
             for key, run in of_many_states(states[:, :count], pool).items():
                 calls[key] = again(run, CALLS // count, count)
-        taken = clock.in_turns([run for run, _ in calls.values()], rounds=5 if quick else 12)
-    nanoseconds = {key: 1e9 * min(t) / count for (key, (_, count)), t in zip(calls.items(), taken)}
-    rows = [
+        taken = clock.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
+    nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
+    operations = [kernels.slope_source(tmt.ARM, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
+    return table(nanoseconds), told(nanoseconds, simulate_overhead(), operations)
+
+
+def per_state(counts, times) -> dict:
+    """Nanoseconds of one state for each key of `counts`, {key: states in a call}, from the seconds of its calls."""
+    return {key: 1e9 * min(taken) / count for (key, count), taken in zip(counts.items(), times)}
+
+
+def table(nanoseconds) -> list[dict]:
+    """The rows of evaluations.csv, by quantity, the slowest first."""
+    return [
         dict(zip(("quantity", "implementation", "states", "threads"), key)) | {"ns_per_state": value}
         for key, value in sorted(nanoseconds.items(), key=lambda item: (item[0][0], -item[1]))
     ]
-    return rows, told(nanoseconds)
 
 
 def again(run, calls, count) -> tuple[Callable, int]:
@@ -131,8 +141,8 @@ def simulate_overhead() -> tuple[float, float]:
     return times["call"], times["loop"]
 
 
-def told(ns) -> list[str]:
-    """The ratios in words."""
+def told(ns, overhead, operations) -> list[str]:
+    """The ratios in words. overhead: seconds of tmt.simulate and of its loop; operations: of the literal and composite form."""
     many = max(states for _, _, states, _ in ns)
     lanes = min(ns[FORWARD, LANES, states, 1] for states in {key[2] for key in ns} - {1})
     sentences = [f"Processor: {machine.vectors()}."]
@@ -143,29 +153,33 @@ def told(ns) -> list[str]:
         one, apart = ns[FORWARD, WAITING, 1, 1], ns[FORWARD, EACH, 1000, 1]
         sentences.append(
             f"Forward dynamics of the arm: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work {equal:.0f} ns, "
-            f"the kernel {one:.1f} ns where each evaluation waits for the last ({whole / one:.0f} and {equal / one:.0f} times "
-            f"less), {apart:.1f} ns where they are independent ({whole / apart:.0f} and {equal / apart:.0f} times less), in "
-            f"lanes {lanes:.1f} ns a state ({whole / lanes:.0f} times less)."
+            f"the kernel {one:.1f} ns where each evaluation waits for the last ({less(whole, one)}; than the same work "
+            f"{less(equal, one)}), {apart:.1f} ns where they are independent ({less(whole, apart)}; {less(equal, apart)}), in "
+            f"lanes {lanes:.1f} ns a state ({less(whole, lanes)})."
         )
         kernel = ns[STEP, EACH, 1, 1]
         sentences.append(
-            f"A step of RK4: mj_step {step:.0f} ns, the kernel {kernel:.0f} ns ({step / kernel:.0f} times less), in lanes "
+            f"A step of RK4: mj_step {step:.0f} ns, the kernel {kernel:.0f} ns ({less(step, kernel)}), in lanes "
             f"{ns[STEP, LANES, many, 1]:.0f} ns a run."
         )
     else:
         sentences.append(
             "MuJoCo's library was not found beside its package: its calls were not timed in compiled loops."
         )
-    call, loop = simulate_overhead()
+    call, loop = overhead
+    literal, composite = operations
     sentences.append(
-        f"Those are compiled loops. tmt.simulate of 64 steps takes {1e6 * call:.0f} us, its loop {1e6 * loop:.0f} us of it: the "
-        "rest checks arguments and makes room, once a call."
-    )
-    literal, composite = (
-        kernels.slope_source(tmt.ARM, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())
+        f"Those are compiled loops. A call of tmt.simulate with 64 steps takes {1e6 * call:.0f} us, its loop alone "
+        f"{1e6 * loop:.0f} us."
     )
     sentences.append(
         f"Straight-line code of the literal method has {literal} operations, that of the composite form {composite}; the kernel "
         "is made for this one arm, MuJoCo for any model."
     )
     return sentences
+
+
+def less(slow, fast) -> str:
+    """How many times less, or more, the second takes than the first, in words."""
+    ratio, word = (slow / fast, "less") if slow >= fast else (fast / slow, "more")
+    return f"{ratio:.{0 if ratio >= 10 else 1}f} times {word}"

@@ -1,37 +1,34 @@
 """Failures that a linear limit does not foresee, or that an engine does not report."""
 
-import dataclasses
-
 import numpy as np
 
 import tmt
 from tmt.methods import METHODS
 
 from .engine_linear import left_to_itself
-from .limits import ALLOWED, growth, stiffest
+from .limits import ALLOWED, STEPS, growth, stiffest
 from .linear import held
 from .motion import diverged_at
-from .parties import Party, finite
+from .parties import Party
 from .scenes import SCENES, posture
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
 EDGE = np.linspace(1.0, 2.03, 207)  # omega dt, across the linear limit of 2
 NEAR = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
 EDGE_SIZES = np.geomspace(1e-4, 3e-2, 16)  # rad
+MOST = 1e300  # stands for the growth of a run that has diverged
 SMALL, LARGE = 1e-6, 1e-3  # rad, of the perturbations that are compared at the resonance
 BENT = next(scene for scene in SCENES if scene.name == "bent, free")
-COARSE, FINE = 5 / 64, 1e-3  # s
-LONG = 60.0  # s
-KEPT = 600  # points of a curve
-NEWTON = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)  # s
-NEWTON_SIZES = {"held, 1e-6 rad off": 1e-6, "held, 0.01 rad off": 1e-2, "held, 0.1 rad off": 0.1, "free": None}
+COARSE = 5 / 64  # s
 
 
-def edge(party, mujoco, sizes, swings) -> np.ndarray:
-    """Growth in 2,000 steps at bent along the stiffest mode, (sizes, swings): size in rad, swing = omega dt."""
+def edge(party, mujoco, sizes, swings, steps=STEPS) -> np.ndarray:
+    """Growth in so many steps at bent along the stiffest mode, (sizes, swings): size in rad, swing = omega dt."""
     at = held("bent", posture("bent"))
     omega, direction = stiffest(at)
-    return np.array([[growth(party, mujoco, at, direction, swing / omega, size) for swing in swings] for size in sizes])
+    return np.array([
+        [growth(party, mujoco, at, direction, swing / omega, size, steps) for swing in swings] for size in sizes
+    ])  # fmt: skip
 
 
 def own_reset(mujoco) -> dict:
@@ -43,10 +40,26 @@ def own_reset(mujoco) -> dict:
     first = int(np.argmax(back)) + 1 if back.any() else None
     _, *stopped = mujoco.trajectory(*BENT.start, BENT.tau, COARSE, steps, "Euler")
     return {
-        "t": t, "energy": tmt.energy(run["q"], run["qd"]), "clock": run["time"], "warnings": run["warnings"],
-        "resets": int(back.sum()), "first_reset_s": None if first is None else float(t[first]),
+        **observed(t, run), "resets": int(back.sum()), "first_reset_s": None if first is None else float(t[first]),
         "finite": bool(np.isfinite(run["q"]).all()), "after_q": None if first is None else run["q"][first],
-        "caught_at_s": diverged_at(BENT, t, *stopped), "caught_in_it_s": caught(BENT, t, run),
+        "caught_at_s": diverged_at(BENT, t, *stopped),
+    }  # fmt: skip
+
+
+def observed(t, run) -> dict:
+    """A run that MuJoCo is left to itself with: its energy, J, since when it is wrong, and when that is noticed, s.
+
+    since_s: the first time at which it has gained more energy than the range of the potential, or its clock goes back.
+    """
+    fine = np.isfinite(np.concatenate([run["q"], run["qd"]], axis=1)).all(axis=1)
+    energy = np.full(len(t), np.nan)
+    energy[fine] = tmt.energy(run["q"][fine], run["qd"][fine])
+    reach = float(np.ptp(tmt.potential_energy([posture("upright"), posture("hanging")])))
+    wrong = ~(energy - energy[0] <= reach) | np.append(False, np.diff(run["time"]) <= 0.0)
+    return {
+        "t": t, "energy": energy, "clock": run["time"], "warnings": run["warnings"], "range": reach,
+        "gain": float(np.nanmax(energy) - energy[0]), "since_s": float(t[np.argmax(wrong)]) if wrong.any() else None,
+        "caught_in_it_s": caught(BENT, t, run),
     }  # fmt: skip
 
 
@@ -59,174 +72,99 @@ def caught(scene, t, run) -> float | None:
 
 
 def silent_gain(mujoco) -> dict:
-    """Bent, free, by MuJoCo's `implicit` at 5/64 s: energy gained without a warning, and the matrix it solves with.
+    """Bent, free, by MuJoCo's `implicit` at 5/64 s: whether it gains energy, and the matrix it solves with.
 
     definite: the smallest eigenvalue of the symmetric part of Mbar + dt D + dt dh/dqd along the run in kg m2, for
-    64, 128 and 256 steps in 5 s.
+    64, 128 and 256 steps in 5 s; None where the run is not finite.
     """
-    definite = {}
+    definite, kept = {}, {}
     for count in (64, 128, 256):
         dt = BENT.duration / count
         run = left_to_itself(mujoco, *BENT.start, BENT.tau, dt, count, "implicit")
-        rows = METHODS["implicit"].matrix(tmt.ARM, list(run["q"].T), list(run["qd"].T), dt)
-        A = np.array([[np.broadcast_to(entry, count + 1) for entry in row] for row in rows]).transpose(2, 0, 1)
-        smallest = np.linalg.eigvalsh(0.5 * (A + A.transpose(0, 2, 1)))[:, 0]
-        definite[count] = float(smallest.min())
-        if count == 64:
-            t, energy = dt * np.arange(count + 1), tmt.energy(run["q"], run["qd"])
-            kept = {"t": t, "energy": energy, "smallest": smallest, "warnings": run["warnings"]}
-            kept |= {"caught_in_it_s": caught(BENT, t, run), "gain": float(energy.max() - energy[0])}
-    heights = tmt.potential_energy([posture("upright"), posture("hanging")])
-    return kept | {"definite": definite, "range": float(np.ptp(heights))}
+        fine = np.isfinite(np.concatenate([run["q"], run["qd"]], axis=1)).all(axis=1)
+        rows = METHODS["implicit"].matrix(tmt.ARM, list(run["q"][fine].T), list(run["qd"][fine].T), dt)
+        A = np.array([[np.broadcast_to(entry, fine.sum()) for entry in row] for row in rows]).transpose(2, 0, 1)
+        smallest = np.full(count + 1, np.nan)
+        smallest[fine] = np.linalg.eigvalsh(0.5 * (A + A.transpose(0, 2, 1)))[:, 0]
+        definite[count] = float(smallest.min()) if fine.all() else None
+        kept = kept or {**observed(dt * np.arange(count + 1), run), "smallest": smallest}
+    return kept | {"definite": definite}
 
 
-def long_run(party, dt, mujoco) -> dict:
-    """A minute of bent, free: the energy over time, and whether it stays bounded, drifts, or the run diverges.
-
-    It drifts if its mean of the last fifth is off that of the first by more than three standard deviations of either.
-    """
-    steps = round(LONG / dt)
-    with np.errstate(over="ignore", invalid="ignore"):
-        q, qd = party.run(mujoco, tmt.ARM, *BENT.start, BENT.tau, dt, steps)
-        t = dt * np.arange(steps + 1)
-        ended = diverged_at(dataclasses.replace(BENT, duration=LONG), t, q, qd)
-        off = np.full(steps + 1, np.nan)
-        alive = t < (np.inf if ended is None else ended)
-        off[alive] = tmt.energy(q[alive], qd[alive])
-    off -= off[0]
-    every = max(1, steps // KEPT)
-    fifth = (steps + 1) // 5
-    change = largest = None
-    kind = "diverges"
-    if ended is None:
-        first, last = off[:fifth], off[-fifth:]
-        change, largest = float(last.mean() - first.mean()), float(np.abs(off).max())
-        kind = "drifts" if abs(change) > 3.0 * max(first.std(), last.std()) else "bounded"
-    row = {
-        "scene": BENT.name, "engine": party.engine, "method": party.method, "dt_s": dt, "energy": kind,
-        "largest_j": largest, "change_j": change, "diverged_at_s": ended,
-    }  # fmt: skip
-    return {"row": row, "t": t[::every], "off": off[::every]}
-
-
-def newton(name) -> list:
-    """Steps of an implicit method that Newton's method finds, of 2,000, against dt, in small and in large motion."""
-    at = held("bent", posture("bent"))
-    direction = stiffest(at)[1]
-    rows = []
-    for motion, size in NEWTON_SIZES.items():
-        start, tau = (at.q, np.zeros(3)) if size is None else (at.q + size * direction, at.tau)
-        for dt in NEWTON:
-            _, q, qd = tmt.simulate(start, np.zeros(3), tau, dt, 2000, name)
-            found = int(np.isfinite(q).all(axis=1).sum()) - 1
-            rows.append({
-                "method": name, "motion": motion, "dt_s": dt, "steps_found": found,
-                "last_rad_per_s": finite(np.abs(qd[found]).max()),
-            })  # fmt: skip
-    return rows
-
-
-IMPLICIT = tuple(name for name, stepping in METHODS.items() if hasattr(stepping, "newton"))
 EDGES = (Party("TMT", "implicit"), Party("TMT", "semi_implicit_euler"))
 
 
-def judge(result, mujoco, near, minutes, found) -> None:
-    """Checks, tables and sentences about the resonance, silent failure, a minute of motion and Newton's method."""
-    worst = {}
-    for party, grown in near.items():
-        worst[party.label] = grown.max(axis=1)
-        where = f"bent, {party.label}, omega dt near sqrt 3"
-        result.check(where, f"growth in 2000 steps from {SMALL:g} rad", grown[0].max(), ALLOWED, "fold")
-        if party.scheme == "implicit":
-            missing = max(0.0, ALLOWED - min(grown[1].max(), 1e300))
-            result.check(
-                where, f"growth in 2000 steps from {LARGE:g} rad is less than 100-fold", missing, 0.0, "fold missing"
-            )
-    told = "; ".join(
-        f"{label} {'diverges' if not np.isfinite(large) else f'grows {large:.1e}-fold'}"
-        for label, (_, large) in worst.items()
-    )
+def judge_near(result, found) -> None:
+    """The resonance. found: of each party the growth (2, swings) from a small and a large perturbation, in `steps`."""
+    steps = found["steps"]
+    worst = {party.label: np.minimum(grown.max(axis=1), MOST) for party, grown in found["grown"].items()}
+    for label, (small, large) in worst.items():
+        where, quantity = f"bent, {label}, omega dt near sqrt 3", f"growth in {steps} steps from"
+        result.check(where, f"{quantity} {SMALL:g} rad", small, ALLOWED, "fold")
+        result.check(where, f"{quantity} {LARGE:g} rad", large, ALLOWED, "fold", rule="at least")
+    told = "; ".join(f"{label} {fold(small)} and {fold(large)}" for label, (small, large) in worst.items())
     result.notes.append(
-        f"The nonlinear edge: at bent a perturbation of {LARGE:g} rad along the stiffest mode meets a 1:3 resonance at "
-        f"omega dt = sqrt 3 = {RESONANCE:.4f} (a swing takes three steps), below the linear limit of 2. There {told}, "
-        f"in 2000 steps; from {SMALL:g} rad all of them grow at most "
-        f"{max(small for small, _ in worst.values()):.2f}-fold."
+        f"The nonlinear edge, at bent: at omega dt = sqrt 3 = {RESONANCE:.4f}, below the linear limit of 2, a swing of the "
+        f"stiffest mode takes three steps, a 1:3 resonance. The largest growth near it in {steps} steps, from {SMALL:g} and "
+        f"from {LARGE:g} rad: {told}."
     )
-    result.curves["near"] = {party.label: grown for party, grown in near.items()}
 
-    reset, gain = own_reset(mujoco), silent_gain(mujoco)
+
+def fold(grown) -> str:
+    """A growth in words."""
+    if not grown < MOST:
+        return "diverges"
+    return f"{grown:.2f}-fold" if grown < 1e3 else f"{grown:.1e}-fold"
+
+
+def judge_silent(result, reset, gain) -> None:
+    """Failures that MuJoCo does not report: where one occurs, it must be caught at once."""
     for where, run in (("Euler, automatic reset on", reset), ("implicit", gain)):
-        missed = run["caught_in_it_s"] is None
-        result.check(f"bent, free, MuJoCo {where}, dt = 5/64 s", "failure that is not caught", missed, 0.0, "runs")
-    if reset["resets"]:
-        alpha, beta, gamma = np.degrees(reset["after_q"])
-        result.notes.append(
-            "Silent failure, MuJoCo's default: bent, free, by Euler at 5/64 s with its automatic reset on. In "
-            f"{reset['t'][-1]:.0f} s it starts again {reset['resets']} times, first at {reset['first_reset_s']:.2f} s, "
-            f"from ({alpha:.1f}, {beta:.1f}, {gamma:.1f}) deg; "
-            f"{'every number' if reset['finite'] else 'not every number'} is finite, and the counters of its warnings "
-            f"stand at {reset['warnings']}. Caught at {at_time(reset['caught_in_it_s'])}, by the bound on the energy "
-            "or its clock that goes back. With the reset off, as everywhere else in this report, the run is found to "
-            f"have diverged at {at_time(reset['caught_at_s'])}."
-        )
-    least = ", ".join(f"{value:.4f} kg m2 at {count} steps" for count, value in gain["definite"].items())
-    result.notes.append(
-        f"Silent failure of `implicit`: the same at 5/64 s gains {gain['gain']:.0f} J in 5 s, on an arm whose whole "
-        f"potential range is {gain['range']:.1f} J, with {gain['warnings']} warnings. Its matrix Mbar + dt dh/dqd "
-        f"loses definiteness: the smallest eigenvalue of its symmetric part along 5 s is {least}. Caught at "
-        f"{at_time(gain['caught_in_it_s'])} by the energy."
-    )
+        if run["since_s"] is not None:
+            delay = None if run["caught_in_it_s"] is None else run["caught_in_it_s"] - run["since_s"]
+            quantity = "time from a silent failure until it is caught"
+            result.check(f"bent, free, MuJoCo {where}, dt = 5/64 s", quantity, delay, COARSE, "s")
+    result.notes += [tell_reset(reset), tell_gain(gain)]
     result.curves["silent"] = {"reset": reset, "gain": gain}
 
-    table = [run["row"] for run in minutes]
-    result.tables["stability_energy"] = table
-    verdict = {(row["engine"], row["method"], row["dt_s"]): row["energy"] for row in table}
-    for party, dt in {(Party(row["engine"], row["method"]), row["dt_s"]) for row in table if row["engine"] == "MuJoCo"}:
-        other = verdict[("MuJoCo", party.method, dt)] != verdict[("TMT", party.scheme, dt)]
-        where = f"bent, free, 60 s, {party.label}, dt = {dt:.4g} s"
-        result.check(where, "energy does otherwise than its twin's", other, 0.0, "runs")
-    for dt in sorted({row["dt_s"] for row in table}, reverse=True):
-        mine = [row for row in table if row["dt_s"] == dt and row["engine"] == "TMT"]
-        of_kind = {
-            kind: [f"{row['method']} ({how_far(row)})" for row in mine if row["energy"] == kind]
-            for kind in ("bounded", "drifts", "diverges")
-        }
-        told = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in of_kind.items() if names)
-        result.notes.append(f"Energy over a minute of bent, free, at dt = {dt:.4g} s: {told}.")
-    result.curves["minutes"] = minutes
-    newton_table = [row for rows in found for row in rows]
-    if newton_table:
-        result.tables["stability_newton"] = newton_table
-        result.notes.append(tell_newton(newton_table))
+
+def tell_reset(reset) -> str:
+    """Whether MuJoCo starts a run again by itself, and what gives that away."""
+    text = f"MuJoCo's default, bent, free, by Euler at 5/64 s with its automatic reset on, {reset['t'][-1]:.0f} s: "
+    if not reset["resets"]:
+        text += "it never starts again, "
+        text += "and no failure is silent" if reset["since_s"] is None else f"but is wrong from {at_time(reset['since_s'])} on"
+    else:
+        angles = ", ".join(f"{angle:.1f}" for angle in np.degrees(reset["after_q"]))
+        text += f"a silent failure. It starts again {times(reset['resets'])}, first at {reset['first_reset_s']:.2f} s, from "
+        text += f"({angles}) deg; {'every number' if reset['finite'] else 'not every number'} is finite"
+    text += f"; the counters of its warnings stand at {reset['warnings']}. Energy or clock show it at "
+    return text + (
+        f"{at_time(reset['caught_in_it_s'])}. With the reset off, as everywhere else in this report, the run "
+        + ("does not diverge." if reset["caught_at_s"] is None else f"diverges at {at_time(reset['caught_at_s'])}.")
+    )
 
 
-def how_far(row) -> str:
-    """How the energy of a minute behaves, in words."""
-    if row["energy"] == "diverges":
-        return f"at {row['diverged_at_s']:.2f} s"
-    return f"within {row['largest_j']:.2g} J" if row["energy"] == "bounded" else f"by {row['change_j']:+.2g} J"
+def tell_gain(gain) -> str:
+    """Whether `implicit` gains energy that is not there, and whether its matrix is definite."""
+    silent, coarse = gain["since_s"] is not None, gain["definite"][64]
+    least = ", ".join(f"{'none' if v is None else f'{v:.4f} kg m2'} at {n} steps" for n, v in gain["definite"].items())
+    text = (
+        f"MuJoCo's `implicit`, bent, free, at 5/64 s: in 5 s the energy rises by {gain['gain']:.3g} J at most, with "
+        f"{gain['warnings']} warnings; the range of the arm's potential is {gain['range']:.1f} J. "
+    )
+    text += "A silent failure" if silent and not gain["warnings"] else "A failure with warnings" if silent else "No failure"
+    if coarse is not None:
+        text += f": the symmetric part of its matrix Mbar + dt dh/dqd {'loses' if coarse <= 0.0 else 'stays'} "
+        text += "definiteness" if coarse <= 0.0 else "definite"
+    return text + f" (smallest eigenvalue in 5 s: {least}). The energy shows a failure at {at_time(gain['caught_in_it_s'])}."
+
+
+def times(count) -> str:
+    """How often, in words."""
+    return "once" if count == 1 else f"{count} times"
 
 
 def at_time(seconds) -> str:
     """A time in words."""
     return "no time" if seconds is None else f"{seconds:.2f} s"
-
-
-def tell_newton(table) -> str:
-    """Up to which step Newton's method finds all stages of 2,000 steps, method by method and motion by motion."""
-    told = []
-    for name in dict.fromkeys(row["method"] for row in table):
-        limits = []
-        for motion in NEWTON_SIZES:
-            rows = [row for row in table if row["method"] == name and row["motion"] == motion]
-            failing = [row["dt_s"] for row in rows if row["steps_found"] < 2000]
-            limits.append(
-                f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never to {NEWTON[-1]:g} s"
-            )
-        told.append(f"{name} ({'; '.join(limits)})")
-    fastest = max(row["last_rad_per_s"] for row in table)
-    return (
-        "The A-stable methods have no linear limit; what ends them is Newton's method, from the steps on at which it "
-        f"does not find a stage of 2000 at bent: {', '.join(told)}. The run is NaN from there; its last rates are at "
-        f"most {fastest:.1e} rad/s, so it has not overflowed."
-    )

@@ -1,5 +1,7 @@
 """The torque that holds the arm against gravity."""
 
+from functools import partial
+
 import numpy as np
 
 import tmt
@@ -8,12 +10,12 @@ from .agreement import Result, acceleration_scale, gravity_scale
 
 TITLE = "Gravity balance: do both hold the arm with the same torque?"
 CLAIM = (
-    "TMT's holding torque is MuJoCo's qfrc_bias at rest; in both it is the gradient of the party's own potential "
-    "energy; and the torque of one, given to the other, leaves the arm at rest."
+    "TMT's holding torque is MuJoCo's qfrc_bias at rest; in both it is the gradient of the engine's own potential "
+    "energy; and TMT's torque, given to MuJoCo, leaves the arm at rest."
 )
 BAR = (
-    "Torques: 64 eps x 9.42 N m, the sum of m g reach. Accelerations left: 64 eps x (cond(Mbar) + 1) x |Mbar^-1| x "
-    "9.42 N m. "
+    f"Torques: 64 eps x {gravity_scale():.2f} N m, the sum of m g reach. Accelerations left: 64 eps x (cond(Mbar) + 1) x "
+    f"|Mbar^-1| x {gravity_scale():.2f} N m. "
     "The gradient is exact, not a small difference: V is a + b cos q_i + c sin q_i in each hinge angle, so that "
     "dV/dq_i = (V(q_i + 90 deg) - V(q_i - 90 deg)) / 2. (Rounding the sum q_i + 90 deg costs about 2 eps of the scale.)"
 )
@@ -26,7 +28,7 @@ def gradient(potential_energy, q) -> np.ndarray:
 
 
 def rows(setup) -> Result:
-    """Torques at each named posture and at random ones, their gradients, and the exchange of torques."""
+    """Torques at each named posture and at random ones, their gradients, and TMT's torque given to MuJoCo."""
     result = Result("gravity")
     engine, scale = setup.engine, gravity_scale()
     for sample in (*setup.named.each(), setup.random):
@@ -40,19 +42,14 @@ def rows(setup) -> Result:
 
     for sample in (setup.named, setup.random):
         q = sample.q
-        at_rest = np.zeros_like(q)
-        limit = acceleration_scale(q, scale)
-        left = {
-            "qdd of MuJoCo under TMT's torque": (at_rest, engine.acceleration(q, at_rest, tmt.gravity_balance(q))),
-            "qdd of TMT under MuJoCo's torque": (tmt.acceleration(q, at_rest, engine.gravity_balance(q)), at_rest),
-        }
-        for quantity, (ours, theirs) in left.items():
-            result.agree(sample, quantity, "rad/s2", ours, theirs, limit)
+        at_rest = np.zeros_like(q)  # given to TMT, MuJoCo's torque would leave the same number with the other sign
+        left = engine.acceleration(q, at_rest, tmt.gravity_balance(q))
+        result.agree(sample, "qdd of MuJoCo under TMT's torque", "rad/s2", at_rest, left, acceleration_scale(q, scale))
     return result
 
 
 def figures(result):
     from . import draw  # matplotlib is for the process that draws
 
-    yield draw.distances(result, "random states", ["holding torque"])
-    yield draw.holding_torques(result)
+    yield partial(draw.distances, result, "random states", ["holding torque"])
+    yield partial(draw.holding_torques, result)

@@ -1,5 +1,7 @@
 """Positions, angular velocities, Jacobians and convective terms."""
 
+from functools import partial
+
 import tmt
 
 from .agreement import Result, reaches
@@ -11,8 +13,8 @@ CLAIM = (
     "and both convective terms (mj_jacDot times the rates)."
 )
 BAR = (
-    "64 eps x scale. Lengths and T_b: the largest distance from the shoulder, 0.45 m. B_b: 1. Angular velocity: the sum "
-    "S of |rates|. Convective terms: 0.45 m x S^2 and S^2."
+    f"64 eps x scale. Lengths and T_b: the largest distance from the shoulder, {reaches().max():.2f} m. B_b: 1. Angular "
+    f"velocity: the sum S of |rates|. Convective terms: {reaches().max():.2f} m x S^2 and S^2."
 )
 
 
@@ -44,4 +46,4 @@ def rows(setup) -> Result:
 def figures(result):
     from . import draw  # matplotlib is for the process that draws
 
-    yield draw.distances(result, "random states")
+    yield partial(draw.distances, result, "random states")

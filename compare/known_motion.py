@@ -14,9 +14,10 @@ from .scenes import posture
 
 SWINGS = (4, 8, 16, 32, 64, 128)  # times the scene's own steps
 ROUNDED = 1e-11  # rad: smaller errors are not those of the method alone
-COMPARED = 16  # of these, those of the runs in the table
+COMPARED = 16  # of these, those that the table has
 AMPLITUDES = (0.16, 0.08, 0.04, 0.02, 0.01)  # rad, each half of the one before
-FINE = 8192  # steps, at which the error of RK4 is far below that of the linear modes
+DURATION = 5.0  # s
+FINE, LESS_FINE = 8192, 1024  # steps, at which the error of RK4 is far below that of the linear modes
 
 
 def swings(result, engine, scenes) -> None:
@@ -34,10 +35,9 @@ def of_pendulum(result, engine, scene) -> None:
     hanging, frequency = pendulum(scene.model)
     t = np.linspace(0.0, scene.duration, SWINGS[0] * scene.steps + 1)
     exact = swing(t, q, qd, hanging, frequency)
-    off = distance(exact[::8], exact_swing(t[::8], q, qd, hanging, frequency))
+    off = distance(exact[::8], exact_swing(t[::8], q, qd, hanging, frequency)).max()
     # rounding of the angle itself, and of the argument times the fastest rate
-    bar = FACTOR * EPS * (np.abs(exact).max() + 2.0 * frequency * scene.duration)
-    result.check(scene.name, "elliptic function, scipy to 50 digits", off.max(), bar, "rad", rounding=True)
+    judge_function(result, scene.name, off, np.abs(exact).max() + 2.0 * frequency * scene.duration)
     errors = {}
     for integrator in INTEGRATORS:
         method = TWINS[integrator]
@@ -53,18 +53,11 @@ def of_pendulum(result, engine, scene) -> None:
                 errors.setdefault((party, integrator), []).append(error)
                 if finer == COMPARED:
                     result.curves["apart"][scene.name, party, integrator] = error
-    found = {}
-    for (party, integrator), values in errors.items():
-        order = METHODS[TWINS[integrator]].order
-        clear = max(2, sum(value > ROUNDED for value in values))
-        found[party, integrator] = np.log2(values[clear - 2] / values[clear - 1])
-        off = abs(found[party, integrator] - order)
-        where = f"{scene.name}, {integrator}, {party}"
-        result.check(where, f"order of the error against the elliptic function, from {order}", off, ORDER_MARGIN, "")
+    orders = judge_orders(result, scene.name, errors)
     result.curves["swings"][scene.name] = {
         "dt": scene.duration / scene.steps / np.array(SWINGS),
         "errors": errors,
-        "orders": found,
+        "orders": orders,
     }
     best = {party: errors[party, "RK4"][-1] for party in ("TMT", "MuJoCo")}
     result.notes.append(
@@ -74,25 +67,55 @@ def of_pendulum(result, engine, scene) -> None:
     )
 
 
-def small_oscillations(result, engine) -> None:
+def judge_function(result, scene, off, scale) -> None:
+    """A check: the elliptic function in doubles is that with 50 digits, but for rounding. off, scale: rad."""
+    result.check(scene, "elliptic function, scipy to 50 digits", off, FACTOR * EPS * scale, "rad", rounding=True)
+
+
+def judge_orders(result, scene, errors) -> dict:
+    """Checks: errors fall at the method's order. errors, orders: {(engine, integrator): ...}, rad, each step half the last.
+
+    Measured between the last two errors above 1e-11 rad, below which rounding comes in.
+    """
+    orders = {}
+    for (party, integrator), values in errors.items():
+        order = METHODS[TWINS[integrator]].order
+        clear = max(2, sum(value > ROUNDED for value in values))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            orders[party, integrator] = float(np.log2(np.divide(values[clear - 2], values[clear - 1])))
+        off = abs(orders[party, integrator] - order)
+        where = f"{scene}, {integrator}, {party}"
+        result.check(where, f"order of the error against the elliptic function, from {order}", off, ORDER_MARGIN, "")
+    return orders
+
+
+def small_oscillations(result, engine, amplitudes=AMPLITUDES, fine=FINE) -> None:
     """The whole arm let go near hanging: relative distance from the linear modes falls with the amplitude squared."""
     q, rest, away = posture("hanging"), np.zeros(3), np.ones(3)
-    duration = 5.0
     off = {"TMT": [], "MuJoCo": []}
-    for amplitude in AMPLITUDES:
-        run = q + amplitude * away, rest, rest, duration / FINE, FINE
+    for amplitude in amplitudes:
+        run = q + amplitude * away, rest, rest, DURATION / fine, fine
         t, ours, _ = tmt.simulate(*run)
         linear = small_oscillation(t, tmt.ARM, q, amplitude * away)
         for party, path in (("TMT", ours), ("MuJoCo", engine.trajectory(*run)[1])):
             off[party].append(float(np.abs(path - linear).max() / amplitude))
-    for party, values in off.items():
-        power = np.log2(values[-2] / values[-1])
-        what = "power of the amplitude with which the distance from the linear modes falls, from 2"
-        result.check(f"hanging, {party}", what, abs(power - 2.0), ORDER_MARGIN, "")
+    powers = judge_modes(result, off)
     frequencies, _ = modes(tmt.ARM, q)
-    result.curves["small"] = {"amplitude": np.array(AMPLITUDES), "off": off, "frequencies": frequencies}
+    result.curves["small"] = {
+        "amplitude": np.array(amplitudes), "off": off, "frequencies": frequencies, "powers": powers, "duration": DURATION,
+    }  # fmt: skip
     result.notes.append(
-        f"About hanging the linear modes have {', '.join(f'{f:.4f}' for f in frequencies)} rad/s. Let go {AMPLITUDES[-1]} rad "
-        f"away in each hinge, TMT's arm is {off['TMT'][-1]:.2e} of that from them at most in five seconds, MuJoCo's "
+        f"About hanging the linear modes have {', '.join(f'{f:.4f}' for f in frequencies)} rad/s. Let go {amplitudes[-1]} rad "
+        f"away in each hinge, TMT's arm is {off['TMT'][-1]:.2e} of that from them at most in {DURATION:g} s, MuJoCo's "
         f"{off['MuJoCo'][-1]:.2e}."
     )
+
+
+def judge_modes(result, off) -> dict:
+    """Checks: halving the amplitude divides the relative distance from the linear modes by 4. off, powers: by engine."""
+    powers = {}
+    for party, values in off.items():
+        powers[party] = float(np.log2(np.divide(values[-2], values[-1])))
+        what = "power of the amplitude with which the distance from the linear modes falls, from 2"
+        result.check(f"hanging, {party}", what, abs(powers[party] - 2.0), ORDER_MARGIN, "")
+    return powers

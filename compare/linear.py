@@ -1,6 +1,6 @@
 """The equations of motion linearised about a held posture: modes, and what one step of a method does to them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -110,7 +110,7 @@ class Held:
 
 def held(name, q, damping=0.0) -> Held:
     """The posture q, rad, under TMT's own torque, with joint damping in N m s/rad."""
-    model = tmt.Tree(**{**vars(tmt.ARM), "damping": (damping,) * len(q)})
+    model = replace(tmt.ARM, damping=(damping,) * len(q))
     return Held(name, model, q, tmt.gravity_balance(q))
 
 

@@ -20,7 +20,7 @@ def vectors() -> str:
 def first_line(name) -> str:
     """The first value of that name that Linux tells of the processor; "" elsewhere."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return ""
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith(name)), "")

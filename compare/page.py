@@ -10,7 +10,7 @@ import pandas as pd
 
 from .verdict import answers, outcome, passed
 
-TITLE = "TMT and MuJoCo, held against each other on a human arm"
+TITLE = "TMT and MuJoCo compared on a human arm"
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
 DIGITS |= dict.fromkeys(
     ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
@@ -18,9 +18,9 @@ DIGITS |= dict.fromkeys(
 LONG = 30  # rows: a longer table is folded in the HTML
 INTRO = (
     "A human arm, two rigid bodies on three hinges, modelled twice: as MJCF, run by MuJoCo, and by the TMT method in a "
-    "program that shares nothing with it. Each difference stands beside a bar that was fixed beforehand; 'exact' is "
-    "the method in 50-digit arithmetic, and distances from it are in eps = 2.2e-16 of the quantity's scale. Of the states "
-    "in a row, the largest difference is the largest of all; the worst is the one that comes closest to its own bar."
+    "program that shares nothing with it. Each difference stands beside a tolerance that was fixed beforehand (column bar); "
+    "'exact' is the method in 50-digit arithmetic, and distances from it are in eps = 2.2e-16 of the quantity's scale. Of the "
+    "states in a row, the largest difference is the largest of all; the worst is the one that comes closest to its tolerance."
 )
 
 
@@ -39,32 +39,36 @@ def shown(table, columns=None) -> pd.DataFrame:
     return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
 
 
-def tables(section) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The table of a section as text, and its checks that failed."""
+def of_causes(causes) -> pd.DataFrame:
+    """The causes as a table for readers."""
+    return pd.DataFrame([(cause["rank"], cause["text"]) for cause in causes], columns=["rank", "cause"])
+
+
+def failing(section) -> pd.DataFrame:
+    """The checks of a section that fail, as text."""
     failed = [check.record() for check in section.result.checks if not check.passed]
-    return shown(pd.DataFrame(section.result.rows), section.result.shown), shown(
-        pd.DataFrame(failed).drop(columns="passed", errors="ignore")
-    )
+    return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
 
 
-def markdown(sections, origin, result) -> str:
-    """The report as Markdown; `result`: the verdict."""
-    lines = [
-        f"# {TITLE}",
-        f"**{result}**",
-        INTRO,
-        "## The assignment's questions",
-        md_table(answers(sections)),
-    ]
+def markdown(sections, origin, result, causes=()) -> str:
+    """The report as Markdown; `result`: the verdict; `causes`: of what fails."""
+    lines = [f"# {TITLE}", f"**{result}**"]
+    lines += ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
+    lines += [INTRO, "## The assignment's questions", md_table(answers(sections))]
     for section in sections:
-        table, failed = tables(section)
-        lines += [f"## {section.title}", f"*Claim:* {section.claim} **{outcome(section)}**", f"*Bar:* {section.bar}"]
+        failed = failing(section)
+        lines += [
+            f"## {section.title}",
+            f"*Claim:* {section.claim} **{outcome(section)}**",
+            f"*Tolerance:* {section.bar}",
+        ]
         if len(failed):
             lines += ["**Checks that fail:**", md_table(failed)]
-        lines += [md_table(table)] if len(table.columns) else []
-        lines += [f"All columns, {len(section.result.rows)} rows: {link(section.name)}"]
-        for name, rows in section.result.tables.items():
-            lines += [f"**{heading(name)}**", md_table(shown(pd.DataFrame(rows))), f"In full: {link(name)}"]
+        for name, rows in section.tables.items():
+            table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
+            lines += [f"**{heading(name)}**"] if name != section.name else []
+            lines += [md_table(table)] if len(table.columns) else []
+            lines += [f"All columns, {len(rows)} rows: {link(name)}"]
         lines += [f"- {note}" for note in section.result.notes]
         for name, caption in section.figures:
             lines += [f"![{name}](figures/{name}.png)", caption]
@@ -90,30 +94,31 @@ def origins(origin) -> pd.DataFrame:
     return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
 
 
-def page(folder, sections, origin, result) -> str:
+def page(folder, sections, origin, result, causes=()) -> str:
     """The report as one HTML file with its figures inside."""
-    body = [
+    body = ["<h2>Causes</h2>", html_table(of_causes(causes), "text")] if causes else []
+    body += [
         f"<p>{html.escape(INTRO)}</p>",
         '<h2 id="questions">The assignment\'s questions</h2>',
         html_table(answers(sections), "text"),
     ]
     for section in sections:
-        table, failed = tables(section)
+        failed = failing(section)
         body += [
             f'<h2 id="{section.name}">{html.escape(section.title)}</h2>',
-            f"<p><em>Claim:</em> {html.escape(section.claim)} <strong>{outcome(section)}</strong></p>",
-            f"<p><em>Bar:</em> {html.escape(section.bar)}</p>",
+            f"<p><em>Claim:</em> {html.escape(section.claim)} <strong>{html.escape(outcome(section))}</strong></p>",
+            f"<p><em>Tolerance:</em> {html.escape(section.bar)}</p>",
         ]
         if len(failed):
-            body += ["<p><strong>Checks that fail:</strong></p>", html_table(failed)]
+            body += ["<p><strong>Checks that fail:</strong></p>", folded(failed, f"{len(failed)} checks")]
         for name, caption in section.figures:
             data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
             image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
             body.append(f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>")
-        if len(table.columns):
-            body.append(folded(table, f"Table, {len(table)} rows"))
-        for name, rows in section.result.tables.items():
-            body += [f"<h3>{heading(name)}</h3>", folded(shown(pd.DataFrame(rows)), f"{len(rows)} rows")]
+        for name, rows in section.tables.items():
+            table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
+            body += [f"<h3>{heading(name)}</h3>"] if name != section.name else []
+            body += [folded(table, f"Table, {len(table)} rows")] if len(table.columns) else []
         checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
         body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:

@@ -10,20 +10,32 @@ from .engine_parameters import options, parameters
 TITLE = "Parameters: is MuJoCo's compiled arm the stated arm?"
 CLAIM = (
     "The MJCF file, as MuJoCo compiled it, has the stated masses, centres of mass, inertia tensors (turned back into body "
-    "axes, R diag R'), hinge axes, anchors, order and gravity, and nothing that the method does not have: no "
+    "axes, R diag R'), hinge axes, anchors, order, zero and gravity, and nothing that the method does not have: no "
     "armature, friction, springs, limits or further masses, and at random states no force of springs, fluid, tendons, "
     "actuators, constraints or contacts."
 )
 BAR = (
     "64 eps x the largest entry of the quantity (the compiler stores each number once; turning the inertia to its "
     "principal axes and back costs a few roundings; MuJoCo 3.10 turns a fullinertia only to about 1e-8). What must be "
-    "absent must be exactly 0."
+    "absent must be exactly 0. The model is read in the file's own configuration, so that a `ref` is seen as that alone."
+)
+OF_ALL = (
+    "flag gravity",
+    "flag damper",
+    "flag eulerdamp",
+    "gravity",
+    "density",
+    "viscosity",
+    "other mass",
+    "tendon armature",
 )
 UNITS = {
-    "axis": "", "anchor": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m",
-    "stiffness": "N m/rad", "limited": "", "order": "", "mass": "kg", "com": "m", "inertia": "kg m2",
-    "gravcomp": "", "gravity": "m/s2", "other mass": "kg", "tendon armature": "kg m2",
+    "flag gravity": "", "flag damper": "", "flag eulerdamp": "", "order": "", "ref": "rad", "axis": "", "anchor": "m",
+    "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad", "limited": "", "mass": "kg",
+    "com": "m", "inertia": "kg m2", "gravcomp": "", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
+    "other mass": "kg", "tendon armature": "kg m2",
 }  # fmt: skip
+OPTIONS = ("flag gravity", "flag damper", "flag eulerdamp", "order", "ref", "density", "viscosity")  # causes of rank 1
 
 
 def stated(model=tmt.ARM) -> dict:
@@ -32,8 +44,10 @@ def stated(model=tmt.ARM) -> dict:
     anchors = []
     for parent, offset in zip(model.parent, model.offset):
         anchors.append(np.array(offset) + (anchors[parent] if parent >= 0 else 0.0))
-    absent = {"armature": n, "frictionloss": n, "stiffness": n, "limited": n, "gravcomp": m}
+    absent = {"ref": n, "armature": n, "frictionloss": n, "stiffness": n, "limited": n, "gravcomp": m}
+    absent |= dict.fromkeys(("density", "viscosity", "other mass", "tendon armature"), 1)
     return {name: np.zeros(count) for name, count in absent.items()} | {
+        **dict.fromkeys(("flag gravity", "flag damper", "flag eulerdamp"), 1.0),
         "axis": model.axis,
         "anchor": anchors,
         "damping": model.damping,
@@ -42,42 +56,68 @@ def stated(model=tmt.ARM) -> dict:
         "com": model.com,
         "inertia": model.inertia,
         "gravity": model.gravity,
-        "other mass": 0.0,
-        "tendon armature": 0.0,
     }
 
 
 def rows(setup) -> Result:
-    """One row for each number; one check for each quantity of each hinge or body."""
+    """One row for each number; one check for each quantity of each hinge or body; the causes that follow."""
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
     compiled = parameters(setup.engine)
+    expected_of, causes = stated(), []
     owners = {len(tmt.ARM.hinge_names): tmt.ARM.hinge_names, len(tmt.ARM.body_names): tmt.ARM.body_names}
-    for quantity, expected in stated().items():
-        expected, found = np.asarray(expected, dtype=float), np.asarray(compiled[quantity], dtype=float)
-        names = ("world",) if quantity in ("gravity", "other mass", "tendon armature") else owners[len(expected)]
+    for quantity, unit in UNITS.items():
+        expected = np.asarray(expected_of[quantity], dtype=float)
+        found = np.asarray(compiled[quantity], dtype=float)
+        names = ("world",) if quantity in OF_ALL else owners[len(expected)]
         for owner, e, f in zip(names, expected.reshape(len(names), -1), found.reshape(len(names), -1)):
-            result.check(
-                owner, quantity, np.abs(e - f).max(), FACTOR * EPS * np.abs(e).max(), UNITS[quantity], rounding=True
-            )
+            off, tolerance = np.abs(e - f), FACTOR * EPS * np.abs(e).max()
+            result.check(owner, quantity, off.max(), tolerance, unit, rounding=True)
             for k, (a, b) in enumerate(zip(e, f)):
-                result.rows.append(
-                    {
-                        "of": owner,
-                        "quantity": quantity,
-                        "component": component(k, len(e)),
-                        "stated": a,
-                        "compiled": b,
-                        "difference": b - a,
-                        "unit": UNITS[quantity],
-                    }
-                )
+                about = {"of": owner, "quantity": quantity, "component": component(k, len(e))}
+                result.rows.append(about | {"stated": a, "compiled": b, "difference": b - a, "unit": unit})
+            causes += named(owner, quantity, e, f, off, tolerance)
     sample = setup.random
     for source, force in setup.engine.other_forces(sample.q, sample.qd).items():
-        result.check(sample.name, f"forces of {source}", np.abs(force).max(), 0.0, "N m")
+        most = float(np.abs(force).max())
+        check = result.check(sample.name, f"no forces of {source}", most, 0.0, "N m")
+        if not check.passed and not causes:  # nothing read back explains them: they are all there is to say
+            text = f"forces of {source}: none stated, up to {most:.3g} N m found"
+            causes.append(
+                {"rank": 2, "place": f"forces of {source}", "stated": 0.0, "found": most, "text": text, "size": np.inf}
+            )
     for option, value in options(setup.engine).items():
         result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
     result.curves["com"] = compiled["com"]
+    result.curves["causes"] = sorted(causes, key=lambda cause: (cause["rank"], -cause["size"]))
     return result
+
+
+def named(owner, quantity, stated, found, off, tolerance) -> list[dict]:
+    """The causes in one quantity of one hinge or body: each number that is off by more than the tolerance.
+
+    Rank 1: an option, or a convention of a hinge (its order, its sign, its zero); 2: one number.
+    """
+    flipped = quantity == "axis" and bool(np.abs(stated + found).max() <= tolerance)
+    rank = 1 if flipped or quantity in OPTIONS else 2
+    of = "" if owner == "world" else f" of {owner}"
+    causes = []
+    for k, (a, b, difference) in enumerate(zip(stated, found, off)):
+        if not difference <= tolerance:
+            place = " ".join(filter(None, (quantity, component(k, len(stated))))) + of
+            share = difference / tolerance if tolerance else np.inf
+            causes.append(cause(rank, place, a, b, UNITS[quantity], share, " (the opposite sign)" * flipped))
+    return causes
+
+
+def cause(rank, place, stated, found, unit, size, remark="") -> dict:
+    """A cause with its sentence; size: its difference over its tolerance."""
+    if place.startswith("flag "):
+        text = f"{place}: stated {'enable' if stated else 'disable'}, compiled {'enable' if found else 'disable'}"
+    else:
+        values = (f"{number:.7g} {unit}".rstrip() for number in (stated, found))
+        text = "{}: stated {}, compiled {}".format(place, *values) + remark
+    found = float(found) if np.isfinite(found) else None
+    return {"rank": rank, "place": place, "stated": float(stated), "found": found, "text": text, "size": float(size)}
 
 
 def component(k, count) -> str:
@@ -90,4 +130,4 @@ def component(k, count) -> str:
 def figures(result):
     from . import draw  # matplotlib is for the process that draws
 
-    yield draw.sketch()
+    yield draw.sketch

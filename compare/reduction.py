@@ -1,6 +1,7 @@
 """What each scene needs of the model: the fewest hinges, an integrator at all; and what the rest costs."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from . import known_motion, sub_blocks
 from .agreement import Result
 from .band import NARROW, band
 from .clock import fastest
-from .cost import INTEGRATORS, QUICK_ROUNDS, ROUNDS, TIMED, costs
+from .cost import INTEGRATORS, TIMED, costs
 from .engine_file import ModelError
 from .motion import TWINS, farthest, step
 from .scenes import HINGES, SCENES
@@ -36,34 +37,44 @@ BAR = (
 )
 FINER = 16  # times as fine as a scene's own step: runs that are compared, judged at the scene's own
 TIMED_TMT = 1024  # steps of a timed run in tmt
+LEAST = ("zero, free", "elbow swing")  # the scenes of a run without timings
 MOVES = 0.1  # rad: a run without a torque that holds shows nothing if it moves less
 
 
-def rows(setup, scenes=SCENES) -> Result:
-    """Sub-blocks for every subset; for each scene what it needs, runs and times; exact solutions; costs in MuJoCo."""
+def rows(setup, scenes=None, timed=True) -> Result:
+    """Sub-blocks for every subset; for each scene what it needs, runs and times; exact solutions; costs in MuJoCo.
+
+    timed=False: one choice of angles, one scene with a smaller model, and the exact solutions, in a few tenths of a second:
+    enough to see a wrong model.
+    """
     result = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}})
+    scenes = scenes or [scene for scene in SCENES if timed or scene.name in LEAST]
     try:
-        fill(result, setup, scenes)
+        fill(result, setup, scenes, timed)
     except ModelError as error:  # another model, with something that cannot be taken out with its hinge
-        result.check("every subset", f"cannot be locked: {error}", 1.0, 0.0, "models")
+        result.check("every subset", "models whose hinges can be locked", 0, 1, "models", str(error), rule="equal")
     return result
 
 
-def fill(result, setup, scenes) -> None:
+def fill(result, setup, scenes, timed) -> None:
     """All parts of `rows`, one after the other."""
-    quick = setup.is_quick
-    sub_blocks.compare(result, setup.engine, angles=3 if quick else 10)
-    models = [model for scene in scenes for model in of_scene(result, scene, setup.engine)]
+    sub_blocks.compare(result, setup.engine, angles=setup.of(10, 3, 1) if timed else 1)
+    integrators = INTEGRATORS if timed else INTEGRATORS[-1:]
+    models = [model for scene in scenes for model in of_scene(result, scene, setup.engine, integrators)]
     known_motion.swings(result, setup.engine, scenes)
-    known_motion.small_oscillations(result, setup.engine)
-    setup.quiet()
-    timed(result, models, setup.engine, QUICK_ROUNDS if quick else ROUNDS)
-    costs(result, setup)
+    few = () if timed else (known_motion.AMPLITUDES[-2:], known_motion.LESS_FINE)
+    known_motion.small_oscillations(result, setup.engine, *few)
+    if timed:
+        setup.quiet()
+        rounds = setup.of(160, 16, 2)
+        times(result, models, setup.engine, rounds)
+        costs(result, setup.engine, rounds)
 
 
-def of_scene(result, scene, engine) -> list:
+def of_scene(result, scene, engine, integrators=INTEGRATORS) -> list:
     """What the scene needs, in words; runs of it and of a smaller model; the models to be timed, None for none at all."""
-    need, smaller = needed(scene), reduced(scene)
+    need = needed(scene)
+    smaller = reduced(scene, need)
     stays = len(need.stays) == len(scene.hinges)
     models = [(scene.name, dataclasses.replace(scene, locked=()))]
     if smaller or scene.locked or stays:
@@ -71,7 +82,7 @@ def of_scene(result, scene, engine) -> list:
     result.curves["needs"][scene.name] = {"locked": scene.locked, "stays": need.stays}
     result.notes.append(told(scene, need))
     if smaller or stays:
-        for integrator in INTEGRATORS:
+        for integrator in integrators:
             runs(result, scene, smaller, engine, integrator)
     return models
 
@@ -108,29 +119,47 @@ def runs(result, scene, smaller, engine, integrator) -> None:
     references = both(smaller, engine, integrator) if smaller else dict.fromkeys(paths)
     width = band(METHODS[method], scene.model, *np.split(paths["TMT"], 2, axis=1), scene.tau, dt, FINER)
     t = dt * FINER * np.arange(len(width))
-    judged = np.cumsum(~(width[:, :n].max(axis=1) < NARROW)) == 0
-    until, required = float(t[judged][-1]), scene.required(method, dt)
+    until = None
     for party, path in paths.items():
         where = f"{scene.name}, {party}, {integrator}, {step(scene, steps)}"
         reference = np.tile(np.concatenate(scene.start), (steps + 1, 1))
         if smaller:
             free = [scene.hinges.index(name) for name in smaller.hinges]
             reference[:, free + [n + i for i in free]] = references[party]
-            moved = farthest(path[:, :n] - path[0, :n])
-            result.check(where, f"moves less than {MOVES} rad", max(0.0, MOVES - moved), 0.0, "rad missing")
-        apart = np.abs(path - reference)[::FINER][judged]
-        ratio = np.divide(apart, width[judged], out=np.zeros_like(apart), where=width[judged] > 0)
-        k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
-        place, unit = f"{scene.hinges[i % n]} at t = {t[k]:.3f} s", ("rad", "rad/s")[i // n]
-        result.check(where, "smallest model to whole", apart[k, i], width[k, i], unit, place, True)
-        result.check(where, f"judged for less than {required:g} s", max(0.0, required - until), 0.0, "s missing")
-        result.curves["apart"][scene.name, party, integrator] = float(apart[:, :n].max())
+            judge_movement(result, where, path[:, :n])
+        apart = np.abs(path - reference)[::FINER]
+        until = judge_run(result, where, scene.hinges, t, apart, width, scene.required(method, dt))
+        result.curves["apart"][scene.name, party, integrator] = float(apart[t <= until, :n].max())
     if not smaller:
+        moved = {party: result.curves["apart"][scene.name, party, integrator] for party in paths}
+        told = " and ".join(f"that of {party} by {m:.1e} rad" if np.isfinite(m) else f"{party} diverges"
+                            for party, m in moved.items())  # fmt: skip
         result.notes.append(
-            f"{scene.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the arm of TMT "
-            f"moves by {result.curves['apart'][scene.name, 'TMT', integrator]:.1e} rad, that of MuJoCo by "
-            f"{result.curves['apart'][scene.name, 'MuJoCo', integrator]:.1e} rad."
+            f"{scene.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the largest angle "
+            f"moves: {told}."
         )
+
+
+def judge_movement(result, where, q) -> None:
+    """A check: a run without a torque that holds moves. q: (times, n) rad."""
+    result.check(where, "movement", farthest(q - q[0]), MOVES, "rad", rule="at least")
+
+
+def judge_run(result, where, hinges, t, apart, width, required) -> float:
+    """Checks: the runs stay within the band of rounding while it is narrow, and that is long enough; until when, s.
+
+    apart, width: (times, 2 n), rad and rad/s, the distance of the smaller model's run from the whole one's, and the band.
+    """
+    n = len(hinges)
+    judged = np.cumsum(~(width[:, :n].max(axis=1) < NARROW)) == 0
+    apart, width = apart[judged], width[judged]
+    ratio = np.divide(apart, width, out=np.where(apart > 0, np.inf, apart), where=width > 0)
+    k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
+    place, unit = f"{hinges[i % n]} at t = {t[k]:.3f} s", ("rad", "rad/s")[i // n]
+    result.check(where, "smallest model to whole", apart[k, i], width[k, i], unit, place, True)
+    until = float(t[judged][-1])
+    result.check(where, "time judged", until, required, "s", rule="at least")
+    return until
 
 
 def both(scene, engine, integrator) -> dict:
@@ -143,35 +172,40 @@ def both(scene, engine, integrator) -> dict:
     }
 
 
-def timed(result, models, engine, rounds) -> None:
+def times(result, models, engine, rounds) -> None:
     """The table: all models of all scenes, timed in turn, against the whole model of the same scene."""
-    calls, steps = {}, {"TMT": TIMED_TMT, "MuJoCo": TIMED}
+    calls = {}
     for name, scene in models:
         for integrator in INTEGRATORS if scene else ():
             state = *scene.start, scene.tau, scene.duration / scene.steps / FINER
             calls[name, scene.hinges, "TMT", integrator] = tmt_run(scene.model, TWINS[integrator], *state)
             calls[name, scene.hinges, "MuJoCo", integrator] = scene.engine(engine).runner(*state, TIMED, integrator)[1]
-    seconds = {key: taken / steps[key[2]] for key, taken in fastest(calls, rounds).items()}
+    result.rows += table(models, fastest(calls, rounds), result.curves["apart"])
+
+
+def table(models, seconds, apart) -> list[dict]:
+    """The rows: models as (scene's name, Scene or None), seconds of a timed run by (name, hinges, engine, integrator)."""
+    rows, steps = [], {"TMT": TIMED_TMT, "MuJoCo": TIMED}
     for name, scene in models:
         hinges = scene.hinges if scene else ()
         for party in ("TMT", "MuJoCo"):
             for integrator in INTEGRATORS:
                 taken = seconds.get((name, hinges, party, integrator))
                 count = operations(scene.model, TWINS[integrator]) if scene else 0
-                apart = None if hinges == HINGES else result.curves["apart"].get((name, party, integrator))
-                result.rows.append(
+                rows.append(
                     {
                         "scene": name,
                         "hinges": " ".join(hinges) or "none",
                         "engine": party,
                         "nv": len(hinges),
                         "operations": count if party == "TMT" else None,
-                        "ns_per_step": 1e9 * taken if taken else None,
+                        "ns_per_step": 1e9 * taken / steps[party] if taken else None,
                         "speedup": seconds[name, HINGES, party, integrator] / taken if taken else None,
-                        "max_difference_rad": apart,
+                        "max_difference_rad": None if hinges == HINGES else apart.get((name, party, integrator)),
                         "integrator": integrator,
                     }
                 )
+    return rows
 
 
 def tmt_run(model, method, q, qd, tau, dt):
@@ -182,13 +216,14 @@ def tmt_run(model, method, q, qd, tau, dt):
 
 
 def figures(result):
-    """What each scene needs and how fast that is; the exact swing; small oscillations; costs in MuJoCo."""
+    """What each scene needs and how fast that is; the exact swing; small oscillations; costs: calls that draw one figure."""
     from . import draw_reduction  # matplotlib is for the process that draws
 
-    if not result.rows:  # a model that cannot be locked
-        return
-    yield draw_reduction.needs(result)
+    if result.rows:  # none of a model that cannot be locked
+        yield partial(draw_reduction.needs, result)
     for scene in result.curves["swings"]:
-        yield draw_reduction.swing(result, scene)
-    yield draw_reduction.small_oscillations(result)
-    yield draw_reduction.costs(result)
+        yield partial(draw_reduction.swing, result, scene)
+    if "small" in result.curves:
+        yield partial(draw_reduction.small_oscillations, result)
+    if "cost_in_mujoco" in result.tables:
+        yield partial(draw_reduction.costs, result)

@@ -10,8 +10,11 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
-from decimal import Decimal
+from decimal import Decimal, InvalidOperation
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,6 +29,7 @@ TABLE = Path(__file__).with_name("reference.csv")
 RECORDS = 64  # of a run, and its start
 STEPS = {"zero, free": 1024, "ball catch, free": 2048, "bent, free": 512, "bent, damped": 512}
 STATE = [f"{name}_{unit}" for unit in ("rad", "rad_per_s") for name in ("alpha", "beta", "gamma")]
+UNUSABLE = (OSError, RuntimeError, ValueError, csv.Error)  # of a cache folder: none, not the user's own; or of what is in it
 COLUMNS = ["scene", "key", "steps", "halving_difference", "t_s", *STATE]
 
 
@@ -55,14 +59,25 @@ def references(map: Callable = map, tell: Callable = print) -> dict[str, Referen
     rows = read(TABLE)
     missing = [scene for scene in scenes if key(scene) not in rows]
     for scene in missing:
-        with suppress(OSError, RuntimeError):  # no folder, no home: it only costs time
-            rows |= read(kept(scene))
+        with suppress(*UNUSABLE):  # it only costs time
+            found = read(kept(scene)).get(key(scene))
+            if found and begins(found, scene):
+                rows[key(scene)] = found
     missing = [scene for scene in missing if key(scene) not in rows]
     for scene, made in zip(missing, remade(missing, map, tell)):
         rows[key(scene)] = made
-        with suppress(OSError, RuntimeError):
+        with suppress(*UNUSABLE):
             write(kept(scene), made)
     return {scene.name: reference(rows[key(scene)]) for scene in scenes}
+
+
+def begins(rows, scene) -> bool:
+    """Whether a run starts as the scene does, and has its times."""
+    times = np.linspace(0.0, scene.duration, RECORDS + 1)
+    start = [Decimal(rows[0][name]) for name in STATE]
+    return start == [Decimal(v) for v in np.concatenate(scene.start).tolist()] and np.array_equal(
+        [float(row["t_s"]) for row in rows], times
+    )
 
 
 def kept(scene: Scene) -> Path:
@@ -112,19 +127,29 @@ def reference(rows) -> Reference:
 
 
 def read(path) -> dict[str, list[dict]]:
-    """The rows of a table by their key; nothing if it is not there, or is not whole."""
+    """The rows of a table by their key, of each run that is whole and has a finite number wherever one belongs."""
     if not path.exists():
         return {}
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    by_key = {row["key"]: [r for r in rows if r["key"] == row["key"]] for row in rows}
-    return {name: of_key for name, of_key in by_key.items() if len(of_key) == RECORDS + 1}
+    by_key = {row.get("key"): [r for r in rows if r.get("key") == row.get("key")] for row in rows}
+    return {name: of_key for name, of_key in by_key.items() if name and whole(of_key)}
+
+
+def whole(rows) -> bool:
+    """Whether these are the rows of a run: so many, with nothing but finite numbers."""
+    try:
+        numbers = [Decimal(row[name]) for row in rows for name in (*COLUMNS[2:5], *STATE)]
+    except (KeyError, TypeError, InvalidOperation):
+        return False
+    return len(rows) == RECORDS + 1 and all(number.is_finite() for number in numbers)
 
 
 def write(path, rows) -> None:
     """The rows as a table, written aside and moved."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".new", delete=False, newline="") as file:
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    aside = {"dir": path.parent, "suffix": ".new", "delete": False}
+    with tempfile.NamedTemporaryFile("w", newline="", encoding="utf-8", **aside) as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
@@ -134,13 +159,9 @@ def write(path, rows) -> None:
 
 def main() -> None:
     """Remake the committed table."""
-    from .terminal import Terminal
-    from .workers import start_workers
-
-    progress = Terminal(stderr=True)
     scenes = [scene for scene in SCENES if scene.name in STEPS]
-    with start_workers() as workers, progress.status("runs with many digits") as status:
-        tables = remade(scenes, workers.map, status.update)
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        tables = remade(scenes, pool.map, partial(print, file=sys.stderr))
     write(TABLE, [row for rows in tables for row in rows])
     for rows in tables:
         print(f"{rows[0]['scene']}: {rows[0]['steps']} steps, {rows[0]['halving_difference']} from half as many")

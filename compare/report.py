@@ -64,17 +64,23 @@ def commit() -> str | None:
     return told[0] + (" with uncommitted changes" if told[1] else "")
 
 
-def write(folder, sections, origin, result) -> None:
-    """All files of a report, the figures excepted, into a folder that has those."""
+def write(folder, sections, origin, result, causes=()) -> None:
+    """All files of a report, the figures excepted, into a folder that has those; `result`: the verdict in words."""
     (folder / "tables").mkdir()
     for section in sections:
-        for name, rows in {section.name: section.result.rows, **section.result.tables}.items():
+        for name, rows in section.tables.items():
             save(folder / "tables" / f"{name}.csv", plain(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
     checks = [check.record() for section in sections for check in section.result.checks]
-    save(folder / "report.md", markdown(sections, origin, result))
-    save(folder / "index.html", page(folder, sections, origin, result))
+    save(folder / "report.md", markdown(sections, origin, result, causes))
+    save(folder / "index.html", page(folder, sections, origin, result, causes))
     origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
-    results = {"passed": passed(sections), "checks": checks, "provenance": origin}
+    results = {
+        "passed": passed(sections),
+        "checks": checks,
+        "causes": [{name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in causes],
+        "skipped": [],  # every experiment serves this arm
+        "provenance": origin,
+    }
     save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
 
 

@@ -15,6 +15,7 @@ POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "bent": (30, 20, 60),
 }
 HINGES = tmt.ARM.hinge_names
+MOST_STEPS = 10_000_000  # of a run
 
 
 def posture(name) -> np.ndarray:
@@ -40,6 +41,7 @@ class Scene:
     judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along
 
     def __post_init__(self):
+        self.refuse("name", not isinstance(self.name, str) or not self.name.strip(), "a text that is not empty")
         three = f"three numbers, one per hinge ({', '.join(HINGES)})"
         choices = {
             "posture": (tuple(POSTURES), f"{', '.join(POSTURES)} or {three}, in deg"),
@@ -50,20 +52,29 @@ class Scene:
             value = getattr(self, name)
             known = value in words if isinstance(value, str) else finite(value, (3,))
             self.refuse(name, not known, accepted)
+            if not isinstance(value, str):
+                object.__setattr__(self, name, tuple(float(v) for v in value))
         for name in ("duration", "dt"):
             self.refuse(name, not finite(getattr(self, name), ()) or getattr(self, name) <= 0.0, "a time in s above 0")
         self.refuse("damping", not finite(self.damping, ()) or self.damping < 0.0, "at least 0 N m s/rad")
+        self.refuse("gravity", not isinstance(self.gravity, bool | np.bool_), "True, the model's own, or False, none")
+        self.refuse("dt", self.duration / self.dt > MOST_STEPS, f"a step that divides {self.duration:g} s into at most "
+                    f"{MOST_STEPS:,}")  # fmt: skip
         left = abs(self.steps * self.dt - self.duration)
         self.refuse("dt", self.steps < 1 or left > 1e-9 * self.duration, f"a step that divides {self.duration:g} s")
+        judged = self.judged is None or (finite(self.judged, ()) and 0.0 < self.judged <= self.duration)
+        self.refuse("judged", not judged, f"None, or a time in s above 0 and at most {self.duration:g}")
         locked = self.locked
-        wrong = isinstance(locked, str) or not set(locked) <= set(HINGES) or len(set(locked)) >= len(HINGES)
-        self.refuse("locked", wrong, f"a tuple of at most two of {', '.join(HINGES)}")
+        wrong = not isinstance(locked, tuple | list) or not all(name in HINGES for name in locked)
+        self.refuse("locked", wrong or len(set(locked)) >= len(HINGES), f"a tuple of at most two of {', '.join(HINGES)}")
+        object.__setattr__(self, "locked", tuple(locked))
         moving = [name for name, rate in zip(HINGES, self.speed) if rate and name in locked]
         self.refuse("speed", moving, f"no speed of a locked hinge ({', '.join(locked)})")
 
     def refuse(self, name, wrong, accepted):
         if wrong:
-            raise ValueError(f"scene {self.name!r}: {name} is {getattr(self, name)!r}; {accepted} is expected")
+            named, found = (shorten(" ".join(repr(getattr(self, field)).split())) for field in ("name", name))
+            raise ValueError(f"scene {named}: {name} is {found}; {accepted} is expected")
 
     @property
     def steps(self) -> int:
@@ -77,9 +88,9 @@ class Scene:
 
     @property
     def whole(self) -> tmt.Tree:
-        """The arm with the scene's damping and gravity, no hinge locked."""
+        """The arm with the scene's damping added, and without gravity if the scene has none; no hinge locked."""
         gravity = tmt.ARM.gravity if self.gravity else (0.0, 0.0, 0.0)
-        return dataclasses.replace(tmt.ARM, damping=(self.damping,) * 3, gravity=gravity)
+        return dataclasses.replace(tmt.ARM, damping=tuple(d + self.damping for d in tmt.ARM.damping), gravity=gravity)
 
     @property
     def angles(self) -> dict:
@@ -88,12 +99,15 @@ class Scene:
 
     @property
     def model(self) -> tmt.Tree:
-        """The scene's model on the side of TMT: the arm with the scene's damping and gravity, without the locked hinges."""
+        """The scene's model on the side of TMT: the arm with what the scene changes, without the locked hinges."""
         return self.whole.lock(self.angles)
 
     def engine(self, engine):
-        """The scene's model on the side of MuJoCo, from the engine that is held against the arm."""
-        return engine.lock(self.angles).variant(self.whole.gravity, self.damping)
+        """The scene's model on the side of MuJoCo: the engine's own numbers with what the scene changes.
+
+        Gravity and damping of the file stay: a scene that set them would hide what the file says of them.
+        """
+        return engine.lock(self.angles).variant(None if self.gravity else 0.0, self.damping)
 
     @property
     def start(self) -> tuple[np.ndarray, np.ndarray]:
@@ -118,12 +132,17 @@ class Scene:
 
 
 def finite(value, shape) -> bool:
-    """Whether a value is one finite number, or so many."""
+    """Whether a value is one finite real number, or so many; neither text nor true and false."""
     try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
         return False
-    return array.shape == shape and bool(np.isfinite(array).all())
+    return array.shape == shape and array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
+
+
+def shorten(text, length=60) -> str:
+    """A text that may stand in one line."""
+    return text if len(text) <= length else text[: length - 4] + " ..."
 
 
 SCENES = (

@@ -87,9 +87,9 @@ def folded(scene, model, still) -> dict:
     return {name: tape.lift(a).number for name, a in accelerations(scene, model, still, tape.lift, q, qd).items()}
 
 
-def reduced(scene) -> Scene | None:
-    """The same scene with the hinges locked that stay; None if it needs all of them, or none."""
-    stays = needed(scene).stays
+def reduced(scene, need=None) -> Scene | None:
+    """The same scene with the hinges locked that stay; None if it needs all of them, or none. need: what `needed` found."""
+    stays = (need or needed(scene)).stays
     if not stays or len(stays) == len(scene.hinges):
         return None
     return dataclasses.replace(scene, name=f"{scene.name}, {' and '.join(stays)} locked", locked=scene.locked + stays)

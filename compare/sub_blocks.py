@@ -16,44 +16,47 @@ UNITS = {"Mbar": "kg m2", "bias": "N m"}
 
 
 def compare(result, engine, angles) -> None:
-    """A check and a row of a table for each subset, quantity and pair of parties, over random angles and states."""
-    table = result.tables["reduction_subsets"] = []
+    """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
+    result.tables["reduction_subsets"] = []
     rng = np.random.default_rng(SEED)
     for locked in (names for count in range(1, len(HINGES)) for names in combinations(HINGES, count)):
-        found = {}  # (quantity, parties): differences and bars, a pair of arrays for each choice of angles
+        found = {}  # (quantity, parties): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
             q, qd = rng.uniform(-np.pi, np.pi, (STATES, 3)), rng.uniform(-10.0, 10.0, (STATES, 3))
             at = {name: float(q[0, HINGES.index(name)]) for name in locked}
-            for quantity, parties, apart, bar in differences(engine, at, q, qd):
-                found.setdefault((quantity, parties), []).append((apart, bar))
+            for quantity, parties, apart, scale in differences(engine, at, q, qd):
+                found.setdefault((quantity, parties), []).append((apart, scale))
         counts = {
             "operations_whole": operations(tmt.ARM),
             "operations_locked_at_zero": operations(tmt.ARM.lock(dict.fromkeys(locked, 0.0))),
             "operations_locked_at_angles": operations(tmt.ARM.lock(at)),
         }
         for (quantity, parties), pairs in found.items():
-            apart, bar = np.concatenate(pairs, axis=1)
-            worst = int(np.argmax(apart / bar))
-            where = f"{' and '.join(locked)} locked"
-            check = result.check(
-                where, f"{quantity}, {parties}", apart[worst], bar[worst], UNITS[quantity], rounding=True
-            )
-            table.append(
-                {
-                    "locked": " ".join(locked),
-                    "quantity": quantity,
-                    "parties": parties,
-                    "states": len(apart),
-                    "largest_difference": float(apart.max()) if np.isfinite(apart).all() else None,
-                    "unit": UNITS[quantity],
-                    "difference_over_bar": check.over_bar,
-                }
-                | counts
-            )
+            judge(result, locked, quantity, parties, *np.concatenate(pairs, axis=1), counts)
+
+
+def judge(result, locked, quantity, parties, apart, scale, counts) -> None:
+    """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
+    bar = FACTOR * EPS * scale
+    worst = int(np.argmax(np.where(np.isfinite(apart), apart / bar, np.inf)))
+    where = f"{' and '.join(locked)} locked"
+    check = result.check(where, f"{quantity}, {parties}", apart[worst], bar[worst], UNITS[quantity], rounding=True)
+    result.tables["reduction_subsets"].append(
+        {
+            "locked": " ".join(locked),
+            "quantity": quantity,
+            "parties": parties,
+            "states": len(apart),
+            "largest_difference": float(apart.max()) if np.isfinite(apart).all() else None,
+            "unit": UNITS[quantity],
+            "difference_over_bar": check.over_bar,
+        }
+        | counts
+    )
 
 
 def differences(engine, at, q, qd):
-    """(quantity, parties, difference, bar) of the states q, qd with the hinges in `at`, {name: rad}, locked there."""
+    """(quantity, parties, difference, scale) of the states q, qd with the hinges in `at`, {name: rad}, locked there."""
     free = [i for i, name in enumerate(HINGES) if name not in at]
     q, qd = q.copy(), qd.copy()
     for name, angle in at.items():
@@ -76,7 +79,7 @@ def differences(engine, at, q, qd):
             "reduced, TMT to MuJoCo": left[quantity],
         }
         for parties, (one, other) in pairs.items():
-            yield quantity, parties, largest(one - other), FACTOR * EPS * scale
+            yield quantity, parties, largest(one - other), scale
 
 
 @lru_cache

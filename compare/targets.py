@@ -14,7 +14,7 @@ def targets(result, floors, vectors) -> list[dict]:
     """A row for each aim: what is compared, the ratio that was aimed at, the ratio that is reached."""
     ns = {(row["quantity"], row["implementation"], row["states"], row["threads"]): row["ns_per_state"]
           for row in result.tables["evaluations"]}  # fmt: skip
-    most = max(states for _, _, states, _ in ns)
+    most = max((states for _, _, states, _ in ns), default=1)
     wide = next((aim for name, aim in LANES_AIM.items() if name in vectors), 120)
     rows = []
 
@@ -45,3 +45,13 @@ def targets(result, floors, vectors) -> list[dict]:
                 what = f"{scene}, {row['worst_error_rad']:.0e} rad: heyoka's Taylor over tmt's cheapest"
                 add(what, 1, row["seconds"], min(reach, default=None))
     return rows
+
+
+def told(rows) -> list[str]:
+    """How many aims are met and which are missed, in words."""
+    measured = [row for row in rows if row["met"] is not None]
+    missed = [f"{row['what']}: {row['reached']:.3g} of {row['aim']:g}" for row in measured if not row["met"]]
+    text = f"Of {len(measured)} aims for speed {len(measured) - len(missed)} are met"
+    text += f"; missed: {'; '.join(missed)}." if missed else "."
+    unknown = [row["what"] for row in rows if row["met"] is None]
+    return [text + (f" Not measured: {'; '.join(unknown)}." if unknown else "")]

@@ -1,40 +1,58 @@
-"""Five seconds of motion by the same method on both sides: a twin for every integrator of MuJoCo."""
+"""Five seconds of motion by the same scheme on both sides: a method of tmt for every integrator of MuJoCo."""
 
 from functools import partial
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
 import tmt
 from tmt.methods import METHODS
 
-from . import motion
+from . import drift, horizon, motion, told
 from .agreement import Result
 from .band import NARROW, band, slope_rounding, step_rounding
 from .engine import INTEGRATORS
 from .scenes import SCENES
 from .smallest import reduced
 
-TITLE = "Trajectories: a twin for every integrator of MuJoCo"
+TITLE = "Trajectories: the same scheme for every integrator of MuJoCo"
 CLAIM = (
     "For every integrator of MuJoCo the same scheme stands on the TMT side (Euler, implicitfast and discrete are one scheme "
     "here, and give the same bits; implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is the "
-    "assignment's). Twins agree in the derivative at every recorded state, in one step from every recorded state, and in "
+    "assignment's). The two agree in the derivative at every recorded state, in one step from every recorded state, and in "
     "the open-loop run as long as rounding allows. A scene that does not need all hinges (see reduction) runs once more, by RK4, "
     "without those."
 )
+MOVES = 0.1  # rad: a free run that moves less shows nothing
 BAR = (
     "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
     "the sum of the absolute terms of the force, and 8 eps of the sums of the step. Open loop: a band computed along the "
     "run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's own "
-    "steps. Judged at the states of the coarsest step while the band of the angles is below 1e-3 rad and no run has diverged; "
-    "each scene states how long that must be. A free run must move by 0.1 rad, and the parties must not give the same bits. A "
-    "run has diverged if it stops, is not finite, or has gained more energy than its bound: the arm's whole potential range "
-    "and the kinetic energy at the start. Parties that diverge while the band is narrow must do so at the same step."
+    f"steps. Judged at the states of the coarsest step while the band of the angles is below {NARROW:g} rad and no run has "
+    f"diverged; each scene states how long that must be. A free run must move by {MOVES:g} rad. A run has diverged if it stops, "
+    "is not finite, or has gained more energy than the stated arm's whole potential range and the kinetic energy at the start. "
+    "Where one diverges while the band is narrow, the other must do so at the same step."
 )
-MOVES = 0.1  # rad: a free run that moves less shows nothing
 QUICK = ("ball catch, free", "bent, free", "ball catch, held", "bent, held")  # the scenes of a quick run
-EXACT_SCENES = ("bent, free", "ball catch, free")  # held against a run of the same scheme with many digits
+EXACT_SCENES = ("bent, free", "ball catch, free")  # compared with a run of the same scheme with many digits
+FEW = 8  # of its steps, in a small run
+
+
+class Ours(NamedTuple):
+    """What TMT gives of one scene with one method and step; states are recorded at the scene's coarsest steps."""
+
+    t: np.ndarray  # (steps + 1,) s
+    q: np.ndarray  # (steps + 1, n) rad
+    qd: np.ndarray
+    width: np.ndarray  # (recorded, 2n): the band of rounding
+    ended: float | None  # s: when it diverged
+    states: list  # the recorded q and qd before that
+    derivative: np.ndarray  # (states, n) rad/s2
+    derivative_bar: np.ndarray  # (states,)
+    stepped: np.ndarray  # (states, 2n): one step from each
+    step_bar: np.ndarray
+    ulp: np.ndarray  # (steps + 1, n): angles of the run that starts one ulp away
 
 
 def begin(setup) -> None:
@@ -42,13 +60,16 @@ def begin(setup) -> None:
 
     A quick run takes fewer scenes, and leaves out many digits and the growth of errors.
     """
-    quick = setup.is_quick
-    scenes = [scene for scene in SCENES if scene.name in QUICK or not quick]
-    exact = [scene for scene in scenes if scene.name in EXACT_SCENES and not quick]
-    grown = [] if quick else scenes
+    scenes = [scene for scene in SCENES if scene.name in QUICK or not setup.is_quick]
+    names = setup.of(EXACT_SCENES, (), EXACT_SCENES[:1])
+    exact = [scene for scene in scenes if scene.name in names]
+    digits = setup.of(horizon.EXACT_STEPS, 0, FEW)
+    grown = setup.of(scenes, [], scenes)
+    long = setup.of(horizon.LONG, horizon.LONG, horizon.SHORT)
+    curves = setup.map(partial(horizon.grown, duration=long[0], steps=long[1]), grown)
     setup.background["scenes"] = setup.map(partial(follow, engine=setup.engine, steps=setup.steps), scenes)
-    setup.background["exact"] = exact, setup.map(motion.exact_runs, exact)
-    setup.background["growth"] = grown, setup.map(motion.grown, grown)
+    setup.background["exact"] = exact, setup.map(partial(horizon.exact_runs, steps=digits), exact)
+    setup.background["growth"] = grown, curves, *long
 
 
 def rows(setup) -> Result:
@@ -60,95 +81,101 @@ def rows(setup) -> Result:
     if "scenes" not in setup.background:
         begin(setup)
     motion.derivative(result, setup.engine)
-    motion.drift(result, setup.engine)
+    drift.drift(result, setup.engine, setup.of(drift.STEPS, drift.STEPS, drift.FEW_STEPS))
     result.curves["runs"] = {}
     for part in setup.background.pop("scenes"):
         result.rows += part.rows
         result.checks += part.checks
         result.curves["runs"] |= part.curves
-    motion.many_digits(result, setup.engine, *setup.background.pop("exact"))
-    motion.growth_of_errors(result, *setup.background.pop("growth"))
-    result.notes = motion.published_claims(result) + result.notes
+    horizon.many_digits(result, setup.engine, *setup.background.pop("exact"))
+    grown = setup.background.pop("growth")
+    if grown[0]:
+        horizon.growth_of_errors(result, *grown)
+    result.curves["errors"] = motion.held_errors(result) | motion.free_errors(result)
+    result.notes = told.notes(result, setup.engine) + result.notes
     return result
 
 
-def follow(scene, engine, steps) -> Result:
-    """One scene with every twin and step size, and once by RK4 without the hinges that it does not need.
+def follow(scene, engine, steps, known=None) -> Result:
+    """One scene with every scheme and step size, and once by RK4 without the hinges that it does not need.
 
-    steps: the numbers of steps, of a scene of 64; of others as much finer than their own dt.
+    steps: the numbers of steps, of a scene of 64; of others as much finer than their own dt. known: a dict in which TMT's
+    side is kept, for whoever compares it with several engines.
     """
-    result = Result("trajectory")
+    result, known = Result("trajectory"), {} if known is None else known
+    if scene not in known:
+        known[scene] = reduced(scene)
+    runs = [(scene, scene.steps * count // 64, twin, list(of_twin)) for count in steps
+            for twin, of_twin in groupby(INTEGRATORS, motion.TWINS.get)]  # fmt: skip
+    if smaller := known[scene]:
+        runs.append((smaller, smaller.steps, "rk4", ["RK4"]))
+    engines = {each: each.engine(engine) for each in {run[0] for run in runs}}
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
-        for count in steps:
-            for twin, integrators in groupby(INTEGRATORS, motion.TWINS.get):
-                pair(result, scene, scene.engine(engine), scene.steps * count // 64, twin, list(integrators))
-        if smaller := reduced(scene):
-            pair(result, smaller, smaller.engine(engine), smaller.steps, "rk4", ["RK4"])
+        for each, count, twin, integrators in runs:
+            if (each, count, twin) not in known:
+                known[each, count, twin] = ours(each, count, twin)
+            pair(result, each, engines[each], count, twin, integrators, known[each, count, twin])
     return result
 
 
-def pair(result, scene, engine, steps, twin, integrators) -> None:
-    """One method of tmt and the integrators of MuJoCo whose twin it is, from the same start with the same step."""
-    model, tau, dt = scene.model, scene.tau, scene.duration / steps
-    stepping, n = METHODS[twin], len(tau)
-    every = steps // scene.steps
-    t, *ours = tmt.simulate(*scene.start, tau, dt, steps, twin, model)
-    width = band(stepping, model, *ours, tau, dt, every)
-    ours_end = motion.diverged_at(scene, t, *ours)
-    recorded = [path[::every] for path in ours]
-    alive = t[::every] < (np.inf if ours_end is None else ours_end)
-    states = [path[alive] for path in recorded]
-    derivative = tmt.acceleration(*states, tau, model)
-    derivative_bar = slope_rounding(METHODS["rk4"], model, *states, tau, dt)[2]
-    derivative_apart = derivative - engine.acceleration(*states, np.broadcast_to(tau, derivative.shape))
-    stepped = stack(*(path[:, 1] for path in tmt.simulate(*states, tau, dt, 1, twin, model)[1:]))
-    step_bar = step_rounding(stepping, model, *states, tau, dt)
+def ours(scene, steps, twin) -> Ours:
+    """TMT's side of a scene: the run, its band, and the two other levels at its recorded states."""
+    stepping, model, tau, dt, every = METHODS[twin], scene.model, scene.tau, scene.duration / steps, steps // scene.steps
+    t, q, qd = tmt.simulate(*scene.start, tau, dt, steps, twin, model)
+    ended = motion.diverged_at(scene, t, q, qd)
+    alive = t[::every] < (np.inf if ended is None else ended)
+    states = [path[::every][alive] for path in (q, qd)]
+    return Ours(
+        t, q, qd,
+        band(stepping, model, q, qd, tau, dt, every),
+        ended,
+        states,
+        tmt.acceleration(*states, tau, model),
+        slope_rounding(METHODS["rk4"], model, *states, tau, dt)[2],
+        stack(*(path[:, 1] for path in tmt.simulate(*states, tau, dt, 1, twin, model)[1:])),
+        step_rounding(stepping, model, *states, tau, dt),
+        motion.one_ulp(scene, twin, dt, steps),
+    )  # fmt: skip
 
-    first = None
+
+def pair(result, scene, engine, steps, twin, integrators, mine) -> None:
+    """One method of tmt and the integrators of MuJoCo that are the same scheme, from the same start with the same step."""
+    tau, dt, every, n = scene.tau, scene.duration / steps, steps // scene.steps, len(scene.hinges)
+    t, times, first = mine.t, mine.t[::every], None
+    accelerations = engine.acceleration(*mine.states, np.broadcast_to(tau, mine.derivative.shape))
     for integrator in integrators:
         _, *theirs = engine.trajectory(*scene.start, tau, dt, steps, integrator)
-        theirs_end = motion.diverged_at(scene, t, *theirs)
-        ends = [end for end in (ours_end, theirs_end) if end is not None]
-        judged = (width[:, :n].max(axis=1) < NARROW) & (t[::every] < min(ends, default=np.inf))
-        judged = np.cumsum(~judged) == 0
-        until = float(t[::every][judged][-1])
-        required = scene.required(twin, dt)
+        ends = {"TMT": mine.ended, "MuJoCo": motion.diverged_at(scene, t, *theirs)}
+        count = judged(times, mine.width[:, :n].max(axis=1), ends)
         where = f"{scene.name}, {integrator}, {motion.step(scene, steps)}"
-        about = {
-            "scene": scene.name, "engine_integrator": integrator, "twin": twin, "dt_s": dt,
-        }  # fmt: skip
+        until, required = float(times[count - 1]), scene.required(twin, dt)
+        about = {"scene": scene.name, "engine_integrator": integrator, "twin": twin, "dt_s": dt}
         ending = {
-            "judged_until_s": until, "required_s": required, "diverged_at_s": theirs_end, "twin_diverged_at_s": ours_end,
+            "judged_until_s": until, "required_s": required, "diverged_at_s": ends["MuJoCo"],
+            "twin_diverged_at_s": ends["TMT"],
         }  # fmt: skip
-        one = stack(*(path[:, 1] for path in engine.trajectory(*states, tau, dt, 1, integrator)[1:]))
-        apart = stack(*(a[::every][judged] - b[::every][judged] for a, b in zip(ours, theirs)))
-        times = t[::every]
+        one = stack(*(path[:, 1] for path in engine.trajectory(*mine.states, tau, dt, 1, integrator)[1:]))
+        apart = stack(*(a[::every][:count] - b[::every][:count] for a, b in zip((mine.q, mine.qd), theirs)))
+        alive = times[: len(mine.states[0])]
         for name, difference, bar, at in (
-            ("derivative", derivative_apart, derivative_bar[:, None], times[alive]),
-            ("one step", stepped - one, step_bar, times[alive]),
-            ("open loop", apart, width[judged], times[judged]),
+            ("derivative", mine.derivative - accelerations, mine.derivative_bar[:, None], alive),
+            ("one step", mine.stepped - one, mine.step_bar, alive),
+            ("open loop", apart, mine.width[:count], times[:count]),
         ):
             level(result, where, about | {"level": name}, scene.hinges, difference, bar, at, ending)
-
-        result.check(where, f"judged for less than {required:g} s", max(0.0, required - until), 0.0, "s missing")
-        if ends and width[min(int(min(ends) / dt / every), scene.steps), :n].max() < NARROW:
-            apart_steps = abs((ours_end or np.inf) - (theirs_end or np.inf)) / dt
-            result.check(where, "diverged at another step than its twin", round(min(apart_steps, steps)), 0.0, "steps")
+        result.check(where, "time judged", until, required, "s", rule="at least")
+        divergence(result, where, ends, dt, steps, mine.width[:, :n].max(axis=1))
         if scene.torque == "free":
-            moved = min(motion.farthest(path[0] - scene.start[0]) for path in (ours, theirs))
-            result.check(where, f"moves less than {MOVES} rad", max(0.0, MOVES - moved), 0.0, "rad missing")
-            same = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(ours, theirs))
-            result.check(where, "both parties give the same bits", same, 0.0, "runs")
+            movement(result, where, min(motion.farthest(path - scene.start[0]) for path in (mine.q, theirs[0])))
         if first is None:
             first = theirs
             result.curves[(scene.name, twin, steps)] = {
-                "integrator": integrator, "t": t, "every": every, "tmt": ours, "mujoco": theirs, "band": width[:, :n].max(axis=1),
-                "ulp": motion.one_ulp(scene, twin, dt, steps), "judged_until_s": until, "left": {
-                    "TMT": motion.departure(t, ours[0]), "MuJoCo": motion.departure(t, theirs[0])},
+                "integrator": integrator, "t": t, "every": every, "tmt": [mine.q, mine.qd], "mujoco": theirs,
+                "band": mine.width[:, :n].max(axis=1), "ulp": mine.ulp, "judged_until_s": until, "ended": ends,
+                "left": {"TMT": motion.departure(t, mine.q), "MuJoCo": motion.departure(t, theirs[0])},
             }  # fmt: skip
         else:
-            other = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(first, theirs))
-            result.check(where, f"{integrator} and {integrators[0]}: not the same bits", other, 0.0, "arrays")
+            same_bits(result, where, integrators[0], first, theirs)
 
 
 def stack(q, qd) -> np.ndarray:
@@ -156,12 +183,45 @@ def stack(q, qd) -> np.ndarray:
     return np.concatenate([q, qd], axis=-1)
 
 
+# the rules of a run
+
+
+def judged(times, width, ends) -> int:
+    """How many of the recorded states are judged: all before the band is wide or a run has diverged; the start always is."""
+    alive = times < min((end for end in ends.values() if end is not None), default=np.inf)
+    return max(1, int(np.argmin(np.append((width < NARROW) & alive, False))))
+
+
+def divergence(result, where, ends, dt, steps, width) -> None:
+    """Both diverge at the same step, if one does while the band (recorded,) is narrow: then rounding decides nothing."""
+    known = [end for end in ends.values() if end is not None]
+    if not known:
+        return
+    every = steps // (len(width) - 1)
+    if width[int(round(min(known) / dt) / every)] < NARROW:
+        ours, theirs = (steps + 1 if end is None else round(end / dt) for end in (ends["TMT"], ends["MuJoCo"]))
+        note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
+        result.check(where, "step of divergence, MuJoCo's, is TMT's", theirs, ours, "", note, rule="equal")
+
+
+def movement(result, where, moved) -> None:
+    """A free run moves: one that stays shows nothing."""
+    result.check(where, "movement", moved, MOVES, "rad", rule="at least")
+
+
+def same_bits(result, where, integrator, first, other) -> None:
+    """Integrators that are one scheme here give the same bits: q and qd of both."""
+    differ = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(first, other))
+    result.check(where, f"the same bits as {integrator}", differ, 0.0, "arrays that differ", rule="equal")
+
+
 def level(result, where, about, hinges, difference, bar, times, ending) -> None:
-    """A row and a check: the component and state of the recorded ones that come closest to their bar."""
+    """A row and a check: the component and state of the recorded ones that come closest to their tolerance."""
     name, n = about["level"], len(hinges)
     difference = np.abs(difference)
     bar = np.broadcast_to(bar, difference.shape)
-    ratio = np.divide(difference, bar, out=np.zeros_like(difference), where=bar > 0)
+    ratio = np.divide(difference, bar, out=np.where(difference > 0.0, np.inf, 0.0), where=bar > 0)
+    ratio[np.isnan(difference)] = np.nan
     k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
     unit, largest_unit = ("rad/s2",) * 2 if name == "derivative" else (("rad", "rad/s")[i // n], "rad")
     place = f"{hinges[i % n]} at t = {times[k]:.3f} s"
@@ -182,16 +242,16 @@ def level(result, where, about, hinges, difference, bar, times, ending) -> None:
 
 
 def figures(result):
-    """The assignment's Figures 2 and 3, one figure for each scene, and the growth of errors."""
+    """The assignment's Figures 2 and 3, one figure for each scene, drift, and the growth of errors."""
     from . import draw_motion  # matplotlib is for the processes that draw
 
-    yield draw_motion.held(result, "ball catch, held", "assignment_figure_2")
-    yield draw_motion.held(result, "bent, held", "assignment_figure_3")
+    yield partial(draw_motion.held, result, "ball catch, held", "assignment_figure_2")
+    yield partial(draw_motion.held, result, "bent, held", "assignment_figure_3")
     names = {name for name, *_ in result.curves["runs"]}
-    quick = len(names) < len(SCENES)  # then the held scenes are in the two figures above
+    grown = "growth" in result.curves  # else the held scenes are in the two figures above
     for scene in SCENES:
-        if scene.name in names and not (quick and scene.torque == "hold"):
-            yield draw_motion.run(result, scene)
-    yield draw_motion.drift(result)
-    if not quick:
-        yield draw_motion.growth(result)
+        if scene.name in names and (grown or scene.torque != "hold"):
+            yield partial(draw_motion.run, result, scene)
+    yield partial(draw_motion.drift, result)
+    if grown:
+        yield partial(draw_motion.growth, result)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import stat
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from trees import random_tree
 
 import tmt
 from compare.agreement import EPS, FACTOR, bias_scale
-from tmt import cache, kernels, method
+from tmt import kernels, method
 from tmt.methods import METHODS, one_step
 from tmt.trace import Tape
 
@@ -60,50 +59,3 @@ def test_compiled_loop_is_the_step_in_python(rng, name):
     for k in range(1, 6):
         state = one_step(METHODS[name], model, *state, tau.tolist(), 0.01)
         assert np.allclose(state, [path_q[k], path_qd[k]], rtol=0, atol=1e-12)
-
-
-def test_generated_code_goes_to_the_cache_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("TMT_CACHE", str(tmp_path / "new" / "cache"))
-    assert cache.load("kept = CACHE\n").kept is True
-    (file,) = (tmp_path / "new" / "cache").glob("kernel_*.py")
-    assert file.read_text() == "kept = True\n"
-
-
-def test_a_damaged_cache_file_is_written_anew(tmp_path, monkeypatch):
-    monkeypatch.setenv("TMT_CACHE", str(tmp_path))
-    assert cache.load("value = 1\n").value == 1
-    (file,) = tmp_path.glob("kernel_*.py")
-    file.write_text("value = 2\n")
-    assert cache.load("value = 1\n").value == 1
-
-
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-def test_damaged_machine_code_is_compiled_anew(tmp_path, monkeypatch, suffix):
-    monkeypatch.setenv("TMT_CACHE", str(tmp_path))
-    text = 'from numba import njit\n\n@njit("float64(float64)", cache=CACHE)\ndef f(x):\n    return 2.0 * x\n'
-    assert cache.load(text).f(1.5) == 3.0
-    damaged = list(tmp_path.glob(f"__pycache__/*.{suffix}"))
-    assert damaged
-    for file in damaged:
-        file.write_bytes(b"junk")
-    assert cache.load(text).f(1.5) == 3.0
-    assert cache.load(text).f(2.5) == 5.0
-    assert all(file.read_bytes() != b"junk" for file in damaged)
-
-
-def test_an_empty_setting_is_no_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("TMT_CACHE", "")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cache.cache_folder() == tmp_path / "tmt"
-
-
-def test_a_folder_that_cannot_be_written_only_costs_time(tmp_path, monkeypatch):
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    monkeypatch.setenv("TMT_CACHE", str(blocked / "cache"))
-    assert cache.load("value = CACHE\n").value is False
-    read_only = tmp_path / "read_only"
-    read_only.mkdir()
-    read_only.chmod(stat.S_IRUSR | stat.S_IXUSR)
-    monkeypatch.setenv("TMT_CACHE", str(read_only))
-    assert cache.load("value = 3\n").value == 3

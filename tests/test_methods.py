@@ -8,6 +8,7 @@ import pytest
 
 import tmt
 from compare.band import band
+from tmt import kernels
 from tmt.implicit import ImplicitRungeKutta
 from tmt.methods import METHODS, AdaptiveRungeKutta, RungeKutta, amplification, one_step
 
@@ -149,6 +150,35 @@ def test_amplification_is_what_a_step_does_to_a_small_deviation(name, rng):
         ]
         assert np.abs((ends[0] - ends[1]) / 2e-5 - column).max() < 1e-7
     assert np.array_equal(amplification(METHODS[name], tmt.ARM, np.stack([q, -q]), qd, tau, 0.1)[0], J)
+
+
+IMPLICIT = [name for name, stepping in METHODS.items() if isinstance(stepping, ImplicitRungeKutta)]
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+@pytest.mark.parametrize("dt", [1.0, 10.0])
+def test_newton_finds_the_stages_of_a_held_arm_at_large_steps(name, dt):
+    q, qd = (path[-1] for path in tmt.simulate(BENT + 0.1, REST, tmt.gravity_balance(BENT), dt, 500, name)[1:])
+    assert np.isfinite([q, qd]).all() and np.abs(q - BENT).max() < 2.0
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_every_evaluation_of_an_implicit_method_is_counted(name):
+    counted, stepping, state = 0, METHODS[name], (BENT.tolist(), [1.0, 2.0, 3.0])
+
+    def slope(q, qd):
+        nonlocal counted
+        counted += all(isinstance(x, float) for x in (*q, *qd))  # else for the Jacobian, which belongs to an evaluation
+        return stepping.slope(tmt.ARM, q, qd, [0.0] * 3, 0.1)
+
+    for _ in range(4):
+        state = stepping.step(slope, *state, 0.1)
+    path = np.full((2, 1, 5, 3), np.nan)
+    path[:, 0, 0] = BENT, [1.0, 2.0, 3.0]
+    evaluations = kernels.stepper(tmt.ARM, name)(*path, np.zeros((1, 3)), 0.1)
+    assert np.allclose(path[:, 0, -1], state, rtol=0, atol=1e-12)
+    # over any scalar the stages are found once more, for the sake of their derivatives
+    assert evaluations == counted - 4 * len(stepping.b)
 
 
 def test_where_newton_fails_the_run_is_nan_and_the_step_says_so():

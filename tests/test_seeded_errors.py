@@ -138,7 +138,7 @@ def test_error_in_the_method(old, new, expected, engine):
 
 @dataclasses.dataclass(frozen=True)
 class Altered(SemiImplicitEuler):
-    """A wrong twin: damping explicit, or the derivative of the bias dropped."""
+    """A wrong scheme: damping explicit, or the derivative of the bias dropped."""
 
     drop: str = ""
 
@@ -151,7 +151,7 @@ class Altered(SemiImplicitEuler):
 
 @dataclasses.dataclass(frozen=True)
 class Hasty(RungeKutta):
-    """A wrong twin: its step is a little too long."""
+    """A wrong scheme: its step is a little too long."""
 
     def step(self, slope, q, qd, dt):
         return RungeKutta.step(self, slope, q, qd, dt * (1.0 + 1e6 * EPS))

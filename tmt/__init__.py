@@ -2,32 +2,34 @@
 
 Stands alone: needs NumPy, mpmath and (for `simulate`) numba, and knows nothing of any physics engine.
 Every function takes states of any leading batch shape, a further argument `model` for another Tree than
-the assignment's arm, and raises ValueError for wrong shapes, values that are not finite and unknown names.
+the assignment's arm, and raises ValueError for wrong shapes, values that are not finite, unknown names, a singular Mbar
+and results beyond the largest double.
 
 Units: rad, s, kg, m, N m, J. Frames: inertial frame at the shoulder, x north, y west, z up; "body axes"
 are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd, with h = `bias` (MuJoCo's
 qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that holds the arm at rest.
 """
 
-import math
-import numbers
-import reprlib
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import method as _method
+from . import singular as _singular
 from .arm import ARM
-from .implicit import ImplicitRungeKutta
-from .methods import METHODS, AdaptiveRungeKutta
+from .given import quantity as _quantity
+from .given import states as _states
+from .methods import METHODS
+from .simulation import Motion, simulate
+from .space import solve as _solve
 from .tree import Tree
 
 __all__ = [
-    "ARM", "METHODS", "Tree", "acceleration", "angular_velocities", "bias", "com_positions", "convective_terms",
+    "ARM", "METHODS", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions", "convective_terms",
     "energy", "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "simulate",
 ]  # fmt: skip
 
 
+@_quantity
 def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Positions x_b of the centres of mass in the inertial frame, m, shape (..., m, 3).
 
@@ -37,6 +39,7 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     return _gather((list(b.x) for b in _method.bodies(model, q)), q[0].shape)
 
 
+@_quantity
 def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Angular velocities omega_b = B_b qd in body axes, rad/s, shape (..., m, 3).
 
@@ -46,6 +49,7 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
     return _gather((list(b.omega) for b in _method.bodies(model, q, qd)), q[0].shape)
 
 
+@_quantity
 def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, n).
 
@@ -57,6 +61,7 @@ def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     return _gather((zip(*b.T) for b in parts), shape), _gather((zip(*b.B) for b in parts), shape)
 
 
+@_quantity
 def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """v_conv = d(T_b qd)/dq qd, m/s2, inertial frame, and w_conv = d(B_b qd)/dq qd, rad/s2, body axes.
 
@@ -69,6 +74,7 @@ def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np
     return _gather((list(b.v_conv) for b in parts), shape), _gather((list(b.w_conv) for b in parts), shape)
 
 
+@_quantity
 def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, shape (..., n, n), symmetric positive definite.
 
@@ -78,6 +84,7 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.mass_matrix(_method.bodies(model, q)), q[0].shape)
 
 
+@_quantity
 def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Bias h = Coriolis, centrifugal and gravity terms, N m, shape (..., n): Mbar qdd + h = tau - D qd.
 
@@ -88,6 +95,7 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.bias(_method.bodies(model, q, qd), model.gravity), q[0].shape)
 
 
+@_quantity
 def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque +dV/dq that holds the model at rest, N m, shape (..., n).
 
@@ -97,15 +105,23 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.bias(_method.bodies(model, q), model.gravity), q[0].shape)
 
 
+@_quantity
 def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Hinge accelerations qdd from Mbar qdd = tau - D qd - h, rad/s2, shape (..., n).
 
     q, qd, tau: hinge angles, rates and torques (..., n), rad, rad/s, N m. Assignment, parts e and f.
     """
     q, qd, tau = _states(model, q=q, qd=qd, tau=tau)
-    return _gather(_method.acceleration(model, q, qd, tau), q[0].shape)
+    M, h = _method.mass_matrix_and_bias(model, q, qd)
+    if not model.never_singular:
+        angles, n = _gather(q, q[0].shape).reshape(-1, len(q)), len(q)
+        if found := _singular.first(model, angles, _gather(M, q[0].shape).reshape(-1, n, n)):
+            at = ", ".join(f"{angle:.6g}" for angle in angles[found[0]])
+            raise ValueError(f"Mbar is singular at q = ({at}) rad: {found[1]}")
+    return _gather(_solve(M, _method.reduced_force(model, h, qd, tau)), q[0].shape)
 
 
+@_quantity
 def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin.
 
@@ -115,107 +131,32 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     return _gather(_method.potential(_method.bodies(model, q), model.gravity), q[0].shape)
 
 
+@_quantity
 def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Total energy, kinetic and potential, J, shape (...).
+    """Total energy, kinetic and potential, J, shape (...); infinite where it is beyond the largest double.
 
     q, qd: hinge angles and rates (..., n), rad and rad/s. Its zero is that of `potential_energy`.
     """
     q, qd = _states(model, q=q, qd=qd)
     parts = _method.bodies(model, q, qd)
-    return _gather(_method.potential(parts, model.gravity) + _method.kinetic(parts, qd), q[0].shape)
+    total = _method.potential(parts, model.gravity) + _method.kinetic(parts, qd)
+    return _gather(total, q[0].shape, overflow=np.inf)
 
 
-def simulate(
-    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
-    tolerance: float | None = None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """Motion under constant torque: t (steps+1,) s, q and qd (..., steps+1, n), rad and rad/s.
+def _gather(nested, batch, overflow=None) -> np.ndarray:
+    """Nested iterables of scalars, each of the batch shape or constant, as one array with that shape in front.
 
-    q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1; method: a key of
-    METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units
-    of 1 + |value|. States after a run has left the finite numbers, or has turned by 2^49 rad, are NaN, and so are those
-    after Newton's method has failed in an implicit one (its `step` then raises ArithmeticError). Assignment, part i.
+    overflow: what stands for what is not finite, since all that was given is; None: it is a ValueError.
     """
-    if not isinstance(method, str) or method not in METHODS:
-        raise ValueError(f"unknown method {method!r}; known are {', '.join(METHODS)}")
-    if not isinstance(steps, numbers.Integral) or isinstance(steps, bool) or steps < 1:
-        raise ValueError(f"steps is {steps!r}; a whole number of at least 1 is expected")
-    steps, dt = int(steps), _positive("dt", dt, "a step in s")
-    adaptive = isinstance(METHODS[method], AdaptiveRungeKutta)
-    if tolerance is not None and not adaptive:
-        raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
-    q, qd, tau = (np.stack(state, axis=-1) for state in _states(model, q=q, qd=qd, tau=tau))
-    batch, n = q.shape[:-1], q.shape[-1]
-    runs = q.size // n
-    path_q, path_qd = np.full((2, runs, steps + 1, n), np.nan)
-    path_q[:, 0], path_qd[:, 0] = q.reshape(-1, n), qd.reshape(-1, n)
-    paths = path_q, path_qd, np.ascontiguousarray(tau.reshape(-1, n))
-
-    from . import kernels  # here, so that `import tmt` need not wait for numba
-
-    if adaptive:
-        tolerance = 1e-9 if tolerance is None else _positive("tolerance", tolerance, "a number")
-        kernels.stepper(model, method)(*paths, dt, tolerance)
-    else:
-        worth = (
-            runs * steps >= kernels.WORTH
-            and n <= kernels.TRACED
-            and not isinstance(METHODS[method], ImplicitRungeKutta)
-        )
-        in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
-        if in_lanes:
-            kernels.lane_stepper(model, method)(*(array[:in_lanes] for array in paths), dt)
-        kernels.stepper(model, method)(*(array[in_lanes:] for array in paths), dt)
-    return dt * np.arange(steps + 1), path_q.reshape(*batch, steps + 1, n), path_qd.reshape(*batch, steps + 1, n)
-
-
-def _positive(name, value, kind) -> float:
-    """The value as a finite float above 0."""
-    try:
-        number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
-    except OverflowError:
-        number = math.inf
-    if not 0.0 < number < math.inf:
-        raise ValueError(f"{name} is {reprlib.repr(value)}; {kind} above 0 is expected")
-    return number
-
-
-def _states(model, **arrays):
-    """Each array as n scalars of one batch shape, after a check of type, shape and values."""
-    if not isinstance(model, Tree):
-        raise ValueError(f"model is {model!r}; a tmt.Tree is expected")
-    n = len(model.hinge_names)
-    checked = []
-    for name, values in arrays.items():
-        try:
-            array = np.asarray(values)
-            if array.dtype.kind not in "fiu":
-                raise TypeError
-            array = array.astype(float)
-        except (TypeError, ValueError):
-            raise ValueError(
-                f"{name} is {' '.join(reprlib.repr(values).split())}; real numbers of shape (..., {n}) are expected"
-            ) from None
-        if array.ndim == 0 or array.shape[-1] != n:
-            hinges = ", ".join(model.hinge_names)
-            raise ValueError(f"{name} has shape {array.shape}; (..., {n}) is expected, one number per hinge ({hinges})")
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
-        checked.append(array)
-    try:
-        checked = np.broadcast_arrays(*checked)
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(arrays, checked))
-        raise ValueError(f"the batch shapes do not fit together: {shapes}") from None
-    return [[array[..., i] for i in range(n)] for array in checked]
-
-
-def _gather(nested, batch) -> np.ndarray:
-    """Nested iterables of scalars, each of the batch shape or constant, as one array with that shape in front."""
 
     def lists(item):
         return [lists(i) for i in item] if not isinstance(item, (float, np.ndarray)) else np.broadcast_to(item, batch)
 
     array = np.array(lists(nested), dtype=float)
+    finite = np.isfinite(array)
+    if not finite.all():
+        if overflow is None:
+            raise ValueError("the result is beyond the largest double; smaller numbers in the state or model are expected")
+        array = np.where(finite, array, overflow)
     own = array.ndim - len(batch)
     return np.moveaxis(array, range(own), range(-own, 0)).copy()

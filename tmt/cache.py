@@ -1,20 +1,31 @@
 """Generated code on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
 A module's name is the hash of its text, of the compiled code that it takes from `sine`, and of numba's version; numba keeps
-the machine code beside it. Where that folder cannot be written the code is compiled anew in each process: it only costs time.
+the machine code beside it. What lies there is run, so the folder must be the user's own: others may neither write to it nor
+put another in its place. Without such a folder the code is compiled anew in each process: it only costs time.
 """
 
 import hashlib
-import importlib.util
 import linecache
+import logging
 import os
+import stat
 import sys
 import tempfile
+import time
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
 SINE = Path(__file__).with_name("sine.py")  # by its path: importing it would load numba
+LEFT_OVER = ("*.new", "__pycache__/*.tmp.*")  # written aside and never moved, by us and by numba
+ABANDONED = 3600.0  # s: a file takes milliseconds to write, but the clocks of a shared disk differ
+complaints = []  # about the folder, of this process
+
+
+class NotOwn(OSError):
+    """What lies there can be written by others, or belongs to somebody else."""
 
 
 def cache_folder() -> Path:
@@ -24,40 +35,114 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tmt"
 
 
-def load(text):
-    """The module with this source, from the cache folder if that can be used, else from memory.
+def own_folder(folder: Path | None = None) -> Path:
+    """The cache folder (or another), its links resolved, made if it is not there; NotOwn unless it is the user's own."""
+    folder = Path(os.path.realpath(folder or cache_folder()))
+    for path in (*reversed(folder.parents), folder):
+        if not path.exists():
+            path.mkdir(mode=0o700, exist_ok=True)
+        # in a folder like /tmp everybody makes entries, but moves only his own
+        check_own(path, on_the_way=path != folder)
+    return folder
 
-    numba unpickles what it finds there: the folder must be the user's own.
+
+def own_file(name: str) -> Path:
+    """The path of a file in the cache folder, which need not be there; NotOwn unless folder and file are the user's own."""
+    path = own_folder() / name
+    if os.path.lexists(path):
+        check_own(path)
+    return path
+
+
+def check_own(path, on_the_way=False, shut=False) -> None:
+    """Raise NotOwn if a file or folder belongs to somebody else or others can write to it.
+
+    on_the_way: a parent folder; it may be root's, and in it others may make entries of their own (as in /tmp).
+    shut: it lies in a folder that nobody else can enter, so that its own bits do not matter.
     """
+    if os.name != "posix":
+        return  # elsewhere these bits say nothing
+    about = os.lstat(path)
+    if about.st_uid != os.geteuid() and not (on_the_way and about.st_uid == 0):
+        raise NotOwn(f"{path} belongs to user {about.st_uid}")
+    if stat.S_ISLNK(about.st_mode):
+        raise NotOwn(f"{path} is a link")
+    # the group's bit counts: it is also what further access rights show as
+    if about.st_mode & 0o022 and not (shut or (on_the_way and about.st_mode & stat.S_ISVTX)):
+        raise NotOwn(f"{path} can be written by others (mode {stat.S_IMODE(about.st_mode):04o})")
+
+
+def load(text):
+    """The module with this source, its machine code from the cache folder if that is the user's own and can be used."""
     # numba versions do not read each other's machine code: each keeps its own
     key = "\n".join([version("numba"), SINE.read_text(encoding="utf-8"), text])
     name = "kernel_" + hashlib.sha256(key.encode()).hexdigest()[:16]
     try:
-        return from_disk(name, text.replace("CACHE", "True"), cache_folder())
+        return from_disk(name, text.replace("CACHE", "True"), own_folder())
+    except NotOwn as error:
+        complain(error)
     except Exception:  # whatever is wrong with the folder or with a file in it: compile without them
-        module = ModuleType(name)
-        text = text.replace("CACHE", "False")
-        linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
-        exec(compile(text, name, "exec"), module.__dict__)
-        return module
+        pass
+    text = text.replace("CACHE", "False")
+    linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
+    return executed(name, text, name)
+
+
+def complain(error) -> None:
+    """Say once in a process why the folder is not used; on stderr, unless logging is set up otherwise."""
+    if not complaints:
+        complaints.append(error)
+        logging.getLogger("tmt").warning(
+            "%s: nothing there is run, code is compiled in memory; remove it, or set TMT_CACHE to a folder of your own",
+            error,
+        )
 
 
 def from_disk(name, text, folder):
-    """The module from its file in the folder, written if it is not there; a damaged cache is cleared away."""
-    path = folder / f"{name}.py"
-    if not path.exists() or path.read_text() != text:
-        folder.mkdir(parents=True, exist_ok=True)
+    """The module, with its machine code from the folder, written if it is not there; what is damaged is cleared away."""
+    from numba import config  # here, so that `import tmt` need not wait for numba
+
+    config.reload_config()  # it is read when something is compiled: too late
+    if config.CACHE_DIR:  # $NUMBA_CACHE_DIR: numba takes that one instead
+        own_folder(Path(config.CACHE_DIR))
+    path, inside = folder / f"{name}.py", folder / "__pycache__"
+    inside.mkdir(mode=0o700, exist_ok=True)
+    check_own(inside)
+    if not os.access(inside, os.W_OK):  # numba would look in another folder, of its own choice
+        raise PermissionError(f"{inside} cannot be written")
+    shut = not inside.stat().st_mode & 0o077
+    for file in (path, *inside.glob(f"{name}.*")):
+        if os.path.lexists(file):
+            check_own(file, shut=shut and file != path)
+    if os.name == "posix" and not shut:
+        inside.chmod(0o700)  # numba's files get the usual rights, with which the group may be allowed to write
+    if not path.exists() or path.read_bytes() != text.encode():
+        clear(folder)
         # written aside and moved, so that a process that reads meanwhile sees all of it or nothing
-        with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".new", delete=False) as file:
-            file.write(text)
+        with tempfile.NamedTemporaryFile("wb", dir=folder, suffix=".new", delete=False) as file:
+            file.write(text.encode())
         os.replace(file.name, path)
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # numba looks it up there when it reads machine code back
     try:
-        spec.loader.exec_module(module)
+        return executed(name, text, str(path))
     except Exception:
-        for file in folder.glob(f"__pycache__/{name}.*"):
+        for file in inside.glob(f"{name}.*"):
             file.unlink()
         raise
+
+
+def executed(name, text, path):
+    """The module with this source, which numba believes to be in that file: it looks for machine code beside it."""
+    module = ModuleType(name)
+    module.__file__ = path
+    sys.modules[name] = module  # numba looks it up there when it reads machine code back
+    exec(compile(text, path, "exec"), module.__dict__)
     return module
+
+
+def clear(folder) -> None:
+    """Remove what writers that were killed have left."""
+    for pattern in LEFT_OVER:
+        for file in folder.glob(pattern):
+            with suppress(OSError):
+                if time.time() - file.lstat().st_mtime > ABANDONED:
+                    file.unlink()

@@ -52,7 +52,7 @@ def compiled():
 
 
 def stepper(tree, stepping) -> Callable:
-    """run(q, qd, tau, dt) of a Tree and a RungeKutta, as in kernels.stepper."""
+    """run(q, qd, tau, dt, ended) of a Tree and a RungeKutta, as in kernels.stepper."""
     stages = len(stepping.b)
     A = np.array([[*row, *[0.0] * (stages - len(row))] for row in stepping.A])
     return partial(compiled().run_tableau, arrays(tree), A, np.array(stepping.b))

@@ -1,7 +1,8 @@
 """Implicit Runge-Kutta methods: their stages solve an equation, by Newton's method with exact Jacobians.
 
 The unknowns are the accelerations a_i of the stages, a_i = qdd(q_i, qd_i), at
-q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j.
+q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. Newton's method starts from the a_i that
+the equations linearised at (q, qd) have.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from .dual import Dual, jacobian
 from .method import acceleration, mass_matrix_and_bias
 from .space import solve_any
 from .trace import Tape
+from .tree import shown
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
@@ -19,7 +21,7 @@ CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size:
 STEP = '''
 def step({state}, {torque}, dt):
     """The state one dt later and how often Newton's method was applied; NaN where it does not find the stages."""
-    {unknown}, = ({zeros},)
+    {unknown}, = start({state}, {torque}, dt)
     for used in range(1, {iterations} + 1):
         {change}, = newton({state}, {torque}, dt, {unknown})
         {update}
@@ -46,6 +48,7 @@ class ImplicitRungeKutta:
     c: tuple  # the time of each stage in units of dt
 
     def __post_init__(self):
+        as_tuples(self, "A", "b", "c")
         stages = len(self.b)
         if not len(self.A) == stages == len(self.c) or any(len(row) != stages for row in self.A):
             raise ValueError("A must be square, and b and c must have one entry for each of its rows")
@@ -70,7 +73,7 @@ class ImplicitRungeKutta:
             rows = jacobian(lambda x: slope(x[:n], x[n:]), [*q, *qd])
             return slope(q, qd), [row[:n] for row in rows], [row[n:] for row in rows]
 
-        a, last = [0.0] * (n * len(self.b)), False
+        a, last = self.start(evaluate, q, qd, dt), False
         for _ in range(ITERATIONS):
             change = self.newton(evaluate, q, qd, dt, a)
             a = [old + new for old, new in zip(a, change)]
@@ -88,6 +91,21 @@ class ImplicitRungeKutta:
                 [q[k] + dt * (self.c[i] * qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
                 [qd[k] + dt * weighted(self.A[i], a[k::n]) for k in range(n)],
             )
+
+    def start(self, evaluate, q, qd, dt):
+        """The accelerations of the stages from which Newton's method starts: exact if the equations were linear.
+
+        They take one evaluation, at (q, qd). The acceleration there would be a start too, but with a large step the stages of
+        a stiff motion are far from it.
+        """
+        f, by_q, by_qd = evaluate(q, qd)
+
+        def linear(q_i, qd_i):
+            off, faster = [x - y for x, y in zip(q_i, q)], [x - y for x, y in zip(qd_i, qd)]
+            changes = [weighted(by_q[k], off) + weighted(by_qd[k], faster) for k in range(len(q))]
+            return [value + change for value, change in zip(f, changes)], by_q, by_qd
+
+        return self.newton(linear, q, qd, dt, [0.0] * (len(q) * len(self.b)))
 
     def newton(self, evaluate, q, qd, dt, a):
         """The change of the accelerations a by one step of Newton's method.
@@ -116,6 +134,16 @@ class ImplicitRungeKutta:
             [q[k] + dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
             [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)],
         )
+
+
+def as_tuples(method, *names) -> None:
+    """Make the parts of a tableau nested tuples of float: a method is a value, and a key of what is compiled for it."""
+    for name in names:
+        try:
+            rows = [tuple(map(float, row)) if np.iterable(row) else float(row) for row in getattr(method, name)]
+        except (TypeError, ValueError):
+            raise ValueError(f"{name} of the method is {shown(getattr(method, name))}; numbers are expected") from None
+        object.__setattr__(method, name, tuple(rows))
 
 
 def weighted(weights, values):
@@ -161,6 +189,8 @@ def step_source(tree, stepping, terms) -> str:
 
     change = stepping.newton(called, q, qd, dt, a)
     functions.append(tape.function("newton", [*q, *qd, *tau, dt, *a], change))
+    tape, q, qd, tau, dt, _ = fresh()
+    functions.append(tape.function("start", [*q, *qd, *tau, dt], stepping.start(called, q, qd, dt)))
     tape, q, qd, tau, dt, a = fresh()
     new_q, new_qd = stepping.finish(q, qd, dt, a)
     functions.append(tape.function("finish", [*q, *qd, dt, *a], [*new_q, *new_qd]))
@@ -174,7 +204,6 @@ def step_source(tree, stepping, terms) -> str:
         state=", ".join([list_of("q{i}", n), list_of("qd{i}", n)]),
         torque=list_of("tau{i}", n),
         unknown=list_of("a{i}"),
-        zeros=list_of("0.0"),
         iterations=ITERATIONS,
         change=list_of("d{i}"),
         update="; ".join(f"a{i} += d{i}" for i in range(count)),

@@ -4,66 +4,111 @@ Traced is the composite form of the dynamics, with a sine of our own. One trace 
 LANES states side by side, which the compiler turns into SIMD instructions. Both give the same bits.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
 from . import composite
 from .cache import load
+from .calls import Evaluator, checked_evaluator, checked_run
+from .given import checked_model
 from .implicit import ImplicitRungeKutta, step_source
 from .method import acceleration
-from .methods import METHODS, AdaptiveRungeKutta, RungeKutta
-from .templates import ADAPTIVE, EVALUATE, HEADER, RATE, RUN, RUN_LANES, SLOPES, STAGE
+from .methods import AdaptiveRungeKutta, RungeKutta, method_named
+from .templates import ADAPTIVE, CHECK, EVALUATE, HEADER, NEWTON, OVERFLOW, RATE, RUN, RUN_LANES, SLOPES, SMALL, STAGE, TURNED
 from .trace import Code, Tape
+from .tree import Tree, shown
 
 LANES = 32  # states in a block
 TRACED = 12  # hinges up to which straight-line code is worth its compilation
+QUANTITIES, SINES = ("forward_dynamics", "mass_matrix_and_bias"), ("sincos", "library_sincos")
 WORTH = 10_000_000  # steps of all runs together from which lanes are worth their compilation
 
 
-@lru_cache(maxsize=64)
-def stepper(tree, method_name):
-    """Compiled `run(q, qd, tau, dt)` of a Tree and one of METHODS, for arrays of shape (batch, ...).
+def stepper(tree: Tree, method_name: str) -> Callable:
+    """Compiled `run(q, qd, tau, dt)` of a Tree and one of METHODS: fills the paths q and qd from their first states.
 
-    It returns how often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes
-    its tolerance too: `run(q, qd, tau, dt, tolerance)`.
+    q, qd: (runs, steps + 1, n), of which [:, 0] is given; tau (runs, n); all contiguous, float64; rad, s, N m. It returns how
+    often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its tolerance too:
+    `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is told why each run ended, see templates.
     For many hinges an explicit method of fixed step takes the generic loop, which needs no compilation.
     """
-    if len(tree.parent) > TRACED and type(METHODS[method_name]) is RungeKutta:
+    checked_model(tree)
+    stepping = method_named(method_name)
+    return _stepper(tree, stepping, len(tree.parent) > TRACED and type(stepping) is RungeKutta)
+
+
+@lru_cache(maxsize=64)
+def _stepper(tree, stepping, large):
+    if large:
         from . import generic  # here, because it is compiled when it is imported for the first time
 
-        return generic.stepper(tree, METHODS[method_name])
-    return load(source(tree, method_name)).run
+        compiled = generic.stepper(tree, stepping)
+    else:
+        compiled = load(source(tree, stepping)).run
+    return checked_run(compiled, len(tree.parent), isinstance(stepping, AdaptiveRungeKutta))
 
 
-@lru_cache(maxsize=64)
-def lane_stepper(tree, method_name):
+def lane_stepper(tree: Tree, method_name: str) -> Callable:
     """`run(q, qd, tau, dt)` for a batch that is a multiple of LANES; the same bits. Not for adaptive and implicit methods."""
-    return load(lanes_source(tree, method_name)).run
+    checked_model(tree)
+    stepping = method_named(method_name)
+    if isinstance(stepping, (AdaptiveRungeKutta, ImplicitRungeKutta)):
+        raise ValueError(f"method {method_name!r} has no lanes; an explicit one with a fixed step is expected")
+    return _lane_stepper(tree, stepping)
 
 
 @lru_cache(maxsize=64)
-def evaluator(tree, quantity, terms=composite.mass_matrix_and_bias, sine="sincos"):
-    """Compiled evaluation of many states: a module with `each(q, qd, tau, out)`, `lanes(q, qd, tau, out)` and `chain`.
+def _lane_stepper(tree, stepping):
+    return checked_run(load(lanes_source(tree, stepping)).run, len(tree.parent), adaptive=False)
+
+
+def evaluator(
+    tree: Tree, quantity: str, terms: Callable = composite.mass_matrix_and_bias, sine: str = "sincos"
+) -> Evaluator:
+    """Compiled evaluation of many states: `each(q, qd, tau, out)`, `lanes(q, qd, tau, out)` and `chain`.
 
     quantity: "forward_dynamics", the n of qdd, and besides `rate(y, tau)` for solvers; or "mass_matrix_and_bias", the rows of
     the upper triangle of Mbar, then h. Arrays are contiguous: for each of shape (N, n), out (N, m); for lanes, component by
     component as registers want them, (n, N) and (m, N). rad, s, kg, m, N m.
     terms: the form of the dynamics that is traced; sine: "sincos" or "library_sincos".
     """
-    return load(evaluator_source(tree, quantity, terms, sine))
+    checked_model(tree)
+    for name, value, accepted in (("quantity", quantity, QUANTITIES), ("sine", sine, SINES)):
+        if not isinstance(value, str) or value not in accepted:
+            raise ValueError(f"{name} is {shown(value)}; known are {', '.join(accepted)}")
+    if not callable(terms) or terms.__hash__ is None:
+        raise ValueError(f"terms is {shown(terms)}; a function terms(tree, q, qd) -> (Mbar, h) is expected")
+    return _evaluator(tree, quantity, terms, sine)
+
+
+@lru_cache(maxsize=64)
+def _evaluator(tree, quantity, terms, sine):
+    n = len(tree.parent)
+    m = n if quantity == "forward_dynamics" else n * (n + 3) // 2
+    return checked_evaluator(load(evaluator_source(tree, quantity, terms, sine)), n, m)
+
+
+for _public, _cached in ((stepper, _stepper), (lane_stepper, _lane_stepper), (evaluator, _evaluator)):
+    _public.cache_clear = _cached.cache_clear
 
 
 def slope_source(tree, method_name, terms=composite.mass_matrix_and_bias) -> Code:
     """Straight-line source of slope(q, qd, tau, dt), with its number of operations."""
+    return _slope(tree, method_named(method_name), terms)
+
+
+def _slope(tree, stepping, terms=composite.mass_matrix_and_bias) -> Code:
     tape = Tape()
     q, qd, tau, dt = _inputs(tape, tree)
-    return tape.function("slope", [*q, *qd, *tau, dt], METHODS[method_name].slope(tree, q, qd, tau, dt, terms))
+    return tape.function("slope", [*q, *qd, *tau, dt], stepping.slope(tree, q, qd, tau, dt, terms))
 
 
-def source(tree, method_name) -> str:
+def source(tree, stepping) -> str:
     """The module that follows one state at a time: slope, step, and the loop over both."""
-    stepping, n = METHODS[method_name], len(tree.parent)
+    n = len(tree.parent)
     if isinstance(stepping, ImplicitRungeKutta):
-        loop = RUN.format(**_words(n), used=", used", cost=f"used * {len(stepping.b)}")
+        words = _words(n) | {"why": f"{NEWTON} if math.isnan({_sum('q', n)}) else {_why(n)}"}
+        loop = RUN.format(**words, used=", used", cost=f"1 + used * {len(stepping.b)}")
         return HEADER + step_source(tree, stepping, composite.mass_matrix_and_bias) + loop
     tape = Tape()
     q, qd, tau, dt = _inputs(tape, tree)
@@ -78,7 +123,7 @@ def source(tree, method_name) -> str:
     inline = '@njit(forceinline=True, error_model="numpy")\n'
     return "\n\n".join(
         [
-            HEADER + inline + slope_source(tree, method_name).text,
+            HEADER + inline + _slope(tree, stepping).text,
             f'@njit(error_model="numpy")\n{step.text}',
             _loop(stepping, n),
         ]
@@ -89,7 +134,7 @@ def _loop(stepping, n) -> str:
     """The loop of `source` over the states of n hinges."""
     words = _words(n)
     if not isinstance(stepping, AdaptiveRungeKutta):
-        return RUN.format(**words, used="", cost=len(getattr(stepping, "b", "1")))
+        return RUN.format(**words, used="", cost=_stages(stepping))
     states = [f"{name}{i}" for name in ("q", "qd") for i in range(n)]
 
     def squares(error):
@@ -102,14 +147,20 @@ def _loop(stepping, n) -> str:
         squares5=squares("errors5"),
         squares3=squares("errors3"),
         stages=len(stepping.b),
+        small=SMALL,
         components=2 * n,
         exponent=-1.0 / stepping.order,
     )
 
 
-def lanes_source(tree, method_name) -> str:
+def _stages(stepping) -> int:
+    """Evaluations of the dynamics in one step."""
+    return len(getattr(stepping, "b", "1"))
+
+
+def lanes_source(tree, stepping) -> str:
     """The module that follows LANES states side by side, stage by stage."""
-    stepping, n = METHODS[method_name], len(tree.parent)
+    n = len(tree.parent)
     tape = Tape()
     q, qd, _, dt = _inputs(tape, tree)
     asked, answers = [], []
@@ -120,7 +171,7 @@ def lanes_source(tree, method_name) -> str:
         return answers[-1]
 
     results = stepping.step(slope, q, qd, dt)
-    functions, stages = [slope_source(tree, method_name).text], []
+    functions, stages = [_slope(tree, stepping).text], []
     own = [_lane("y", i) for i in range(2 * n)] + ["dt"]
     for j in range(len(asked) + 1):
         inputs = [*q, *qd, dt, *(value for answer in answers[:j] for value in answer)]
@@ -133,6 +184,7 @@ def lanes_source(tree, method_name) -> str:
             stages.append(STAGE.format(W=LANES, j=j, arguments=arguments, known=known, offset=j * n * LANES))
     words = _words(n) | {
         "W": LANES,
+        "cost": _stages(stepping),
         "size_x": 3 * n * LANES,
         "size_y": 2 * n * LANES,
         "size_k": len(asked) * n * LANES,
@@ -225,8 +277,19 @@ def _words(n) -> dict:
         "first": sequence("{name}[b, 0, {i}]"),
         "given": sequence("{name}[b, {i}]", ["tau"]),
         "store": sequence("{name}[b, k, {i}]"),
-        "sound": f"({angles} < LIMIT and math.isfinite({sequence('{name}{i}', ['qd'], ' + ')}))",
+        "sound": f"({angles} < LIMIT and math.isfinite({_sum('qd', n)}))",
+        "why": _why(n),
+        "check": CHECK.format(n=n),
     }
+
+
+def _sum(name, n) -> str:
+    return " + ".join(f"{name}{i}" for i in range(n))
+
+
+def _why(n) -> str:
+    """Why a state is not sound."""
+    return f"({TURNED} if math.isfinite({_sum('q', n)} + {_sum('qd', n)}) else {OVERFLOW})"
 
 
 def _row(name, i) -> str:

@@ -141,10 +141,13 @@ def forward_dynamics(tree, q, qd, tau, qdd):
 
 
 @njit(cache=CACHE, error_model="numpy", nogil=True)
-def run_tableau(tree, A, b, q, qd, tau, dt):
+def run_tableau(tree, A, b, q, qd, tau, dt, ended):
     """Fill q and qd (batch, steps + 1, n) by an explicit Runge-Kutta method, while finite; evaluations of the dynamics."""
+    n = len(tree.parent)
+    if not (q.shape == qd.shape == (len(tau), q.shape[1], n) and tau.shape[1] == n and len(ended) in (0, len(q))):
+        raise ValueError("q and qd of shape (runs, steps + 1, n) and tau of shape (runs, n) are expected")
     evaluations = 0
-    stages, n = len(b), q.shape[2]
+    stages = len(b)
     rates, changes = np.empty((stages, n)), np.empty((stages, n))
     angles = np.empty(n)
     for i in range(q.shape[0]):
@@ -166,6 +169,8 @@ def run_tableau(tree, A, b, q, qd, tau, dt):
                 size += abs(q[i, k, j]) + abs(qd[i, k, j])
             if not size < np.inf:
                 q[i, k], qd[i, k] = np.nan, np.nan
+                if len(ended):
+                    ended[i] = 1  # templates.OVERFLOW
                 break
     return evaluations
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from . import dop853
 from .dual import seeded
-from .implicit import ImplicitRungeKutta
+from .implicit import ImplicitRungeKutta, as_tuples
 from .method import acceleration, bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
+from .tree import shown
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class RungeKutta:
     c: tuple  # the time of each stage in units of dt
 
     def __post_init__(self):
+        as_tuples(self, "A", "b", "c")
         if not len(self.A) == len(self.b) == len(self.c):
             raise ValueError("A, b and c must have one entry for each stage")
         for i, (row, c) in enumerate(zip(self.A, self.c)):
@@ -75,6 +77,12 @@ class AdaptiveRungeKutta(RungeKutta):
     """
 
     errors: tuple = ()  # weights of the stages in the two estimates
+
+    def __post_init__(self):
+        super().__post_init__()
+        as_tuples(self, "errors")
+        if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
+            raise ValueError("errors must be two rows of one weight for each stage")
 
     def attempt(self, slope, q, qd, dt):
         """A step, and the two estimates of its error, each for q and qd."""
@@ -167,3 +175,13 @@ METHODS = {
         c=(1 / 2 - ROOT, 1 / 2 + ROOT),
     ),
 }
+
+
+def method_named(name):
+    """The method of that name in METHODS, as it is there now; ValueError if there is none, or no method."""
+    if not isinstance(name, str) or name not in METHODS:
+        raise ValueError(f"unknown method {shown(name)}; known are {', '.join(METHODS)}")
+    stepping = METHODS[name]
+    if not all(callable(getattr(stepping, part, None)) for part in ("slope", "step", "__hash__")):
+        raise ValueError(f"METHODS[{name!r}] is {shown(stepping)}; a method with a slope and a step, hashable, is expected")
+    return stepping

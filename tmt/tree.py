@@ -1,10 +1,14 @@
 """A kinematic tree of hinges that carry rigid bodies, as plain numbers."""
 
+import math
 import reprlib
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
+from . import singular
 from .space import IDENTITY, ZERO, Matrix, Vector, rotation
 
 
@@ -30,6 +34,12 @@ class Tree:
     inertia: tuple  # (m, 3, 3) kg m2, about the centre of mass, in the frame of its hinge
     gravity: tuple  # (3,) m/s2, inertial frame
 
+    def __new__(cls, *values, **named):
+        known = [field.name for field in fields(cls)]
+        if unknown := [name for name in named if name not in known]:
+            raise ValueError(f"a Tree has no field {unknown[0]!r}; its fields are {', '.join(known)}")
+        return super().__new__(cls)
+
     def __post_init__(self):
         for name in ("hinge_names", "body_names"):
             object.__setattr__(self, name, _names(name, getattr(self, name)))
@@ -47,27 +57,28 @@ class Tree:
                 if hinge != int(hinge) or not -1 <= hinge < end:
                     raise ValueError(f"Tree.{name}[{i}] is {hinge:g}; a whole number from -1 to {end - 1} is expected")
             object.__setattr__(self, name, tuple(int(hinge) for hinge in hinges))
-        lengths = [float(np.linalg.norm(axis)) for axis in self.axis]
-        if min(lengths) == 0.0:
-            raise ValueError(f"Tree.axis[{lengths.index(0.0)}] is zero; a direction is expected")
-        object.__setattr__(
-            self, "axis", tuple(tuple(a / length for a in axis) for axis, length in zip(self.axis, lengths))
-        )
+        object.__setattr__(self, "axis", tuple(_direction(i, axis) for i, axis in enumerate(self.axis)))
         if min(self.mass) < 0.0:
-            raise ValueError(f"Tree.mass is {self.mass}; masses of at least 0 kg are expected")
+            raise ValueError(f"Tree.mass is {shown(self.mass)}; masses of at least 0 kg are expected")
         if min(self.damping) < 0.0:
-            raise ValueError(f"Tree.damping is {self.damping}; values of at least 0 N m s/rad are expected")
+            raise ValueError(f"Tree.damping is {shown(self.damping)}; values of at least 0 N m s/rad are expected")
         for name, inertia in zip(self.body_names, self.inertia):
             _check_inertia(name, np.array(inertia))
         for i, name in enumerate(self.hinge_names):
             moved = [b for b in range(m) if self.moves(b)[i]]
             if not any(self.mass[b] or np.any(self.inertia[b]) for b in moved):
                 raise ValueError(f"hinge {name!r} moves nothing that has mass or inertia; Mbar would be singular")
+        singular.check_tree(self)
 
     def __repr__(self):
         return f"Tree({', '.join(f'{field.name}={getattr(self, field.name)}' for field in fields(self))})"
 
-    def lock(self, angles: dict) -> "Tree":
+    @cached_property
+    def never_singular(self) -> bool:
+        """Whether Mbar is known to be regular at every q; else it may be singular at some."""
+        return singular.never(self)
+
+    def lock(self, angles: Mapping) -> "Tree":
         """The tree without the hinges that are named in `angles`, {name: rad}: they stay at these angles, at rest.
 
         What hangs on a locked hinge is carried by the hinge before it, its vectors turned so that all frames are again
@@ -75,8 +86,10 @@ class Tree:
         ValueError for an unknown hinge, an angle that is no finite number, or if no hinge is left.
         """
         names = self.hinge_names
+        if not isinstance(angles, Mapping):
+            raise ValueError(f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected")
         if unknown := [name for name in angles if name not in names]:
-            raise ValueError(f"there is no hinge {unknown[0]!r} to lock; the hinges are {', '.join(names)}")
+            raise ValueError(f"there is no hinge {shown(unknown[0])} to lock; the hinges are {', '.join(names)}")
         if len(angles) == len(names):
             raise ValueError(f"all hinges ({', '.join(names)}) are locked; at least one must be free")
         locked = dict(zip(angles, _numbers("lock", list(angles.values()), (len(angles),))))
@@ -133,29 +146,66 @@ def _turned(turn, inertia):
     return (tensor + tensor.T) / 2.0
 
 
+def shown(value) -> str:
+    """What was given, in one short line."""
+    try:
+        return " ".join(reprlib.repr(value).split())
+    except Exception:  # a repr that fails, an int of too many digits
+        return f"a {type(value).__name__}"
+
+
+def real_numbers(values) -> np.ndarray | None:
+    """The values as an array of float, None if they are anything else but real numbers: truth values, masked ones, text."""
+    try:
+        if _masked(values):
+            return None
+        array = np.asarray(values)
+        return array.astype(float) if array.dtype.kind in "fiu" else None
+    except MemoryError:
+        raise
+    except Exception:  # whatever the conversion of a stranger's object raises
+        return None
+
+
+def _masked(values) -> bool:
+    """Whether an entry is masked: NumPy would ignore the mask."""
+    if isinstance(values, (list, tuple)):
+        return any(_masked(value) for value in values if not isinstance(value, float))
+    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.getmaskarray(values).any())
+
+
 def _names(field, values):
-    """The values as a tuple of different strings."""
-    names = (values,) if isinstance(values, str) else tuple(values) if hasattr(values, "__iter__") else (values,)
-    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
-        raise ValueError(f"Tree.{field} is {values!r}; different names are expected")
-    return names
+    """The values as a tuple of different strings that can stand in a line."""
+    names = tuple(values) if isinstance(values, (list, tuple, np.ndarray)) and np.ndim(values) == 1 else (None,)
+    if not all(isinstance(name, str) and name.isprintable() for name in names) or len(set(names)) < len(names):
+        raise ValueError(f"Tree.{field} is {shown(values)}; different names are expected")
+    return tuple(map(str, names))
 
 
 def _numbers(name, values, shape):
     """The values as nested tuples of float, after a check of their shape."""
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"Tree.{name} is {reprlib.repr(values)}; numbers of shape {shape} are expected") from None
+    array = real_numbers(values)
+    if array is None:
+        raise ValueError(f"Tree.{name} is {shown(values)}; numbers of shape {shape} are expected")
     if array.shape != shape:
         raise ValueError(f"Tree.{name} has shape {array.shape}; {shape} is expected")
     if not np.isfinite(array).all():
-        raise ValueError(f"Tree.{name} is {reprlib.repr(values)}; finite numbers are expected")
+        raise ValueError(f"Tree.{name} is {shown(values)}; finite numbers are expected")
 
     def nested(item):
         return tuple(map(nested, item)) if isinstance(item, list) else item
 
     return nested(array.tolist())
+
+
+def _direction(i, axis) -> tuple:
+    """The axis of hinge i at length 1, however long it is."""
+    exponent = math.frexp(max(map(abs, axis)))[1]
+    axis = [math.ldexp(a, -exponent) for a in axis]  # exact, and the squares neither overflow nor vanish
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise ValueError(f"Tree.axis[{i}] is zero; a direction is expected")
+    return tuple(a / length for a in axis)
 
 
 def _check_inertia(name, inertia):

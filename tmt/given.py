@@ -1,0 +1,98 @@
+"""What a user gives, checked: the value in the type that is worked with, or a ValueError of one line.
+
+The line says what was given and what is accepted.
+"""
+
+import functools
+import math
+import numbers
+import os
+import reprlib
+from collections.abc import Callable
+
+import numpy as np
+
+from .tree import Tree, real_numbers, shown
+
+
+def quantity(function: Callable) -> Callable:
+    """The function without NumPy's warnings, which no caller can place; what does not fit into memory is a ValueError."""
+
+    @functools.wraps(function)
+    def evaluated(*arguments, **named):
+        try:
+            with np.errstate(all="ignore"):
+                return function(*arguments, **named)
+        except MemoryError as error:
+            raise ValueError(f"{function.__name__} of so many states does not fit into memory: {error}") from None
+
+    return evaluated
+
+
+def states(model, **arrays) -> list:
+    """Each array as n scalars of one batch shape, after a check of type, shape and values."""
+    checked_model(model)
+    n = len(model.hinge_names)
+    checked = []
+    for name, values in arrays.items():
+        array = real_numbers(values)
+        if array is None:
+            raise ValueError(f"{name} is {shown(values)}; real numbers of shape (..., {n}) are expected")
+        if array.ndim == 0 or array.shape[-1] != n:
+            hinges = ", ".join(model.hinge_names)
+            raise ValueError(f"{name} has shape {array.shape}; (..., {n}) is expected, one number per hinge ({hinges})")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
+        checked.append(array)
+    try:
+        checked = np.broadcast_arrays(*checked)
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(arrays, checked))
+        raise ValueError(f"the batch shapes do not fit together: {shapes}") from None
+    return [[array[..., i] for i in range(n)] for array in checked]
+
+
+def checked_model(model) -> None:
+    """Raise ValueError unless it is a Tree."""
+    if not isinstance(model, Tree):
+        raise ValueError(f"model is {shown(model)}; a tmt.Tree is expected")
+
+
+def positive(name, value, kind) -> float:
+    """The value as a finite float above 0."""
+    try:
+        number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        number = math.inf
+    if not 0.0 < number < math.inf:
+        raise ValueError(f"{name} is {shown(value)}; {kind} above 0 is expected")
+    return number
+
+
+def whole(name, value) -> int:
+    """The value as an int of at least 1."""
+    if not isinstance(value, numbers.Integral) or isinstance(value, bool) or value < 1:
+        raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
+    return int(value)
+
+
+def paths(runs, steps, n) -> np.ndarray:
+    """Room for q and qd of so many runs, NaN, (2, runs, steps + 1, n); ValueError if there is no memory for it."""
+    size = 2 * runs * (steps + 1) * n * 8
+    try:
+        if size > memory():
+            raise MemoryError
+        return np.full((2, runs, steps + 1, n), np.nan)
+    except MemoryError:
+        size = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
+        raise ValueError(
+            f"steps is {shown(steps)}: with {n} hinges the states of {runs} runs would take {size} of memory, more than there is"
+        ) from None
+
+
+def memory() -> float:
+    """The memory of this machine, B; infinite where it is not known."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):
+        return math.inf

@@ -1,0 +1,112 @@
+"""Motion by a method of integration, and why it ended where it did."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import given, singular
+from .arm import ARM
+from .implicit import ImplicitRungeKutta
+from .methods import METHODS, AdaptiveRungeKutta, method_named
+from .templates import NEWTON, OVERFLOW, SMALL, TURNED
+from .tree import Tree
+
+
+class _Path(NamedTuple):
+    t: np.ndarray  # (steps + 1,) s
+    q: np.ndarray  # (..., steps + 1, n) rad
+    qd: np.ndarray  # (..., steps + 1, n) rad/s
+
+
+class Motion(_Path):
+    """The t, q, qd of a simulation, and what else is known of it.
+
+    ended: why a run ended early, a line that says when, or None; for a batch an array of its shape. Its states are NaN from
+    there on. evaluations: of the dynamics, of all runs; those of an implicit method with their Jacobian.
+    """
+
+    ended: str | None | np.ndarray
+    evaluations: int
+
+
+def simulate(
+    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
+    tolerance: float | None = None,
+) -> Motion:  # fmt: skip
+    """Motion under constant torque: t (steps+1,) s, q and qd (..., steps+1, n), rad and rad/s.
+
+    q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1; method: a key of
+    METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units
+    of 1 + |value|. A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad,
+    Mbar is singular, Newton's method does not find the stages of an implicit method, or an adaptive method would need
+    steps below 1e-9 dt: `ended` of the result says which. Assignment, part i.
+    """
+    stepping = method_named(method)
+    steps, dt = given.whole("steps", steps), given.positive("dt", dt, "a step in s")
+    adaptive = isinstance(stepping, AdaptiveRungeKutta)
+    if tolerance is not None and not adaptive:
+        raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
+    tolerance = 1e-9 if tolerance is None else given.positive("tolerance", tolerance, "a number")
+    state = given.states(model, q=q, qd=qd, tau=tau)
+    batch, n = state[0][0].shape, len(model.parent)
+    runs = int(np.prod(batch, dtype=object))
+    path_q, path_qd = given.paths(runs, steps, n)
+    if steps * dt == np.inf:
+        raise ValueError(f"dt is {dt:g} and steps is {given.shown(steps)}; their product is beyond the largest double")
+    path_q[:, 0], path_qd[:, 0], tau = (np.stack(part, axis=-1).reshape(-1, n) for part in state)
+    arguments = path_q, path_qd, np.ascontiguousarray(tau)
+
+    from . import kernels  # here, so that `import tmt` need not wait for numba
+
+    codes, evaluations = np.zeros(runs, np.int8), 0
+    if adaptive:
+        evaluations = kernels.stepper(model, method)(*arguments, dt, tolerance, codes)
+    else:
+        worth = runs * steps >= kernels.WORTH and n <= kernels.TRACED and not isinstance(stepping, ImplicitRungeKutta)
+        in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
+        if in_lanes:
+            part = [array[:in_lanes] for array in arguments]
+            evaluations += kernels.lane_stepper(model, method)(*part, dt, codes[:in_lanes])
+        rest = [array[in_lanes:] for array in arguments]
+        evaluations += kernels.stepper(model, method)(*rest, dt, codes[in_lanes:])
+    ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
+    shape = *batch, steps + 1, n
+    motion = Motion(dt * np.arange(steps + 1), path_q.reshape(shape), path_qd.reshape(shape))
+    motion.ended, motion.evaluations = ended.reshape(batch)[()], evaluations
+    return motion
+
+
+def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
+    """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
+
+    q, qd: the paths (runs, steps + 1, n); codes: why the compiled loop ended each, 0: it did not.
+    """
+    told = np.full(len(codes), None, dtype=object)
+    if not tree.never_singular:
+        for run in range(len(codes)):
+            if found := singular_in(tree, q[run], qd[run]):
+                k, told[run] = found
+                q[run, k + 1 :] = qd[run, k + 1 :] = np.nan
+    words = {
+        OVERFLOW: "the motion has left the finite numbers",
+        TURNED: "a hinge has turned by 2^49 rad, where neighbouring doubles are an eighth of a radian apart",
+        NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
+        SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
+    }
+    for run in np.flatnonzero((codes != 0) | (told != None)):  # noqa: E711
+        last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
+        told[run] = f"at t = {last * dt:g} s: {told[run] or words[int(codes[run])]}"
+    return told
+
+
+def singular_in(tree, q, qd) -> tuple[int, str] | None:
+    """The first state of a run at which Mbar is singular, among those where it would show; and the words for it.
+
+    They are its start, its last, and the one before the largest change of the rates.
+    """
+    alive = int(np.isfinite(q[:, 0]).sum())
+    change = np.abs(np.diff(qd[:alive], axis=0)).max(axis=1)
+    places = np.unique([0, alive - 1, int(np.argmax(change)) if len(change) else 0])
+    found = singular.first(tree, q[places])
+    return found and (int(places[found[0]]), f"Mbar is singular: {found[1]}")
