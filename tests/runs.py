@@ -93,6 +93,21 @@ def screen(output, columns) -> tuple[list[str], bool]:
     return lines, visible
 
 
+def words(lines) -> str:
+    return " ".join(" ".join(lines).split())
+
+
+def readable_lines(run) -> list[str]:
+    """The screen in the end: nothing of the progress is left, the cursor is back, nothing is over anything else."""
+    lines, visible = screen(run.output, run.columns)
+    assert visible
+    assert all(len(line) <= run.columns for line in lines)
+    assert "Traceback" not in run.output
+    for left in ("imports", "(1 of 1)", "figures"):
+        assert left not in words(lines)
+    return lines
+
+
 def started(*arguments, cwd, env=None):
     """A run in a process group of its own, as a terminal's, that hears Ctrl-C."""
 

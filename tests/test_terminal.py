@@ -7,27 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import pytest
-from runs import ROOT, SECOND, compare, in_shell, on_terminal, screen
+from runs import ROOT, SECOND, compare, in_shell, on_terminal, readable_lines, screen, words
 
 from compare.engine_file import ARM_XML, load
 
 LINE = "interrupted; a report that was there is unchanged"
 HEAVY = ARM_XML.read_text().replace('mass="1.5"', 'mass="1.6"')
-
-
-def words(lines) -> str:
-    return " ".join(" ".join(lines).split())
-
-
-def readable_lines(run) -> list[str]:
-    """The screen in the end: nothing of the progress is left, the cursor is back, nothing is over anything else."""
-    lines, visible = screen(run.output, run.columns)
-    assert visible
-    assert all(len(line) <= run.columns for line in lines)
-    assert "Traceback" not in run.output
-    for left in ("imports", "(1 of 1)", "figures"):
-        assert left not in words(lines)
-    return lines
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +47,7 @@ def test_mass(runs, columns, term):
     run = runs["arm", columns, term]
     assert run.status == 0, run.output
     text = words(readable_lines(run))
-    assert re.match(r"mass ok \d+ checks worst .* s The two models agree in mass \(1 of 10 experiments\)", text)
+    assert re.match(r"mass ok \d+ checks uses .* of a tolerance .* s The two models agree in mass \(1 of 10 experiments\)", text)
     assert f"Report: arm({columns}, '{term}')/index.html (" in text and text.endswith(" s)")
     assert ("\x1b" in run.output) == (term == "xterm")
 
@@ -74,9 +59,11 @@ def test_a_model_that_fails(runs, columns, term):
     lines = readable_lines(run)
     results = json.loads((runs["plain"] / f"heavy{columns, term}" / "results.json").read_text())
     failed = [check for check in results["checks"] if not check["passed"]]
-    assert len([line for line in lines if line.startswith("  FAIL mass: ")]) == 5
-    assert f"  and {len(failed) - 5} more: in the report" in lines
+    shown = [line for line in lines if line.startswith(("  CAUSE mass of forearm: stated 1.5 kg", "  FAIL mass: "))]
+    assert len(shown) == 5 and shown[0].startswith("  CAUSE")
+    assert f"  and {len(failed) - 4} more: in the report" in lines
     assert "The two models do not agree in mass" in words(lines)
+    assert "Checks that fail" in (runs["plain"] / f"heavy{columns, term}" / "report.md").read_text(encoding="utf-8")
     assert ("\x1b" in run.output) == (term == "xterm")
 
 
