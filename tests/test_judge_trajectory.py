@@ -17,8 +17,9 @@ EPS = 2.0**-52
 BY_NAME = {scene.name: scene for scene in SCENES}
 FREE, HELD, DAMPED = (BY_NAME[name] for name in ("bent, free", "ball catch, held", "bent, damped"))
 TURN = tmt.Tree(  # one hinge without gravity: a linear system, and nothing but a sum of roundings
-    hinge_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,), body_names=("disc",),
-    body_hinge=(0,), mass=(1.0,), com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),), gravity=(0.0, 0.0, 0.0),
+    hinge_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,),
+    body_names=("disc",), body_hinge=(0,), mass=(1.0,), com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),),
+    gravity=(0.0, 0.0, 0.0),
 )  # fmt: skip
 
 
@@ -116,21 +117,21 @@ def damped():
 
 
 def judged_with(engine, mine, scene=DAMPED) -> dict:
-    """The checks of a run whose TMT side was edited, by quantity."""
+    """The checks of a run whose TMT side may be edited, by quantity."""
     result = Result("trajectory")
     trajectory.pair(result, scene, scene.engine(engine), 64, "rk4", ["RK4"], mine)
-    return {check.quantity: check for check in result.checks}, result.rows
+    return {check.quantity: check for check in result.checks}
 
 
 @pytest.mark.parametrize("level, field", [("derivative", "derivative_bar"), ("one step", "step_bar"), ("open loop", "width")])
 def test_each_level_uses_its_own_bound_and_no_other(level, field, engine, damped):
     name = f"{level}, TMT to MuJoCo"
-    checks, rows = judged_with(engine, damped)
+    checks = judged_with(engine, damped)
     used = checks[name].over_bar
     assert all(check.passed for check in checks.values()) and 1e-5 < used < 1.0
     assert checks[name].tolerance in getattr(damped, field)
     for more, passes in ((1.01, True), (0.99, False)):
-        tight, _ = judged_with(engine, damped._replace(**{field: more * used * getattr(damped, field)}))
+        tight = judged_with(engine, damped._replace(**{field: more * used * getattr(damped, field)}))
         assert {quantity for quantity, check in tight.items() if not check.passed} == (set() if passes else {name})
 
 
@@ -152,7 +153,7 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
 @pytest.mark.parametrize("judged, passes", [(3.12, True), (3.13, False)])
 def test_the_time_that_is_judged_is_at_least_what_the_scene_asks_for(judged, passes, engine):
     scene = dataclasses.replace(HELD, judged=judged)
-    checks, _ = judged_with(engine, trajectory.ours(scene, 64, "rk4"), scene)
+    checks = judged_with(engine, trajectory.ours(scene, 64, "rk4"), scene)
     assert (checks["time judged"].value, checks["time judged"].passed) == (3.125, passes)
 
 
@@ -196,7 +197,8 @@ def test_a_free_run_moves_by_a_tenth_of_a_radian():
 def test_integrators_that_are_one_scheme_give_the_same_bits():
     one = [np.array([1.0, np.nan]), np.array([2.0, 3.0])]
     for other, passes in (
-        (one, True), ([one[0].copy(), one[1] + 0.0], True), ([one[0], np.nextafter(one[1], 9.0)], False), ([one[0] + 1, one[1]], False),
+        (one, True), ([one[0].copy(), one[1] + 0.0], True), ([one[0], np.nextafter(one[1], 9.0)], False),
+        ([one[0] + 1, one[1]], False),
     ):  # fmt: skip
         result = Result("trajectory")
         trajectory.same_bits(result, "x", "Euler", one, other)
@@ -275,8 +277,10 @@ def test_drift_falls_at_the_order_of_the_scheme_and_rk4s_is_far_below_that_of_eu
     order = f"order of the drift of energy, from 1 bent, free, Euler, {engine}, 1 s"
     share = f"drift of energy over that of Euler bent, free, RK4, {engine}, 1 s"
     for made, failed in (
-        ({}, set()), ({"order": 1.149}, set()), ({"order": 1.151}, {order}), ({"order": 0.849}, {order}), ({"order": 0.851}, set()),
-        ({"share": 0.999e-3}, set()), ({"share": 1.001e-3}, {share}), ({"euler": np.nan}, {order, share}), ({"euler": 0.0}, {order, share}),
+        ({}, set()), ({"order": 1.149}, set()), ({"order": 1.151}, {order}), ({"order": 0.849}, {order}),
+        ({"order": 0.851}, set()),
+        ({"share": 0.999e-3}, set()), ({"share": 1.001e-3}, {share}),
+        ({"euler": np.nan}, {order, share}), ({"euler": 0.0}, {order, share}),
     ):  # fmt: skip
         result = Result("trajectory")
         drift.judge(result, drifts(engine=engine, **made))
@@ -382,10 +386,9 @@ def test_the_error_of_a_free_scene_is_its_distance_from_many_digits(engine):
         path = tmt.simulate(*scene.start, scene.tau, 5 / 64, 64, "rk4", scene.model)[1]
         runs[name, "rk4", 64] = run_of(scene) | {"tmt": [path, path], "mujoco": [path + 100.0, path]}
     errors = motion.free_errors(Result("trajectory", curves={"runs": runs}))
-    assert {name: round(ours, 1) for name, (ours, _) in errors.items()} == {
-        "zero, free": 1.6, "ball catch, free": 10.2, "bent, free": 0.3,
-    }  # fmt: skip
-    assert all(90.0 < theirs < 110.0 for _, theirs in errors.values())
+    found = {name: ours for name, (ours, _) in errors.items()}
+    assert found == pytest.approx({"zero, free": 1.6, "ball catch, free": 10.2, "bent, free": 0.27}, rel=0.03)
+    assert all(theirs > 90.0 for _, theirs in errors.values())
 
 
 def test_what_is_said_of_errors_and_agreement_follows_the_numbers():
@@ -429,8 +432,10 @@ def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
         assert np.allclose(lines[2 * i].get_ydata(), np.degrees(curve["tmt"][0][:, i])) and lines[2 * i].get_marker() == "None"
         assert np.allclose(lines[2 * i + 1].get_ydata(), np.degrees(curve["mujoco"][0][:, i]))
         assert lines[2 * i + 1].get_marker() == "o" and lines[2 * i].get_label().endswith("TMT")
-    assert name == "assignment_figure_2" and "the arm of TMT stays within 0.1 rad, that of MuJoCo is 0.1 rad away at 4.00 s" in caption
-    assert "of that TMT is at most 1.0e-01 rad off, MuJoCo 2.0e-01 rad; while judged, to 2.50 s, they are 5.0e-02 rad apart" in caption
+    assert name == "assignment_figure_2"
+    assert "the arm of TMT stays within 0.1 rad, that of MuJoCo is 0.1 rad away at 4.00 s" in caption
+    assert "of that TMT is at most 1.0e-01 rad off, MuJoCo 2.0e-01 rad" in caption
+    assert "while judged, to 2.50 s, they are 5.0e-02 rad apart" in caption
 
     result.rows = [{"scene": "ball catch, held", "level": "open loop", "engine_integrator": "RK4", "dt_s": 5 / 64,
                     "diverged_at_s": at, "difference_over_band": used} for at, used in ((None, 0.25), (0.0, None))]  # fmt: skip
@@ -459,11 +464,11 @@ def test_the_figure_of_drift_says_whose_drift_falls_how():
     assert "MuJoCo's drift is 0.1 to 2 times TMT's." in caption
     lines = {line.get_label(): line for line in fig.axes[0].lines}
     assert lines["implicit, TMT"].get_ydata().tolist() == [8.0, 4.0, 2.0]
-    assert [line.get_ydata().tolist() for line in fig.axes[0].lines if line.get_marker() == "o"][1] == [16.0, 4.0, 1.0]
+    assert [line.get_ydata().tolist() for line in fig.axes[0].lines if line.get_marker() == "o"][2] == [16.0, 4.0, 1.0]
     for engine in ("TMT", "MuJoCo"):  # nothing moves: no order, no ratio, and no error
         for values in of.values():
             values[engine] = [0.0, 0.0, 0.0]
-    assert "TMT no number, MuJoCo no number" in drawn(result, "drift")[2]
+    assert "TMT no number, MuJoCo no number" in drawn(made, "drift_caption", drift.STEPS)
 
 
 def test_the_figure_of_growth_says_which_scene_grows_how_much():
