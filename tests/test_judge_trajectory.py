@@ -18,7 +18,8 @@ BY_NAME = {scene.name: scene for scene in SCENES}
 FREE, HELD, DAMPED = (BY_NAME[name] for name in ("bent, free", "ball catch, held", "bent, damped"))
 TURN = tmt.Tree(  # one hinge without gravity: a linear system, and nothing but a sum of roundings
     hinge_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,),
-    body_names=("disc",), body_hinge=(0,), mass=(1.0,), com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),),
+    body_names=("disc",), body_hinge=(0,), mass=(1.0,),
+    com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),),
     gravity=(0.0, 0.0, 0.0),
 )  # fmt: skip
 
