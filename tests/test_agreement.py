@@ -14,7 +14,6 @@ from compare.engine_file import parse
 from compare.engine_parameters import parameters
 from compare.parameters import stated
 
-
 SMALL = ("published", "kinematics", "mass", "gravity", "acceleration", "trajectory")  # whose small run takes every path
 
 

@@ -18,7 +18,9 @@ MODELS = {
     "damped by 5": ('axis="1 0 0"/>', 'axis="1 0 0" damping="5"/>'),
     "with a spring": ('axis="1 0 0"/>', 'axis="1 0 0" stiffness="30"/>'),
     "a muscle's activation": ("</mujoco>", '<actuator><position joint="beta" kp="3" timeconst="0.1"/></actuator></mujoco>'),
-    "a feather": ('pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"', 'pos="1e-5 0 0" mass="1.5" diaginertia="1e-9 1e-9 1e-9"'),
+    "a feather": (
+        'pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"', 'pos="1e-5 0 0" mass="1.5" diaginertia="1e-9 1e-9 1e-9"',
+    ),
 }  # fmt: skip
 STEPS = {"Euler": (16, 32, 64), "implicit": (16, 32, 64), "RK4": (16, 32, 64)}
 
