@@ -145,9 +145,9 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
         (check,), (row,) = result.checks, result.rows
         assert (check.passed, check.unit, check.note) == (passes, "rad/s", "beta at t = 0.500 s")
         assert row["worst_difference"] == check.value and (row["largest_difference"] is None) == (check.value is None)
-    for off, passes in ((0.0, True), (1e-300, False)):  # where rounding has nothing to add, nothing may differ
-        result = Result("trajectory")
-        trajectory.level(result, "x", {"level": "open loop"}, ("alpha", "beta"), bar[:1] * off, 0.0 * bar[:1], times, {})
+    for off, passes in ((0.0, True), (1e-300, False), (np.nan, False)):  # where rounding has nothing to add, nothing may differ
+        result, difference = Result("trajectory"), np.array([[0.0, 0.0, off, 0.0]])
+        trajectory.level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, 0.0 * bar[:1], times, {})
         assert result.checks[0].passed is passes
 
 
@@ -204,6 +204,19 @@ def test_integrators_that_are_one_scheme_give_the_same_bits():
         result = Result("trajectory")
         trajectory.same_bits(result, "x", "Euler", one, other)
         assert verdicts(result) == {"the same bits as Euler": passes}
+
+
+def test_what_is_kept_of_a_run_is_whose_it_says(engine):
+    moon = HELD.engine(engine.variant(gravity=(0.0, 0.0, -1.62)))
+    mine, result = trajectory.ours(HELD, 64, "rk4"), Result("trajectory")
+    trajectory.pair(result, HELD, moon, 64, "rk4", ["RK4"], mine)
+    (kept,) = result.curves.values()
+    theirs = moon.trajectory(*HELD.start, HELD.tau, 5 / 64, 64)
+    assert all(np.array_equal(a, b) for a, b in zip(kept["tmt"], (mine.q, mine.qd)))
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(kept["mujoco"], theirs[1:]))
+    assert kept["left"] == {"TMT": None, "MuJoCo": 5 / 64} and kept["ended"]["TMT"] is None
+    assert kept["ended"]["MuJoCo"] == motion.diverged_at(HELD, *theirs)
+    assert {row["diverged_at_s"] for row in result.rows} == {kept["ended"]["MuJoCo"]}
 
 
 def test_every_rule_of_a_run_is_applied(engine):
