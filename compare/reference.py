@@ -74,10 +74,8 @@ def references(map: Callable = map, tell: Callable = print) -> dict[str, Referen
 def begins(rows, scene) -> bool:
     """Whether a run starts as the scene does, and has its times."""
     times = np.linspace(0.0, scene.duration, RECORDS + 1)
-    start = [Decimal(rows[0][name]) for name in STATE]
-    return start == [Decimal(v) for v in np.concatenate(scene.start).tolist()] and np.array_equal(
-        [float(row["t_s"]) for row in rows], times
-    )
+    start = [float(rows[0][name]) for name in STATE]
+    return start == np.concatenate(scene.start).tolist() and [float(row["t_s"]) for row in rows] == times.tolist()
 
 
 def kept(scene: Scene) -> Path:
