@@ -66,7 +66,8 @@ def test_the_elliptic_function_is_right_to_64_eps(off, passes):
 
 @pytest.mark.parametrize(
     "order, clear, passes",
-    [(4.149, 1e-8, True), (4.151, 1e-8, False), (3.851, 1e-8, True), (3.849, 1e-8, False), (4.1, 1.1e-11, True), (0.0, 1.0, False)],
+    [(4.149, 1e-8, True), (4.151, 1e-8, False), (3.851, 1e-8, True), (3.849, 1e-8, False), (4.1, 1.1e-11, True),
+     (0.0, 1.0, False)],
 )  # fmt: skip
 def test_errors_fall_at_the_order_of_the_method(order, clear, passes):
     values = [2.0 ** (2 * order) * clear, 2.0**order * clear, clear, 9e-12, 8e-12]  # the last two are rounding
