@@ -85,7 +85,7 @@ def kept(scene: Scene) -> Path:
 
 def remade(scenes: list[Scene], map: Callable, tell: Callable) -> list[list[dict]]:
     """The rows of each scene, computed: two runs a scene, one with half the steps."""
-    runs = [(scene, STEPS[scene.name] // part) for scene in scenes for part in (2, 1)]
+    runs = [(scene, RECORDS, STEPS[scene.name] // part) for scene in scenes for part in (2, 1)]
     paths = []
     for path in map(run, runs):
         paths.append(path)
@@ -110,9 +110,9 @@ def remade(scenes: list[Scene], map: Callable, tell: Callable) -> list[list[dict
 
 
 def run(job) -> np.ndarray:
-    """One run with many digits."""
-    scene, steps = job
-    return trajectory(scene.model, *scene.start, scene.tau, scene.duration, RECORDS, steps)
+    """One run with many digits; a job is a scene, the number of records and that of steps."""
+    scene, records, steps = job
+    return trajectory(scene.model, *scene.start, scene.tau, scene.duration, records, steps)
 
 
 def reference(rows) -> Reference:

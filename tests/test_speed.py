@@ -1,5 +1,6 @@
 """Speed against accuracy: the reference, the clock, the errors, and what is concluded from them."""
 
+import csv
 import dataclasses
 
 import mpmath
@@ -58,24 +59,27 @@ def test_a_record_of_the_reference_is_computed_from_the_one_before(scene):
     assert exact[0].astype(float).tolist() == np.concatenate(scene.start).tolist()
 
 
-def test_a_changed_model_gets_a_reference_of_its_own(tmp_path, monkeypatch):
+def test_a_changed_scene_gets_a_reference_of_its_own(tmp_path, monkeypatch):
+    changed = dataclasses.replace(BENT, duration=0.02, dt=0.005)
+    path = tmt.simulate(*changed.start, changed.tau, 0.005, 4, "dopri8", changed.model)[1]
     monkeypatch.setenv("TMT_CACHE", str(tmp_path))
-    changed = dataclasses.replace(BENT, damping=0.1, duration=0.5, dt=0.5 / 64)
+    others = [dataclasses.replace(BENT, **{name: value}) for name, value in (
+        ("damping", 0.1), ("gravity", False), ("torque", (0, 0, 1)), ("speed", (0, 1, 0)), ("posture", (1, 2, 3)))]  # fmt: skip
+    assert len({reference.key(scene) for scene in (BENT, changed, *others)}) == 7
     monkeypatch.setattr(reference, "SCENES", (changed,))
-    monkeypatch.setattr(reference, "STEPS", {changed.name: 128})
+    monkeypatch.setattr(reference, "STEPS", {changed.name: 8})
+    monkeypatch.setattr(reference, "RECORDS", 4)
     told = []
     first = reference.references(tell=told.append)[changed.name]
     assert told[-1] == "runs with many digits: 2 of 2" and first.halving < 1e-20
-    assert (
-        first.error(tmt.simulate(*changed.start, changed.tau, 0.5 / 64, 64, "dopri8", changed.model)[1]).max() < 1e-13
-    )
+    assert first.error(path).max() < 1e-13
     (kept,) = tmp_path.glob("reference_*.csv")
     again = reference.references(tell=told.append)[changed.name]
     assert len(told) == 2 and np.array_equal(first.high, again.high)
     text = kept.read_text(encoding="utf-8")
     kept.write_text(text[:1000], encoding="utf-8")
     assert reference.read(kept) == {}  # damaged: as if it were not there
-    planted = text.replace(reference.read(reference.TABLE)[reference.key(BENT)][0]["beta_rad"], "0.1")
+    planted = text.replace(next(csv.DictReader(text.splitlines()))["beta_rad"], "0.1")
     assert planted != text
     kept.write_text(planted, encoding="utf-8")  # a run of another start: made anew
     once_more = reference.references(tell=told.append)[changed.name]
@@ -83,15 +87,16 @@ def test_a_changed_model_gets_a_reference_of_its_own(tmp_path, monkeypatch):
 
 
 def test_the_command_remakes_the_table(tmp_path, monkeypatch, capsys):
-    short = dataclasses.replace(BENT, duration=0.064, dt=0.001)
+    short = dataclasses.replace(BENT, duration=0.008, dt=0.001)
     monkeypatch.setattr(reference, "SCENES", (short,))
-    monkeypatch.setattr(reference, "STEPS", {short.name: 128})
+    monkeypatch.setattr(reference, "STEPS", {short.name: 16})
+    monkeypatch.setattr(reference, "RECORDS", 8)
     monkeypatch.setattr(reference, "TABLE", tmp_path / "reference.csv")
     reference.main()
     (rows,) = reference.read(reference.TABLE).values()
     assert reference.begins(rows, short) and float(rows[0]["halving_difference"]) < 1e-28
     printed = capsys.readouterr()
-    assert printed.out.startswith("bent, free: 128 steps, ") and "digits: 2 of 2" in printed.err
+    assert printed.out.startswith("bent, free: 16 steps, ") and "digits: 2 of 2" in printed.err
 
 
 def test_competitors_are_timed_in_turns():
