@@ -139,8 +139,8 @@ class ImplicitRungeKutta:
 def checked_tableau(method, *rows) -> None:
     """Make order, b, c and these rows of a tableau plain numbers: a method is a value, and a key of what is compiled for it."""
     order = method.order
-    if not isinstance(order, int) or isinstance(order, bool) or order < 1:
-        raise ValueError(f"order of the method is {shown(order)}; a whole number of at least 1 is expected")
+    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= 100:
+        raise ValueError(f"order of the method is {shown(order)}; a whole number from 1 to 100 is expected")
     for name in ("b", "c", *rows):
         given = getattr(method, name)
         try:

@@ -78,6 +78,7 @@ def simulate(
     return motion
 
 
+@np.errstate(over="ignore")
 def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
@@ -92,14 +93,17 @@ def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
                 k, told[run] = found
                 q[run, k + 1 :] = qd[run, k + 1 :] = np.nan
     words = {
-        OVERFLOW: "the motion has left the finite numbers",
-        TURNED: "a hinge has turned by 2^49 rad, where neighbouring doubles are an eighth of a radian apart",
+        OVERFLOW: "the motion diverges: within a step its numbers overflow, or its angles pass 2^49 rad",
+        TURNED: "a hinge turns by 2^49 rad or more, where doubles are too far apart for a sine",
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
     }
     for run in (run for run in range(len(codes)) if codes[run] or told[run]):
         last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
-        told[run] = f"at t = {last * dt:g} s: {told[run] or words[int(codes[run])]}"
+        code = int(codes[run])
+        if code in (OVERFLOW, NEWTON) and np.abs(q[run, last]).sum() + dt * np.abs(qd[run, last]).sum() > 2.0**48:
+            code = TURNED  # within the step: there is no sine at its stages
+        told[run] = f"at t = {last * dt:g} s: {told[run] or words[code]}"
     return told
 
 
