@@ -214,9 +214,9 @@ def tell_departures(rows) -> str:
         )
         fine = [abs(late(row)) for row in both if row["dt_s"] < coarsest]
         told += f", and {max(fine):.3f} s at steps below {coarsest:.4g} s" if fine else ""
-    told += f"; {neither} stay in both" if neither else ""
+    told += f"; staying in both: {neither}" if neither else ""
     lost = len(rows) - len(both) - neither
-    return told + (f"; {lost} stay in only one of the two." if lost else ".")
+    return told + (f"; staying in only one of the two: {lost}." if lost else ".")
 
 
 def exponent(rows) -> float | None:
