@@ -17,7 +17,7 @@ def described(error, with_place=True) -> str:
 
 def place(error) -> str:
     """The last line of this project that an exception came through, "compare/mass.py:12"; "" if there is none."""
-    if hasattr(error, "place"):  # it comes from another process, which knew
+    if getattr(error, "place", ""):  # it comes from another process, which knew
         return error.place
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         path = Path(frame.filename)

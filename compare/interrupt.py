@@ -78,5 +78,5 @@ def end() -> None:
         with suppress(Exception):
             act()
     with suppress(OSError):
-        os.write(2, f"{LINE}\n".encode())
+        os.write(2, ("\r" * os.isatty(2) + LINE + "\n").encode())  # over what a terminal shows of Ctrl-C
     os._exit(2)

@@ -4,6 +4,7 @@ import os
 import re
 import sys
 from contextlib import contextmanager, suppress
+from textwrap import fill
 
 from rich.console import Console
 from rich.text import Text
@@ -25,13 +26,14 @@ class Terminal:
         self.status = None
 
     def say(self, text="", style="") -> None:
-        """A line; on a terminal broken between words, with columns closed up where it is narrow."""
-        columns = self.out.columns()
-        self.lines.width = max(columns or 80, 20)
+        """A line; on a terminal that is narrower: its columns closed up, and broken between words."""
+        text, columns = readable(text), self.out.columns()
         if columns and len(text) > columns:
-            text = text[: len(text) - len(text.lstrip())] + re.sub(" {2,}", "  ", text.strip())
+            indent = " " * (len(text) - len(text.lstrip()))
+            text = indent + re.sub(" {2,}", "  ", text.strip())
+            text = fill(text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False)
         with self.paused():
-            self.lines.print(Text(readable(text), style=style), soft_wrap=columns is None, highlight=False)
+            self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 
     def show(self, text) -> None:
         """What is under way, in one line."""

@@ -1,0 +1,137 @@
+"""Runs of the command line as a user starts them: in a pipe, on a terminal, and ended by a signal."""
+
+import fcntl
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+ROOT = Path(__file__).resolve().parent.parent
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+SECOND = 1.0  # an interrupt is answered within
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "compare", *map(os.fspath, arguments)]
+
+
+def compare(*arguments, cwd, env=None, **options):
+    """A run in pipes."""
+    options = {"capture_output": True, "text": True} | options
+    return subprocess.run(command(*arguments), cwd=cwd, env=ENVIRONMENT | (env or {}), **options)
+
+
+def in_shell(text, cwd):
+    """A line of a shell, in which `compare` stands for the command line; its exit status is that of `compare`."""
+    text = text.replace("compare", f"{sys.executable} -m compare")
+    return subprocess.run(["bash", "-c", text], cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True)
+
+
+def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
+    """A run on a pseudo-terminal: status, output, and seconds from the key Ctrl-C, if that is pressed, to the end.
+
+    interrupt_at: what stands in the output when the key is pressed.
+    """
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+
+    def own_terminal():
+        os.setsid()
+        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+    streams = dict.fromkeys(("stdin", "stdout", "stderr"), theirs)
+    environment = ENVIRONMENT | {"TERM": term}
+    run = subprocess.Popen(command(*arguments), cwd=cwd, env=environment, preexec_fn=own_terminal, **streams)
+    os.close(theirs)
+    output, pressed = b"", None
+    while True:
+        select.select([ours], [], [], 60)
+        try:
+            new = os.read(ours, 65536)
+        except OSError:  # the other side is closed
+            break
+        output += new
+        if interrupt_at and not pressed and interrupt_at in output:
+            os.write(ours, b"\x03")
+            pressed = time.perf_counter()
+    status = run.wait(timeout=60)
+    seconds = time.perf_counter() - pressed if pressed else None
+    os.close(ours)
+    return SimpleNamespace(status=status, output=output.decode(), seconds=seconds, columns=columns)
+
+
+def screen(output, columns) -> tuple[list[str], bool]:
+    """The lines that a terminal of this width shows in the end, and whether its cursor is visible; other codes are an error."""
+    lines, row, column, visible = [""], 0, 0, True
+    for code, move, plain in re.findall(r"(\x1b\[(?:\?25[lh]|2K|[\d;]*m|1A))|([\r\n])|([^\x1b\r\n]+|\x1b)", output):
+        assert plain != "\x1b", "a code that this terminal does not know"
+        if code.endswith("2K"):
+            lines[row] = ""
+        elif code.endswith("1A"):
+            row -= 1
+        elif "?25" in code:
+            visible = code.endswith("h")
+        elif move == "\r":
+            column = 0
+        elif move == "\n":
+            row += 1
+        for letter in plain:
+            if column == columns:
+                row, column = row + 1, 0
+            lines += [""] * (row + 1 - len(lines))
+            lines[row] = lines[row].ljust(column)[:column] + letter + lines[row][column + 1 :]
+            column += 1
+        lines += [""] * (row + 1 - len(lines))
+    return lines, visible
+
+
+def words(lines) -> str:
+    return " ".join(" ".join(lines).split())
+
+
+def readable_lines(run) -> list[str]:
+    """The screen in the end: nothing of the progress is left, the cursor is back, nothing is over anything else."""
+    lines, visible = screen(run.output, run.columns)
+    assert visible
+    assert all(len(line) <= run.columns for line in lines)
+    assert "Traceback" not in run.output
+    for left in ("imports", "(1 of 1)", "figures"):
+        assert left not in words(lines)
+    return lines
+
+
+def started(*arguments, cwd, env=None):
+    """A run in a process group of its own, as a terminal's, that hears Ctrl-C."""
+
+    def hearing():  # a shell starts what runs in its background deaf to Ctrl-C
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    environment = ENVIRONMENT | (env or {})
+    return subprocess.Popen(arguments, cwd=cwd, env=environment, start_new_session=True, preexec_fn=hearing, **pipes)
+
+
+def ended(run, number):
+    """A run that gets this signal: status, lines on stderr, seconds until it ended; all of its processes end with it."""
+    sent = time.perf_counter()
+    os.killpg(run.pid, number)
+    status = run.wait(timeout=60)
+    seconds = time.perf_counter() - sent
+    lines = run.communicate()[1].splitlines()
+    for _ in range(500):
+        try:
+            os.killpg(run.pid, 0)
+        except ProcessLookupError:
+            break
+        time.sleep(0.01)
+    else:
+        raise AssertionError("a process is still there")
+    return SimpleNamespace(status=status, lines=lines, seconds=seconds)
