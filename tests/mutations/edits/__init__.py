@@ -1,0 +1,5 @@
+"""The edits, by what they break."""
+
+from . import rules
+
+EDITS = (*rules.EDITS,)
