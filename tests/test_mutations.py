@@ -1,10 +1,18 @@
 """The command that tests the judge: its edits apply to the sources as they are, and it sees which ones no test notices."""
 
+import os
+import re
+import signal
+import subprocess
+import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
+from mutations import campaign
 from mutations.__main__ import main
+from mutations.campaign import Stage
 from mutations.edit import DoesNotApply, Edit, applied
 from mutations.edits import EDITS
 from mutations.stages import stages
@@ -25,10 +33,11 @@ def test_every_edit_applies_and_says_what_it_breaks():
     assert all(edit.breaks for edit in EDITS)
 
 
-def test_the_stages_name_tests_that_exist():
-    judge, rest = stages(PROJECT)
-    assert judge and all((PROJECT / path).is_file() for path in judge)
-    assert all((PROJECT / path.removeprefix("--ignore=")).is_file() for path in rest if path.startswith("--ignore"))
+def test_every_test_is_in_one_stage_but_those_that_judge_nothing():
+    judge, rest = (stage.files for stage in stages(PROJECT))
+    assert "tests/test_agreement.py" in judge and "tests/test_command_line.py" in rest
+    every = {str(path.relative_to(PROJECT)) for path in (PROJECT / "tests").rglob("test_*.py")}
+    assert every - {*judge} - {*rest} == {"tests/test_mutations.py", "tests/test_structure.py"} and not {*judge} & {*rest}
 
 
 @pytest.fixture
@@ -136,24 +145,71 @@ def test_an_edit_survives_the_move_of_its_function(toy):
     assert applied(toy, Edit("rules", "Check.width", "3", "4", "")).path.name == "verdicts.py"
 
 
-def test_one_edit_is_caught_and_one_survives(toy, capfd):
+def two_stages(project):
+    return [Stage(["tests/test_toy.py"]), Stage(["tests/test_late.py"])]
+
+
+def runs(pid) -> bool:
+    """Whether a process is there and has not ended, as one that nobody waits for has."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+PROGRAM = """
+import sys
+sys.path.insert(0, {tests!r})
+from pathlib import Path
+from mutations.__main__ import main
+from mutations.campaign import Stage
+from mutations.edit import Edit
+edits = [Edit("rules", "WIDTH", "0.5", "5", "wide")]
+sys.exit(main([], Path({toy!r}), edits, lambda project: [Stage(["tests/test_long.py"])]))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_ends_it_at_once_and_leaves_nothing(toy, tmp_path, number):
+    asleep = tmp_path / "asleep"
+    (toy / "tests/test_long.py").write_text(
+        "import os, subprocess, time\n\n\ndef test_long():\n"
+        "    child = subprocess.Popen(['sleep', '60'], start_new_session=True)\n"
+        f"    open({str(asleep)!r}, 'w').write(f'{{os.getpid()}} {{child.pid}}\\n')\n    time.sleep(60)\n"
+    )
+    (tmp_path / "scratch").mkdir()
+    program = PROGRAM.format(tests=str(PROJECT / "tests"), toy=str(toy))
+    environment = os.environ | {"TMPDIR": str(tmp_path / "scratch")}
+    run = subprocess.Popen([sys.executable, "-c", program], env=environment, stdout=subprocess.PIPE, text=True)
+    while not (asleep.exists() and asleep.read_text().endswith("\n")):
+        assert run.poll() is None
+        time.sleep(0.02)
+    began = time.monotonic()
+    run.send_signal(number)
+    assert run.communicate(timeout=30)[0] == "interrupted\n" and run.returncode == 2
+    assert time.monotonic() - began < 5.0
+    assert list((tmp_path / "scratch").iterdir()) == []
+    assert not any(map(runs, asleep.read_text().split()))
+
+
+def test_one_edit_is_caught_and_one_survives(toy, capfd, monkeypatch):
+    monkeypatch.setattr(campaign, "PATIENCE", (1.0, 1.0))
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # as fast as may be
     edits = (
         Edit("rules", "Check.passed", "abs(value) <= tolerance", "True", "always passes"),
         Edit("rules", "Check.width", "3", "4", "wider"),
         Edit("rules", "WIDTH", "0.5", "5", "wide", harmless="nobody uses it"),
         Edit("rules_of_motion", "slope", "2.0", "3.0", "steeper"),
+        Edit("rules_of_motion", "slope", "return _1", "while True:\n    pass", "endless"),
     )
     before = {path: path.read_text() for path in toy.rglob("*.py")}
-
-    def two_stages(project):
-        return [["tests/test_toy.py"], ["tests/test_late.py"]]
-
     assert main(["--jobs", "2"], toy, edits, two_stages) == 1
     out = capfd.readouterr().out
     assert "always passes: caught by tests/test_toy.py::test_a_value_above_its_tolerance_fails" in out
     assert "steeper: caught by tests/test_late.py::test_a_process_of_its_own_has_the_copy_too" in out
+    assert re.search(r"endless: caught by no end after \d s", out)
     assert "wider: SURVIVED" in out and "wide: harmless" in out
     assert "survived: rules.Check.width: wider\n--- a/compare/rules.py" in out and "-    width = 3\n+    width = (4)" in out
     assert out.index("+    width = (4)") < out.index("(harmless: nobody uses it)")
-    assert out.endswith("4 edits: 2 caught, 1 declared harmless, 1 survived\n")
+    assert out.endswith("5 edits: 3 caught, 1 declared harmless, 1 survived\n")
     assert {path: path.read_text() for path in toy.rglob("*.py")} == before

@@ -22,6 +22,13 @@ ASIDE = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "venv", "build
 PATIENCE = 60.0, 3.0  # seconds and times the time of the unedited copy: then a run counts as endless
 
 
+class Stage(NamedTuple):
+    """Tests that run together."""
+
+    files: list[str]
+    options: tuple = ()
+
+
 class Tried(NamedTuple):
     """What became of an edit."""
 
@@ -42,10 +49,10 @@ class CannotStart(Exception):
 class Campaign:
     """Copies of a project in one temporary folder, and the runs in them; a context, which leaves nothing.
 
-    stages: lists of arguments for pytest; an edit that survives one stage meets the next.
+    stages: files of tests and further arguments for pytest; an edit that survives one stage meets the next.
     """
 
-    def __init__(self, project: Path, stages: list[list[str]], jobs: int):
+    def __init__(self, project: Path, stages: list[Stage], jobs: int):
         self.project, self.stages, self.jobs = project, stages, jobs
         self.running, self.lock, self.stopped = set(), threading.Lock(), False
         self.allowed = [PATIENCE[0] * 20] * len(stages)
@@ -94,7 +101,7 @@ class Campaign:
         """Stage, seconds, what failed in the copy as it is. Compiled code that it leaves is what the edits start from."""
         copy, started = self.free.pop(), time.perf_counter()
         try:
-            failed, output = self.run(copy, self.folder / "cache", stage)
+            failed, output = self.run(copy, self.folder / "cache", stage, self.stages[stage].files)
             return stage, time.perf_counter() - started, failed and f"{failed}\n{output}"
         finally:
             self.free.append(copy)
@@ -112,16 +119,27 @@ class Campaign:
         try:
             write(file, place.after)
             for stage in range(len(self.stages)):
-                caught = caught or self.run(copy, cache, stage)[0]
+                caught = caught or self.run(copy, cache, stage, self.nearest(stage, edit))[0]
         finally:
             write(file, place.before)
             shutil.rmtree(cache, ignore_errors=True)
             self.free.append(copy)
         return Tried(edit, caught, time.perf_counter() - started, difference(name, place))
 
-    def run(self, copy, cache, stage) -> tuple[str, str]:
+    def nearest(self, stage, edit) -> list[str]:
+        """The files of a stage, those first that name what is edited: most edits are caught by one of these."""
+        words = {*edit.module.split("."), *edit.where.split(".")}
+
+        def named(file):
+            text = (self.project / file).read_text(encoding="utf-8")
+            return sum(word in text for word in words) + (edit.module in Path(file).stem)
+
+        return sorted(self.stages[stage].files, key=named, reverse=True)
+
+    def run(self, copy, cache, stage, files) -> tuple[str, str]:
         """What failed first, empty if nothing did, and the end of the output."""
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-rfE", f"--basetemp={copy / 'tests'}", *self.stages[stage]]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-rfE", f"--basetemp={copy / 'tests'}"]
+        command += [*self.stages[stage].options, *files]
         project = copy / "project"
         environment = os.environ | {"TMT_CACHE": str(cache), "TMPDIR": str(copy / "scratch"), "COLUMNS": "200"}
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(project), os.environ.get("PYTHONPATH")]))
@@ -152,7 +170,7 @@ def failure(status, output) -> str:
     """The test that failed first in a run of pytest, or what else ended it; empty if all pass."""
     if status == 0:
         return ""
-    named = re.search(r"^(?:FAILED|ERROR) (.*)", output, re.MULTILINE)
+    named = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", output, re.MULTILINE)
     last = (output.strip().splitlines() or ["no output"])[-1]
     return named[1] if named else f"status {status}: {last}"
 

@@ -20,7 +20,7 @@ class Edit:
     module: a file by the end of its dotted name, "verdict" or "trajectory.rows", or the name of a folder of files;
     where: a function, Class.method, function.inner function, or a name that is assigned in the module or a class.
     old: an expression, a keyword argument (name=value) or a statement; new: what replaces it (statements: any number).
-    In both _1, _2 stand for any expression, and *_1 at the end of a call for all arguments that are left.
+    In both _1, _2 stand for any expression (on a line of its own: statement), *_1 at the end of a call for all other arguments.
     nth: which one, from 1, if there are several. breaks: what the edited judge does. harmless: why it may survive.
     """
 
@@ -50,7 +50,7 @@ class Place(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """A node that matches, with the way to it from the root: (node, field, index or None) of each parent."""
+    """A node that matches, with the way to it from the root: a field and an index in it, or None, of each parent."""
 
     node: ast.AST
     way: tuple
@@ -60,11 +60,11 @@ class Hit(NamedTuple):
 def applied(project: Path, edit: Edit) -> Place:
     """The file that the edit changes, with its text before and after."""
     paths = [path for package in PACKAGES for path in sorted((project / package).rglob("*.py"))]
-    holding = [path for path in paths if scopes(path, edit.where)]
-    named = [path for path in holding if is_named(path.relative_to(project), edit.module)]
+    named = [path for path in paths if is_named(path.relative_to(project), edit.module) and scopes(path, edit.where)]
+    holding = named or [path for path in paths if scopes(path, edit.where)]  # moved to another file
     if not holding:
         raise DoesNotApply(f"{edit.name}: there is no {edit.where} below {' or '.join(PACKAGES)}")
-    found = {path: hits for path in named or holding if (hits := matches(path, edit))}
+    found = {path: hits for path in holding if (hits := matches(path, edit))}
     if not found:
         raise DoesNotApply(f"{edit.name}: {edit.where} has no {one_line(edit.old)}")
     count = sum(map(len, found.values()))
@@ -101,7 +101,8 @@ def parsed(text):
 
 def scopes(path, where) -> list[Hit]:
     """The nodes of this qualified name: definitions, or statements that assign it."""
-    hits = [Hit(source(path)[1], (), {})]
+    text, tree = source(path)
+    hits = [Hit(tree, (), {})] if where.split(".")[0] in text else []
     for name in where.split("."):
         hits = [inner for hit in hits for inner in named_inside(hit, name)]
     return hits
@@ -127,16 +128,19 @@ def children(hit):
     """The nodes directly below a node, in the order of the source."""
     for name, value in ast.iter_fields(hit.node):
         if isinstance(value, ast.AST):
-            yield Hit(value, (*hit.way, (hit.node, name, None)), {})
+            yield Hit(value, (*hit.way, (name, None)), {})
         elif isinstance(value, list):
             for k, item in enumerate(value):
                 if isinstance(item, ast.AST):
-                    yield Hit(item, (*hit.way, (hit.node, name, k)), {})
+                    yield Hit(item, (*hit.way, (name, k)), {})
 
 
 def matches(path, edit) -> list[Hit]:
     """Every node in the edit's function or statement that matches its old expression."""
-    patterns = read(edit.old)
+    try:
+        patterns, _ = read(edit.old), read(edit.new)
+    except SyntaxError:
+        patterns = []
     if len(patterns) != 1:
         raise DoesNotApply(f"{edit.name}: old is one expression or statement")
     (pattern,) = patterns
@@ -174,6 +178,9 @@ def equal(pattern, node, holes) -> bool:
     if isinstance(pattern, ast.Name) and ONE.match(pattern.id) and isinstance(node, ast.expr):
         known = holes.setdefault(pattern.id, node)
         return known is node or ast.dump(known) == ast.dump(node)
+    if isinstance(pattern, ast.Expr) and isinstance(pattern.value, ast.Name) and ONE.match(pattern.value.id):
+        holes[pattern.value.id] = node
+        return isinstance(node, ast.stmt)
     if type(pattern) is not type(node):
         return False
     if isinstance(pattern, ast.Call) and pattern.args and is_rest(pattern.args[-1]):
@@ -219,6 +226,10 @@ class Filled(ast.NodeTransformer):
     def visit_Name(self, node):
         return copy.deepcopy(self.holes.get(node.id, node))
 
+    def visit_Expr(self, node):
+        value = self.visit(node.value)
+        return value if isinstance(value, ast.stmt) else ast.Expr(value)
+
     def visit_Call(self, node):
         if node.args and is_rest(node.args[-1]):
             args, keywords = copy.deepcopy(self.holes[node.args[-1].value.id])
@@ -228,25 +239,28 @@ class Filled(ast.NodeTransformer):
 
 def edited(text, hit, edit) -> str:
     """The text of a file with the new expression in the place of the node; only that place changes."""
-    way = copy.deepcopy([(hit.node, None, None), *reversed(hit.way)])  # one copy: the ties between the nodes stay
+    number = hit.way[0][1]
+    root = ast.Module([copy.deepcopy(parsed(text)[1].body[number])], [])
+    nodes = [root]  # from the root to the node
+    way = (("body", 0), *hit.way[1:])
+    for name, k in way:
+        nodes.append(getattr(nodes[-1], name) if k is None else getattr(nodes[-1], name)[k])
     new = [Filled(hit.holes).visit(node) for node in read(edit.new)]
-    parent, name, k = way[1]
     if isinstance(hit.node, ast.keyword):
         new = [ast.keyword(arg=new[0].targets[0].id, value=new[0].value)]
-    if isinstance(hit.node, ast.stmt):
+    elif isinstance(hit.node, ast.stmt):
         new = [ast.Expr(node) if isinstance(node, ast.expr) else node for node in new]
-        getattr(parent, name)[k : k + 1] = new
     elif len(new) != 1:
         raise DoesNotApply(f"{edit.name}: new is one expression, as old is")
-    elif k is None:
-        setattr(parent, name, new[0])
+    (name, k), texts = way[-1], [ast.unparse(node) for node in new]
+    if k is None:
+        setattr(nodes[-2], name, new[0])
     else:
-        getattr(parent, name)[k] = new[0]
-    old, texts = hit.node, [ast.unparse(node) for node in new]
-    for outer, *_ in hit.way:  # before Python 3.12 the places inside an f-string are not known
-        if isinstance(outer, ast.JoinedStr):
-            depth = [node for node, *_ in hit.way].index(outer)
-            old, texts = outer, [ast.unparse([node for node, *_ in reversed(way)][depth])]
+        getattr(nodes[-2], name)[k : k + 1] = new
+    old = hit.node
+    for node in nodes:  # before Python 3.12 the places inside an f-string are not known
+        if isinstance(node, ast.JoinedStr):
+            old, texts = node, [ast.unparse(node)]
             break
     if isinstance(old, ast.stmt):
         piece = ("\n" + " " * old.col_offset).join("\n".join(texts).splitlines())
@@ -255,10 +269,10 @@ def edited(text, hit, edit) -> str:
     start, end = place(text, old.lineno, old.col_offset), place(text, old.end_lineno, old.end_col_offset)
     result = text[:start] + piece + text[end:]
     try:
-        same = ast.dump(ast.parse(result)) == ast.dump(way[-1][0])
+        found = ast.parse(result).body[number : number + len(root.body)]
     except SyntaxError:
-        same = False
-    if not same:
+        found = []
+    if ast.dump(ast.Module(found, [])) != ast.dump(root):
         raise DoesNotApply(f"{edit.name}: {one_line(edit.old)} cannot be replaced in the text")
     return result
 

@@ -1,5 +1,5 @@
 """The edits, by what they break."""
 
-from . import rules
+from . import report, rules
 
-EDITS = (*rules.EDITS,)
+EDITS = (*rules.EDITS, *report.EDITS)

@@ -1,10 +1,57 @@
-"""Edits of the rules that turn a number into a verdict."""
+"""Edits of what turns a number into a verdict: rules, tolerances, scales, and the comparison of two engines."""
 
 from ..edit import Edit
 
 EDITS = (
-    Edit("agreement", "FACTOR", "64", "6400", "64 eps become 6400"),
+    # rules
     Edit("agreement", "RULES", "value <= tolerance", "True", "'at most' always passes"),
     Edit("agreement", "RULES", "value <= tolerance", "value < tolerance", "a value equal to its tolerance fails"),
-    Edit("verdict", "answers.printed", '("published", "tmt", "mujoco")', '("published", "mujoco", "tmt")', "exchange"),
-)
+    Edit("agreement", "RULES", "value >= tolerance", "True", "'at least' always passes"),
+    Edit("agreement", "RULES", "value >= tolerance", "value > tolerance", "a value equal to the least fails"),
+    Edit("agreement", "RULES", "value == tolerance", "True", "'equal' always passes"),
+    Edit("agreement", "RULES", "value == tolerance", "value <= tolerance", "'equal' passes what is smaller"),
+    Edit("agreement", "Check.passed", "self.value is not None and bool(_1)", "self.value is None or bool(_1)",
+         "a check without a number passes"),
+    Edit("agreement", "Check.__post_init__", "not np.isfinite(self.tolerance)", "False", "a tolerance may be infinite"),
+    Edit("agreement", "Check.over_bar", "self.value / self.tolerance if _1 else None", "0.0 if _1 else None",
+         "the share of the tolerance is 0"),
+    Edit("agreement", "Check.over_bar", "self.rounding and _1 and _2", "_1 and _2",
+         "a share of tolerances that are not of rounding"),
+    Edit("agreement", "Result.check", "not np.isfinite(value)", "np.isnan(value)", "an infinite value is a number"),
+    Edit("agreement", "Result.check", "None if value is None or not np.isfinite(value) else float(value)",
+         "0.0 if value is None or not np.isfinite(value) else float(value)", "no number counts as 0"),
+    # the comparison of two engines
+    Edit("agreement", "FACTOR", "64", "6400", "64 eps become 6400"),
+    Edit("agreement", "FACTOR", "64", "96", "64 eps become 96"),
+    Edit("agreement", "Result.agree.closest", "np.argmax(share)", "np.argmin(share)", "the best state is judged"),
+    Edit("agreement", "Result.agree.closest", "np.argmax(share)", "np.argmax(difference)",
+         "the largest difference is judged, whatever its tolerance"),
+    Edit("agreement", "Result.agree.closest", "np.where(np.isfinite(difference), _1, np.inf)",
+         "np.where(np.isfinite(difference), _1, 0.0)", "a state without a number is not judged"),
+    Edit("agreement", "largest", "np.abs(_1)", "_1", "a negative difference passes"),
+    Edit("agreement", "largest", "_1.max(axis=1)", "_1[:, 0]", "only the first component is compared"),
+    Edit("agreement", "Result.agree", "largest(distance(values[:len(known)], known))",
+         "largest(distance(values[:len(known)], known)) / 2", "the distance from the exact values is halved"),
+    Edit("agreement", "Result.agree", "(('TMT', tmt_values), ('MuJoCo', mujoco_values))",
+         "(('TMT', tmt_values), ('MuJoCo', tmt_values))", "MuJoCo's distance from the exact values is TMT's"),
+    Edit("agreement", "Result.agree", "list(apart)[1:]", "list(apart)[2:]", "TMT is not compared with the exact values"),
+    Edit("agreement", "Result.agree", "in_eps['TMT to exact'].max() if truth else None",
+         "in_eps['MuJoCo to exact'].max() if truth else None", "the distances from the exact values are exchanged"),
+    Edit("agreement", "Sample.truths", "slice(self.exact_states)", "slice(1)", "one state is compared with its exact value"),
+    Edit("agreement", "Setup.random", "rng.uniform(-np.pi, np.pi, (self.states, 3))", "np.zeros((self.states, 3))",
+         "every random state is zero"),
+    Edit("agreement", "Setup.named", "len(q)", "1", "of the named postures one is compared with its exact value"),
+    # scales
+    Edit("agreement", "reaches", "to_hinge[hinge] + np.linalg.norm(com)", "100.0 * (to_hinge[hinge] + np.linalg.norm(com))",
+         "reaches x 100"),
+    Edit("agreement", "reaches", "to_hinge[hinge] + np.linalg.norm(com)", "np.linalg.norm(com)", "reaches without the links"),
+    Edit("agreement", "gravity_scale", "np.dot(_1, reaches(model))", "100 * np.dot(_1, reaches(model))", "the scale x 100"),
+    Edit("agreement", "bias_scale", "_1.max(axis=1) + gravity_scale(model)", "100 * _1.max(axis=1) + gravity_scale(model)",
+         "the moving terms x 100"),
+    Edit("agreement", "bias_scale", "newton + euler", "newton", "without Euler's terms"),
+    Edit("agreement", "bias_scale", "_1.max(axis=1) + gravity_scale(model)", "_1.max(axis=1)", "without gravity"),
+    Edit("agreement", "mass_scale", "np.abs(_1).max(axis=(1, 2))", "100 * np.abs(_1).max(axis=(1, 2))", "the scale x 100"),
+    Edit("agreement", "condition", "np.linalg.cond(_1)", "np.linalg.cond(_1) ** 2", "squared"),
+    Edit("agreement", "acceleration_scale", "(_1 * size + force) / _2", "100 * (_1 * size + force) / _2", "the scale x 100"),
+    Edit("agreement", "acceleration_scale", "_1 * size + force", "force", "without the error of Mbar"),
+)  # fmt: skip
