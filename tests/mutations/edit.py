@@ -272,9 +272,14 @@ def edited(text, hit, edit) -> str:
         found = ast.parse(result).body[number : number + len(root.body)]
     except SyntaxError:
         found = []
-    if ast.dump(ast.Module(found, [])) != ast.dump(root):
+    if written(ast.Module(found, [])) != written(root):
         raise DoesNotApply(f"{edit.name}: {one_line(edit.old)} cannot be replaced in the text")
     return result
+
+
+def written(tree) -> str:
+    """A tree as text, whether its names are read or assigned."""
+    return re.sub(r", ctx=\w+\(\)", "", ast.dump(tree))
 
 
 def place(text, line, column) -> int:

@@ -30,6 +30,20 @@ CHECKS = (
     ("reduction", "runs", '"movement"'),
     ("reduction", "rows", '"models whose hinges can be locked"'),
     ("sub_blocks", "judge", 'f"{_1}, {_2}"'),
+    ("trajectory", "pair", '"time judged"'),
+    ("trajectory", "divergence", '"step of divergence, MuJoCo\'s, is TMT\'s"'),
+    ("trajectory", "movement", '"movement"'),
+    ("trajectory", "same_bits", 'f"the same bits as {_1}"'),
+    ("trajectory", "level", 'f"{_1}, TMT to MuJoCo"'),
+    ("motion", "judge_derivative", '"dh/dqd + D, TMT to MuJoCo\'s -qDeriv"'),
+    ("drift", "judge", 'f"order of the drift of {_1}, from {_2}"'),
+    ("drift", "judge", 'f"drift of {_1} over that of Euler"'),
+    ("horizon", "judge_digits", 'f"{_1} to many digits of its own scheme"'),
+    ("limits", "judge", '"limit, observed / predicted - 1"'),
+    ("limits", "judge", "quantity"),
+    ("limits", "judge", 'f"growth in {_1} steps, observed / predicted - 1"'),
+    ("departure", "judge", '"exponent of the time to leave, from -1/2"'),
+    ("departure", "check_row", "quantity"),
 )
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (
