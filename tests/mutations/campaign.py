@@ -16,6 +16,8 @@ from importlib.util import cache_from_source
 from pathlib import Path
 from typing import NamedTuple
 
+from tmt.cache import cache_folder
+
 from .edit import Edit, Place
 
 ASIDE = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "venv", "build", "latest")  # not part of a copy
@@ -95,7 +97,9 @@ class Campaign:
             shutil.copytree(self.project, self.folder / str(k) / "project", ignore=ASIDE, dirs_exist_ok=True)
             (self.folder / str(k) / "scratch").mkdir()
             self.free.append(self.folder / str(k))
-        (self.folder / "cache").mkdir(mode=0o700)
+        with suppress(OSError):  # what the user has compiled already; without it the first run takes a minute longer
+            shutil.copytree(cache_folder(), self.folder / "cache")
+        (self.folder / "cache").mkdir(mode=0o700, exist_ok=True)
 
     def unedited(self, stage) -> tuple[int, float, str]:
         """Stage, seconds, what failed in the copy as it is. Compiled code that it leaves is what the edits start from."""
