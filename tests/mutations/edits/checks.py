@@ -27,7 +27,7 @@ CHECKS = (
     ("known_motion", "judge_modes", "what"),
     ("reduction", "judge_run", '"smallest model to whole"'),
     ("reduction", "judge_run", '"time judged"'),
-    ("reduction", "runs", '"movement"'),
+    ("reduction", "judge_movement", '"movement"'),
     ("reduction", "rows", '"models whose hinges can be locked"'),
     ("sub_blocks", "judge", 'f"{_1}, {_2}"'),
     ("trajectory", "pair", '"time judged"'),
@@ -44,6 +44,15 @@ CHECKS = (
     ("limits", "judge", 'f"growth in {_1} steps, observed / predicted - 1"'),
     ("departure", "judge", '"exponent of the time to leave, from -1/2"'),
     ("departure", "check_row", "quantity"),
+    ("claims", "judge_torques", "text"),
+    ("claims", "judge_torques", '"movement under the engine\'s own bias"'),
+    ("claims", "judge_finer", 'f"movement in 5 s at {_1} steps"'),
+    ("beyond", "judge", 'f"time within {_1:g} rad, below the limit"'),
+    ("failure", "judge_near", 'f"{_1} {SMALL:g} rad"'),
+    ("failure", "judge_near", 'f"{_1} {LARGE:g} rad"'),
+    ("failure", "judge_silent", "quantity"),
+    ("long_runs", "judge_minutes", "quantity"),
+    ("stability", "amplification", "quantity"),
 )
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (
