@@ -13,9 +13,6 @@ EDITS = (
         Edit("parameters", "rows", FOUND, f"expected if quantity == {name!r} else {FOUND}", f"{name} is read as stated")
         for name in READ
     ),
-    Edit("engine_parameters", "parameters", "m.dof_frictionloss[_1]", "0 * m.dof_frictionloss[_1]", "frictionloss read as 0"),
-    Edit("engine_parameters", "parameters", "m.body_gravcomp[_1]", "0 * m.body_gravcomp[_1]", "gravcomp read as 0"),
-    Edit("engine_parameters", "parameters", "m.jnt_limited[_1]", "0 * m.jnt_limited[_1]", "limits read as 0"),
     Edit("parameters", "rows", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
     Edit("parameters", "rows", "sorted(causes, key=_1)", "causes", "causes in the order in which they are found"),
     Edit("parameters", "named", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
