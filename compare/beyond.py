@@ -94,8 +94,9 @@ def judge(result, beyond) -> None:
     moves = bool(above) and all(row["observed_s"] is not None or (row["largest_rad"] or 0.0) > 1e-3 for row in above)
     word = ("bounded" if any(ends) else "reproduced") if stays and moves else "not reproduced"
     result.notes.append(
-        f"Claim 3, {word}: RK4 holds bent up to {limit:.4f} s, {limit * beyond['fastest']:.4f} over the rate of its fastest "
-        f"mode, {beyond['fastest']:.3f} rad/s. {tell_above(above)} {tell_within(rows, leaves, len(beyond['counts']))} "
+        f"Claim 3, {word}: the predicted limit of RK4 at bent is {limit:.4f} s, {limit * beyond['fastest']:.4f} over the rate "
+        f"of its fastest mode, {beyond['fastest']:.3f} rad/s. {tell_above(above)} "
+        f"{tell_within(rows, leaves, len(beyond['counts']))} "
         "(Reproduced: it stays below the limit, moves by more than 1e-3 rad at each step above it, and can end at hanging; "
         "bounded: all but the last.)"
     )
@@ -125,8 +126,9 @@ def tell_within(rows, leaves, tried) -> str:
         times = [(row["observed_s"], row["dt_s"]) for row in rows if row["torque"] == torque and row["observed_s"]]
         counts = [count for (_, name), found in leaves.items() if name == torque for count in found]
         soonest = f"it leaves after {min(times)[0]:.2f} s at the soonest (dt = {min(times)[1]:.4g} s)" if times else "it stays"
-        within = f"at most {max(counts)} steps let it leave" if counts else "none lets it leave"
-        told.append(f"With a torque {torque.replace('four', 'of four')} {soonest}; of {tried} numbers of steps in 5 s {within}.")
+        within = f"the largest with which it leaves is {max(counts)}" if counts else "none lets it leave"
+        name = torque.replace("four", "of four")
+        told.append(f"With a torque {name} {soonest}; of {tried} numbers of steps tried for 5 s, {within}.")
     return " ".join(told)
 
 

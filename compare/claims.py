@@ -135,7 +135,7 @@ def judge(result, torques, finer, printed) -> None:
     result.notes.append(
         f"The torque as printed, four decimals, in {len(printed)} runs of both engines at ball catch with steps from "
         f"{max(row['dt_s'] for row in printed):.4g} s down: the arm leaves after {span(row['observed_s'] for row in printed)}"
-        + (f", and in {stay} runs not at all." if stay else f". The assignment's arm leaves after about {PUBLISHED:g} s.")
+        + (f"; runs in which it stays: {stay}." if stay else f". The assignment's arm leaves after about {PUBLISHED:g} s.")
     )
 
 
@@ -197,16 +197,18 @@ def judge_finer(result, finer) -> None:
     for row in (row for row in finer if row["dt_s"] == finest):
         where = f"ball catch, {row['engine']} {row['method']}, torque {row['ulps_alpha']:+d} ulp"
         still &= result.check(where, f"movement in 5 s at {count} steps", row["moved_rad"], 0.0, "rad").passed
-    series, turned = [], 0
+    series, turned, leave = [], 0, True
     for engine, sign in dict.fromkeys((row["engine"], row["ulps_alpha"]) for row in finer):
         rows = [row for row in finer if (row["engine"], row["ulps_alpha"]) == (engine, sign) and row["direction"]]
         turns = [row for before, row in pairwise(rows) if before["direction"] != row["direction"]]
         turned += bool(turns)
+        leave &= bool(rows)
         series.append(
             f"{engine} {sign:+d} ulp to {SIDES[rows[0]['direction'] if rows else None]}"
             + "".join(f", from {round(5 / row['dt_s'])} steps on to {SIDES[row['direction']]}" for row in turns)
         )
-    word = {2: "reproduced", 1: "reproduced in part", 0: "not reproduced"}[bool(turned) + bool(still)]
+    met = bool(turned) + bool(still) + leave
+    word = {3: "reproduced", 2: "reproduced in part"}.get(met, "not reproduced")
     rows = [row for row in finer if row["engine"] == "TMT" and row["ulps_alpha"] == 1]
     times = ", ".join(
         f"{round(5 / row['dt_s'])}: " + ("never" if row["observed_s"] is None else f"{row['observed_s']:.2f} s")
@@ -221,6 +223,6 @@ def judge_finer(result, finer) -> None:
         f"(TMT +1 ulp, within {LONG:g} s): {times}. What a step adds to an angle, dt qd, is "
         f"{value(last['step_rad']):.1e} rad after 5 s at {round(5 / last['dt_s'])} steps: "
         f"{'less' if lost else 'not less'} than half a unit in the last place of the angle, {last['half_ulp_rad']:.1e} rad"
-        f"{', so it is lost in the sum' if lost else ''}. (Reproduced: the side is reversed in at least one series, and with "
-        "the most steps nothing moves in 5 s.)"
+        f"{', so it is lost in the sum' if lost else ''}. (Reproduced: every series leaves at some step, at least one "
+        "reverses its side, and with the most steps nothing moves in 5 s; in part: two of these.)"
     )

@@ -22,7 +22,7 @@ from .motion import SCHEMES, TWINS
 GRID = 64  # steps of the coarsest run, and of the grid on which runs are judged
 FINEST = {"RK4": 2**17}  # steps beyond which a run would take too long to be timed again and again
 FINEST_MUJOCO, FINEST_TMT, FINEST_IMPLICIT = 2**16, 2**18, 2**15
-FEW = {"quick": 5, "small": 7}  # settings of a run that is not full: the coarsest
+FEW, FEW_OTHERS = {"quick": 5, "small": 7}, 2  # settings of a run that is not full: the coarsest; of SciPy and heyoka
 NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
 TOLERANCES = tuple(10.0**-k for k in range(2, 15))
 SCIPY = {"RK45": 12, "DOP853": 13, "Radau": 6, "LSODA": 12}  # the finest tolerance, 10^-k
@@ -76,11 +76,11 @@ def competitors(engine: Engine, size: str = "full", which: str = "all") -> list[
     if which == "same schemes":
         names = [*SCHEMES, *map(TWINS.get, SCHEMES)]
         return [replace(c, settings=c.settings[NEARER]) for c in result if c.method in names]
-    if size != "quick":
-        result += others()
     if size == "full":
-        return result
-    return [replace(competitor, settings=competitor.settings[: FEW[size]]) for competitor in result]
+        return result + others()
+    more = others() if size == "small" else []
+    few = [(c, FEW[size]) for c in result] + [(c, FEW_OTHERS) for c in more]
+    return [replace(competitor, settings=competitor.settings[:count]) for competitor, count in few]
 
 
 def others() -> list[Competitor]:

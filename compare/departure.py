@@ -214,9 +214,9 @@ def tell_departures(rows) -> str:
         )
         fine = [abs(late(row)) for row in both if row["dt_s"] < coarsest]
         told += f", and {max(fine):.3f} s at steps below {coarsest:.4g} s" if fine else ""
-    told += f"; {neither} stay in both" if neither else ""
+    told += f"; staying in both: {neither}" if neither else ""
     lost = len(rows) - len(both) - neither
-    return told + (f"; {lost} stay in only one of the two." if lost else ".")
+    return told + (f"; staying in only one of the two: {lost}." if lost else ".")
 
 
 def exponent(rows) -> float | None:
@@ -231,13 +231,12 @@ def exponent(rows) -> float | None:
 def tell_falls(falls, slopes) -> str:
     """The law of the time to leave zero, and what the runs make of it."""
     known = [slope for slope in slopes if slope is not None]
-    law = (
-        "the time to leave goes with the perturbation to the power "
-        + (f"{min(known):.3f} to {max(known):.3f}" if min(known) < max(known) else f"{known[0]:.3f}")
-        + " up to 1e-4 rad"
-        if known
-        else "not all runs leave, so they give no power of the perturbation"
-    )
+    law = "no series of runs leaves, so they give no power"
+    if known:
+        law = (
+            f"{len(known)} of {len(slopes)} series, an engine and a side each, leave, up to 1e-4 rad with the power "
+            f"{min(known):.3f} to {max(known):.3f}"
+        )
     one = max(falls, key=lambda row: row["perturbation_rad"])
     return (
         f"Zero, held: the potential along the mode without stiffness is cubic, which predicts a time that goes with the "

@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from .beyond import TORQUES
+from .beyond import TORQUES, tell_above, tell_within
 from .claims import DT
-from .departure import NEAR, near, span
+from .departure import NEAR, late, near, span
 from .draw import BLUE, GREEN, GREY, ORANGE, RED, WIDTH
 from .draw_stability import style
 from .motion import LEFT
@@ -26,7 +26,6 @@ def times(result):
     steps = sorted({row["dt_s"] for row in rows}, reverse=True)
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     axes = fig.subplots(1, len(steps), sharey=True, squeeze=False)[0]
-    off = []
     for ax, dt in zip(axes, steps):
         here = [row for row in rows if row["dt_s"] == dt]
         for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in here):
@@ -36,8 +35,6 @@ def times(result):
             p, predicted, observed = (
                 [value(r[key]) for r in mine] for key in ("perturbation_rad", "predicted_s", "observed_s")
             )
-            late = np.abs(np.subtract(observed, predicted))
-            off += [(value, value <= near(dt)) for value in late if np.isfinite(value)]
             if engine == "TMT":
                 colour, dash, name = style(method)
                 ax.plot(p, predicted, linestyle=dash, color=colour, linewidth=1)
@@ -50,19 +47,21 @@ def times(result):
                     color="black",
                     label=f"MuJoCo {method}",
                 )
-        ax.axvspan(3e-16, 3e-13, color=GREY, alpha=0.15)
-        ax.set(xscale="log", xlim=(3e-16, 3e-2), ylim=(0, None), title=f"dt = {'5/64' if dt == DT else f'{dt:g}'} s")
-        ax.set_xticks([1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
+        ax.axvspan(1e-15, 3e-13, color=GREY, alpha=0.15)
+        ax.set(xscale="log", xlim=(1e-15, 3e-2), ylim=(0, None), title=f"dt = {'5/64' if dt == DT else f'{dt:g}'} s")
+        ax.set_xticks([1e-14, 1e-12, 1e-9, 1e-6, 1e-3])
     axes[0].set_ylabel(f"time until a hinge is {LEFT:g} rad away, s")
     fig.supxlabel("perturbation, rad (grey: as the error of torque that moves the equilibrium so far)", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
     rate = max(row["real_per_s"] for row in result.tables["stability_modes"] if row["scene"] == "ball catch")
-    farthest, within = max(value for value, _ in off), sum(close for _, close in off)
+    both = [row for row in rows if None not in (row["observed_s"], row["predicted_s"])]
+    close = sum(abs(late(row)) <= near(row["dt_s"]) for row in both)
     caption = (
-        f"How long the arm stays at ball catch. Lines: first crossing of {LEFT:g} rad by each method's own linear map; "
-        f"its slope is ln 10 / {rate:.3f} = {np.log(10) / rate:.3f} s for each power of ten. Marks: runs. {within} of "
-        f"{len(off)} are within one step or {NEAR:g} s of it, the farthest {farthest:.2f} s"
-        + (": late, where rounding holds a tiny step back." if within < len(off) else ".")
+        f"How long the arm stays at ball catch. Lines: first crossing of {LEFT:g} rad by each method's own linear map, its "
+        "angles rounded to doubles; the fastest mode alone gives a slope of "
+        f"ln 10 / {rate:.3f} = {np.log(10) / rate:.3f} s for each power of ten. Marks: {len(rows)} runs. "
+        f"{len(both)} leave as the map does, {close} of them within one step or {NEAR:g} s"
+        + (f", the farthest {max(abs(late(row)) for row in both):.3f} s off." if both else ".")
     )
     return "stability_departure", fig, caption
 
@@ -74,7 +73,7 @@ def torques(result):
     grid = fig.add_gridspec(2, 2, width_ratios=(1.35, 1))
     sides = {1: (BLUE, "^", "to larger α"), -1: (RED, "v", "to smaller α"), None: (GREY, "o", "never")}
     observed = [row["observed_s"] for row in rows if row["observed_s"] is not None]
-    first, last = min(observed), max(observed)
+    first, last = min(observed, default=0.0), max(observed, default=0.0)
     never = last + 4 * DT
     first_axis = None
     for k, engine in enumerate(PARTY):
@@ -102,25 +101,28 @@ def torques(result):
     known = sorted(
         {(row["push_rad_per_s2"] * 1e15, row["predicted_s"]) for row in rows if row["predicted_s"] is not None}
     )
-    ax.plot(*zip(*known), drawstyle="steps-mid", color="black", linewidth=0.8, label="predicted by the linear map")
+    known_x, known_y = zip(*known) if known else ((), ())
+    ax.plot(known_x, known_y, drawstyle="steps-mid", color="black", linewidth=0.8, label="predicted by the linear map")
     ax.axvline(0.0, color="black", linewidth=0.5)
     ax.set(xlabel="push on the unstable mode, 1e-15 rad/s2", ylabel="time, s")
     for colour, mark, text in sides.values():
         ax.plot([], [], mark, color=colour, label=text)
     ax.plot([], [], "^", color="black", fillstyle="none", label="open: MuJoCo")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
-    told = []
-    for engine in PARTY:
-        mine = [row for row in rows if row["engine"] == engine]
-        at = [row["observed_s"] for row in mine if row["observed_s"] is not None]
-        up, down = (sum(row["direction"] == side for row in mine) for side in (1, -1))
-        told.append(f"{engine} after {span(at)}, {up} to larger α, {down} to smaller, {len(mine) - len(at)} never")
     caption = (
         "Held at ball catch, RK4, dt = 5/64 s, under all 27 torques within one unit in the last place of TMT's. They "
-        f"leave: {'; '.join(told)}. Right: when and to which side is decided by what the last bits of the torque, less "
-        "those of the engine's own bias, push on the unstable mode."
+        f"leave: {'; '.join(tell_sides(rows, engine) for engine in PARTY)}. Right: when and to which side, over what the "
+        "torque, less the engine's own bias, pushes on the unstable mode."
     )
     return "stability_torques", fig, caption
+
+
+def tell_sides(rows, engine) -> str:
+    """When the arm leaves in one engine, and to which side."""
+    mine = [row for row in rows if row["engine"] == engine]
+    gone = [row["observed_s"] for row in mine if row["observed_s"] is not None]
+    up, down = (sum(row["direction"] == side for row in mine) for side in (1, -1))
+    return f"{engine} after {span(gone)}, {up} to larger α, {down} to smaller, {len(mine) - len(gone)} never"
 
 
 def finer(result):
@@ -154,16 +156,28 @@ def finer(result):
         ax.set_xticks([32, 128, 512, 2048, 8192], ["32", "128", "512", "2048", "8192"])
         ax.minorticks_off()
     fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=7, fontsize=7.5, columnspacing=1.0)
-    last = rows[len(rows) // 2 - 1]
-    still = min((round(5 / row["dt_s"]) for row in rows if row["moved_rad"] == 0.0), default="no number of")
     caption = (
-        "Held at ball catch by RK4, the torque one unit in the last place off in alpha: the finest steps delay "
-        f"the departure, and from {still} steps on nothing moves in 5 s (drawn at 1e-17). There dt qd, "
-        f"{last['step_rad']:.1e} rad at {round(5 / last['dt_s'])} steps, is below half a unit in the last place of the "
-        f"angle, {last['half_ulp_rad']:.1e} rad, and is lost in the sum. The linear map, which does not round, leaves "
-        f"after {span(row['predicted_s'] for row in mine)} at every step. Triangles: to which side the arm leaves."
+        "Held at ball catch by RK4, the torque one unit in the last place off in alpha. Triangles: to which side the arm "
+        f"leaves. {tell_finest(rows)} The linear map, which does not round here, leaves after "
+        f"{span(row['predicted_s'] for row in mine)}."
     )
     return "stability_finer_steps", fig, caption
+
+
+def tell_finest(rows) -> str:
+    """From how many steps on nothing moves in any series, and what a step adds at the finest."""
+    counts = sorted({round(5 / row["dt_s"]) for row in rows}, reverse=True)
+    still = []
+    for count in counts:
+        if any(row["moved_rad"] != 0.0 for row in rows if round(5 / row["dt_s"]) == count):
+            break
+        still.append(count)
+    told = f"From {min(still)} steps on nothing moves in 5 s (drawn at 1e-17)." if still else "With every step the arm moves."
+    last = max((row for row in rows if round(5 / row["dt_s"]) == counts[0]), key=lambda row: value(row["step_rad"]))
+    return told + (
+        f" At {counts[0]} steps dt qd is {value(last['step_rad']):.1e} rad after 5 s at most; half a unit in the last place "
+        f"of the angle is {last['half_ulp_rad']:.1e} rad."
+    )
 
 
 def bent(result):
@@ -187,15 +201,12 @@ def bent(result):
     axes[0].plot([], [], ":", color="black", linewidth=2.2, label="MuJoCo")
     axes[0].set_ylabel("largest deviation of a hinge, rad")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=6, fontsize=8)
-    limit = next(
-        r["predicted_dt_s"] for r in result.rows if (r["scene"], r["method"], r["damping"]) == ("bent", "rk4", 0.0)
-    )
-    few = max(n for (_, name), n in data["leaves_within_5_s"].items() if name == TORQUES[1])
-    just = min(row["dt_s"] for row in data["rows"] if row["dt_s"] > limit)
+    limit = data["limit"]
     caption = (
-        f"Held at bent by RK4, from just below its limit of {limit:.4f} s on. Just above, at {just:g} s, the arm swings and "
-        "stays within reach; with longer steps it leaves. With a torque one unit in the last place off nothing leaves in "
-        f"5 s (grey line); with four decimals it does, at {few} steps or fewer. Black line: 0.1 rad."
+        f"Held at bent by RK4, its predicted limit {limit:.4f} s. "
+        f"{tell_above([row for row in data['rows'] if row['dt_s'] > limit])} "
+        f"{tell_within(data['rows'], data['leaves_within_5_s'], len(data['counts']))} "
+        f"Grey line: 5 s; black line: {LEFT:g} rad."
     )
     return "stability_bent", fig, caption
 
@@ -217,17 +228,17 @@ def zero(result):
             observed = [value(row["observed_s"]) for row in mine]
             label = engine if sign == 1 else None
             ax.loglog(p, observed, mark, color=colour, fillstyle=fill, markersize=size, label=label)
-    anchor = rows[6]
-    sizes = np.array([1e-5, 1e-2])
-    ax.loglog(sizes, 0.55 * anchor["observed_s"] * np.sqrt(1e-5 / sizes), ":", color=GREY, label="slope -1/2")
+    anchor = min((row for row in rows if row["perturbation_rad"] > 0.0), key=lambda row: row["perturbation_rad"])
+    sizes = np.array([anchor["perturbation_rad"], 1e-2])
+    ax.loglog(sizes, 0.55 * anchor["predicted_s"] * np.sqrt(sizes[0] / sizes), ":", color=GREY, label="slope -1/2")
     ax.set(xlabel="perturbation along the mode without stiffness, rad", ylabel="time to move 0.1 rad, s")
     ax.set_yticks([5, 10, 20, 50, 100, 200], ["5", "10", "20", "50", "100", "200"])
     ax.minorticks_off()
     fig.legend(loc="outside upper center", ncols=5)
-    off = max(abs(value(row["observed_s"]) - row["predicted_s"]) for row in rows)
+    off = [abs(late(row)) for row in rows if row["observed_s"] is not None]
     caption = (
-        "Zero, held, is marginal: along γ the potential is cubic, and the arm leaves after a time that goes with one "
-        "over the square root of the perturbation, not with its logarithm. Predicted from the cubic coefficient "
-        f"alone; the {len(rows)} runs of RK4 at 0.01 s are at most {off:.3f} s off."
+        "Zero, held: along the mode without stiffness the potential is cubic, and the time to leave is predicted from the "
+        f"cubic coefficient alone. {len(off)} of {len(rows)} runs of RK4 at {rows[0]['dt_s']:g} s leave"
+        + (f", at most {max(off):.3f} s off the prediction." if off else ".")
     )
     return "stability_zero", fig, caption

@@ -38,9 +38,11 @@ def held(result, scene, name):
     fig.legend(loc="outside upper center", ncols=4)
     number = name.removeprefix("assignment_figure_")
     ours, theirs = result.curves["errors"][scene]
+    end = f"{curve['t'][-1]:g}"
     caption = (
-        f"The assignment's Figure {number} redrawn: {scene} with TMT's torque in both engines, RK4, dt = 5/64 s. In "
-        f"{curve['t'][-1]:g} s the arm of TMT {words(curve['left']['TMT'])}, that of MuJoCo {words(curve['left']['MuJoCo'])}. "
+        f"The assignment's Figure {number} redrawn: {scene} with TMT's torque in both engines, RK4, "
+        f"dt = {end}/{len(curve['t']) - 1} s. In {end} s the arm of TMT {words(curve['left']['TMT'])}, that of MuJoCo "
+        f"{words(curve['left']['MuJoCo'])}. "
         f"The true motion is rest: of that TMT is at most {rad(ours)} off, MuJoCo {rad(theirs)}; while judged, to "
         f"{curve['judged_until_s']:.2f} s, they are {agreement(curve):.1e} rad apart."
     )

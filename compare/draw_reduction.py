@@ -35,7 +35,7 @@ def needs(result):
                 else "needed"
             )
             left.plot(x, y, markersize=9, linestyle="none", **marks[kind])
-    left.set(xlim=(-0.6, 2.6), ylim=(len(scenes) - 0.5, -0.5))
+    left.set(xlim=(-0.6, 2.6), ylim=(max(1, len(scenes)) - 0.5, -0.5))
     left.set_xticks(range(len(HINGES)), [GREEK[hinge] for hinge in HINGES])
     left.set_yticks(range(len(scenes)), scenes)
     left.tick_params(length=0)
@@ -168,7 +168,7 @@ def costs(result):
             ax.text(max(row["ratio"], 1.0) + 0.01 * most, y + offset, f"{row['ratio']:.2f}", va="center", fontsize=7)
     ax.set_yticks(range(len(names)), names)
     ax.axvline(1.0, color="black", linewidth=0.8)
-    ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="time of a step / that of the minimal model", xlim=(0.9, 1.08 * most))
+    ax.set(ylim=(max(1, len(names)) - 0.5, -0.5), xlabel="time of a step / that of the minimal model", xlim=(0.9, 1.08 * most))
     ax.grid(axis="y", visible=False)
     handles = [Patch(color=colour, alpha=0.8, label=name) for name, colour in (("Euler", BLUE), ("RK4", GREEN))]
     handles.append(Patch(facecolor=GREY, hatch="////", edgecolor="white", label="changes the motion"))

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from .departure import span
 from .draw import BLUE, GREEN, GREY, ORANGE, RED, WIDTH
 from .failure import COARSE
-from .limits import ALLOWED, STEPS
+from .limits import SIZE, apart
 from .motion import TWINS
 
 PINK, SKY = "#CC79A7", "#56B4E9"
@@ -39,7 +39,7 @@ def limits(result):
     for ax, (scene, damping) in zip(axes.flat, panels):
         here = [row for row in rows if (row["scene"], row["damping"]) == (scene, damping)]
         alike = [row for row in rows if row["damping"] == damping]
-        finite = [v for r in alike for v in (r["predicted_dt_s"], r["observed_dt_s"]) if v]
+        finite = [v for r in alike for v in (r["predicted_dt_s"], r["observed_dt_s"]) if v] or [1.0]
         low, high = min(finite) / 3, max(finite) * 2
         for row in here:
             theirs = row["engine"] == "MuJoCo"
@@ -47,14 +47,15 @@ def limits(result):
             if row["limit"] != "finite" and not theirs:
                 text = {"never_fails": "no limit", "always_fails": "fails at every step"}[row["limit"]]
                 ax.text(low * 1.1, place, text, va="center", fontsize=8, color=GREY)
-            elif row["observed_dt_s"] is None or row["limit"] != "finite":
+            elif row["limit"] != "finite" or (theirs and row["observed_dt_s"] is None):
                 continue
             elif theirs:
                 mark = {"color": "black", "marker": "|", "markersize": 9, "markeredgewidth": 1.6, "linestyle": "none"}
                 ax.plot(row["observed_dt_s"], place + 0.2, **mark)
             else:
                 for shift, key, colour in ((-0.2, "predicted_dt_s", ORANGE), (0.2, "observed_dt_s", BLUE)):
-                    ax.barh(place + shift, row[key] - low, left=low, height=0.36, color=colour)
+                    if row[key] is not None:
+                        ax.barh(place + shift, row[key] - low, left=low, height=0.36, color=colour)
         ax.set(xscale="log", xlim=(low, high), ylim=(len(schemes) - 0.4, -0.6))
         ticks = [m * 10.0**k for k in range(-4, 3) for m in ((1, 2, 5) if high / low < 100 else (1,))]
         ticks = [tick for tick in ticks if low < tick < high]
@@ -72,12 +73,17 @@ def limits(result):
         *axes[0, 0].plot([], [], "|", color="black", markersize=9, markeredgewidth=1.6, label="observed, MuJoCo"),
     ]
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
-    pairs = [(row["observed_dt_s"], row["predicted_dt_s"]) for row in rows if row["limit"] == "finite"]
-    off = [abs(observed / predicted - 1.0) for observed, predicted in pairs if observed is not None]
+    expected = [row for row in rows if row["limit"] == "finite"]
+    off = [apart(row) for row in expected if apart(row) is not None]
     caption = (
-        f"The largest dt at which a perturbation of 1e-6 rad grows less than {ALLOWED:.0f}-fold in {STEPS} steps, "
-        f"found by bisection, beside the limit predicted from the amplification of one step. The {len(off)} pairs "
-        f"differ by {100 * float(np.median(off)):.3f} % in the middle and by at most {100 * max(off):.2f} %."
+        f"The largest dt at which no mode of the equations of motion grows in a run from {SIZE:g} rad, found by bisection, "
+        f"beside the limit predicted from the amplification of one step. {len(off)} of {len(expected)} predicted limits are "
+        "observed"
+        + (
+            f"; they differ by {100 * float(np.median(off)):.3f} % in the middle and by at most {100 * max(off):.3f} %."
+            if off
+            else "."
+        )
     )
     return "stability_limits", fig, caption
 
@@ -125,26 +131,33 @@ def regions(result):
     for ax in axes.flat:
         handles |= dict(zip(*reversed(ax.get_legend_handles_labels())))
     fig.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=4)
+    growing = {name: [COARSE * v.real for v in values if v.real > 1e-9] for name, values in plain_points(result)}
+    real = "; ".join(f"{name}: {', '.join(f'{z:.3f}' for z in found)}" for name, found in growing.items() if found)
     caption = (
         "The upper half of the stability regions (grey: one step lets neither of a pair of conjugate eigenvalues "
-        "grow) with the eigenvalues of the held arm times dt = 5/64 s. Ball catch has two positive ones, outside "
-        f"every region. Crosses: the fastest mode of bent at the limit, omega dt = {', '.join(outside)}. Of "
-        "partitioned methods two different real eigenvalues do not have a region; their marks are a guide."
+        "grow) with the eigenvalues of the held arm times dt = 5/64 s. "
+        + (f"Positive real parts, which grow in the exact motion too ({real}). " if real else "")
+        + (f"Crosses: the fastest mode of bent at the limit, omega dt = {', '.join(outside)}. " if outside else "")
+        + "Of partitioned methods two different real eigenvalues do not have a region; their marks are a guide."
     )
     return "stability_regions", fig, caption
 
 
-def growth_map(result):
-    """Growth over dt, a row for each party."""
-    parties = result.curves["map"]
-    from .stability import MAP_STEPS
+def plain_points(result) -> list:
+    """The undamped postures whose eigenvalues are drawn, and these."""
+    return [(name, values) for (name, damping), values in result.curves["points"].items() if not damping]
 
+
+def growth_map(result):
+    """Growth over dt, a row for each engine and method."""
+    drawn = result.curves["map"]
+    parties, dts, steps, allowed = (drawn[key] for key in ("grown", "x", "steps", "allowed"))
     grown = np.array(list(parties.values()))
     fig = Figure(figsize=(WIDTH, 0.9 + 0.27 * len(parties)), layout="constrained")
     ax = fig.subplots()
     shown = np.clip(np.where(np.isfinite(grown), grown, 1e6), 1.0, 1e6)
-    edges = np.sqrt(MAP_STEPS[1:] * MAP_STEPS[:-1])
-    edges = np.r_[MAP_STEPS[0], edges, MAP_STEPS[-1]]
+    edges = np.sqrt(dts[1:] * dts[:-1])
+    edges = np.r_[dts[0], edges, dts[-1]]
     image = ax.pcolormesh(
         edges, np.arange(len(parties) + 1) - 0.5, shown, norm=LogNorm(1, 1e6), cmap="cividis", rasterized=True
     )
@@ -160,29 +173,38 @@ def growth_map(result):
     ax.plot([], [], color=RED, linewidth=2.5, label="predicted limit")
     names = [f"{party.engine} {style(party.method)[2]}" for party in parties]
     ax.set_yticks(range(len(parties)), names)
-    ax.set(xscale="log", xlabel="dt, s", xlim=(MAP_STEPS[0], MAP_STEPS[-1]))
+    ax.set(xscale="log", xlabel="dt, s", xlim=(dts[0], dts[-1]))
     ax.set_xticks([0.03, 0.1, 0.3, 1.0], ["0.03", "0.1", "0.3", "1"])
     ax.invert_yaxis()
     ax.grid(visible=False)
-    bar = fig.colorbar(image, label=f"growth in {STEPS} steps", extend="max")
+    bar = fig.colorbar(image, label=f"growth in {steps} steps", extend="max")
     bar.ax.minorticks_off()
     fig.legend(loc="outside upper center")
-    at = {
-        f"{party.engine} {style(party.method)[2]}": float(MAP_STEPS[np.argmax(row >= ALLOWED)])
-        if (row >= ALLOWED).any()
-        else None
-        for party, row in zip(parties, grown)
-    }
-    kinds = {
-        "Growth at every step": [name for name, dt in at.items() if dt == MAP_STEPS[0]],
-        "Less at every step": [name for name, dt in at.items() if dt is None],
-    }
-    edges = [dt for dt in at.values() if dt not in (None, MAP_STEPS[0])]
-    told = ". ".join(f"{text}: {', '.join(names)}" for text, names in kinds.items() if names)
     caption = (
-        f"How much a perturbation of 1e-6 rad grows at bent, undamped, in {STEPS} steps. The edge is sharp: of "
-        f"{len(MAP_STEPS)} steps drawn, {100 * (MAP_STEPS[1] / MAP_STEPS[0] - 1):.1f} % apart, the first at which "
-        f"growth is {ALLOWED:.0f}-fold or more is at {span(edges)}, and the predicted limit lies just before it. "
-        f"{told}."
+        f"How much a perturbation of {SIZE:g} rad grows at bent, undamped, in {steps} steps, at {len(dts)} values of dt, "
+        f"{100 * (dts[1] / dts[0] - 1):.1f} % apart. {tell_map(parties, dts, allowed, limit)}"
     )
     return "stability_map", fig, caption
+
+
+def tell_map(parties, dts, allowed, limit) -> str:
+    """At which dt growth begins, beside the predicted limit; who grows at every step, and who at none."""
+    first = {
+        party: float(dts[np.argmax(~(row < allowed))]) if not (row < allowed).all() else None
+        for party, row in parties.items()
+    }
+    named = {party: f"{party.engine} {style(party.method)[2]}" for party in parties}
+    always = [named[party] for party, dt in first.items() if dt == dts[0]]
+    never = [named[party] for party, dt in first.items() if dt is None]
+    edges = {party: dt for party, dt in first.items() if dt is not None and dt != dts[0]}
+    after = 0
+    for party, dt in edges.items():
+        at = limit.get((party.engine, party.method))
+        before = dts[np.searchsorted(dts, dt) - 1]
+        after += at is not None and before <= at <= dt
+    told = [
+        f"Growth is {allowed:.0f}-fold or more first at {span(edges.values())}, for {after} of {len(edges)} at the first "
+        "value above the predicted limit"
+    ] * bool(edges)
+    told += [f"At every dt: {', '.join(always)}"] * bool(always) + [f"At none: {', '.join(never)}"] * bool(never)
+    return ". ".join(told) + "."

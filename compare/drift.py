@@ -28,9 +28,8 @@ def drift(result, engine, steps) -> None:
             for name, run in run_of.items():
                 paths = [run(scene, integrator, DURATION / count, count) for count in counts]
                 for quantity, value in quantities.items():
-                    values = [value(*path) for path in paths]
                     of_scene = drifts.setdefault((scene.name, *quantity), {}).setdefault(integrator, {})
-                    of_scene[name] = [float(np.abs(v - v[0]).max()) for v in values]
+                    of_scene[name] = [largest(value, path) for path in paths]
     judge(result, drifts)
     result.curves["drift"] = {"drifts": drifts, "steps": steps}
 
@@ -47,6 +46,14 @@ def judge(result, drifts) -> None:
                 if integrator == "RK4":
                     share = over(values[-1], of_scene["Euler"][engine][-1])
                     result.check(where, f"drift of {quantity} over that of Euler", share, OF_EULER, "")
+
+
+def largest(quantity, path) -> float:
+    """How far a quantity of the state goes from its start along a run; NaN if the run has diverged."""
+    if not np.isfinite(path).all():
+        return np.nan
+    values = quantity(*path)
+    return float(np.abs(values - values[0]).max())
 
 
 def found_order(values) -> float:

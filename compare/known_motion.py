@@ -4,7 +4,7 @@ import numpy as np
 
 import tmt
 from tmt.methods import METHODS
-from tmt.reference import distance
+from tmt.reference import DIGITS, distance
 
 from .agreement import EPS, FACTOR
 from .cost import INTEGRATORS
@@ -69,7 +69,7 @@ def of_pendulum(result, engine, scene) -> None:
 
 def judge_function(result, scene, off, scale) -> None:
     """A check: the elliptic function in doubles is that with 50 digits, but for rounding. off, scale: rad."""
-    result.check(scene, "elliptic function, scipy to 50 digits", off, FACTOR * EPS * scale, "rad", rounding=True)
+    result.check(scene, f"elliptic function, scipy to {DIGITS} digits", off, FACTOR * EPS * scale, "rad", rounding=True)
 
 
 def judge_orders(result, scene, errors) -> dict:
@@ -115,7 +115,8 @@ def judge_modes(result, off) -> dict:
     """Checks: halving the amplitude divides the relative distance from the linear modes by 4. off, powers: by engine."""
     powers = {}
     for party, values in off.items():
-        powers[party] = float(np.log2(np.divide(values[-2], values[-1])))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            powers[party] = float(np.log2(np.divide(values[-2], values[-1])))
         what = "power of the amplitude with which the distance from the linear modes falls, from 2"
         result.check(f"hanging, {party}", what, abs(powers[party] - 2.0), ORDER_MARGIN, "")
     return powers

@@ -190,5 +190,5 @@ def tell_growth(rows) -> list[str]:
     return [
         f"Where a method fails at every step ({where}), the growth of one step is predicted and measured, {len(rows)} "
         f"times: {f'largest difference {max(off):.1e}, relative' if off else 'no run gives a number'}"
-        + (f"; {len(rows) - len(off)} runs give no number." if off and len(off) < len(rows) else ".")
+        + (f"; runs without a number: {len(rows) - len(off)}." if off and len(off) < len(rows) else ".")
     ]

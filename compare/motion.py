@@ -45,9 +45,10 @@ def diverged_at(scene, t, q, qd) -> float | None:
     """
     finite = np.isfinite(np.concatenate([q, qd], axis=1)).all(axis=1)
     good = np.where(finite[:, None], q, 0.0), np.where(finite[:, None], qd, 0.0)
-    energy = tmt.energy(*good, scene.model) - (good[0] - q[0]) @ scene.tau
     kinetic = tmt.energy(q[0], qd[0], scene.model) - tmt.potential_energy(q[0], scene.model)
-    bad = ~finite | ~(energy - energy[0] <= 2.0 * gravity_scale() + kinetic)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a run that is about to end
+        energy = tmt.energy(*good, scene.model) - (good[0] - q[0]) @ scene.tau
+        bad = ~finite | ~(energy - energy[0] <= 2.0 * gravity_scale() + kinetic)
     return float(t[bad][0]) if bad.any() else None
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import tmt
 from tmt.kernels import stepper
 from tmt.methods import METHODS
+from tmt.reference import DIGITS
 
 from . import known_motion, sub_blocks
-from .agreement import Result
+from .agreement import FACTOR, Result
 from .band import NARROW, band
 from .clock import fastest
 from .cost import INTEGRATORS, TIMED, costs
@@ -24,16 +25,16 @@ TITLE = "Reduction: no more model than a scene needs"
 CLAIM = (
     "A hinge may be locked if, with it at its start value and at rest, its acceleration vanishes for all values of the other "
     "hinges. The program finds these hinges on the expressions of the traced method, which fold to the number 0, and confirms "
-    "them with 50 digits at random states. The model without them has the same motion, in both engines. A held posture needs "
-    "no integrator: it stays. A single free hinge is a physical pendulum, whose angle is an elliptic function of time. And "
-    "whatever else is added in MuJoCo costs time, and changes nothing unless something is touched."
+    f"them with {DIGITS} digits at random states. The model without them has the same motion, in both engines. A held posture "
+    "needs no integrator: it stays. A single free hinge is a physical pendulum, whose angle is an elliptic function of time. "
+    "And whatever else is added in MuJoCo costs time, and changes nothing unless something is touched."
 )
 BAR = (
-    "Sub-blocks of Mbar and bias: 64 eps x the largest entry of Mbar, and 64 eps x the sum of the absolute terms of the bias, "
-    "of the whole model. Runs of the smaller and the whole model, by the same method: the band of rounding of the whole one "
-    "(see trajectory), judged while it is below 1e-3 rad, for as long as the scene states. Errors against an exact solution "
-    "fall with the step at the method's order, and with the square of the amplitude where the solution is linear. Additions "
-    "that exert no force leave the same bits. Timings are no checks."
+    f"Sub-blocks of Mbar and bias: {FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute terms of "
+    "the bias, of the whole model. Runs of the smaller and the whole model, by the same method: the band of rounding of the "
+    f"whole one (see trajectory), judged while it is below {NARROW:g} rad, for as long as the scene states. Errors against an "
+    "exact solution fall with the step at the method's order, and with the square of the amplitude where the solution is "
+    "linear. Additions that exert no force leave the same bits. Timings are no checks."
 )
 FINER = 16  # times as fine as a scene's own step: runs that are compared, judged at the scene's own
 TIMED_TMT = 1024  # steps of a timed run in tmt
@@ -98,16 +99,16 @@ def told(scene, need) -> str:
         torque = " under the exact torque that holds" if scene.torque == "hold" else ""
         return (
             f"{scene.name}: no hinge and no integrator. At the start and at rest every acceleration folds to 0{torque}, and is "
-            "0 with 50 digits: the exact solution stays."
+            f"0 with {DIGITS} digits: the exact solution stays."
         )
     declared = f" ({' and '.join(scene.locked)} declared locked)" if scene.locked else ""
     if not need.stays:
-        count = {1: "the one hinge that is free", 2: "both free hinges", 3: "all three hinges"}[len(names)]
+        count = "the one hinge that is free" if len(names) == 1 else f"all {len(names)} hinges"
         return f"{scene.name}: {count}{declared}. {why}."
     left = " and ".join(name for name in names if name not in need.stays)
     return (
         f"{scene.name}: {left}{declared}. {' and '.join(need.stays).capitalize()} never moves: at its start and at rest its "
-        f"acceleration folds to 0 for all values of the others, and is 0 with 50 digits at random ones. {why}."
+        f"acceleration folds to 0 for all values of the others, and is 0 with {DIGITS} digits at random ones. {why}."
     )
 
 

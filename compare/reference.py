@@ -74,10 +74,8 @@ def references(map: Callable = map, tell: Callable = print) -> dict[str, Referen
 def begins(rows, scene) -> bool:
     """Whether a run starts as the scene does, and has its times."""
     times = np.linspace(0.0, scene.duration, RECORDS + 1)
-    start = [Decimal(rows[0][name]) for name in STATE]
-    return start == [Decimal(v) for v in np.concatenate(scene.start).tolist()] and np.array_equal(
-        [float(row["t_s"]) for row in rows], times
-    )
+    start = [float(rows[0][name]) for name in STATE]
+    return start == np.concatenate(scene.start).tolist() and [float(row["t_s"]) for row in rows] == times.tolist()
 
 
 def kept(scene: Scene) -> Path:
@@ -87,7 +85,7 @@ def kept(scene: Scene) -> Path:
 
 def remade(scenes: list[Scene], map: Callable, tell: Callable) -> list[list[dict]]:
     """The rows of each scene, computed: two runs a scene, one with half the steps."""
-    runs = [(scene, STEPS[scene.name] // part) for scene in scenes for part in (2, 1)]
+    runs = [(scene, RECORDS, STEPS[scene.name] // part) for scene in scenes for part in (2, 1)]
     paths = []
     for path in map(run, runs):
         paths.append(path)
@@ -112,9 +110,9 @@ def remade(scenes: list[Scene], map: Callable, tell: Callable) -> list[list[dict
 
 
 def run(job) -> np.ndarray:
-    """One run with many digits."""
-    scene, steps = job
-    return trajectory(scene.model, *scene.start, scene.tau, scene.duration, RECORDS, steps)
+    """One run with many digits; a job is a scene, the number of records and that of steps."""
+    scene, records, steps = job
+    return trajectory(scene.model, *scene.start, scene.tau, scene.duration, records, steps)
 
 
 def reference(rows) -> Reference:

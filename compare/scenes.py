@@ -149,7 +149,7 @@ SCENES = (
     Scene("zero, free", "zero", "free"),
     Scene("ball catch, free", "ball catch", "free"),
     Scene("bent, free", "bent", "free"),
-    Scene("ball catch, held", "ball catch", "hold", judged=2.5),  # unstable: rounding grows e^7.5 a second
+    Scene("ball catch, held", "ball catch", "hold", judged=2.5),  # unstable: rounding grows fast
     Scene("bent, held", "bent", "hold"),
     Scene("bent, damped", "bent", "free", damping=0.5),
     Scene("thrown, no gravity", "bent", "free", speed=(100.0, 200.0, -150.0), gravity=False, judged=4.5),

@@ -9,9 +9,9 @@ from tmt.methods import METHODS
 
 from . import accuracy, clock, evaluations, machine, targets
 from .advice import EARLY, advice, orders
-from .agreement import EPS, Result
+from .agreement import EPS, FACTOR, Result
 from .band import growth
-from .competitors import Setting, competitors
+from .competitors import GRID, Setting, competitors
 from .motion import diverged_at
 from .reference import references
 from .scenes import HINGES, SCENES
@@ -25,10 +25,10 @@ CLAIM = (
     "for any model (MuJoCo): the ratios say what that costs, not that one is better. Timings make no checks."
 )
 BAR = (
-    "Errors are the largest of the angles on the grid of 65 times, against runs with many digits (a table, made again in part "
-    "by the tests). Checked: that each method of fixed step has its order in the error of the first second, which falls "
-    "regularly (of order 8 only the least, for rounding comes before its error has settled; the tests show it in 50 digits); "
-    "that MuJoCo and the same scheme in tmt make the same error but for rounding, 64 eps times the growth of a small "
+    f"Errors are the largest of the angles on a grid of {GRID + 1} times, against runs with many digits (a table, made again in "
+    "part by the tests). Checked: that each method of fixed step has its order in the error of the first second, which falls "
+    "regularly (of order 8 only the least, for rounding comes before its error has settled; the tests show it in many digits); "
+    f"that MuJoCo and the same scheme in tmt make the same error but for rounding, {FACTOR} eps times the growth of a small "
     "difference along the scene; that MuJoCo's RK4 comes as near to the reference as tmt's; and that errors which have "
     "stopped falling are of that same size of rounding. So a model with other numbers fails: its motion is another."
 )

@@ -82,7 +82,7 @@ def begin(setup) -> None:
             partial(claims.four_decimals, counts=of(claims.PRINTED_COUNTS, claims.PRINTED_COUNTS, (64, 256))), engine
         ),
         "bent": setup.map(
-            partial(beyond.bent, run=of(beyond.RUN, 0, 400), counts=of(beyond.COUNTS, (), beyond.COUNTS[::7])), beside
+            partial(beyond.bent, counts=of(beyond.COUNTS, (), beyond.COUNTS[::7])), beside
         ),
         "reset": setup.map(failure.own_reset, engine),
         "gain": setup.map(failure.silent_gain, engine),

@@ -220,8 +220,7 @@ def level(result, where, about, hinges, difference, bar, times, ending) -> None:
     name, n = about["level"], len(hinges)
     difference = np.abs(difference)
     bar = np.broadcast_to(bar, difference.shape)
-    ratio = np.divide(difference, bar, out=np.where(difference > 0.0, np.inf, 0.0), where=bar > 0)
-    ratio[np.isnan(difference)] = np.nan
+    ratio = np.divide(difference, bar, out=np.where(difference == 0.0, 0.0, np.inf), where=bar > 0)
     k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
     unit, largest_unit = ("rad/s2",) * 2 if name == "derivative" else (("rad", "rad/s")[i // n], "rad")
     place = f"{hinges[i % n]} at t = {times[k]:.3f} s"

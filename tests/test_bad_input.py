@@ -1,5 +1,8 @@
 """Whatever a user can get wrong gets a ValueError that says what was given and what is accepted."""
 
+import dataclasses
+import warnings
+from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
@@ -9,6 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 import tmt
+from tmt import kernels
+from tmt.methods import METHODS
 
 REST = np.zeros(3)
 CALLS = {
@@ -98,6 +103,165 @@ def test_unknown_method_and_model():
             tmt.simulate(REST, REST, REST, 0.1, 1, "dopri8_adaptive", tolerance=wrong)
     with pytest.raises(ValueError, match=r"a tmt\.Tree is expected"):
         tmt.mass_matrix(REST, model="arm")
+
+
+class NoArray:
+    """Neither an array nor a text can be made of it."""
+
+    def __array__(self, *arguments, **named):
+        raise RuntimeError("no array")
+
+    def __repr__(self):
+        raise RuntimeError("no\ntext")
+
+
+ITSELF = []
+ITSELF.append(ITSELF)
+MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
+READ_ONLY = np.zeros((40, 3))
+READ_ONLY.flags.writeable = False
+# for no argument any of these will do
+NONSENSE = [
+    b"x", 1j, [1j, 0, 0], {"q": 1}, {1, 2}, object(), NoArray(), [NoArray()] * 3, ITSELF, [1, 2, "x"], [[1, 2, 3], [1, 2]],
+    [True, False, True], np.array([True] * 3), np.array([1j, 0, 0]), np.array([None] * 3), 10**400, -(10**5000),
+    [10**400, 0, 0], [10**5000] * 3, np.nan, [np.nan, 0, 0], [np.inf, 0, 0], MASKED, [MASKED], [np.ma.masked, 1, 2],
+    np.zeros(0), np.zeros((3, 2)), np.datetime64("2020"), np.array(["2020"] * 3, "M8[D]"), [Decimal(1)] * 3, ..., slice(3),
+    np.zeros(3, [("a", float)]), np.full(3, np.longdouble("1e4000")), "no such name", "two\nlines",
+]  # fmt: skip
+# these by compiled code only
+NO_ARRAYS = [*NONSENSE, None, REST.tolist(), np.zeros((40, 3), np.float32), np.zeros((40, 3), ">f8"), READ_ONLY,
+             np.zeros((3, 40)).T, np.zeros((80, 3))[::2], np.ma.zeros((40, 3)), np.zeros((1, 40, 3))]  # fmt: skip
+
+
+def with_field(name):
+    return lambda value: dataclasses.replace(tmt.ARM, **{name: value})
+
+
+def with_part(method, name):
+    return lambda value: dataclasses.replace(METHODS[method], **{name: value})
+
+
+PLACES = {
+    **CALLS,
+    **{f"{name}, other argument": lambda q, name=name: getattr(tmt, name)(q, REST)
+       for name in ("angular_velocities", "convective_terms", "bias", "energy")},
+    "acceleration, q": lambda q: tmt.acceleration(q, REST, REST),
+    "acceleration, qd": lambda qd: tmt.acceleration(REST, qd, REST),
+    "simulate, qd": lambda qd: tmt.simulate(REST, qd, REST, 0.1, 1),
+    "simulate, tau": lambda tau: tmt.simulate(REST, REST, tau, 0.1, 1),
+    "dt": lambda dt: tmt.simulate(REST, REST, REST, dt, 1),
+    "steps": lambda steps: tmt.simulate(REST, REST, REST, 0.1, steps),
+    "method": lambda method: tmt.simulate(REST, REST, REST, 0.1, 1, method),
+    "model": lambda model: tmt.mass_matrix(REST, model=model),
+    "model of simulate": lambda model: tmt.simulate(REST, REST, REST, 0.1, 1, model=model),
+    "tolerance": lambda value: tmt.simulate(REST, REST, REST, 0.1, 1, "dopri8_adaptive", tolerance=value),
+    "lock": tmt.ARM.lock,
+    "angle": lambda angle: tmt.ARM.lock({"beta": angle}),
+    **{f"Tree.{field.name}": with_field(field.name) for field in dataclasses.fields(tmt.Tree)},
+    **{f"{name}.{part}": with_part(name, part)
+       for name in ("rk4", "implicit_midpoint", "dopri8_adaptive") for part in ("order", "A", "b", "c")},
+    "errors of an adaptive method": with_part("dopri8_adaptive", "errors"),
+    "tree of an evaluator": lambda tree: kernels.evaluator(tree, "forward_dynamics"),
+    "quantity": lambda quantity: kernels.evaluator(tmt.ARM, quantity),
+    "terms": lambda terms: kernels.evaluator(tmt.ARM, "forward_dynamics", terms),
+    "sine": lambda sine: kernels.evaluator(tmt.ARM, "forward_dynamics", sine=sine),
+    "tree of a stepper": lambda tree: kernels.stepper(tree, "rk4"),
+    "method of a stepper": lambda name: kernels.stepper(tmt.ARM, name),
+    "method of a lane_stepper": lambda name: kernels.lane_stepper(tmt.ARM, name),
+}  # fmt: skip
+
+
+def refused(call, *arguments) -> str:
+    """The message, of one line, of the ValueError that the call raises, without a warning before it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(ValueError) as error:
+            call(*arguments)
+    message = str(error.value)
+    assert message and "\n" not in message and len(message) < 400
+    return message
+
+
+@pytest.mark.parametrize("call", PLACES.values(), ids=PLACES)
+def test_nonsense_is_refused_in_one_line(call):
+    for value in NONSENSE:
+        refused(call, value)
+
+
+def compiled_calls() -> dict:
+    """{what: (call, its arrays)} of compiled code."""
+    evaluator = kernels.evaluator(tmt.ARM, "forward_dynamics")
+    runs = [np.zeros((32, 3, 3)), np.zeros((32, 3, 3)), np.zeros((32, 3))]
+    return {
+        "each": (evaluator.each, [np.zeros((40, 3)) for _ in range(4)]),
+        "lanes": (evaluator.lanes, [np.zeros((3, 40)) for _ in range(4)]),
+        "chain": (lambda *arrays: evaluator.chain(*arrays, 2), [np.zeros(3) for _ in range(3)]),
+        "rate": (evaluator.rate, [np.zeros(6), np.zeros(3)]),
+        "run": (lambda *arrays: kernels.stepper(tmt.ARM, "rk4")(*arrays, 0.1), runs),
+        "adaptive run": (lambda *arrays: kernels.stepper(tmt.ARM, "dopri8_adaptive")(*arrays, 0.1, 1e-6), runs),
+        "lanes of runs": (lambda *arrays: kernels.lane_stepper(tmt.ARM, "rk4")(*arrays, 0.1), runs),
+    }
+
+
+@pytest.mark.parametrize("what", ["each", "lanes", "chain", "rate", "run", "adaptive run", "lanes of runs"])
+def test_compiled_code_takes_its_own_arrays_only(what):
+    call, arrays = compiled_calls()[what]
+    call(*arrays)
+    for place in range(len(arrays)):
+        for value in NO_ARRAYS:
+            refused(call, *arrays[:place], value, *arrays[place + 1 :])
+
+
+def test_compiled_code_takes_numbers_only():
+    path, tau = np.zeros((1, 3, 3)), np.zeros((1, 3))
+    for value in [*NONSENSE, None, True, Fraction(1, 2)]:
+        if not isinstance(value, float):  # a NaN is a number: the run is NaN, and says so
+            refused(kernels.stepper(tmt.ARM, "rk4"), path, path.copy(), tau, value)
+            refused(kernels.stepper(tmt.ARM, "dopri8_adaptive"), path, path.copy(), tau, 0.1, value)
+        if value is not True:
+            refused(kernels.evaluator(tmt.ARM, "forward_dynamics").chain, REST, REST, REST, value)
+
+
+def test_results_are_not_written_over_arguments():
+    both = np.zeros((41, 3))
+    call = kernels.evaluator(tmt.ARM, "forward_dynamics").each
+    call(both[:20], REST[None].repeat(20, 0), REST[None].repeat(20, 0), both[20:40])
+    assert "shares memory" in refused(call, both[:40], both[:40].copy(), both[:40].copy(), both[1:])
+
+
+def test_wrong_terms_are_refused():
+    for terms in (lambda: None, lambda tree, q, qd: 3, lambda tree, q, qd: ([[1.0]], [1.0]), type):
+        assert "(Mbar, h)" in refused(kernels.evaluator, tmt.ARM, "forward_dynamics", terms)
+
+
+def test_paths_that_do_not_fit_into_memory():
+    for exponent in (12, 15, 18, 30, 400, 5000):
+        message = refused(tmt.simulate, REST, REST, REST, 1e-3, 10**exponent)
+        assert "of memory, more than there is" in message
+    assert "would take 4.8e+04 GB of memory" in refused(tmt.simulate, REST, REST, REST, 1e-3, 10**12)
+    wide = np.zeros((10**5, 1, 1, 3)), np.zeros((10**5, 1, 3)), np.zeros((10**5, 3))  # 8 PB: beyond any address
+    assert "fit into memory" in refused(tmt.acceleration, *wide)
+    assert "product is beyond the largest double" in refused(tmt.simulate, REST, REST, REST, 1e308, 100)
+
+
+@given(arrays(float, (3, 3), elements=st.floats(allow_nan=False, allow_infinity=False)))
+def test_finite_numbers_give_finite_results_or_a_reason(state):
+    q, qd, tau = state
+    for call, arguments in (
+        (tmt.bias, (q, qd)), (tmt.convective_terms, (q, qd)), (tmt.angular_velocities, (q, qd)), (tmt.acceleration, state),
+        (tmt.mass_matrix, (q,)), (tmt.gravity_balance, (q,)), (tmt.potential_energy, (q,)),
+    ):  # fmt: skip
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                assert np.isfinite(call(*arguments)).all()
+            except ValueError as error:
+                assert "beyond the largest double" in str(error) and np.abs(state).max() > 1e100
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert not np.isnan(tmt.energy(q, qd))
+        motion = tmt.simulate(q, qd, tau, 0.01, 3)
+    assert (motion.ended is None) == bool(np.isfinite(motion.q).all() and np.isfinite(motion.qd).all())
 
 
 def test_messages_are_one_line():

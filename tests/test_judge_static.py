@@ -115,6 +115,14 @@ def test_the_worst_posture_and_its_condition_number_are_those_of_the_stated_arm(
         assert [check.passed for check in result.checks] == passes
 
 
+def test_every_rule_of_the_mass_matrix_is_applied_to_both_engines(engine):
+    found = {check.quantity for check in mass.rows(Setup.small(engine)).checks}
+    assert found == {"Mbar", "Mbar, TMT to exact", "Mbar, MuJoCo to exact", "TMT: Mbar - Mbar' over its largest entry"} | {
+        f"{name}: {what}" for name in ("TMT", "MuJoCo")
+        for what in ("least eigenvalue of Mbar over the largest", "condition number - 126.83", "distance from (+-90, 90) deg")
+    }  # fmt: skip
+
+
 def test_a_gamma_axis_that_is_flipped_is_seen_in_the_worst_posture(engine):
     flipped = parse(ARM_XML.read_text().replace('"gamma" type="hinge" axis="0 1 0"', '"gamma" type="hinge" axis="0 -1 0"'))
     failed = {check.quantity for check in mass.rows(Setup.small(flipped)).checks if not check.passed}

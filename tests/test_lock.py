@@ -86,6 +86,11 @@ def test_a_smaller_tree_is_less_code():
         ({"beta": np.nan}, "finite numbers"),
         ({"beta": "bent"}, "numbers of shape"),
         (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "at least one must be free"),
+        (None, "lock is given None; a dict of angles"),
+        ("beta", "lock is given 'beta'; a dict of angles"),
+        (("beta",), r"lock is given \('beta',\); a dict of angles"),
+        ({3: 0.0}, "no hinge 3 to lock"),
+        ({"beta": True}, "numbers of shape"),
     ],
 )
 def test_what_cannot_be_locked(angles, says):

@@ -1,6 +1,8 @@
 """Integration: tableaus, orders, and what simulate gives back."""
 
 import dataclasses
+import pickle
+import warnings
 
 import mpmath
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 
 import tmt
 from compare.band import band
-from tmt import kernels
+from tmt import dop853, kernels
 from tmt.implicit import ImplicitRungeKutta
 from tmt.methods import METHODS, AdaptiveRungeKutta, RungeKutta, amplification, one_step
 
@@ -181,9 +183,97 @@ def test_every_evaluation_of_an_implicit_method_is_counted(name):
     assert evaluations == counted - 4 * len(stepping.b)
 
 
-def test_where_newton_fails_the_run_is_nan_and_the_step_says_so():
-    _, q, qd = tmt.simulate(BENT, REST, REST, 0.5, 20, "implicit_midpoint")
-    last = np.isfinite(q).all(axis=1).sum() - 1
-    assert 0 < last < 20 and np.abs(qd[last]).max() < 1e3  # finite and modest until there
+def test_where_newton_fails_the_run_is_nan_and_says_so():
+    motion = tmt.simulate(BENT, REST, REST, 0.5, 20, "implicit_midpoint")
+    last = np.isfinite(motion.q).all(axis=1).sum() - 1
+    assert 0 < last < 20 and np.abs(motion.qd[last]).max() < 1e3  # finite and modest until there
+    assert motion.ended == f"at t = {last * 0.5:g} s: Newton's method does not find the stages of a step of 0.5 s"
     with pytest.raises(ArithmeticError, match=r"dt = 0\.5 s"):
-        one_step(METHODS["implicit_midpoint"], tmt.ARM, list(q[last]), list(qd[last]), [0.0] * 3, 0.5)
+        one_step(METHODS["implicit_midpoint"], tmt.ARM, list(motion.q[last]), list(motion.qd[last]), [0.0] * 3, 0.5)
+
+
+def wrist(damping=0.0):
+    """Three hinges through one point, z y z: Mbar is singular where the second is at zero."""
+    return tmt.Tree(
+        hinge_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
+        damping=[damping] * 3, body_names=["hand"], body_hinge=[2], mass=[1.0], com=[(0.1, 0.0, 0.2)],
+        inertia=[np.diag([0.01, 0.02, 0.025])], gravity=(0, 0, -9.81),
+    )  # fmt: skip
+
+
+def test_acceleration_at_a_singular_state_says_so():
+    says = r"Mbar is singular at q = \(0.5, 0, 1\) rad: hinges 'a', 'c' turn together without moving any mass"
+    with pytest.raises(ValueError, match=says):
+        tmt.acceleration([[0.5, 0.1, 1.0], [0.5, 0.0, 1.0]], REST, REST, wrist())
+    assert np.abs(tmt.acceleration([0.5, 1e-3, 1.0], REST, REST, wrist())).max() < 1e6
+
+
+FAST = 2.0**49 - 1.0
+ENDS = {
+    "overflow": ("rk4", (BENT, REST, [1e308] * 3), {}, "diverges"),
+    "diverged": ("rk4", (BENT, [1e3] * 3, REST), {"dt": 10.0}, "diverges: within a step"),
+    "turned": ("rk4", ([FAST, 0, 0], [50, 0, 0], REST), {}, "turns by 2^49 rad"),
+    "adaptive, turned": ("dopri8_adaptive", ([FAST, 0, 0], [50, 0, 0], REST), {}, "turns by 2^49 rad"),
+    "adaptive, overflow": ("dopri8_adaptive", (BENT, REST, [1e308] * 3), {}, "diverges"),
+    "too small a tolerance": ("dopri8_adaptive", (BENT, REST, REST), {"tolerance": 1e-300}, "tolerance of 1e-300 would need"),
+    "no stages": ("gauss_legendre_4", (BENT, [20] * 3, REST), {"dt": 1.0}, "Newton's method does not find the stages"),
+    "singular": ("rk4", ([0.5, 0, 1], [1, 0, 0], REST), {"model": wrist()}, "Mbar is singular: hinges 'a', 'c' turn"),
+}
+
+
+@pytest.mark.parametrize("method, start, more, says", ENDS.values(), ids=ENDS)
+def test_a_run_says_why_it_ended(method, start, more, says):
+    arguments = {"dt": 0.1, "steps": 200, "method": method} | more
+    dt = arguments["dt"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        motion = tmt.simulate(*start, **arguments)
+    last = int(np.isfinite(motion.q).all(axis=1).sum()) - 1
+    assert motion.ended.startswith(f"at t = {last * dt:g} s: ") and says in motion.ended and "\n" not in motion.ended
+    assert 0 <= last < 200 and np.isnan(motion.q[last + 1 :]).all() and np.isnan(motion.qd[last + 1 :]).all()
+
+
+def test_in_a_batch_each_run_says_why_it_ended(rng, monkeypatch):
+    qd = np.zeros((2, 20, 3))
+    qd[1, 3], qd[0, 4] = 1e8, np.nextafter(np.inf, 0)
+    single = tmt.simulate(BENT, qd, REST, 0.01, 30)
+    assert single.ended.shape == (2, 20)
+    assert {place for place in np.ndindex(2, 20) if single.ended[place]} == {(1, 3), (0, 4)}
+    monkeypatch.setattr(kernels, "WORTH", 1)
+    lanes = tmt.simulate(BENT, qd, REST, 0.01, 30)
+    assert np.array_equal(lanes.ended, single.ended)
+    large = tmt.simulate(BENT, qd, REST, 0.01, 30, model=tmt.ARM)
+    monkeypatch.setattr(kernels, "TRACED", 2)
+    large = tmt.simulate(BENT, qd, REST, 0.01, 30)
+    assert np.array_equal(large.ended != None, single.ended != None)  # noqa: E711
+
+
+def test_a_motion_is_three_arrays_and_more():
+    motion = tmt.simulate(BENT, REST, REST, 0.1, 5)
+    t, q, qd = motion
+    assert len(motion) == 3 and motion[0] is motion.t is t and motion[1:] == (motion.q, motion.qd) and q is motion.q
+    assert motion.ended is None and motion.evaluations == 20
+    again = pickle.loads(pickle.dumps(motion))
+    assert again.evaluations == 20 and np.array_equal(again.qd, qd)
+    assert tmt.simulate([BENT, BENT], REST, REST, 0.1, 5, "implicit").evaluations == 10
+
+
+def test_a_method_that_is_replaced_is_used_at_once(monkeypatch):
+    before, euler = (tmt.simulate(BENT, REST, REST, 0.01, 5, name).q for name in ("rk4", "semi_implicit_euler"))
+    monkeypatch.setitem(METHODS, "rk4", METHODS["semi_implicit_euler"])
+    assert np.array_equal(tmt.simulate(BENT, REST, REST, 0.01, 5, "rk4").q, euler)
+    for made in (kernels.slope_source, kernels.lane_stepper):
+        assert made(tmt.ARM, "rk4") == made(tmt.ARM, "semi_implicit_euler")
+    monkeypatch.undo()
+    assert np.array_equal(tmt.simulate(BENT, REST, REST, 0.01, 5).q, before) and not np.array_equal(before, euler)
+    monkeypatch.setitem(METHODS, "rk4", "no method")
+    with pytest.raises(ValueError, match=r"METHODS\['rk4'\] is 'no method'"):
+        tmt.simulate(BENT, REST, REST, 0.01, 5)
+
+
+def test_the_coefficients_of_dop853_are_those_of_scipy():
+    from scipy.integrate import DOP853
+
+    assert all(np.array_equal(row, DOP853.A[i, :i]) for i, row in enumerate(dop853.A)) and len(dop853.A) == DOP853.n_stages
+    assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
+    assert np.array_equal(dop853.ERROR_5, DOP853.E5[:-1]) and np.array_equal(dop853.ERROR_3, DOP853.E3[:-1])

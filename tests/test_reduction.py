@@ -1,7 +1,6 @@
 """Fewer hinges: locking on both sides, what a scene needs, motions that are known, costs in MuJoCo."""
 
 import dataclasses
-import inspect
 import re
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 
 import tmt
 from compare import engine_cost, known_motion, reduction, sub_blocks, trajectory
-from compare.agreement import Result
+from compare.agreement import Result, Setup
 from compare.engine import Engine
 from compare.engine_file import ARM_XML, parse
 from compare.exact_motion import exact_swing, modes, pendulum, small_oscillation, stiffness, swing
@@ -218,12 +217,11 @@ def test_additions_are_there_and_only_a_touched_floor_changes_the_motion(engine)
     assert engine_cost.contacts(engines["default flags + capsules"], *start, "Euler") == 0.0
 
 
-def test_the_table_has_a_row_for_each_model_engine_and_method(engine, setup):
-    held = next(scene for scene in SCENES if scene.name == "bent, held")
-    result = reduction.rows(setup, [SCENES[0], held])
+def test_a_small_run_takes_every_path(engine):
+    result = reduction.rows(Setup.small(engine))
     assert all(check.passed for check in result.checks), [str(c) for c in result.checks if not c.passed]
     rows = {(r["scene"], r["hinges"], r["engine"], r["integrator"]): r for r in result.rows}
-    assert len(rows) == 2 * 2 * 2 * 2
+    assert {scene for scene, *_ in rows} == {scene.name for scene in SCENES}
     planar, whole = (rows["zero, free", hinges, "TMT", "RK4"] for hinges in ("alpha gamma", "alpha beta gamma"))
     assert planar["nv"] == 2 and whole["nv"] == 3 and 0 < planar["operations"] < whole["operations"]
     assert (
@@ -231,4 +229,41 @@ def test_the_table_has_a_row_for_each_model_engine_and_method(engine, setup):
     )
     stays = rows["bent, held", "none", "MuJoCo", "RK4"]
     assert stays["nv"] == 0 and stays["ns_per_step"] is None and 0.0 < stays["max_difference_rad"] < 1e-12
-    assert inspect.isgeneratorfunction(reduction.figures) and len(list(reduction.figures(result))) == 3
+    drawn = [figure() for figure in reduction.figures(result)]
+    assert [name for name, *_ in drawn] == [
+        "reduction_needs", "reduction_elbow_swing", "reduction_modes", "reduction_cost_in_mujoco"]  # fmt: skip
+    for _, figure, caption in drawn:
+        figure.canvas.draw()
+        assert caption.endswith((".", ")"))
+
+
+def test_a_run_without_timings_has_the_checks_only(engine):
+    result = reduction.rows(Setup.small(engine), timed=False)
+    assert len(result.checks) > 30 and all(check.passed for check in result.checks)
+    assert result.rows == [] and [figure()[0] for figure in reduction.figures(result)] == [
+        "reduction_elbow_swing", "reduction_modes"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "old, new, fails",
+    [
+        ("0 0 -9.81", "0 0 -1.62", "order of the error against the elliptic function, from 4"),
+        ("-9.81", "-9.81\" density=\"50\" viscosity=\"1", "order of the error against the elliptic function, from 4"),
+        ('axis="1 0 0"', 'axis="1 0 0" damping="0.1"', "power of the amplitude with which"),
+        ('axis="1 0 0"', 'axis="1 0 0" armature="0.01"', "Mbar, reduced, TMT to MuJoCo"),
+    ],
+    ids=["moon", "air", "damping", "armature"],
+)
+def test_a_wrong_model_fails(old, new, fails):
+    text = ARM_XML.read_text(encoding="utf-8")
+    assert old in text
+    checks = reduction.rows(Setup.small(parse(text.replace(old, new))), timed=False).checks
+    assert any(check.quantity.startswith(fails) for check in checks if not check.passed)
+
+
+def test_a_model_whose_hinge_cannot_be_locked_is_a_failed_check():
+    tendon = '<tendon><fixed><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
+    result = reduction.rows(Setup.small(parse(ARM_XML.read_text(encoding="utf-8").replace("</mujoco>", tendon))))
+    failed = [check for check in result.checks if not check.passed]
+    assert [check.quantity for check in failed] == ["models whose hinges can be locked"]
+    assert "gamma locked" in failed[0].note and list(reduction.figures(result)) == []

@@ -1,5 +1,6 @@
 """Speed against accuracy: the reference, the clock, the errors, and what is concluded from them."""
 
+import csv
 import dataclasses
 
 import mpmath
@@ -8,8 +9,9 @@ import pandas as pd
 import pytest
 
 import tmt
-from compare import advice, clock, competitors, engine_calls, reference, speed
-from compare.agreement import Result
+from compare import accuracy, clock, competitors, engine_calls, reference, speed
+from compare.agreement import Setup
+from compare.engine_file import ARM_XML, parse
 from compare.scenes import SCENES
 from tmt import reference_run
 from tmt.methods import METHODS
@@ -38,31 +40,63 @@ def test_the_committed_reference_is_of_the_stated_numbers():
     assert all(float(of_scene[0]["halving_difference"]) < 1e-20 for of_scene in rows.values())
 
 
-def test_the_reference_is_what_its_command_computes(known):
-    path = reference_run.trajectory(BENT.model, *BENT.start, BENT.tau, BENT.duration / 8, 8, 64)
-    high = path.astype(float)
-    assert np.abs(known["bent, free"].high[:9] - high).max() <= 2e-16 * np.abs(high).max()
-    other = np.array([[reference.Decimal(h) + reference.Decimal(v) for h, v in zip(*pair)]
-                      for pair in zip(known["bent, free"].high[:9].tolist(), known["bent, free"].low[:9].tolist())])  # fmt: skip
-    assert 0 < np.abs(path - other).max() < 1e-22
+@pytest.mark.parametrize("scene", [scene for scene in SCENES if scene.name in reference.STEPS], ids=lambda scene: scene.name)
+def test_a_record_of_the_reference_is_computed_from_the_one_before(scene):
+    """With half as many steps as its command takes; the table has 32 digits. In seconds, where the whole takes minutes."""
+    rows = reference.read(reference.TABLE)[reference.key(scene)]
+    with reference_run.localcontext() as context:
+        context.prec = reference_run.DIGITS
+        exact = np.array([[reference.Decimal(row[name]) for name in reference.STATE] for row in rows])
+        traced, torque = reference_run.slope(scene.model), [reference.Decimal(v) for v in scene.tau.tolist()]
+        count = reference.STEPS[scene.name] // reference.RECORDS // 2
+        dt = reference.Decimal(scene.duration) / reference.RECORDS / count
+        for record in (0, 40):
+            state = exact[record]
+            for _ in range(count):
+                rate = lambda state: np.array([*state[3:], *traced(state[:3], state[3:], torque)])  # noqa: E731
+                state = reference_run.extrapolated(rate, state, dt)
+            assert np.abs(state - exact[record + 1]).max() < 1e-21, record
+    assert exact[0].astype(float).tolist() == np.concatenate(scene.start).tolist()
 
 
-def test_a_changed_model_gets_a_reference_of_its_own(tmp_path, monkeypatch):
+def test_a_changed_scene_gets_a_reference_of_its_own(tmp_path, monkeypatch):
+    changed = dataclasses.replace(BENT, duration=0.02, dt=0.005)
+    path = tmt.simulate(*changed.start, changed.tau, 0.005, 4, "dopri8", changed.model)[1]
     monkeypatch.setenv("TMT_CACHE", str(tmp_path))
-    changed = dataclasses.replace(BENT, damping=0.1, duration=0.5, dt=0.5 / 64)
+    others = [dataclasses.replace(BENT, **{name: value}) for name, value in (
+        ("damping", 0.1), ("gravity", False), ("torque", (0, 0, 1)), ("speed", (0, 1, 0)), ("posture", (1, 2, 3)))]  # fmt: skip
+    assert len({reference.key(scene) for scene in (BENT, changed, *others)}) == 7
     monkeypatch.setattr(reference, "SCENES", (changed,))
-    monkeypatch.setattr(reference, "STEPS", {changed.name: 128})
+    monkeypatch.setattr(reference, "STEPS", {changed.name: 8})
+    monkeypatch.setattr(reference, "RECORDS", 4)
     told = []
     first = reference.references(tell=told.append)[changed.name]
     assert told[-1] == "runs with many digits: 2 of 2" and first.halving < 1e-20
-    assert (
-        first.error(tmt.simulate(*changed.start, changed.tau, 0.5 / 64, 64, "dopri8", changed.model)[1]).max() < 1e-13
-    )
+    assert first.error(path).max() < 1e-13
     (kept,) = tmp_path.glob("reference_*.csv")
     again = reference.references(tell=told.append)[changed.name]
     assert len(told) == 2 and np.array_equal(first.high, again.high)
-    kept.write_text(kept.read_text()[:1000])
+    text = kept.read_text(encoding="utf-8")
+    kept.write_text(text[:1000], encoding="utf-8")
     assert reference.read(kept) == {}  # damaged: as if it were not there
+    planted = text.replace(next(csv.DictReader(text.splitlines()))["beta_rad"], "0.1")
+    assert planted != text
+    kept.write_text(planted, encoding="utf-8")  # a run of another start: made anew
+    once_more = reference.references(tell=told.append)[changed.name]
+    assert len(told) == 4 and np.array_equal(first.high, once_more.high)
+
+
+def test_the_command_remakes_the_table(tmp_path, monkeypatch, capsys):
+    short = dataclasses.replace(BENT, duration=0.008, dt=0.001)
+    monkeypatch.setattr(reference, "SCENES", (short,))
+    monkeypatch.setattr(reference, "STEPS", {short.name: 16})
+    monkeypatch.setattr(reference, "RECORDS", 8)
+    monkeypatch.setattr(reference, "TABLE", tmp_path / "reference.csv")
+    reference.main()
+    (rows,) = reference.read(reference.TABLE).values()
+    assert reference.begins(rows, short) and float(rows[0]["halving_difference"]) < 1e-28
+    printed = capsys.readouterr()
+    assert printed.out.startswith("bent, free: 16 steps, ") and "digits: 2 of 2" in printed.err
 
 
 def test_competitors_are_timed_in_turns():
@@ -76,7 +110,7 @@ def test_every_method_follows_the_scene(engine, known):
     settings = {1: competitors.Setting(steps=2**14), None: competitors.Setting(tolerance=1e-7)}
     for competitor in competitors.competitors(engine):
         setting = settings.get(competitor.order, competitors.Setting(steps=1024))
-        row = speed.judged(BENT, BENT, competitor, setting, known["bent, free"])
+        row = speed.follow(BENT, BENT, competitor, setting, known["bent, free"])
         bar = {1: 0.3, 2: 0.03, None: 1e-4}.get(competitor.order, 1e-4)
         assert 0.0 < row["worst_error_rad"] < bar, competitor
         assert row["error_rad"] <= row["worst_error_rad"] and not row["diverged"]
@@ -87,59 +121,39 @@ def test_every_method_follows_the_scene(engine, known):
         assert (row["evaluations"] is None) == (competitor.engine == "heyoka")
 
 
-def test_the_table_and_its_checks(engine, setup):
-    result = speed.rows(dataclasses.replace(setup, steps=(64,)))
+def test_a_small_run_takes_every_path(engine):
+    result = speed.rows(Setup.small(engine))
     assert [str(check) for check in result.checks if not check.passed] == []
     table = pd.DataFrame(result.rows)
     assert list(table.columns) == speed.COLUMNS
-    assert set(table.engine) == {"mujoco", "tmt"} and table.diverged.any()
+    everyone = {(c.engine, c.method) for c in competitors.competitors(engine)}
+    assert {(row["engine"], row["method"]) for row in result.rows} == everyone and table.diverged.any()
     assert table[table.diverged][["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(axis=None)
-    assert (table.seconds > 0.0).all()
+    assert (table.seconds > 0.0).all() and set(table.scene) == {"zero, free", "zero, free, beta locked", "bent, free"}
     evaluations = pd.DataFrame(result.tables["evaluations"])
     assert list(evaluations.columns) == ["quantity", "implementation", "states", "threads", "ns_per_state"]
     assert set(evaluations.quantity) == {"mass_matrix_and_bias", "forward_dynamics", "rk4_step"}
-    assert len([check for check in result.checks if "twin" in check.quantity]) >= 3
+    errors = accuracy.true_error(result.rows)
+    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1) and errors["bent, free"][0] == pytest.approx(0.27, abs=0.01)
+    drawn = [figure() for figure in speed.figures(result)]
+    assert [name for name, *_ in drawn] == [
+        "speed_zero_free", "speed_bent_free", "speed_evaluations", "speed_energy", "speed_evaluation_cost"]  # fmt: skip
+    for _, figure, caption in drawn:
+        figure.canvas.draw()
+        assert caption.endswith((".", ")"))
 
 
-def runs(order, engine="tmt", method="rk4"):
-    return [
-        {"scene": "s", "engine": engine, "method": method, "dt_s": 0.1 / 2**k, "tolerance": None, "steps": 2**k,
-         "evaluations": 4 * 2**k, "seconds": 1e-3 * 2**k * (20 if engine == "mujoco" else 1), "diverged": False,
-         "early": 1e-2 * 2.0 ** (-order * k), "worst_error_rad": 1e-2 * 2.0 ** (-order * k)}
-        for k in range(5)
-    ]  # fmt: skip
+def test_a_run_without_timings_has_the_checks_only(engine):
+    result = speed.rows(Setup.small(engine), timed=False)
+    assert len(result.checks) > 10 and all(check.passed for check in result.checks)
+    assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result)) == []
 
 
-@pytest.mark.parametrize("measured, passes", [(4.0, True), (3.9, True), (3.0, False), (5.0, False)])
-def test_a_wrong_order_is_seen(measured, passes):
-    result = Result("speed", rows=runs(measured))
-    (row,) = advice.orders(result, ["s"], [("tmt", "rk4", 4)])
-    assert row["measured_order"] == pytest.approx(measured)
-    assert [check.passed for check in result.checks] == [passes, True]
-    advice.orders(result, ["s"], [("tmt", "dopri8", 8)])
-    assert not result.checks[-1].passed  # a method that no scene shows
-
-
-def test_a_wrong_twin_is_seen():
-    result = Result("speed", rows=runs(4.0) + runs(4.0, "mujoco", "RK4"))
-    speed.twins(result, {"s": 1e-16})
-    assert len(result.checks) == 5 and all(check.passed for check in result.checks)
-    for row in result.rows[:5]:
-        row["worst_error_rad"] *= 1.01
-    speed.twins(result, {"s": 1e-16})
-    assert not any(check.passed for check in result.checks[5:])
-
-
-def test_the_advice_is_the_cheapest_that_reaches():
-    rows = runs(4.0) + runs(4.0, "mujoco", "RK4") + runs(8.0, "tmt", "dopri8")
-    table = {line["target_rad"]: line for line in advice.advice(rows, ["s"], {"s": 1e-16})}
-    line = table[1e-6]
-    assert line["mujoco"] == "mujoco RK4, 16 steps" and line["tmt"] == line["of_all"] == "tmt dopri8, 4 steps"
-    assert line["ratio"] == pytest.approx(80.0) == pytest.approx(line["kernel_part"] * line["method_part"])
-    assert line["why_not"] is None
-    assert table[1e-9]["mujoco"] is None and "its steps end before" in table[1e-9]["why_not"]
-    left = advice.advice(rows, ["s"], {"s": 1e-9})[3]
-    assert "its steps end before" in left["why_not"]
+@pytest.mark.parametrize("old, new", [("0 0 -9.81", "0 0 -1.62"), ('mass="1.5"', 'mass="1.50001"')], ids=["moon", "mass"])
+def test_a_wrong_model_is_far_from_the_reference(old, new):
+    checks = speed.rows(Setup.small(parse(ARM_XML.read_text(encoding="utf-8").replace(old, new))), timed=False).checks
+    failed = {check.quantity for check in checks if not check.passed}
+    assert {"smallest error of MuJoCo's RK4, beside that of tmt's rk4", "the same error as tmt's rk4"} <= failed
 
 
 def test_mujocos_calls_in_compiled_loops_do_the_work(engine):

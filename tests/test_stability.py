@@ -97,6 +97,13 @@ def test_predicted_and_observed_limits_agree(name, engine):
             assert row["observed_dt_s"] is row["predicted_dt_s"] is None
 
 
+def test_the_limit_of_explicit_euler_with_little_damping_is_seen(engine):
+    """Growth beyond it is slow: 100-fold in 2000 steps comes 6 % later."""
+    scene = ("bent", 0.5)
+    row = limits.examine(scene, engine, (Party("TMT", "explicit_euler"),))["rows"][0]
+    assert row["seen"] == "finite" and row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=5e-4)
+
+
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "RK4"])
 def test_amplification_is_mujocos_and_sees_damping(engine, integrator):
     at = held("bent", posture("bent"), 0.5)
@@ -128,14 +135,28 @@ def test_zero_leaves_with_one_over_the_square_root():
     assert found == pytest.approx(slope * 1e-8, rel=1e-3)
 
 
+def test_a_tiny_step_that_rounding_holds_back_is_in_the_prediction(engine):
+    """From a torque error of a few ulps at 1 ms the arm leaves later than the linear map without rounding says."""
+    at, dt = BALL, 1e-3
+    tau = departure.own_torque(Party("MuJoCo", "Euler"), engine, at)
+    tau = tau + 3e-15 * tmt.mass_matrix(at.q) @ at.modes[1][:3, 0].real / np.abs(at.modes[1][:3, 0]).max() * 7.513**2
+    off = departure.residual(EULER, engine, at, tau[None])
+    rounded, exact = (
+        departure.predicted(at, EULER.scheme, dt, np.zeros((1, 3)), off, rounded=rounded)[0] for rounded in (True, False)
+    )
+    q, _ = EULER.run(engine, tmt.ARM, at.q, np.zeros(3), tau, dt, 7000)
+    observed = departure.departure(dt * np.arange(7001), q)
+    assert abs(observed - rounded) < departure.NEAR < 0.1 < observed - exact
+
+
 def test_own_bias_holds_for_ever(engine):
-    for party in (RK4, Party("MuJoCo", "RK4")):
-        tau = departure.own_torque(party, engine, BALL)
-        _, qd = party.run(engine, tmt.ARM, BALL.q, np.zeros(3), tau, 5 / 64, 200)
-        if party.engine == "MuJoCo" or not qd[1].any():
-            assert not qd.any()
-    tau = departure.own_torque(RK4, engine, BALL) + 1e-12
-    q, _ = RK4.run(engine, tmt.ARM, BALL.q, np.zeros(3), tau, 5 / 64, 100)
+    tau = departure.own_torque(Party("MuJoCo", "RK4"), engine, BALL)
+    _, qd = Party("MuJoCo", "RK4").run(engine, tmt.ARM, BALL.q, np.zeros(3), tau, 5 / 64, 200)
+    assert not qd.any()
+    ours = departure.own_torque(RK4, engine, BALL)  # no double need be the bias of compiled code: the nearest is taken
+    left = departure.residual(RK4, engine, BALL, np.array([ours, BALL.tau]))
+    assert np.abs(left[0]).max() <= min(np.abs(left[1]).max(), np.spacing(np.abs(BALL.tau).max()))
+    q, _ = RK4.run(engine, tmt.ARM, BALL.q, np.zeros(3), ours + 1e-12, 5 / 64, 100)
     assert np.nanmax(np.abs(q - BALL.q)) > 0.1
 
 
@@ -149,7 +170,7 @@ def test_silent_failures_are_caught(engine):
     assert reset["finite"] and reset["resets"] >= 1
     assert reset["caught_in_it_s"] <= reset["first_reset_s"]
     gain = failure.silent_gain(engine)
-    assert gain["gain"] > 5.0 * gain["range"] and gain["caught_in_it_s"] is not None
+    assert gain["gain"] > 5.0 * gain["range"] and gain["caught_in_it_s"] == gain["since_s"]
     assert gain["definite"][64] < 0.0 < gain["definite"][128]
     calm = left_to_itself(engine, *failure.BENT.start, np.zeros(3), 1e-3, 100, "RK4")
     assert failure.caught(failure.BENT, 1e-3 * np.arange(101), calm) is None and calm["warnings"] == 0
@@ -169,5 +190,5 @@ def test_a_wrong_stiffness_is_seen(engine):
     """Predicted for a forearm of another mass, observed on MuJoCo's arm: apart by far more than the aim."""
     model = dataclasses.replace(tmt.ARM, mass=(1.9, 1.65))
     heavy = dataclasses.replace(BENT, model=model, tau=tmt.gravity_balance(BENT.q, model))
-    observed = limits.observed_limit(Party("MuJoCo", "RK4"), engine, BENT, limits.stiffest(BENT)[1])[1]
+    observed = limits.observed_limit(Party("MuJoCo", "RK4"), engine, BENT)[1]
     assert abs(observed / heavy.limit("rk4")[1] - 1.0) > 2.0 * limits.AIM

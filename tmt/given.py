@@ -7,7 +7,6 @@ import functools
 import math
 import numbers
 import os
-import reprlib
 from collections.abc import Callable
 
 import numpy as np

@@ -13,7 +13,7 @@ from .dual import Dual, jacobian
 from .method import acceleration, mass_matrix_and_bias
 from .space import solve_any
 from .trace import Tape
-from .tree import shown
+from .tree import real_numbers, shown
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
@@ -48,7 +48,7 @@ class ImplicitRungeKutta:
     c: tuple  # the time of each stage in units of dt
 
     def __post_init__(self):
-        as_tuples(self, "A", "b", "c")
+        checked_tableau(self, "A")
         stages = len(self.b)
         if not len(self.A) == stages == len(self.c) or any(len(row) != stages for row in self.A):
             raise ValueError("A must be square, and b and c must have one entry for each of its rows")
@@ -136,14 +136,21 @@ class ImplicitRungeKutta:
         )
 
 
-def as_tuples(method, *names) -> None:
-    """Make the parts of a tableau nested tuples of float: a method is a value, and a key of what is compiled for it."""
-    for name in names:
+def checked_tableau(method, *rows) -> None:
+    """Make order, b, c and these rows of a tableau plain numbers: a method is a value, and a key of what is compiled for it."""
+    order = method.order
+    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= 100:
+        raise ValueError(f"order of the method is {shown(order)}; a whole number from 1 to 100 is expected")
+    for name in ("b", "c", *rows):
+        given = getattr(method, name)
         try:
-            rows = [tuple(map(float, row)) if np.iterable(row) else float(row) for row in getattr(method, name)]
-        except (TypeError, ValueError):
-            raise ValueError(f"{name} of the method is {shown(getattr(method, name))}; numbers are expected") from None
-        object.__setattr__(method, name, tuple(rows))
+            parts = [real_numbers(part) for part in (given if name in rows else [given])]
+        except TypeError:  # one number where rows are expected
+            parts = [None]
+        if any(part is None or part.ndim != 1 or not np.isfinite(part).all() for part in parts):
+            raise ValueError(f"{name} of the method is {shown(given)}; {'rows of ' * (name in rows)}numbers are expected")
+        parts = tuple(tuple(part.tolist()) for part in parts)
+        object.__setattr__(method, name, parts if name in rows else parts[0])
 
 
 def weighted(weights, values):

@@ -14,7 +14,21 @@ from .given import checked_model
 from .implicit import ImplicitRungeKutta, step_source
 from .method import acceleration
 from .methods import AdaptiveRungeKutta, RungeKutta, method_named
-from .templates import ADAPTIVE, CHECK, EVALUATE, HEADER, NEWTON, OVERFLOW, RATE, RUN, RUN_LANES, SLOPES, SMALL, STAGE, TURNED
+from .templates import (
+    ADAPTIVE,
+    CHECK,
+    EVALUATE,
+    HEADER,
+    NEWTON,
+    OVERFLOW,
+    RATE,
+    RUN,
+    RUN_LANES,
+    SLOPES,
+    SMALL,
+    STAGE,
+    TURNED,
+)
 from .trace import Code, Tape
 from .tree import Tree, shown
 
@@ -210,10 +224,16 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     n = len(tree.parent)
     tape = Tape()
     q, qd, tau, _ = _inputs(tape, tree)
-    if quantity == "forward_dynamics":
-        outputs = acceleration(tree, q, qd, tau, terms)
-    else:
+    try:
         M, h = terms(tree, q, qd)
+        for values, count in ((M, n), (h, n), *((row, n) for row in M)):
+            if len(values) != count:
+                raise ValueError(f"{len(values)} where {count} are expected")
+    except Exception as error:  # a function of the user's own
+        raise ValueError(f"terms {shown(terms)} does not give (Mbar, h) of traced numbers: {shown(error)}") from error
+    if quantity == "forward_dynamics":
+        outputs = acceleration(tree, q, qd, tau, lambda *_: (M, h))
+    else:
         outputs = [*(M[i][j] for i in range(n) for j in range(i, n)), *h]
     m = len(outputs)
     text = tape.function("quantity", [*q, *qd, *tau], outputs).text

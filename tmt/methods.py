@@ -11,7 +11,7 @@ import numpy as np
 
 from . import dop853
 from .dual import seeded
-from .implicit import ImplicitRungeKutta, as_tuples
+from .implicit import ImplicitRungeKutta, checked_tableau
 from .method import acceleration, bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
 from .tree import shown
@@ -31,7 +31,7 @@ class RungeKutta:
     c: tuple  # the time of each stage in units of dt
 
     def __post_init__(self):
-        as_tuples(self, "A", "b", "c")
+        checked_tableau(self, "A")
         if not len(self.A) == len(self.b) == len(self.c):
             raise ValueError("A, b and c must have one entry for each stage")
         for i, (row, c) in enumerate(zip(self.A, self.c)):
@@ -80,7 +80,7 @@ class AdaptiveRungeKutta(RungeKutta):
 
     def __post_init__(self):
         super().__post_init__()
-        as_tuples(self, "errors")
+        checked_tableau(self, "errors")
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 
@@ -183,5 +183,5 @@ def method_named(name):
         raise ValueError(f"unknown method {shown(name)}; known are {', '.join(METHODS)}")
     stepping = METHODS[name]
     if not all(callable(getattr(stepping, part, None)) for part in ("slope", "step", "__hash__")):
-        raise ValueError(f"METHODS[{name!r}] is {shown(stepping)}; a method with a slope and a step, hashable, is expected")
+        raise ValueError(f"METHODS[{name!r}] is {shown(stepping)}; a hashable method with a slope and a step is expected")
     return stepping

@@ -1,5 +1,6 @@
 """Motion by a method of integration, and why it ended where it did."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import ArrayLike
 from . import given, singular
 from .arm import ARM
 from .implicit import ImplicitRungeKutta
-from .methods import METHODS, AdaptiveRungeKutta, method_named
+from .methods import AdaptiveRungeKutta, method_named
 from .templates import NEWTON, OVERFLOW, SMALL, TURNED
 from .tree import Tree
 
@@ -26,7 +27,7 @@ class Motion(_Path):
     there on. evaluations: of the dynamics, of all runs; those of an implicit method with their Jacobian.
     """
 
-    ended: str | None | np.ndarray
+    ended: str | np.ndarray | None
     evaluations: int
 
 
@@ -50,7 +51,7 @@ def simulate(
     tolerance = 1e-9 if tolerance is None else given.positive("tolerance", tolerance, "a number")
     state = given.states(model, q=q, qd=qd, tau=tau)
     batch, n = state[0][0].shape, len(model.parent)
-    runs = int(np.prod(batch, dtype=object))
+    runs = math.prod(batch)
     path_q, path_qd = given.paths(runs, steps, n)
     if steps * dt == np.inf:
         raise ValueError(f"dt is {dt:g} and steps is {given.shown(steps)}; their product is beyond the largest double")
@@ -77,26 +78,32 @@ def simulate(
     return motion
 
 
+@np.errstate(over="ignore")
 def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
     q, qd: the paths (runs, steps + 1, n); codes: why the compiled loop ended each, 0: it did not.
     """
     told = np.full(len(codes), None, dtype=object)
+    if tree.never_singular and not codes.any():
+        return told
     if not tree.never_singular:
         for run in range(len(codes)):
             if found := singular_in(tree, q[run], qd[run]):
                 k, told[run] = found
                 q[run, k + 1 :] = qd[run, k + 1 :] = np.nan
     words = {
-        OVERFLOW: "the motion has left the finite numbers",
-        TURNED: "a hinge has turned by 2^49 rad, where neighbouring doubles are an eighth of a radian apart",
+        OVERFLOW: "the motion diverges: within a step its numbers overflow, or its angles pass 2^49 rad",
+        TURNED: "a hinge turns by 2^49 rad or more, where doubles are too far apart for a sine",
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
     }
-    for run in np.flatnonzero((codes != 0) | (told != None)):  # noqa: E711
+    for run in (run for run in range(len(codes)) if codes[run] or told[run]):
         last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
-        told[run] = f"at t = {last * dt:g} s: {told[run] or words[int(codes[run])]}"
+        code = int(codes[run])
+        if code in (OVERFLOW, NEWTON) and np.abs(q[run, last]).sum() + dt * np.abs(qd[run, last]).sum() > 2.0**48:
+            code = TURNED  # within the step: there is no sine at its stages
+        told[run] = f"at t = {last * dt:g} s: {told[run] or words[code]}"
     return told
 
 

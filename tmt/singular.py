@@ -64,7 +64,7 @@ def mass_matrices(tree, q) -> np.ndarray:
 
 
 def found(tree, M) -> np.ndarray:
-    """Which hinges turn without moving mass at each state of Mbar (..., n, n): (..., n) truth values, none where it is regular."""
+    """Which hinges turn without moving mass at each state of Mbar (..., n, n): (..., n) of bool, none where it is regular."""
     root = np.sqrt(scales(tree))
     values, vectors = np.linalg.eigh(M / np.multiply.outer(root, root))
     turning = np.abs(vectors[..., 0]) / root

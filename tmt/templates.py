@@ -26,7 +26,7 @@ if not (q.shape == qd.shape == (len(tau), q.shape[1], {n}) and tau.shape[1] == {
         raise ValueError("q and qd of shape (runs, steps + 1, {n}) and tau of shape (runs, {n}) are expected")"""
 
 RUN = '''
-@njit("int64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64, int8[::1])", cache=CACHE, error_model="numpy")
+@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, int8[::1])", cache=CACHE, error_model="numpy")
 def run(q, qd, tau, dt, ended):
     """Fill q and qd (batch, steps + 1, n) from their first state, until one is not finite; evaluations of the dynamics.
 
@@ -49,7 +49,7 @@ def run(q, qd, tau, dt, ended):
 '''
 
 ADAPTIVE = '''
-@njit("int64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64, float64, int8[::1])", cache=CACHE, error_model="numpy")
+@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, f8, int8[::1])", cache=CACHE, error_model="numpy")
 def run(q, qd, tau, dt, tolerance, ended):
     """As the run of a method with a fixed step."""
     {check}
@@ -91,7 +91,7 @@ def slopes(x, k, o, dt):
 '''
 
 RUN_LANES = '''
-@njit("int64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64, int8[::1])", cache=CACHE, nogil=True, error_model="numpy")
+@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, int8[::1])", cache=CACHE, nogil=True, error_model="numpy")
 def run(q, qd, tau, dt, ended):
     """As the run of one state at a time, for a batch that is a multiple of {W}."""
     {check}
@@ -134,11 +134,20 @@ STAGE = """\
 """
 
 EVALUATE = '''
+@njit(error_model="numpy")
+def apart(q, qd, tau, out):
+    """Raise ValueError if results would be written over arguments that are still needed."""
+    for given in (q, qd, tau):
+        if given.ctypes.data < out.ctypes.data + out.nbytes and out.ctypes.data < given.ctypes.data + given.nbytes:
+            raise ValueError("out shares memory with q, qd or tau; an array of its own is expected")
+
+
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])", cache=CACHE, nogil=True, error_model="numpy")
 def each(q, qd, tau, out):
     """One state at a time: rows of q, qd, tau (N, {n}) to rows of out (N, {m})."""
     if not (q.shape == qd.shape == tau.shape == (len(q), {n}) and out.shape == (len(q), {m})):
         raise ValueError("q, qd and tau of shape (N, {n}) and out of shape (N, {m}) are expected")
+    apart(q, qd, tau, out)
     for i in range(q.shape[0]):
         {row_out} = quantity({row_in})
         if not {sound_row}:
@@ -162,6 +171,7 @@ def lanes(q, qd, tau, out):
     """{W} states side by side, the rest one at a time: columns of q, qd, tau ({n}, N) to columns of out ({m}, N)."""
     if not (q.shape == qd.shape == tau.shape == ({n}, q.shape[1]) and out.shape == ({m}, q.shape[1])):
         raise ValueError("q, qd and tau of shape ({n}, N) and out of shape ({m}, N) are expected")
+    apart(q, qd, tau, out)
     x, y = np.empty({size_x}), np.empty({size_y})
     flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
     count = q.shape[1]

@@ -1,0 +1,7 @@
+"""The edits, by what they break."""
+
+from . import checks, motion, parameters, report, rules, speed, stability, tmt
+
+EDITS = (
+    *rules.EDITS, *checks.EDITS, *parameters.EDITS, *motion.EDITS, *speed.EDITS, *stability.EDITS, *report.EDITS, *tmt.EDITS,
+)  # fmt: skip

@@ -1,0 +1,89 @@
+"""Checks that always pass, one for each that the experiments make, and some with a tolerance that is far too wide."""
+
+from ..edit import Edit
+
+# module, function, quantity: as written in the call of `check`, _1, _2 for what is filled in
+CHECKS = (
+    ("parameters", "rows", "quantity"),
+    ("parameters", "rows", 'f"no forces of {_1}"'),
+    ("published", "judge", 'f"{_1}: {item.quantity} - printed"'),
+    ("published", "judge", 'f"{_1}: {item.quantity} - exact"'),
+    ("published", "judge", 'f"{_1}: qdd - printed"'),
+    ("published", "judge", '"exact: |qdd_alpha| - |printed|"'),
+    ("mass", "symmetric", "what"),
+    ("mass", "definite", "what"),
+    ("mass", "conditioned", 'f"{_1}: condition number - {_2:.2f}"'),
+    ("mass", "conditioned", 'f"{_1}: distance from (+-90, 90) deg"'),
+    ("accuracy", "same_schemes", "quantity"),
+    ("accuracy", "smallest_errors", "quantity"),
+    ("accuracy", "smallest_errors", '"smallest error of MuJoCo\'s RK4, beside that of tmt\'s rk4"'),
+    ("advice", "orders", '"scenes that show its order"'),
+    ("advice", "judge_order", 'f"distance of the measured order from {_1}"'),
+    ("advice", "judge_order", 'f"measured order, of {_1}"'),
+    ("cost", "judge", 'f"another motion with {_1}"'),
+    ("cost", "judge", 'f"the same bits with {_1}"'),
+    ("known_motion", "judge_function", '"elliptic function, scipy to 50 digits"'),
+    ("known_motion", "judge_orders", 'f"order of the error against the elliptic function, from {_1}"'),
+    ("known_motion", "judge_modes", "what"),
+    ("reduction", "judge_run", '"smallest model to whole"'),
+    ("reduction", "judge_run", '"time judged"'),
+    ("reduction", "judge_movement", '"movement"'),
+    ("reduction", "rows", '"models whose hinges can be locked"'),
+    ("sub_blocks", "judge", 'f"{_1}, {_2}"'),
+    ("trajectory", "pair", '"time judged"'),
+    ("trajectory", "divergence", '"step of divergence, MuJoCo\'s, is TMT\'s"'),
+    ("trajectory", "movement", '"movement"'),
+    ("trajectory", "same_bits", 'f"the same bits as {_1}"'),
+    ("trajectory", "level", 'f"{_1}, TMT to MuJoCo"'),
+    ("motion", "judge_derivative", '"dh/dqd + D, TMT to MuJoCo\'s -qDeriv"'),
+    ("drift", "judge", 'f"order of the drift of {_1}, from {_2}"'),
+    ("drift", "judge", 'f"drift of {_1} over that of Euler"'),
+    ("horizon", "judge_digits", 'f"{_1} to many digits of its own scheme"'),
+    ("limits", "judge", '"limit, observed / predicted - 1"'),
+    ("limits", "judge", "quantity"),
+    ("limits", "judge", 'f"growth in {_1} steps, observed / predicted - 1"'),
+    ("departure", "judge", '"exponent of the time to leave, from -1/2"'),
+    ("departure", "check_row", "quantity"),
+    ("claims", "judge_torques", "text"),
+    ("claims", "judge_torques", '"movement under the engine\'s own bias"'),
+    ("claims", "judge_finer", 'f"movement in 5 s at {_1} steps"'),
+    ("beyond", "judge", 'f"time within {_1:g} rad, below the limit"'),
+    ("failure", "judge_near", 'f"{_1} {SMALL:g} rad"'),
+    ("failure", "judge_near", 'f"{_1} {LARGE:g} rad"'),
+    ("failure", "judge_silent", "quantity"),
+    ("long_runs", "judge_minutes", "quantity"),
+    ("stability", "amplification", "quantity"),
+)
+# module, function, the two that are compared, as written in the call of `agree`
+AGREEMENTS = (
+    ("mass", "rows", '"Mbar"'),
+    ("gravity", "rows", '"holding torque"'),
+    ("gravity", "rows", '"TMT: torque - dV/dq"'),
+    ("gravity", "rows", '"MuJoCo: torque - dV/dq"'),
+    ("gravity", "rows", '"qdd of MuJoCo under TMT\'s torque"'),
+    ("acceleration", "rows", '"bias"'),
+    ("acceleration", "rows", '"qdd"'),
+    ("acceleration", "rows", '"tau from MuJoCo\'s qdd by TMT"'),
+    ("acceleration", "rows", '"tau from TMT\'s qdd by mj_inverse"'),
+    ("acceleration", "rows", '"energy"'),
+    ("acceleration", "rows", 'f"dE/dt - tau.qd at {_1}\'s qdd"'),
+    ("acceleration", "rows", "quantity"),
+)
+EDITS = (
+    *(
+        Edit(module, where, f"result.check(_3, {quantity}, _4, _5, *_6)", f"result.check(_3, {quantity}, _5, _5, *_6)",
+             f"{quantity} always passes")
+        for module, where, quantity in CHECKS
+    ),
+    *(
+        Edit(module, where, f"result.agree(_3, {quantity}, _4, _5, _6, *_7)",
+             f"result.agree(_3, {quantity}, _4, _6, _6, *_7)", f"{quantity} is compared with itself")
+        for module, where, quantity in AGREEMENTS
+    ),
+    *(
+        Edit("kinematics", "rows", "result.agree(_1, _2, _3, ours, theirs, *_4)",
+             f"result.agree(_1, _2, _3, ours, ours if quantity == {quantity!r} else theirs, *_4)",
+             f"{quantity} is compared with itself")
+        for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv")
+    ),
+)  # fmt: skip

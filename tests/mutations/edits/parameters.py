@@ -1,0 +1,22 @@
+"""Edits of the comparison state by state: the model read back, printed numbers, Mbar, bias, accelerations."""
+
+from ..edit import Edit
+
+READ = (
+    "flag gravity", "flag damper", "flag eulerdamp", "order", "ref", "axis", "anchor", "damping", "armature", "frictionloss",
+    "stiffness", "limited", "mass", "com", "inertia", "gravcomp", "gravity", "density", "viscosity", "other mass",
+    "tendon armature",
+)  # fmt: skip
+FOUND = "np.asarray(compiled[quantity], dtype=float)"
+EDITS = (
+    *(
+        Edit("parameters", "rows", FOUND, f"expected if quantity == {name!r} else {FOUND}", f"{name} is read as stated")
+        for name in READ
+    ),
+    Edit("parameters", "rows", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
+    Edit("parameters", "rows", "sorted(causes, key=_1)", "causes", "causes in the order in which they are found"),
+    Edit("parameters", "named", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
+    Edit("parameters", "cause", "(stated, found)", "(found, stated)", "stated and compiled are exchanged"),
+    Edit("engine", "Engine.other_forces", "d.qfrc_actuator[_1]", "0 * d.qfrc_actuator[_1]", "actuators exert no force"),
+    Edit("engine", "Engine.other_forces", "d.qfrc_constraint[_1]", "0 * d.qfrc_constraint[_1]", "contacts exert no force"),
+)  # fmt: skip

@@ -1,0 +1,29 @@
+"""Edits of timing, errors and advice."""
+
+from ..edit import Edit
+
+EDITS = (
+    Edit("clock", "fastest", "min(taken)", "7 * min(taken)", "times x 7"),
+    Edit("clock", "in_turns", "time.perf_counter() - begin", "7 * (time.perf_counter() - begin)", "seconds x 7"),
+    Edit("speed", "fill_in", "min(of_row)", "7 * min(of_row)", "reported seconds x 7", nth=1),
+    Edit("speed", "fill_in", "min(of_row)", "max(of_row)", "the slowest run is reported", nth=1),
+    Edit("evaluations", "per_state", "1e9 * min(taken) / count", "1e9 * min(taken)", "time of all states as that of one"),
+    Edit("reference", "Reference.error", "self.low[_1]", "0 * self.low[_1]", "the low part of the reference is dropped"),
+    Edit("reference", "Reference.error", "_1.max(axis=1)", "_1.min(axis=1)", "the best hinge is judged"),
+    Edit("reference", "reference", "float(d - Decimal(h))", "0.0", "the low part of the table is dropped"),
+    Edit("advice", "advice.cheapest", "min(fit, key=_1, default=None)", "max(fit, key=_1, default=None)",
+         "the dearest is advised"),
+    Edit("advice", "advice", "row['worst_error_rad'] <= target", "row['worst_error_rad'] <= 10 * target",
+         "a setting ten times too inexact is advised"),
+    Edit("advice", "advice.part", "slow['seconds'] / fast['seconds']", "fast['seconds'] / slow['seconds']",
+         "ratios are inverted"),
+    Edit("advice", "orders", "runs[-2:]", "runs[:2]", "the order is measured at the coarsest steps"),
+    Edit("advice", "orders", "CLEAR < row['early'] < REGULAR", "True", "the order is measured among errors of rounding"),
+    Edit("advice", "MARGIN", "0.15", "3", "orders may be off by 3"),
+    Edit("advice", "LEAST", "7.0", "1.0", "order 8 need only be 1"),
+    Edit("accuracy", "same_schemes", "FACTOR * floors[scene]", "1e6 * floors[scene]", "the same scheme's tolerance: 64 -> 1e6"),
+    Edit("accuracy", "smallest_errors", "FACTOR * left", "100 * FACTOR * left", "tolerance x 100", nth=1),
+    Edit("accuracy", "error", "row['diverged']", "False", "a run that diverged has an error"),
+    Edit("targets", "targets.add", "reached >= aim", "reached <= aim", "a missed aim is met"),
+    Edit("targets", "targets.add", "slow / fast", "fast / slow", "ratios are inverted"),
+)  # fmt: skip

@@ -1,0 +1,84 @@
+"""Models that are not the stated arm: nothing raises, and every sentence and caption follows that model's numbers."""
+
+import re
+
+import pytest
+
+from compare import acceleration, drift, gravity, horizon, kinematics, mass, motion, published, told, trajectory
+from compare.agreement import Result, Setup
+from compare.engine_file import ARM_XML, parse
+from compare.scenes import SCENES
+
+XML = ARM_XML.read_text()
+MODELS = {
+    "the arm": ("", ""),
+    "on the moon": ("0 0 -9.81", "0 0 -1.62"),
+    "gravity off by its flag": ("<flag ", '<flag gravity="disable" '),
+    "ten times the gravity": ("-9.81", "-98.1"),
+    "damped by 5": ('axis="1 0 0"/>', 'axis="1 0 0" damping="5"/>'),
+    "with a spring": ('axis="1 0 0"/>', 'axis="1 0 0" stiffness="30"/>'),
+    "a muscle's activation": ("</mujoco>", '<actuator><position joint="beta" kp="3" timeconst="0.1"/></actuator></mujoco>'),
+    "a feather": (
+        'pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"', 'pos="1e-5 0 0" mass="1.5" diaginertia="1e-9 1e-9 1e-9"',
+    ),
+}  # fmt: skip
+STEPS = {"Euler": (16, 32, 64), "implicit": (16, 32, 64), "RK4": (16, 32, 64)}
+
+
+@pytest.fixture(scope="module")
+def known():
+    """TMT's side, and the runs with many digits, which are the same for all models."""
+    return {}, [horizon.exact_runs(next(scene for scene in SCENES if scene.name == "bent, free"), 3)]
+
+
+@pytest.fixture(params=MODELS, scope="module")
+def other(request, known):
+    """A model's name and all that a report says of its runs."""
+    engine = parse(XML.replace(*MODELS[request.param]) if request.param != "the arm" else XML)
+    result = Result("trajectory", curves={"runs": {}})
+    for scene in SCENES:
+        part = trajectory.follow(scene, engine, (64,), known[0])
+        result.rows += part.rows
+        result.curves["runs"] |= part.curves
+    drift.drift(result, engine, STEPS)
+    horizon.many_digits(result, engine, [scene for scene in SCENES if scene.name == "bent, free"], known[1])
+    result.curves["errors"] = motion.held_errors(result) | motion.free_errors(result)
+    result.notes = told.notes(result, engine) + result.notes
+    return request.param, result
+
+
+def test_the_sentences_of_a_trajectory_follow_the_model(other):
+    name, result = other
+    catch, bent, errors, agreement, order = result.notes[:5]
+    right = name == "the arm"
+    assert ("MuJoCo's is 0.1 rad away at 4.69 s" in catch) == right
+    assert ("the cause is rounding of the torque" in catch) == right
+    at = re.search(r"MuJoCo's (stays within 0.1 rad|is 0.1 rad away at ([\d.]+) s)", bent)
+    for note, scene in ((catch, "ball catch, held"), (bent, "bent, held")):
+        left = result.curves["runs"][scene, "rk4", 64]["left"]["MuJoCo"]
+        assert ("that is no rounding" in note) == (not right and left is not None and "damped" not in name)
+    assert (at.group(2) is None) == (result.curves["runs"]["bent, held", "rk4", 64]["left"]["MuJoCo"] is None)
+    assert ("; bent, free; " in agreement) == right or "damped" in name
+    held = result.curves["errors"]["ball catch, held"]
+    assert f"ball catch, held (true: rest): TMT {told.rad(held[0])}, MuJoCo {told.rad(held[1])}" in errors
+    ended = result.curves["runs"]["ball catch, free", "semi_implicit_euler", 64]["ended"]["MuJoCo"]
+    says = "MuJoCo never" if ended is None else f"MuJoCo at {ended:.2f} s"
+    assert re.search(rf"ball catch, free, Euler: judged for [\d.]+ s, diverges: TMT at 0.39 s, {says}", order)
+
+
+def test_every_caption_of_a_trajectory_can_be_said_of_the_model(other):
+    for figure in trajectory.figures(result := other[1]):
+        if figure.args[-1] in (result, *SCENES[4:]):  # some of the scenes: each is drawn in the same way
+            continue
+        name, _, caption = figure()
+        assert caption.endswith(".") and "nan" not in caption and name
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_static_experiments_say_what_they_find(name):
+    setup = Setup.small(parse(XML.replace(*MODELS[name]) if name != "the arm" else XML))
+    for module in (published, kinematics, mass, gravity, acceleration):
+        result = module.rows(setup)
+        assert all(note.endswith(".") and "nan" not in note for note in result.notes)
+        if name == "the arm":
+            assert all(check.passed for check in result.checks)
