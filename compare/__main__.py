@@ -118,12 +118,13 @@ def run(options, command) -> int:
                 from . import report, verdict
                 from .agreement import Setup
 
+                origin = report.provenance(command, path)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
                 setup = (Setup.quick if options.quick else Setup)(engine, **of_run)
                 sections, causes = examine(names, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS), causes)
-            seconds = time.perf_counter() - started
-            report.write(folder, sections, report.provenance(command, path, seconds), words, causes)
+            origin["seconds"] = round(time.perf_counter() - started, 1)
+            report.write(folder, sections, origin, words, causes)
     except (ModelError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()

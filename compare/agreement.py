@@ -69,6 +69,8 @@ class Check:
         found = "no number" if self.value is None else f"{self.value:.3g} {self.unit}".rstrip()
         wanted = f"{self.tolerance:.3g} {self.unit}".rstrip()
         where = f", {self.scene}" if self.scene else ""
+        if self.rule == "equal" and self.value is None and self.note:  # there is nothing but the reason to tell
+            return f"{self.experiment}: not so: {self.quantity}{where}: {self.note}"
         note = f" ({self.note})" if self.note else ""
         rule = self.rule.replace("equal", "equal to")
         return f"{self.experiment}: {self.quantity}{where}: {found}, must be {rule} {wanted}{note}"

@@ -24,14 +24,14 @@ OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich", "heyoka")
 
 
-def provenance(command, model, seconds) -> dict:
-    """What a reader needs to repeat the run: command, model, versions, machine, commit, seed."""
+def provenance(command, model) -> dict:
+    """What a reader needs to repeat the run: command, model, versions, machine, commit, seed; `seconds` come at its end."""
     return {
         "command": readable(command),
         "model": "mjcf/arm.xml" if model == ARM_XML else readable(str(model)),
         "model_sha256": hashlib.sha256(Path(model).read_bytes()).hexdigest(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "seconds": round(seconds, 1),
+        "seconds": None,
         "seed": SEED,
         "commit": commit(),
         "cpu": vectors(),
