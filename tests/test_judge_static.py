@@ -244,3 +244,11 @@ def test_every_figure_of_the_single_states_is_drawn(module):
     for figure in module.figures(result):
         name, drawn, caption = figure()
         assert name.startswith(result.experiment) and drawn.axes and caption.endswith(".")
+
+
+def test_what_is_kept_for_the_figures_is_whose_it_says():
+    kept = gravity.rows(Setup.small(MOON)).curves["postures"]["zero"]
+    assert np.array_equal(kept, [tmt.gravity_balance(np.zeros(3)), MOON.gravity_balance(np.zeros(3))])
+    heavy = parse(ARM_XML.read_text().replace('mass="1.5"', 'mass="2.5"'))
+    worst = mass.rows(Setup.small(heavy)).curves["worst"]
+    assert worst["TMT"][0] == pytest.approx(126.83, abs=0.01) and worst["MuJoCo"][0] > 190.0
