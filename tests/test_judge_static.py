@@ -72,11 +72,14 @@ def test_the_notes_on_the_published_numbers_follow_the_numbers(engine):
     right, wrong = (published.rows(Setup.small(e)).notes for e in (engine, upward))
     assert "has the sign of the torque that holds TMT's arm (-2.20725 N m) and the sign of MuJoCo's" in right[-1]
     assert "and not the sign of MuJoCo's qfrc_bias at rest (+2.20725 N m)" in wrong[-1]
+    assert "has the sign of the torque that holds TMT's arm (-2.20725 N m)" in wrong[-1]
     assert right[1].startswith("f3, printed (-3.456e-15, 0, 1.92e-16) rad/s2, is met to every digit by: exact arithmetic all;")
     digits = np.array(ITEMS["f3"].values)
     told = published.shared(ITEMS["f3"], digits + 1.0, digits, -digits, 1.0)
     assert "exact arithmetic none; TMT all; MuJoCo beta, and alpha and gamma with the other sign" in told
     assert "text's omega_1 is 1.9e+00 rad/s from TMT's" in right[2]
+    for off, said in ((0.49e-18, "TMT all"), (0.51e-18, "TMT none")):
+        assert said in published.shared(ITEMS["f3"], digits, digits + off, digits, 1.0)
 
 
 # the mass matrix
