@@ -72,11 +72,14 @@ def test_the_notes_on_the_published_numbers_follow_the_numbers(engine):
     right, wrong = (published.rows(Setup.small(e)).notes for e in (engine, upward))
     assert "has the sign of the torque that holds TMT's arm (-2.20725 N m) and the sign of MuJoCo's" in right[-1]
     assert "and not the sign of MuJoCo's qfrc_bias at rest (+2.20725 N m)" in wrong[-1]
+    assert "has the sign of the torque that holds TMT's arm (-2.20725 N m)" in wrong[-1]
     assert right[1].startswith("f3, printed (-3.456e-15, 0, 1.92e-16) rad/s2, is met to every digit by: exact arithmetic all;")
     digits = np.array(ITEMS["f3"].values)
     told = published.shared(ITEMS["f3"], digits + 1.0, digits, -digits, 1.0)
     assert "exact arithmetic none; TMT all; MuJoCo beta, and alpha and gamma with the other sign" in told
     assert "text's omega_1 is 1.9e+00 rad/s from TMT's" in right[2]
+    for off, said in ((0.49e-18, "TMT all"), (0.51e-18, "TMT none")):
+        assert said in published.shared(ITEMS["f3"], digits, digits + off, digits, 1.0)
 
 
 # the mass matrix
@@ -244,3 +247,11 @@ def test_every_figure_of_the_single_states_is_drawn(module):
     for figure in module.figures(result):
         name, drawn, caption = figure()
         assert name.startswith(result.experiment) and drawn.axes and caption.endswith(".")
+
+
+def test_what_is_kept_for_the_figures_is_whose_it_says():
+    kept = gravity.rows(Setup.small(MOON)).curves["postures"]["zero"]
+    assert np.array_equal(kept, [tmt.gravity_balance(np.zeros(3)), MOON.gravity_balance(np.zeros(3))])
+    heavy = parse(ARM_XML.read_text().replace('mass="1.5"', 'mass="2.5"'))
+    worst = mass.rows(Setup.small(heavy)).curves["worst"]
+    assert worst["TMT"][0] == pytest.approx(126.83, abs=0.01) and worst["MuJoCo"][0] > 190.0

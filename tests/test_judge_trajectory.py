@@ -219,6 +219,27 @@ def test_what_is_kept_of_a_run_is_whose_it_says(engine):
     assert {row["diverged_at_s"] for row in result.rows} == {kept["ended"]["MuJoCo"]}
 
 
+def test_an_engine_that_rests_or_does_not_drift_is_named(engine):
+    """Without gravity MuJoCo's arm stays where it is let go, and TMT's falls."""
+    rests = engine.variant(gravity=0.0)
+    checks = judged_with(rests, trajectory.ours(DAMPED, 64, "rk4"))
+    assert (checks["movement"].value, checks["movement"].passed) == (0.0, False)
+    result = Result("trajectory")
+    drift.drift(result, rests, {"Euler": (32, 64), "RK4": (32, 64)})
+    for integrator in ("Euler", "RK4"):
+        of = result.curves["drift"]["drifts"]["bent, free", "energy", "J"][integrator]
+        assert of["MuJoCo"] == [0.0, 0.0] and min(of["TMT"]) > 0.0
+
+
+def test_each_engine_is_compared_with_many_digits(engine):
+    path = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.model)[1]
+    curve = run_of(FREE) | {"tmt": [path, path]}
+    result = Result("trajectory", curves={"runs": {("bent, free", "rk4", 64): curve}})
+    horizon.many_digits(result, engine.variant(gravity=0.0), [FREE], [{"RK4": path.astype(object)}])
+    assert [(check.quantity[:6], check.passed) for check in result.checks] == [("TMT to", True), ("MuJoCo", False)]
+    assert "TMT is at most 0.0e+00 rad off, MuJoCo" in result.notes[0] and "to 5.00 s" in result.notes[0]
+
+
 def test_every_rule_of_a_run_is_applied(engine):
     """The names of the checks that each kind of scene gets, with every integrator."""
     found = {}
@@ -383,6 +404,12 @@ def run_of(scene, ours=0.0, theirs=0.0, until=5.0, ended=(None, None), left=(Non
         "mujoco": [start + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9), "ulp": start + 0.0 * ramp,
         "judged_until_s": until, "ended": dict(zip(("TMT", "MuJoCo"), ended)), "left": dict(zip(("TMT", "MuJoCo"), left)),
     }  # fmt: skip
+
+
+def test_what_is_said_of_a_claim_follows_the_run(engine):
+    said = told.claim(HELD, engine, run_of(HELD, 0.25, 0.5, left=(3.0, None)))
+    assert "in 5 s TMT's arm is 0.1 rad away at 3.00 s, MuJoCo's stays within 0.1 rad" in said
+    assert "the farthest is TMT's 2.5e-01 rad and MuJoCo's 5.0e-01 rad" in said
 
 
 def test_the_error_of_a_held_scene_is_its_distance_from_the_start():
