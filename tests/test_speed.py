@@ -85,6 +85,13 @@ def test_a_changed_scene_gets_a_reference_of_its_own(tmp_path, monkeypatch):
     once_more = reference.references(tell=told.append)[changed.name]
     assert len(told) == 4 and np.array_equal(first.high, once_more.high)
 
+    def refuse(*_):
+        raise RuntimeError("the folder is not the user's own")
+
+    monkeypatch.setattr(reference, "kept", refuse)
+    reference.references(tell=told.append)
+    assert len(told) == 6  # nothing is read there, and nothing written
+
 
 def test_the_command_remakes_the_table(tmp_path, monkeypatch, capsys):
     short = dataclasses.replace(BENT, duration=0.008, dt=0.001)
