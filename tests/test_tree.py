@@ -21,6 +21,7 @@ def test_tree_converts_arrays_and_scales_axes():
     tree = dataclasses.replace(tmt.ARM, axis=np.array([[0, 2, 0], [3, 0, 0], [0, 1, 0]]), mass=[1, 2])
     assert tree.axis == tmt.ARM.axis
     assert tree.mass == (1.0, 2.0)
+    assert tmt.Tree(**vars(tree)) == tree and tree.never_singular
     assert hash(tree) != hash(tmt.ARM)
 
 
