@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
@@ -34,8 +34,7 @@ CALLS = {
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 @given(array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=5))
 def test_wrong_shapes(call, shape):
-    if shape and shape[-1] == 3:
-        return
+    assume(not shape or shape[-1] != 3)
     with pytest.raises(ValueError, match=r"has shape .*; \(\.\.\., 3\) is expected.*alpha, beta, gamma"):
         call(np.zeros(shape))
 

@@ -94,25 +94,24 @@ def test_lanes_give_the_bits_of_one_state_at_a_time(rng):
 
 
 def test_every_quantity_of_every_tree_falls_back_beyond_the_limit(rng):
-    """An angle that is too large for our sine may leave the first component as it is."""
-    tree = random_tree(rng, bodies=3)
-    n = len(tree.parent)
-    for model, hinge in ((tmt.ARM, 0), *((tree, k) for k in range(n))):
-        q, qd, tau = rng.uniform(-1, 1, (3, 1, len(model.parent)))
-        q[0, hinge] = 1e17
+    """An angle that is too large for our sine may leave the first component as it is: that of another tree has no part in it."""
+    whole = random_tree(rng, bodies=2)
+    fields = {name: getattr(whole, name)[:2] for name in whole.__dataclass_fields__}
+    two_trees = tmt.Tree(**fields | {"parent": (-1, -1), "body_hinge": (0, 1), "gravity": whole.gravity})
+    for model, n in ((tmt.ARM, 3), (two_trees, 2)):
+        size = {"forward_dynamics": n, "mass_matrix_and_bias": n * (n + 3) // 2}
+        q, qd, tau = rng.uniform(-1, 1, (3, n, n))
+        q[np.arange(n), np.arange(n)] = 1e17  # in each state another hinge
         for quantity, expected in (
             ("forward_dynamics", tmt.acceleration(q, qd, tau, model)),
             ("mass_matrix_and_bias", tmt.bias(q, qd, model)),
         ):
             compiled = kernels.evaluator(model, quantity)
-            size = expected.shape[1] + (len(model.parent) * (len(model.parent) + 1) // 2) * (
-                quantity != "forward_dynamics"
-            )
-            one, many = np.empty((1, size)), np.empty((size, 1))
+            one, many = np.empty((n, size[quantity])), np.empty((size[quantity], n))
             compiled.each(q, qd, tau, one)
             compiled.lanes(q.T.copy(), qd.T.copy(), tau.T.copy(), many)
-            assert np.array_equal(one[0], many[:, 0])
-            assert np.allclose(one[0, -expected.shape[1] :], expected[0], rtol=1e-9, atol=1e-9)
+            assert np.array_equal(one, many.T)
+            assert np.allclose(one[:, -n:], expected, rtol=1e-9, atol=1e-9)
 
 
 def test_wrong_shapes_are_refused_by_compiled_code():

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy import ndarray
 
 from .tree import shown
 
@@ -31,7 +32,7 @@ def checked_run(compiled, n, adaptive) -> Callable:
     shapes = {"q": path, "qd": path, "tau": f"(runs, {n})", "ended": "(runs,)"}
 
     def run(q, qd, tau, dt, ended=NOBODY):
-        if not type(q) is type(qd) is type(tau) is type(ended) is np.ndarray:
+        if not type(q) is type(qd) is type(tau) is type(ended) is ndarray:
             q, qd, tau, ended = plain(shapes, q, qd, tau, ended)
         if type(dt) is not float:
             dt = real("dt", dt)
@@ -41,7 +42,7 @@ def checked_run(compiled, n, adaptive) -> Callable:
             raise refusal(error, shapes, q, qd, tau, ended) from None
 
     def run_adaptive(q, qd, tau, dt, tolerance, ended=NOBODY):
-        if not type(q) is type(qd) is type(tau) is type(ended) is np.ndarray:
+        if not type(q) is type(qd) is type(tau) is type(ended) is ndarray:
             q, qd, tau, ended = plain(shapes, q, qd, tau, ended)
         dt, tolerance = real("dt", dt), real("tolerance", tolerance)
         try:
@@ -62,7 +63,7 @@ def checked_evaluator(module, n, m) -> Evaluator:
 
     def of_many(compiled, shapes):
         def evaluate(q, qd, tau, out):
-            if not type(q) is type(qd) is type(tau) is type(out) is np.ndarray:
+            if not type(q) is type(qd) is type(tau) is type(out) is ndarray:
                 q, qd, tau, out = plain(shapes, q, qd, tau, out)
             try:
                 compiled(q, qd, tau, out)
@@ -82,7 +83,7 @@ def checked_evaluator(module, n, m) -> Evaluator:
             raise refusal(error, ends, q, qd, tau) from None
 
     def rate(y, tau):
-        if not type(y) is type(tau) is np.ndarray:
+        if not type(y) is type(tau) is ndarray:
             y, tau = plain(halves, y, tau)
         try:
             return compiled_rate(y, tau)

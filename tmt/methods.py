@@ -182,6 +182,7 @@ def method_named(name):
     if not isinstance(name, str) or name not in METHODS:
         raise ValueError(f"unknown method {shown(name)}; known are {', '.join(METHODS)}")
     stepping = METHODS[name]
-    if not all(callable(getattr(stepping, part, None)) for part in ("slope", "step", "__hash__")):
+    known = isinstance(stepping, (RungeKutta, SemiImplicitEuler, ImplicitRungeKutta))
+    if not known and not all(callable(getattr(stepping, part, None)) for part in ("slope", "step", "__hash__")):
         raise ValueError(f"METHODS[{name!r}] is {shown(stepping)}; a hashable method with a slope and a step is expected")
     return stepping

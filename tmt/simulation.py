@@ -78,7 +78,6 @@ def simulate(
     return motion
 
 
-@np.errstate(over="ignore")
 def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
@@ -101,7 +100,7 @@ def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
     for run in (run for run in range(len(codes)) if codes[run] or told[run]):
         last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
         code = int(codes[run])
-        if code in (OVERFLOW, NEWTON) and np.abs(q[run, last]).sum() + dt * np.abs(qd[run, last]).sum() > 2.0**48:
+        if code in (OVERFLOW, NEWTON) and max(np.abs(q[run, last]).max(), dt * float(np.abs(qd[run, last]).max())) > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages
         told[run] = f"at t = {last * dt:g} s: {told[run] or words[code]}"
     return told

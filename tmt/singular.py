@@ -5,6 +5,7 @@ no larger than its rounding is zero.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,6 +28,7 @@ def scales(tree) -> np.ndarray:
     return sums
 
 
+@lru_cache(maxsize=256)  # not in the Tree: vars(tree) are its fields
 def never(tree) -> bool:
     """Whether Mbar is regular at every q, by an argument from the tips inward: False may also mean unknown.
 

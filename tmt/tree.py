@@ -4,7 +4,6 @@ import math
 import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -73,7 +72,7 @@ class Tree:
     def __repr__(self):
         return f"Tree({', '.join(f'{field.name}={getattr(self, field.name)}' for field in fields(self))})"
 
-    @cached_property
+    @property
     def never_singular(self) -> bool:
         """Whether Mbar is known to be regular at every q; else it may be singular at some."""
         return singular.never(self)

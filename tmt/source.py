@@ -1,0 +1,237 @@
+"""The source of compiled modules: straight-line code that is traced, in the loops of templates.py."""
+
+from . import composite
+from .implicit import ImplicitRungeKutta, step_source
+from .method import acceleration
+from .methods import AdaptiveRungeKutta
+from .templates import (
+    ADAPTIVE,
+    CHECK,
+    EVALUATE,
+    HEADER,
+    NEWTON,
+    OVERFLOW,
+    RATE,
+    RUN,
+    RUN_LANES,
+    SLOPES,
+    SMALL,
+    STAGE,
+    TURNED,
+)
+from .trace import Code, Tape
+from .tree import shown
+
+LANES = 32  # states in a block
+
+
+def slope_code(tree, stepping, terms=composite.mass_matrix_and_bias) -> Code:
+    """Straight-line source of slope(q, qd, tau, dt)."""
+    tape = Tape()
+    q, qd, tau, dt = _inputs(tape, tree)
+    return tape.function("slope", [*q, *qd, *tau, dt], stepping.slope(tree, q, qd, tau, dt, terms))
+
+
+def run_source(tree, stepping) -> str:
+    """The module that follows one state at a time: slope, step, and the loop over both."""
+    n = len(tree.parent)
+    if isinstance(stepping, ImplicitRungeKutta):
+        words = _words(n) | {"why": f"{NEWTON} if math.isnan({_sum('q', n)}) else {_why(n)}"}
+        loop = RUN.format(**words, used=", used", cost=f"1 + used * {len(stepping.b)}")
+        return HEADER + step_source(tree, stepping, composite.mass_matrix_and_bias) + loop
+    tape = Tape()
+    q, qd, tau, dt = _inputs(tape, tree)
+
+    def slope(q, qd):
+        return tape.call("slope", [*q, *qd, *tau, dt], n)
+
+    adaptive = isinstance(stepping, AdaptiveRungeKutta)
+    results = (stepping.attempt if adaptive else stepping.step)(slope, q, qd, dt)
+    name = "attempt" if adaptive else "step"
+    step = tape.function(name, [*q, *qd, *tau, dt], [value for part in results for value in part])
+    inline = '@njit(forceinline=True, error_model="numpy")\n'
+    return "\n\n".join(
+        [
+            HEADER + inline + slope_code(tree, stepping).text,
+            f'@njit(error_model="numpy")\n{step.text}',
+            _loop(stepping, n),
+        ]
+    )
+
+
+def _loop(stepping, n) -> str:
+    """The loop of `run_source` over the states of n hinges."""
+    words = _words(n)
+    if not isinstance(stepping, AdaptiveRungeKutta):
+        return RUN.format(**words, used="", cost=_stages(stepping))
+    states = [f"{name}{i}" for name in ("q", "qd") for i in range(n)]
+
+    def squares(error):
+        scale = "(tolerance * (1.0 + max(abs({s}), abs(new_{s}))))"
+        return " + ".join(f"({error}_{s} / {scale.format(s=s)}) ** 2" for s in states)
+
+    return ADAPTIVE.format(
+        **words,
+        **{name: ", ".join(f"{name}_{s}" for s in states) for name in ("new", "errors5", "errors3")},
+        squares5=squares("errors5"),
+        squares3=squares("errors3"),
+        stages=len(stepping.b),
+        small=SMALL,
+        components=2 * n,
+        exponent=-1.0 / stepping.order,
+    )
+
+
+def _stages(stepping) -> int:
+    """Evaluations of the dynamics in one step."""
+    return len(getattr(stepping, "b", "1"))
+
+
+def lanes_source(tree, stepping) -> str:
+    """The module that follows LANES states side by side, stage by stage."""
+    n = len(tree.parent)
+    tape = Tape()
+    q, qd, _, dt = _inputs(tape, tree)
+    asked, answers = [], []
+
+    def slope(q, qd):
+        asked.append([*q, *qd])
+        answers.append(tape.inputs(*(f"k{len(answers)}_{i}" for i in range(n))))
+        return answers[-1]
+
+    results = stepping.step(slope, q, qd, dt)
+    functions, stages = [slope_code(tree, stepping).text], []
+    own = [_lane("y", i) for i in range(2 * n)] + ["dt"]
+    for j in range(len(asked) + 1):
+        inputs = [*q, *qd, dt, *(value for answer in answers[:j] for value in answer)]
+        known = ", ".join(own + [_lane("k", i) for i in range(j * n)])
+        if j == len(asked):
+            functions.append(tape.function("combined", inputs, [*results[0], *results[1]]).text)
+        else:
+            functions.append(tape.function(f"stage_{j}", inputs, asked[j]).text)
+            arguments = ", ".join(_lane("x", i) for i in range(2 * n))
+            stages.append(STAGE.format(W=LANES, j=j, arguments=arguments, known=known, offset=j * n * LANES))
+    words = _words(n) | {
+        "W": LANES,
+        "cost": _stages(stepping),
+        "size_x": 3 * n * LANES,
+        "size_y": 2 * n * LANES,
+        "size_k": len(asked) * n * LANES,
+        "first": ", ".join(f"{name}[b + l, 0, {i}]" for name in ("q", "qd") for i in range(n)),
+        "given": ", ".join(f"tau[b + l, {i}]" for i in range(n)),
+        "store": ", ".join(f"{name}[b + l, s, {i}]" for name in ("q", "qd") for i in range(n)),
+        "rows_x": ", ".join(_row("x", i) for i in range(2 * n)),
+        "rows_y": ", ".join(_row("y", i) for i in range(2 * n)),
+        "rows_tau": ", ".join(_row("x", i) for i in range(2 * n, 3 * n)),
+        "lane_new": ", ".join(_lane("x", i) for i in range(2 * n)),
+        "known": known,
+        "stages": "".join(stages).rstrip(),
+    }
+    arguments = ", ".join([_lane("x", i) for i in range(3 * n)] + ["dt"])
+    slopes = SLOPES.format(W=LANES, arguments=arguments, results=", ".join(_lane("k", i, "o + ") for i in range(n)))
+    inline = '@njit(forceinline=True, error_model="numpy")\n'
+    return "\n\n".join([HEADER + inline + functions[0], *(inline + text for text in functions[1:]), slopes,
+                        RUN_LANES.format(**words)])  # fmt: skip
+
+
+def evaluator_source(tree, quantity, terms, sine) -> str:
+    """The module of kernels.evaluator."""
+    n = len(tree.parent)
+    tape = Tape()
+    q, qd, tau, _ = _inputs(tape, tree)
+    try:
+        M, h = terms(tree, q, qd)
+        for values, count in ((M, n), (h, n), *((row, n) for row in M)):
+            if len(values) != count:
+                raise ValueError(f"{len(values)} where {count} are expected")
+    except Exception as error:  # a function of the user's own
+        raise ValueError(f"terms {shown(terms)} does not give (Mbar, h) of traced numbers: {shown(error)}") from error
+    if quantity == "forward_dynamics":
+        outputs = acceleration(tree, q, qd, tau, lambda *_: (M, h))
+    else:
+        outputs = [*(M[i][j] for i in range(n) for j in range(i, n)), *h]
+    m = len(outputs)
+    text = tape.function("quantity", [*q, *qd, *tau], outputs).text
+    inputs = [(name, i) for name in ("q", "qd", "tau") for i in range(n)]
+    places = ", ".join(f"{name}[i, {k}]" for name, k in inputs)
+
+    def sequence(pattern, count):
+        return ", ".join(pattern(i) for i in range(count))
+
+    words = {
+        "W": LANES,
+        "size_x": 3 * n * LANES,
+        "size_y": m * LANES,
+        "row_in": places,
+        "row_out": sequence(lambda k: f"out[i, {k}]", m),
+        "n": n,
+        "m": m,
+        "sound_row": " + ".join(f"abs(out[i, {k}])" for k in range(m)) + " < np.inf",
+        "sound_lane": " + ".join(f"abs({_row('y', k)})" for k in range(m)) + " < np.inf",
+        "sound_column": " + ".join(f"abs(out[{k}, i])" for k in range(m)) + " < np.inf",
+        "chained": ", ".join(f"{name}[{k}] + 1e-300 * last" for name, k in inputs),
+        "last": " + ".join(f"results[{k}]" for k in range(m)),
+        "gather": "; ".join(f"{_lane('x', r)} = flat_{a}[b{k} + l]" for r, (a, k) in enumerate(inputs)),
+        "results": sequence(lambda k: _lane("y", k), m),
+        "arguments": sequence(lambda k: _lane("x", k), 3 * n),
+        "scatter": "; ".join(f"flat_out[b{k} + l] = {_lane('y', k)}" for k in range(m)),
+        "lane_in": ", ".join(f"{name}[{k}, b + l]" for name, k in inputs),
+        "lane_out": sequence(lambda k: f"out[{k}, b + l]", m),
+        "begins": "; ".join(f"b{k} = np.uint64({k} * count + b)" for k in range(max(m, n))),
+        "column_in": ", ".join(f"{name}[{k}, i]" for name, k in inputs),
+        "column_out": sequence(lambda k: f"out[{k}, i]", m),
+    }
+    fast = '@njit(forceinline=True, error_model="numpy")\n' + text.replace("sincos(", f"{sine}(")
+    sure = '@njit(error_model="numpy")\n' + text.replace("def quantity(", "def by_library(").replace(
+        "sincos(", "library_sincos("
+    )
+    text = "\n\n".join([HEADER + fast, sure, EVALUATE.format(**words)])
+    if quantity != "forward_dynamics":
+        return text
+    given = sequence(lambda k: f"y[{k}]", 2 * n) + ", " + sequence(lambda k: f"tau[{k}]", n)
+    rates = sequence(lambda k: f"result[{n + k}]", n)
+    sound = " + ".join(f"abs(result[{n + k}])" for k in range(n)) + " < np.inf"
+    return text + RATE.format(n=n, twice=2 * n, rates=rates, given=given, sound_rates=sound)
+
+
+def _inputs(tape, tree):
+    n = len(tree.parent)
+    return *(tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau")), tape.inputs("dt")[0]
+
+
+def _words(n) -> dict:
+    """What the templates say of the states of n hinges, one scalar after the other."""
+
+    def sequence(pattern, names=("q", "qd"), glue=", "):
+        return glue.join(pattern.format(name=name, i=i) for name in names for i in range(n))
+
+    angles = sequence("abs({name}{i})", ["q"], " + ")
+    return {
+        "state": sequence("{name}{i}"),
+        "torque": sequence("{name}{i}", ["tau"]),
+        "first": sequence("{name}[b, 0, {i}]"),
+        "given": sequence("{name}[b, {i}]", ["tau"]),
+        "store": sequence("{name}[b, k, {i}]"),
+        "sound": f"({angles} < LIMIT and math.isfinite({_sum('qd', n)}))",
+        "why": _why(n),
+        "check": CHECK.format(n=n),
+    }
+
+
+def _sum(name, n) -> str:
+    return " + ".join(f"{name}{i}" for i in range(n))
+
+
+def _why(n) -> str:
+    """Why a state is not sound."""
+    return f"({TURNED} if math.isfinite({_sum('q', n)} + {_sum('qd', n)}) else {OVERFLOW})"
+
+
+def _row(name, i) -> str:
+    """Component i of lane l in a block, for a loop over signed l."""
+    return f"{name}[np.uint64({i * LANES} + l)]"
+
+
+def _lane(name, i, before="") -> str:
+    """The same for unsigned l, as the compiler needs it to put lanes into one register."""
+    return f"{name}[{before}np.uint64({i * LANES}) + l]"
