@@ -450,3 +450,34 @@ def test_departure_figure_marks_each_engine_at_its_times(result):
     lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].lines}
     assert lines["MuJoCo RK4"] == 3.0 and lines["RK4"] == 2.0
     assert "Marks: 3 runs. 2 leave as the map does, 2 of them" in caption
+
+
+def test_torques_figure_has_each_engine_on_its_own_axis(result):
+    result.tables["stability_torques"] = torque_rows(times=(4.0, 5.0))
+    _, fig, _ = draw_departure.torques(result)
+    for ax, engine, time in zip(fig.axes, ("TMT", "MuJoCo"), (4.0, 5.0)):
+        assert ax.get_ylabel() == f"runs, {engine}" and {line.get_xdata()[0] for line in ax.lines} == {time}
+    fills = {(line.get_ydata()[0], line.get_fillstyle()) for line in fig.axes[2].lines if line.get_marker() == "^"
+             and len(line.get_ydata())}  # fmt: skip
+    assert fills == {(4.0, "full"), (5.0, "none")}
+
+
+def test_bent_figure_dots_mujoco(result):
+    paths = {(party.engine, torque, 0.3): np.full(3, size)
+             for party, size in zip(claims.PAIR, (1e-3, 1e-6)) for torque in beyond.TORQUES}  # fmt: skip
+    result.curves["bent"] = bent_runs() | {"paths": paths}
+    _, fig, _ = draw_departure.bent(result)
+    lines = [(line.get_linestyle(), line.get_ydata()) for line in fig.axes[0].lines]
+    drawn = {(dash, y[0]) for dash, y in lines if len(y) and y[0] in (1e-3, 1e-6)}
+    assert drawn == {("-", 1e-3), (":", 1e-6)}
+
+
+def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
+    runs = [minute("TMT", "rk4", "drifts"), minute("MuJoCo", "RK4", "drifts")]
+    for run, size in zip(runs, (0.1, 0.2)):
+        run["t"], run["off"] = np.arange(60.0), np.full(60, size)
+    result.curves |= {"minutes": runs, "silent": {"gain": {"range": 18.8}}}
+    _, fig, caption = draw_failure.minutes(result)
+    drawn = {line.get_label(): (line.get_marker(), line.get_ydata()[0]) for line in fig.axes[0].lines}
+    assert drawn == {"RK4": ("None", 0.1), "MuJoCo, same scheme": ("o", 0.2)}
+    assert "drifts: RK4" in caption
