@@ -31,6 +31,11 @@ class Held:
         return {}
 
     @cached_property
+    def limits(self) -> dict:
+        """What `limit` found, by method."""
+        return {}
+
+    @cached_property
     def matrix(self) -> np.ndarray:
         """d(qd, qdd)/d(q, qd), (2n, 2n): exact derivatives of the right-hand side of TMT, by dual numbers."""
         n = len(self.q)
@@ -71,8 +76,15 @@ class Held:
     def limit(self, name) -> tuple[str, float | None]:
         """("finite", dt in s), ("never_fails", None) or ("always_fails", None): up to which step no mode grows.
 
-        The first step at which one does, among 40 for each power of ten, then refined.
+        The first step at which one does, among 40 for each power of ten, then refined. Engines that share a method ask
+        again, so it is kept.
         """
+        if METHODS[name] not in self.limits:
+            self.limits[METHODS[name]] = self.first_failing(name)
+        return self.limits[METHODS[name]]
+
+    def first_failing(self, name) -> tuple[str, float | None]:
+        """What `limit` returns, computed."""
         low, high = SHORTEST, LONGEST
         for _ in range(4):
             steps = np.geomspace(low, high, SCANNED)

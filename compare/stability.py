@@ -74,7 +74,7 @@ def begin(setup) -> None:
         "zero": ask(
             departure.zero_law,
             [party for party in claims.PAIR if party.engine == "TMT" or not setup.is_quick],
-            sizes=of(departure.ZERO_SIZES, departure.ZERO_SIZES, departure.ZERO_SIZES[::2]),
+            sizes=of(departure.ZERO_SIZES, departure.ZERO_SIZES, (1e-2, *departure.ZERO_SIZES[4:6])),
         ),
         "torques": setup.map(claims.holding_torques, engine),
         "finer": setup.map(partial(claims.finer_steps, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))), beside),
