@@ -37,7 +37,8 @@ def test_every_test_is_in_one_stage_but_those_that_judge_nothing():
     judge, rest = (stage.files for stage in stages(PROJECT))
     assert "tests/test_judge_agreement.py" in judge and "tests/test_command_line.py" in rest
     every = {str(path.relative_to(PROJECT)) for path in (PROJECT / "tests").rglob("test_*.py")}
-    assert every - {*judge} - {*rest} == {"tests/test_mutations.py", "tests/test_structure.py"} and not {*judge} & {*rest}
+    aside = {f"tests/test_{name}.py" for name in ("mutations", "structure", "interrupt")}
+    assert every - {*judge} - {*rest} == aside and not {*judge} & {*rest}
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ CHECKS = (
     ("advice", "judge_order", 'f"measured order, of {_1}"'),
     ("cost", "judge", 'f"another motion with {_1}"'),
     ("cost", "judge", 'f"the same bits with {_1}"'),
-    ("known_motion", "judge_function", '"elliptic function, scipy to 50 digits"'),
+    ("known_motion", "judge_function", 'f"elliptic function, scipy to {_1} digits"'),
     ("known_motion", "judge_orders", 'f"order of the error against the elliptic function, from {_1}"'),
     ("known_motion", "judge_modes", "what"),
     ("reduction", "judge_run", '"smallest model to whole"'),
