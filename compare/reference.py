@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.cache import cache_folder
+from tmt.cache import own_file
 from tmt.reference_run import trajectory
 
 from .scenes import SCENES, Scene
@@ -80,7 +80,7 @@ def begins(rows, scene) -> bool:
 
 def kept(scene: Scene) -> Path:
     """Where the reference of a scene is kept that the committed table does not have."""
-    return cache_folder() / f"reference_{key(scene)}.csv"
+    return own_file(f"reference_{key(scene)}.csv")
 
 
 def remade(scenes: list[Scene], map: Callable, tell: Callable) -> list[list[dict]]:

@@ -75,7 +75,10 @@ def test_results_say_what_was_found(tmp_path):
     (tmp_path / "figures").mkdir()
     sections = [section("mass", GOOD, BAD, rows=[{"a": 1.25, "engine": "TMT", "ok": True}], extra=[{"b": 1 / 3}])]
     text = verdict.verdict(sections, 1, [CAUSE])
-    assert text == "The two models do not agree: 1 of 2 checks fail. Cause: mass of forearm: stated 1. 1 further checks fail as a consequence."
+    assert text == (
+        "The two models do not agree: 1 of 2 checks fail. Cause: mass of forearm: stated 1. "
+        "1 further checks fail as a consequence."
+    )
     report.write(tmp_path, sections, {"command": "c"}, text, [CAUSE])
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert set(results) == {"passed", "checks", "causes", "skipped", "provenance"}
