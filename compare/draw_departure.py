@@ -49,7 +49,7 @@ def times(result):
                 )
         ax.axvspan(1e-15, 3e-13, color=GREY, alpha=0.15)
         ax.set(xscale="log", xlim=(1e-15, 3e-2), ylim=(0, None), title=f"dt = {'5/64' if dt == DT else f'{dt:g}'} s")
-        ax.set_xticks([1e-14, 1e-12, 1e-9, 1e-6, 1e-3])
+        ax.set_xticks([1e-14, 1e-11, 1e-8, 1e-5])
     axes[0].set_ylabel(f"time until a hinge is {LEFT:g} rad away, s")
     fig.supxlabel("perturbation, rad (grey: as the error of torque that moves the equilibrium so far)", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
