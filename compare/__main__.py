@@ -1,17 +1,19 @@
-"""python -m compare: hold the two models against each other and write a report.
+"""python -m compare: compare the two models and write a report.
 
 Every experiment is the module of its name: `rows(setup)` computes, `figures(result)` draws.
 """
+
+import os
 
 from . import interrupt, streams
 
 if __name__ == "__main__":
     streams.prepare()
     interrupt.answer()  # before anything that takes its time
+    os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is rendered: no further process looks for a display
 
 import argparse
 import importlib
-import os
 import shlex
 import sys
 import time
@@ -28,7 +30,7 @@ EXPERIMENTS = {
     "mass": "the mass matrix",
     "gravity": "the torque that holds the arm",
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
-    "trajectory": "five seconds of motion, a twin for every integrator",
+    "trajectory": "five seconds of motion, the same scheme in tmt for every integrator",
     "speed": "time against error: every method, every step, and what to use",
     "stability": "step limits, departure from unstable postures, where each method fails",
     "reduction": "what each scene needs of the model, and what the rest costs",
@@ -58,7 +60,7 @@ def main(arguments=None) -> int:
     """Run the command line; the exit status."""
     parser = Parser(
         prog="python -m compare",
-        description="Hold the TMT method and MuJoCo against each other on a human arm, and write a report.",
+        description="Compare the TMT method with MuJoCo on a human arm, and write a report.",
         epilog="experiments:\n" + "".join(f"  {k:<13} {v}\n" for k, v in EXPERIMENTS.items()) + "\n" + EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -77,7 +79,7 @@ def main(arguments=None) -> int:
         "--mjcf",
         type=not_empty,
         metavar="FILE",
-        help="another model of the same three hinges, held against the stated arm",
+        help="another model of the same three hinges, compared with the stated arm",
     )
     options = parser.parse_args(arguments)
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)

@@ -251,7 +251,7 @@ def reaches(model=tmt.ARM) -> np.ndarray:
 
 
 def gravity_scale(model=tmt.ARM) -> float:
-    """Sum of m g reach, N m or J: 9.42 for the arm."""
+    """Sum of m g reach, N m or J."""
     return float(np.linalg.norm(model.gravity) * np.dot(model.mass, reaches(model)))
 
 

@@ -33,7 +33,7 @@ def farthest(deviation) -> float:
 
 def departure(t, path) -> float | None:
     """The time at which a hinge is first 0.1 rad from where it started; None: never."""
-    away = np.abs(path - path[0]).max(axis=1) > LEFT
+    away = ~(np.abs(path - path[0]).max(axis=1) <= LEFT)  # a run that is no number has left too
     return float(t[away][0]) if away.any() else None
 
 

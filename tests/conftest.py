@@ -1,3 +1,6 @@
+import importlib
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -13,6 +16,12 @@ settings.load_profile("project")
 @pytest.fixture(scope="session")
 def engine():
     return load()
+
+
+@pytest.fixture(scope="session")
+def small(engine):
+    """small(name): the result of an experiment in a small run, every path with few states and steps; made once."""
+    return cache(lambda name: importlib.import_module(f"compare.{name}").rows(Setup.small(engine)))
 
 
 @pytest.fixture

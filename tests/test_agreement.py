@@ -2,30 +2,55 @@
 
 import dataclasses
 import importlib
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from trees import mjcf, random_tree
 
 import tmt
+from compare import report
 from compare.__main__ import EXPERIMENTS
-from compare.agreement import EPS, FACTOR, Result, Setup, bias_scale, reaches
+from compare.agreement import EPS, FACTOR, Result, bias_scale, reaches
 from compare.engine_file import parse
 from compare.engine_parameters import parameters
 from compare.parameters import stated
+from compare.verdict import Section, verdict
+from compare.workers import draw
 
-SMALL = ("published", "kinematics", "mass", "gravity", "acceleration", "trajectory")  # whose small run takes every path
+ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
-def test_experiment_agrees(experiment, setup, engine):
-    module = importlib.import_module(f"compare.{experiment}")
-    result = module.rows(Setup.small(engine) if experiment in SMALL else setup)
+def test_experiment_agrees(experiment, small):
+    """Every path of a full run, with few states and steps."""
+    result = small(experiment)
     assert result.checks
     assert [str(check) for check in result.checks if not check.passed] == []
-    if experiment in SMALL:
-        drawn = [figure() for figure in module.figures(result)]
-        assert len({name for name, *_ in drawn}) == len(drawn) and all(caption.endswith(".") for *_, caption in drawn)
+
+
+def test_a_report_of_all_experiments_has_every_figure(small, tmp_path):
+    """Every figure of a full run is drawn, and the report is written, in one process."""
+    (tmp_path / "figures").mkdir()
+    sections = []
+    for name in EXPERIMENTS:
+        module = importlib.import_module(f"compare.{name}")
+        section = Section(name, module.TITLE, module.CLAIM, module.BAR, small(name))
+        section.figures, failed = draw(name, section.result, tmp_path / "figures")
+        assert failed == []
+        sections.append(section)
+    words = verdict(sections, len(EXPERIMENTS))
+    assert words.startswith(f"The two models agree: all {sum(len(s.result.checks) for s in sections)} checks pass.")
+    report.write(tmp_path, sections, {"command": "a small run"}, words)
+    drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
+    of_more_scenes = {"speed_ball_catch_free", "speed_bent_damped"}
+    assert drawn | of_more_scenes == {path.stem for path in (ROOT / "reports/example/figures").iterdir()}
+    captions = [caption for section in sections for _, caption in section.figures]
+    assert len(captions) == len(drawn) and all(caption.endswith((".", ")")) for caption in captions)
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert not {"nan", "None", "inf"} & set(re.findall(r"[A-Za-z]+", "\n".join(captions) + text))
+    assert "not run" not in text and "no result" not in text
 
 
 def test_the_two_sets_of_numbers_are_one(engine):

@@ -34,9 +34,9 @@ IN_THE_MJCF = {
     "a position servo": (
         "</mujoco>",
         '<actuator><position joint="beta" kp="3"/></actuator></mujoco>',
-        ["parameters forces of actuators", "acceleration qdd"],
+        ["parameters no forces of actuators", "acceleration qdd"],
     ),
-    "air": ('<option gravity', '<option density="50" viscosity="1" gravity', ["parameters forces of springs, fluid"]),
+    "air": ('<option gravity', '<option density="50" viscosity="1" gravity', ["parameters no forces of springs, fluid"]),
     "tendon armature": (
         "</mujoco>",
         '<tendon><fixed armature="0.1"><joint joint="alpha" coef="1"/></fixed></tendon></mujoco>',
@@ -45,7 +45,7 @@ IN_THE_MJCF = {
     "an equality constraint": (
         'constraint="disable" autoreset="disable"/>\n  </option>',
         'autoreset="disable"/></option><equality><joint joint1="alpha" joint2="gamma"/></equality>',
-        ["parameters forces of constraints", "acceleration qdd"],
+        ["parameters no forces of constraints", "acceleration qdd"],
     ),
     "a hidden mass": (
         '<body name="forearm"',

@@ -2,22 +2,13 @@
 
 from pathlib import Path
 
-import pytest
-
 from compare import stability
 from compare.agreement import Setup
 from compare.engine_file import ARM_XML, load
 
-NAMES = {"limits", "regions", "departure", "torques", "silent", "map", "edge", "finer_steps", "bent", "zero", "energy"}
 
-
-@pytest.fixture(scope="module")
-def small(engine):
-    return stability.rows(Setup.small(engine))
-
-
-def test_a_small_run_passes_and_fills_every_table(small):
-    assert [str(check) for check in small.checks if not check.passed] == []
+def test_a_small_run_fills_every_table(small):
+    small = small("stability")
     assert set(small.tables) == {
         "departure", "stability_modes", "stability_growth", "stability_torques", "stability_finer_steps",
         "stability_bent", "stability_energy", "stability_newton",
@@ -25,14 +16,6 @@ def test_a_small_run_passes_and_fills_every_table(small):
     told = " ".join(small.notes)
     for words in ("Claim 1, reproduced", "Claim 2, reproduced", "Claim 3, bounded", "loses definiteness"):
         assert words in told
-
-
-def test_every_figure_of_a_small_run_is_drawn(small, tmp_path):
-    drawn = [figure() for figure in stability.figures(small)]
-    assert {name for name, _, _ in drawn} == {f"stability_{name}" for name in NAMES}
-    for name, figure, caption in drawn:
-        figure.savefig(tmp_path / f"{name}.png")
-        assert " nan" not in caption and "inf" not in caption and "None" not in caption
 
 
 def test_on_the_moon_no_sentence_speaks_of_the_stated_arm(tmp_path):
