@@ -146,7 +146,9 @@ def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
     (folder / "figures").mkdir()
     sections, drawings, causes = [], [], []
     modules = {name: importlib.import_module(f".{name}", __package__) for name in names}
-    crashed = {name: attempt(name, module.begin, setup)[1] for name, module in modules.items() if hasattr(module, "begin")}
+    crashed = {
+        name: attempt(name, module.begin, setup)[1] for name, module in modules.items() if hasattr(module, "begin")
+    }
     for name, module in modules.items():
         setup.tell(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})")
         started = time.perf_counter()

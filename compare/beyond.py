@@ -125,7 +125,11 @@ def tell_within(rows, leaves, tried) -> str:
     for torque in TORQUES:
         times = [(row["observed_s"], row["dt_s"]) for row in rows if row["torque"] == torque and row["observed_s"]]
         counts = [count for (_, name), found in leaves.items() if name == torque for count in found]
-        soonest = f"it leaves after {min(times)[0]:.2f} s at the soonest (dt = {min(times)[1]:.4g} s)" if times else "it stays"
+        soonest = (
+            f"it leaves after {min(times)[0]:.2f} s at the soonest (dt = {min(times)[1]:.4g} s)"
+            if times
+            else "it stays"
+        )
         within = f"the largest with which it leaves is {max(counts)}" if counts else "none lets it leave"
         name = torque.replace("four", "of four")
         told.append(f"With a torque {name} {soonest}; of {tried} numbers of steps tried for 5 s, {within}.")

@@ -135,7 +135,11 @@ def judge(result, torques, finer, printed) -> None:
     result.notes.append(
         f"The torque as printed, four decimals, in {len(printed)} runs of both engines at ball catch with steps from "
         f"{max(row['dt_s'] for row in printed):.4g} s down: the arm leaves after {span(row['observed_s'] for row in printed)}"
-        + (f"; runs in which it stays: {stay}." if stay else f". The assignment's arm leaves after about {PUBLISHED:g} s.")
+        + (
+            f"; runs in which it stays: {stay}."
+            if stay
+            else f". The assignment's arm leaves after about {PUBLISHED:g} s."
+        )
     )
 
 

@@ -75,7 +75,9 @@ def hinges() -> list[str]:
     for (hinge, *_), frame in zip(HINGES, method.hinge_frames(tmt.ARM, rest)):
         axis, origin = [float(v) for v in frame.axis], list(frame.origin)
         about = "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else f"({', '.join(f'{v:g}' for v in axis)})"
-        place = next((name for name, point in joints.items() if np.allclose(point, origin)), "neither shoulder nor elbow")
+        place = next(
+            (name for name, point in joints.items() if np.allclose(point, origin)), "neither shoulder nor elbow"
+        )
         words.append(f"{GREEK[hinge]} about {about} at the {place}")
     return words
 
@@ -165,5 +167,8 @@ def needless(postures) -> str:
         engine: [name for name, pair in postures.items() if np.abs(pair[k]).max() <= zero]
         for k, engine in enumerate(("TMT", "MuJoCo"))
     }
-    told = [f"{engine} needs none, but for rounding, at: {', '.join(names) or 'no posture'}." for engine, names in rest.items()]
+    told = [
+        f"{engine} needs none, but for rounding, at: {', '.join(names) or 'no posture'}."
+        for engine, names in rest.items()
+    ]
     return " ".join(told) if rest["TMT"] != rest["MuJoCo"] else told[0].replace("TMT needs", "Both need")

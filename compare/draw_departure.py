@@ -172,7 +172,11 @@ def tell_finest(rows) -> str:
         if any(row["moved_rad"] != 0.0 for row in rows if round(5 / row["dt_s"]) == count):
             break
         still.append(count)
-    told = f"From {min(still)} steps on nothing moves in 5 s (drawn at 1e-17)." if still else "With every step the arm moves."
+    told = (
+        f"From {min(still)} steps on nothing moves in 5 s (drawn at 1e-17)."
+        if still
+        else "With every step the arm moves."
+    )
     last = max((row for row in rows if round(5 / row["dt_s"]) == counts[0]), key=lambda row: value(row["step_rad"]))
     return told + (
         f" At {counts[0]} steps dt qd is {value(last['step_rad']):.1e} rad after 5 s at most; half a unit in the last place "

@@ -35,14 +35,20 @@ def edge(result):
         ax.semilogy(
             swings, values, linestyle=dash or "none", marker=mark, mfc="none", markersize=5, color=colour, label=name
         )
-    ax.semilogy(swings, next(iter(near.values()))[0], ":", color="black", label=f"{next(iter(near)).label}, from {SMALL:g} rad")
+    ax.semilogy(
+        swings, next(iter(near.values()))[0], ":", color="black", label=f"{next(iter(near)).label}, from {SMALL:g} rad"
+    )
     ax.set(
-        xlabel="ω dt", ylabel=f"growth in {close['steps']} steps,\nfrom {LARGE:g} rad", xlim=(swings[0], swings[-1]),
+        xlabel="ω dt",
+        ylabel=f"growth in {close['steps']} steps,\nfrom {LARGE:g} rad",
+        xlim=(swings[0], swings[-1]),
         ylim=(0.5, 5e9),
     )
     ax.set_xticks([1.72, RESONANCE, 1.74, 1.75], ["1.72", "√3", "1.74", "1.75"])
     ax.legend(loc="upper left")
-    told = "; ".join(f"{party.label} {fold(grown[0].max())} and {fold(grown[1].max())}" for party, grown in near.items())
+    told = "; ".join(
+        f"{party.label} {fold(grown[0].max())} and {fold(grown[1].max())}" for party, grown in near.items()
+    )
     caption = (
         "The nonlinear edge at bent. Above: growth over ω dt and the size of the perturbation; the linear limit is 2. Below: "
         f"near √3, where a swing takes three steps. The largest growth there in {close['steps']} steps, from {SMALL:g} and "

@@ -86,8 +86,11 @@ def run(result, scene):
     caption = (
         f"{scene.name[0].upper()}{scene.name[1:]}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
-        + (f"With {scene.steps} steps of RK4 TMT is {rad(errors[0])} and MuJoCo {rad(errors[1])} from the true motion. " if errors
-           else "")
+        + (
+            f"With {scene.steps} steps of RK4 TMT is {rad(errors[0])} and MuJoCo {rad(errors[1])} from the true motion. "
+            if errors
+            else ""
+        )
         + (f"MuJoCo's run diverged: {', '.join(ended)}. " if ended else "")
         + f"Differences of exactly zero are drawn at {ZERO:g}."
     )
@@ -129,7 +132,9 @@ def drift_caption(drifts, steps) -> str:
                   for name in of_engine}  # fmt: skip
         told = ", ".join(f"{name} {value:.1e} J" for name, value in energy.items())
         worst.append(f"{integrator} at dt = 1/{steps[integrator][-1] / DURATION:g} s: {told}")
-    pairs = [pair for of in drifts.values() for engines in of.values() for pair in zip(engines["TMT"], engines["MuJoCo"])]
+    pairs = [
+        pair for of in drifts.values() for engines in of.values() for pair in zip(engines["TMT"], engines["MuJoCo"])
+    ]
     ratios = [theirs / ours if ours else np.nan for ours, theirs in pairs]
     return (
         "Drift of what should be constant (lines: TMT; marks: MuJoCo). The order at which it falls at the finest step, "

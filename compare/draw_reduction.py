@@ -168,7 +168,11 @@ def costs(result):
             ax.text(max(row["ratio"], 1.0) + 0.01 * most, y + offset, f"{row['ratio']:.2f}", va="center", fontsize=7)
     ax.set_yticks(range(len(names)), names)
     ax.axvline(1.0, color="black", linewidth=0.8)
-    ax.set(ylim=(max(1, len(names)) - 0.5, -0.5), xlabel="time of a step / that of the minimal model", xlim=(0.9, 1.08 * most))
+    ax.set(
+        ylim=(max(1, len(names)) - 0.5, -0.5),
+        xlabel="time of a step / that of the minimal model",
+        xlim=(0.9, 1.08 * most),
+    )
     ax.grid(axis="y", visible=False)
     handles = [Patch(color=colour, alpha=0.8, label=name) for name, colour in (("Euler", BLUE), ("RK4", GREEN))]
     handles.append(Patch(facecolor=GREY, hatch="////", edgecolor="white", label="changes the motion"))

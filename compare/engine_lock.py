@@ -17,7 +17,9 @@ from .engine_file import ModelError, name_of
 
 def read(source) -> mujoco.MjSpec:
     """The editable form of a file (a Path) or of MJCF text."""
-    return mujoco.MjSpec.from_file(os.fsencode(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
+    return (
+        mujoco.MjSpec.from_file(os.fsencode(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
+    )
 
 
 def locked(engine, angles: dict) -> Engine:

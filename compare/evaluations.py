@@ -36,7 +36,9 @@ def costs(setup) -> tuple[list[dict], list[str]]:
                 calls[key] = again(run, CALLS // count, count)
         taken = clock.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
-    operations = [kernels.slope_source(tmt.ARM, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
+    operations = [
+        kernels.slope_source(tmt.ARM, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())
+    ]
     return table(nanoseconds), told(nanoseconds, simulate_overhead(), operations)
 
 

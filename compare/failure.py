@@ -133,7 +133,11 @@ def tell_reset(reset) -> str:
     text = f"MuJoCo's default, bent, free, by Euler at 5/64 s with its automatic reset on, {reset['t'][-1]:.0f} s: "
     if not reset["resets"]:
         text += "it never starts again, "
-        text += "and no failure is silent" if reset["since_s"] is None else f"but is wrong from {at_time(reset['since_s'])} on"
+        text += (
+            "and no failure is silent"
+            if reset["since_s"] is None
+            else f"but is wrong from {at_time(reset['since_s'])} on"
+        )
     else:
         angles = ", ".join(f"{angle:.1f}" for angle in np.degrees(reset["after_q"]))
         text += f"a silent failure. It starts again {times(reset['resets'])}, first at {reset['first_reset_s']:.2f} s, from "
@@ -153,11 +157,16 @@ def tell_gain(gain) -> str:
         f"MuJoCo's `implicit`, bent, free, at 5/64 s: in 5 s the energy rises by {gain['gain']:.3g} J at most, with "
         f"{gain['warnings']} warnings; the range of the arm's potential is {gain['range']:.1f} J. "
     )
-    text += "A silent failure" if silent and not gain["warnings"] else "A failure with warnings" if silent else "No failure"
+    text += (
+        "A silent failure" if silent and not gain["warnings"] else "A failure with warnings" if silent else "No failure"
+    )
     if coarse is not None:
         text += f": the symmetric part of its matrix Mbar + dt dh/dqd {'loses' if coarse <= 0.0 else 'stays'} "
         text += "definiteness" if coarse <= 0.0 else "definite"
-    return text + f" (smallest eigenvalue in 5 s: {least}). The energy shows a failure at {at_time(gain['caught_in_it_s'])}."
+    return (
+        text
+        + f" (smallest eigenvalue in 5 s: {least}). The energy shows a failure at {at_time(gain['caught_in_it_s'])}."
+    )
 
 
 def times(count) -> str:

@@ -87,4 +87,8 @@ def cause(scene, size, may, at, left) -> str:
     if size > may:
         return ": that is no rounding"
     steps = np.inf if at is None else abs(left - at) * scene.steps / scene.duration
-    return ": the cause is rounding of the torque" if steps < NEAR + 0.5 else ": rounding of the torque alone does not explain it"
+    return (
+        ": the cause is rounding of the torque"
+        if steps < NEAR + 0.5
+        else ": rounding of the torque alone does not explain it"
+    )

@@ -116,7 +116,9 @@ def tell_newton(table) -> str:
             rows = [row for row in table if (row["method"], row["motion"]) == (name, motion)]
             failing = [row["dt_s"] for row in rows if row["steps_found"] < row["steps"]]
             last = max(row["dt_s"] for row in rows)
-            limits.append(f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never up to {last:g} s")
+            limits.append(
+                f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never up to {last:g} s"
+            )
         told.append(f"{name} ({'; '.join(limits)})")
     failed = [row for row in table if row["steps_found"] < row["steps"]]
     text = f"Newton's method in the implicit methods, {table[0]['steps']} steps at bent: {', '.join(told)}. "
@@ -124,7 +126,11 @@ def tell_newton(table) -> str:
         return text + "It finds every stage."
     rates = [row["last_rad_per_s"] for row in failed if row["last_rad_per_s"] is not None]
     fast = sum(rate > OVERFLOWN for rate in rates)
-    cause = f"before it, the rates are beyond {OVERFLOWN:g} rad/s in {fast}" if fast else "before none of them do rates overflow"
+    cause = (
+        f"before it, the rates are beyond {OVERFLOWN:g} rad/s in {fast}"
+        if fast
+        else "before none of them do rates overflow"
+    )
     return text + (
         f"It fails in {len(failed)} of {len(table)} runs, which are NaN from there; {cause}"
         + (f" (the fastest: {max(rates):.1e} rad/s)." if rates else ".")

@@ -51,7 +51,9 @@ def rows(setup) -> Result:
     for sample in (*setup.named.each(), setup.random):
         ours, theirs = tmt.mass_matrix(sample.q), setup.engine.mass_matrix(sample.q)
         result.agree(sample, "Mbar", "kg m2", ours, theirs, mass_scale(sample.q), truth="mass_matrix")
-    symmetric(result, tmt.mass_matrix(setup.random.q))  # MuJoCo's is one triangle written twice: symmetric by construction
+    symmetric(
+        result, tmt.mass_matrix(setup.random.q)
+    )  # MuJoCo's is one triangle written twice: symmetric by construction
     for engine, mass_matrix in (("TMT", tmt.mass_matrix), ("MuJoCo", setup.engine.mass_matrix)):
         definite(result, engine, mass_matrix(setup.random.q))
         value, worst = worst_condition(mass_matrix)

@@ -29,7 +29,12 @@ TABLE = Path(__file__).with_name("reference.csv")
 RECORDS = 64  # of a run, and its start
 STEPS = {"zero, free": 1024, "ball catch, free": 2048, "bent, free": 512, "bent, damped": 512}
 STATE = [f"{name}_{unit}" for unit in ("rad", "rad_per_s") for name in ("alpha", "beta", "gamma")]
-UNUSABLE = (OSError, RuntimeError, ValueError, csv.Error)  # of a cache folder: none, not the user's own; or of what is in it
+UNUSABLE = (
+    OSError,
+    RuntimeError,
+    ValueError,
+    csv.Error,
+)  # of a cache folder: none, not the user's own; or of what is in it
 COLUMNS = ["scene", "key", "steps", "halving_difference", "t_s", *STATE]
 
 

@@ -66,7 +66,9 @@ class Scene:
         self.refuse("judged", not judged, f"None, or a time in s above 0 and at most {self.duration:g}")
         locked = self.locked
         wrong = not isinstance(locked, tuple | list) or not all(name in HINGES for name in locked)
-        self.refuse("locked", wrong or len(set(locked)) >= len(HINGES), f"a tuple of at most two of {', '.join(HINGES)}")
+        self.refuse(
+            "locked", wrong or len(set(locked)) >= len(HINGES), f"a tuple of at most two of {', '.join(HINGES)}"
+        )
         object.__setattr__(self, "locked", tuple(locked))
         moving = [name for name, rate in zip(HINGES, self.speed) if rate and name in locked]
         self.refuse("speed", moving, f"no speed of a locked hinge ({', '.join(locked)})")

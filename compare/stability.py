@@ -81,9 +81,7 @@ def begin(setup) -> None:
         "printed": setup.map(
             partial(claims.four_decimals, counts=of(claims.PRINTED_COUNTS, claims.PRINTED_COUNTS, (64, 256))), engine
         ),
-        "bent": setup.map(
-            partial(beyond.bent, counts=of(beyond.COUNTS, (), beyond.COUNTS[::7])), beside
-        ),
+        "bent": setup.map(partial(beyond.bent, counts=of(beyond.COUNTS, (), beyond.COUNTS[::7])), beside),
         "reset": setup.map(failure.own_reset, engine),
         "gain": setup.map(failure.silent_gain, engine),
         "maps": maps,
@@ -179,7 +177,13 @@ def figures(result):
     """Limits, the map of growth, regions, the nonlinear edge; departures; the claims; silent failure; a minute."""
     from . import draw_departure, draw_failure, draw_stability  # matplotlib is for the processes that draw
 
-    drawn = [draw_stability.limits, draw_stability.regions, draw_departure.times, draw_departure.torques, draw_failure.silent]
+    drawn = [
+        draw_stability.limits,
+        draw_stability.regions,
+        draw_departure.times,
+        draw_departure.torques,
+        draw_failure.silent,
+    ]
     if result.curves["map"]["grown"]:  # all but a quick run
         drawn += [draw_stability.growth_map, draw_failure.edge, draw_departure.finer, draw_departure.bent]
         drawn += [draw_departure.zero, draw_failure.minutes]

@@ -31,7 +31,9 @@ class Terminal:
         if columns and len(text) > columns:
             indent = " " * (len(text) - len(text.lstrip()))
             text = indent + re.sub(" {2,}", "  ", text.strip())
-            text = fill(text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False)
+            text = fill(
+                text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False
+            )
         with self.paused():
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 

@@ -14,7 +14,10 @@ def notes(result, engine) -> list[str]:
     """All of it; `engine` is the one that the scenes were run with."""
     runs, scenes = result.curves["runs"], {scene.name: scene for scene in SCENES}
     return [
-        *(claim(scenes[name], engine, runs[name, "rk4", scenes[name].steps]) for name in ("ball catch, held", "bent, held")),
+        *(
+            claim(scenes[name], engine, runs[name, "rk4", scenes[name].steps])
+            for name in ("ball catch, held", "bent, held")
+        ),
         *errors(runs, result.curves["errors"], scenes),
         *first_order(runs, scenes),
         f"MuJoCo's integrators here: {', '.join(INTEGRATORS)}.",
@@ -85,13 +88,17 @@ def first_order(runs, scenes) -> list[str]:
             if shortest is None or until < shortest[0]:
                 shortest = until, f"{name}, {curve['integrator']}", scene.dt
             if until < scene.duration:
-                how = ", ".join(f"{engine} {'never' if at is None else f'at {at:.2f} s'}" for engine, at in ended.items())
+                how = ", ".join(
+                    f"{engine} {'never' if at is None else f'at {at:.2f} s'}" for engine, at in ended.items()
+                )
                 diverges = "nothing diverges" if not any(ended.values()) else f"diverges: {how}"
                 lines.append(f"{name}, {curve['integrator']}: judged for {until:.2f} s, {diverges}")
     if shortest is None:
         return []
     if not lines:
-        return [f"At the coarsest step the methods of order 1 are judged all along in every free scene ({shortest[1]} too)."]
+        return [
+            f"At the coarsest step the methods of order 1 are judged all along in every free scene ({shortest[1]} too)."
+        ]
     return [
         f"Order 1 at dt = {shortest[2]:.4g} s. The shortest time that can be judged, before rounding grows beyond the tolerance "
         f"or a run diverges, is {shortest[0]:.2f} s ({shortest[1]}). {'; '.join(lines)}."

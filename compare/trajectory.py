@@ -120,7 +120,13 @@ def follow(scene, engine, steps, known=None) -> Result:
 
 def ours(scene, steps, twin) -> Ours:
     """TMT's side of a scene: the run, its band, and the two other levels at its recorded states."""
-    stepping, model, tau, dt, every = METHODS[twin], scene.model, scene.tau, scene.duration / steps, steps // scene.steps
+    stepping, model, tau, dt, every = (
+        METHODS[twin],
+        scene.model,
+        scene.tau,
+        scene.duration / steps,
+        steps // scene.steps,
+    )
     t, q, qd = tmt.simulate(*scene.start, tau, dt, steps, twin, model)
     ended = motion.diverged_at(scene, t, q, qd)
     alive = t[::every] < (np.inf if ended is None else ended)

@@ -67,7 +67,9 @@ def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("damping", [0.0, 0.5])
 def test_observed_limit_within_a_thousandth(result, share, passes, sign, damping):
-    limits.judge(result, [{"rows": [limit_row(observed=0.1 * (1 + sign * share * 1e-3), damping=damping)], "growths": []}])
+    limits.judge(
+        result, [{"rows": [limit_row(observed=0.1 * (1 + sign * share * 1e-3), damping=damping)], "growths": []}]
+    )
     assert only(result) is passes
 
 
@@ -435,8 +437,15 @@ def test_map_names_who_grows():
 
 
 def test_edge_names_each_engine_with_its_growth(result):
-    near = {Party("TMT", "implicit"): np.array([[1.5], [200.0]]), Party("MuJoCo", "implicit"): np.array([[2.5], [np.inf]])}
-    result.curves["near"] = {"x": np.array([1.7, 1.75]), "steps": 2000, "grown": {k: v.repeat(2, 1) for k, v in near.items()}}
+    near = {
+        Party("TMT", "implicit"): np.array([[1.5], [200.0]]),
+        Party("MuJoCo", "implicit"): np.array([[2.5], [np.inf]]),
+    }
+    result.curves["near"] = {
+        "x": np.array([1.7, 1.75]),
+        "steps": 2000,
+        "grown": {k: v.repeat(2, 1) for k, v in near.items()},
+    }
     result.curves["edge"] = {"x": np.array([1.0, 2.0]), "y": np.array([1e-3, 1e-2]), "steps": 2000,
                              "grown": {Party("TMT", "implicit"): np.ones((2, 2))}}  # fmt: skip
     caption = draw_failure.edge(result)[2]
@@ -445,7 +454,11 @@ def test_edge_names_each_engine_with_its_growth(result):
 
 def test_departure_figure_marks_each_engine_at_its_times(result):
     result.tables["stability_modes"] = [{"scene": "ball catch", "real_per_s": 7.5}]
-    result.tables["departure"] = [fall(2.0, 2.01), fall(3.0, 3.01, engine="MuJoCo") | {"method": "RK4"}, fall(None, None)]
+    result.tables["departure"] = [
+        fall(2.0, 2.01),
+        fall(3.0, 3.01, engine="MuJoCo") | {"method": "RK4"},
+        fall(None, None),
+    ]
     _, fig, caption = draw_departure.times(result)
     lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].lines}
     assert lines["MuJoCo RK4"] == 3.0 and lines["RK4"] == 2.0

@@ -58,7 +58,9 @@ def test_the_printed_digits_of_f2_and_f3_are_met_to_half_a_unit_of_the_last():
 
 
 def test_each_column_of_the_published_numbers_is_whose_it_says(engine):
-    earth, moon = ({(r["item"], r["component"]): r for r in published.rows(Setup.small(e)).rows} for e in (engine, MOON))
+    earth, moon = (
+        {(r["item"], r["component"]): r for r in published.rows(Setup.small(e)).rows} for e in (engine, MOON)
+    )
     ours, theirs = tmt.gravity_balance(np.zeros(3)), MOON.gravity_balance(np.zeros(3))
     for i, name in enumerate(("alpha", "beta", "gamma")):
         assert moon["c", name]["tmt"] == earth["c", name]["tmt"] == ours[i]
@@ -73,7 +75,9 @@ def test_the_notes_on_the_published_numbers_follow_the_numbers(engine):
     assert "has the sign of the torque that holds TMT's arm (-2.20725 N m) and the sign of MuJoCo's" in right[-1]
     assert "and not the sign of MuJoCo's qfrc_bias at rest (+2.20725 N m)" in wrong[-1]
     assert "has the sign of the torque that holds TMT's arm (-2.20725 N m)" in wrong[-1]
-    assert right[1].startswith("f3, printed (-3.456e-15, 0, 1.92e-16) rad/s2, is met to every digit by: exact arithmetic all;")
+    assert right[1].startswith(
+        "f3, printed (-3.456e-15, 0, 1.92e-16) rad/s2, is met to every digit by: exact arithmetic all;"
+    )
     digits = np.array(ITEMS["f3"].values)
     told = published.shared(ITEMS["f3"], digits + 1.0, digits, -digits, 1.0)
     assert "exact arithmetic none; TMT all; MuJoCo beta, and alpha and gamma with the other sign" in told
@@ -127,7 +131,9 @@ def test_every_rule_of_the_mass_matrix_is_applied_to_both_engines(engine):
 
 
 def test_a_gamma_axis_that_is_flipped_is_seen_in_the_worst_posture(engine):
-    flipped = parse(ARM_XML.read_text().replace('"gamma" type="hinge" axis="0 1 0"', '"gamma" type="hinge" axis="0 -1 0"'))
+    flipped = parse(
+        ARM_XML.read_text().replace('"gamma" type="hinge" axis="0 1 0"', '"gamma" type="hinge" axis="0 -1 0"')
+    )
     failed = {check.quantity for check in mass.rows(Setup.small(flipped)).checks if not check.passed}
     assert "MuJoCo: distance from (+-90, 90) deg" in failed and not any(name.startswith("TMT") for name in failed)
 

@@ -54,7 +54,9 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     rates = dt * (64 * EPS * M * abs(a) + 64 * EPS * S) / M + 8 * EPS * (4.0 + dt * abs(a))
     expected = [8 * EPS * (q + dt * 4.0) + dt * rates, rates]
     damped = dataclasses.replace(METHODS["semi_implicit_euler"])
-    found = step_rounding(METHODS["explicit_euler"], scene.model, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt)
+    found = step_rounding(
+        METHODS["explicit_euler"], scene.model, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt
+    )
     assert found[0] == pytest.approx(expected, rel=1e-9)
     implicit = step_rounding(damped, scene.model, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt)
     assert 0.85 < implicit[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
@@ -124,7 +126,9 @@ def judged_with(engine, mine, scene=DAMPED) -> dict:
     return {check.quantity: check for check in result.checks}
 
 
-@pytest.mark.parametrize("level, field", [("derivative", "derivative_bar"), ("one step", "step_bar"), ("open loop", "width")])
+@pytest.mark.parametrize(
+    "level, field", [("derivative", "derivative_bar"), ("one step", "step_bar"), ("open loop", "width")]
+)
 def test_each_level_uses_its_own_bound_and_no_other(level, field, engine, damped):
     name = f"{level}, TMT to MuJoCo"
     checks = judged_with(engine, damped)
@@ -145,7 +149,11 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
         (check,), (row,) = result.checks, result.rows
         assert (check.passed, check.unit, check.note) == (passes, "rad/s", "beta at t = 0.500 s")
         assert row["worst_difference"] == check.value and (row["largest_difference"] is None) == (check.value is None)
-    for off, passes in ((0.0, True), (1e-300, False), (np.nan, False)):  # where rounding has nothing to add, nothing may differ
+    for off, passes in (
+        (0.0, True),
+        (1e-300, False),
+        (np.nan, False),
+    ):  # where rounding has nothing to add, nothing may differ
         result, difference = Result("trajectory"), np.array([[0.0, 0.0, off, 0.0]])
         trajectory.level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, 0.0 * bar[:1], times, {})
         assert result.checks[0].passed is passes
@@ -391,7 +399,9 @@ def test_what_is_said_of_a_held_arm_follows_its_numbers(engine):
     assert earth[2].endswith("it is 0.1 rad away at 4.69 s: the cause is rounding of the torque.")
     assert other[1] == earth[1] and other[2].endswith(": that is no rounding.") and "3.8e+01 rad/s2" in other[2]
     bent = BY_NAME["bent, held"]
-    assert leaving.told(bent, bent.engine(engine), {"TMT": None, "MuJoCo": None})[0].endswith("lets no small deviation grow.")
+    assert leaving.told(bent, bent.engine(engine), {"TMT": None, "MuJoCo": None})[0].endswith(
+        "lets no small deviation grow."
+    )
 
 
 def run_of(scene, ours=0.0, theirs=0.0, until=5.0, ended=(None, None), left=(None, None)) -> dict:
@@ -436,17 +446,27 @@ def test_what_is_said_of_errors_and_agreement_follows_the_numbers():
     runs = {("ball catch, held", "rk4", 64): run_of(HELD, 0.25, 0.26, until=2.5)}
     for ours, far in ((0.49, False), (0.51, True)):
         first, second = told.errors(runs, {"ball catch, held": (ours, 0.1)}, BY_NAME)
-        assert f"ball catch, held (true: rest): TMT {ours:.1e} rad, MuJoCo 1.0e-01 rad, apart 5.0e-03 rad in the 2.50 s" in first
-        assert ("these scenes: ball catch, held." in second) == far and ("In none of these scenes" in second) == (not far)
+        assert (
+            f"ball catch, held (true: rest): TMT {ours:.1e} rad, MuJoCo 1.0e-01 rad, apart 5.0e-03 rad in the 2.50 s"
+            in first
+        )
+        assert ("these scenes: ball catch, held." in second) == far and ("In none of these scenes" in second) == (
+            not far
+        )
     first, second = told.errors(runs, {"ball catch, held": (0.1, None)}, BY_NAME)
     assert "MuJoCo no number (it diverged)" in first and "In none" in second and told.errors(runs, {}, BY_NAME) == []
 
 
 def test_what_is_said_of_order_1_follows_the_numbers():
-    euler, implicit = ((name, twin, 64) for name, twin in (("bent, free", "semi_implicit_euler"), ("bent, free", "implicit")))
+    euler, implicit = (
+        (name, twin, 64) for name, twin in (("bent, free", "semi_implicit_euler"), ("bent, free", "implicit"))
+    )
     runs = {euler: run_of(FREE) | {"integrator": "Euler"}, implicit: run_of(FREE, until=0.3125, ended=(0.5, None))}
     (said,) = told.first_order(runs, BY_NAME)
-    assert "is 0.31 s (bent, free, RK4). bent, free, RK4: judged for 0.31 s, diverges: TMT at 0.50 s, MuJoCo never." in said
+    assert (
+        "is 0.31 s (bent, free, RK4). bent, free, RK4: judged for 0.31 s, diverges: TMT at 0.50 s, MuJoCo never."
+        in said
+    )
     (said,) = told.first_order({euler: runs[euler]}, BY_NAME)
     assert "judged all along" in said and told.first_order({}, BY_NAME) == []
     (said,) = told.first_order({implicit: run_of(FREE, until=3.0)}, BY_NAME)
@@ -470,7 +490,10 @@ def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
     (ax,) = fig.axes
     lines = [line for line in ax.lines if len(line.get_xdata())]
     for i in range(3):
-        assert np.allclose(lines[2 * i].get_ydata(), np.degrees(curve["tmt"][0][:, i])) and lines[2 * i].get_marker() == "None"
+        assert (
+            np.allclose(lines[2 * i].get_ydata(), np.degrees(curve["tmt"][0][:, i]))
+            and lines[2 * i].get_marker() == "None"
+        )
         assert np.allclose(lines[2 * i + 1].get_ydata(), np.degrees(curve["mujoco"][0][:, i]))
         assert lines[2 * i + 1].get_marker() == "o" and lines[2 * i].get_label().endswith("TMT")
     assert name == "assignment_figure_2"
@@ -516,5 +539,7 @@ def test_the_figure_of_growth_says_which_scene_grows_how_much():
     t = np.linspace(0.0, 60.0, 61)
     result = Result("trajectory", curves={"growth": {"t": t, "curves": {"calm": 0.1 * t, "wild": 0.4 * t}}})
     name, fig, caption = drawn(result, "growth")
-    assert name == "trajectory_growth" and "in 5 s and in 60 s: wild: 10^2.0 and 10^24; calm: 10^0.5 and 10^6." in caption
+    assert (
+        name == "trajectory_growth" and "in 5 s and in 60 s: wild: 10^2.0 and 10^24; calm: 10^0.5 and 10^6." in caption
+    )
     assert fig.axes[0].lines[0].get_ydata()[-1] == pytest.approx(6.0)

@@ -215,7 +215,12 @@ ENDS = {
     "turned": ("rk4", ([FAST, 0, 0], [50, 0, 0], REST), {}, "turns by 2^49 rad"),
     "adaptive, turned": ("dopri8_adaptive", ([FAST, 0, 0], [50, 0, 0], REST), {}, "turns by 2^49 rad"),
     "adaptive, overflow": ("dopri8_adaptive", (BENT, REST, [1e308] * 3), {}, "diverges"),
-    "too small a tolerance": ("dopri8_adaptive", (BENT, REST, REST), {"tolerance": 1e-300}, "tolerance of 1e-300 would need"),
+    "too small a tolerance": (
+        "dopri8_adaptive",
+        (BENT, REST, REST),
+        {"tolerance": 1e-300},
+        "tolerance of 1e-300 would need",
+    ),
     "no stages": ("gauss_legendre_4", (BENT, [20] * 3, REST), {"dt": 1.0}, "Newton's method does not find the stages"),
     "singular": ("rk4", ([0.5, 0, 1], [1, 0, 0], REST), {"model": wrist()}, "Mbar is singular: hinges 'a', 'c' turn"),
 }
@@ -274,6 +279,8 @@ def test_a_method_that_is_replaced_is_used_at_once(monkeypatch):
 def test_the_coefficients_of_dop853_are_those_of_scipy():
     from scipy.integrate import DOP853
 
-    assert all(np.array_equal(row, DOP853.A[i, :i]) for i, row in enumerate(dop853.A)) and len(dop853.A) == DOP853.n_stages
+    assert (
+        all(np.array_equal(row, DOP853.A[i, :i]) for i, row in enumerate(dop853.A)) and len(dop853.A) == DOP853.n_stages
+    )
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
     assert np.array_equal(dop853.ERROR_5, DOP853.E5[:-1]) and np.array_equal(dop853.ERROR_3, DOP853.E3[:-1])

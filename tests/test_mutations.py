@@ -210,7 +210,10 @@ def test_one_edit_is_caught_and_one_survives(toy, capfd, monkeypatch):
     assert "steeper: caught by tests/test_late.py::test_a_process_of_its_own_has_the_copy_too" in out
     assert re.search(r"endless: caught by no end after \d s", out)
     assert "wider: SURVIVED" in out and "wide: harmless" in out
-    assert "survived: rules.Check.width: wider\n--- a/compare/rules.py" in out and "-    width = 3\n+    width = (4)" in out
+    assert (
+        "survived: rules.Check.width: wider\n--- a/compare/rules.py" in out
+        and "-    width = 3\n+    width = (4)" in out
+    )
     assert out.index("+    width = (4)") < out.index("(harmless: nobody uses it)")
     assert out.endswith("5 edits: 3 caught, 1 declared harmless, 1 survived\n")
     assert {path: path.read_text() for path in toy.rglob("*.py")} == before

@@ -241,7 +241,7 @@ def test_a_run_without_timings_has_the_checks_only(engine):
     "old, new, fails",
     [
         ("0 0 -9.81", "0 0 -1.62", "order of the error against the elliptic function, from 4"),
-        ("-9.81", "-9.81\" density=\"50\" viscosity=\"1", "order of the error against the elliptic function, from 4"),
+        ("-9.81", '-9.81" density="50" viscosity="1', "order of the error against the elliptic function, from 4"),
         ('axis="1 0 0"', 'axis="1 0 0" damping="0.1"', "power of the amplitude with which"),
         ('axis="1 0 0"', 'axis="1 0 0" armature="0.01"', "Mbar, reduced, TMT to MuJoCo"),
     ],

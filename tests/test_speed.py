@@ -40,7 +40,9 @@ def test_the_committed_reference_is_of_the_stated_numbers():
     assert all(float(of_scene[0]["halving_difference"]) < 1e-20 for of_scene in rows.values())
 
 
-@pytest.mark.parametrize("scene", [scene for scene in SCENES if scene.name in reference.STEPS], ids=lambda scene: scene.name)
+@pytest.mark.parametrize(
+    "scene", [scene for scene in SCENES if scene.name in reference.STEPS], ids=lambda scene: scene.name
+)
 def test_a_record_of_the_reference_is_computed_from_the_one_before(scene):
     """With half as many steps as its command takes; the table has 32 digits. In seconds, where the whole takes minutes."""
     rows = reference.read(reference.TABLE)[reference.key(scene)]
@@ -140,7 +142,9 @@ def test_a_small_run_takes_every_path(engine, small):
     assert list(evaluations.columns) == ["quantity", "implementation", "states", "threads", "ns_per_state"]
     assert set(evaluations.quantity) == {"mass_matrix_and_bias", "forward_dynamics", "rk4_step"}
     errors = accuracy.true_error(result.rows)
-    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1) and errors["bent, free"][0] == pytest.approx(0.27, abs=0.01)
+    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1) and errors["bent, free"][0] == pytest.approx(
+        0.27, abs=0.01
+    )
 
 
 def test_a_run_without_timings_has_the_checks_only(engine):
@@ -149,7 +153,9 @@ def test_a_run_without_timings_has_the_checks_only(engine):
     assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result)) == []
 
 
-@pytest.mark.parametrize("old, new", [("0 0 -9.81", "0 0 -1.62"), ('mass="1.5"', 'mass="1.50001"')], ids=["moon", "mass"])
+@pytest.mark.parametrize(
+    "old, new", [("0 0 -9.81", "0 0 -1.62"), ('mass="1.5"', 'mass="1.50001"')], ids=["moon", "mass"]
+)
 def test_a_wrong_model_is_far_from_the_reference(old, new):
     checks = speed.rows(Setup.small(parse(ARM_XML.read_text(encoding="utf-8").replace(old, new))), timed=False).checks
     failed = {check.quantity for check in checks if not check.passed}

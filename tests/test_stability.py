@@ -142,7 +142,8 @@ def test_a_tiny_step_that_rounding_holds_back_is_in_the_prediction(engine):
     tau = tau + 3e-15 * tmt.mass_matrix(at.q) @ at.modes[1][:3, 0].real / np.abs(at.modes[1][:3, 0]).max() * 7.513**2
     off = departure.residual(EULER, engine, at, tau[None])
     rounded, exact = (
-        departure.predicted(at, EULER.scheme, dt, np.zeros((1, 3)), off, rounded=rounded)[0] for rounded in (True, False)
+        departure.predicted(at, EULER.scheme, dt, np.zeros((1, 3)), off, rounded=rounded)[0]
+        for rounded in (True, False)
     )
     q, _ = EULER.run(engine, tmt.ARM, at.q, np.zeros(3), tau, dt, 7000)
     observed = departure.departure(dt * np.arange(7001), q)

@@ -25,8 +25,19 @@ def test_on_the_moon_no_sentence_speaks_of_the_stated_arm(tmp_path):
     result = stability.rows(Setup.small(load(path)))
     assert sum(not check.passed for check in result.checks) > 100
     told = " ".join(result.notes + [figure()[2] for figure in stability.figures(result)])
-    for words in ("it never starts again", "stays definite", "Claim 1, not reproduced", "MuJoCo: 27 leave, after 0.08 s"):
+    for words in (
+        "it never starts again",
+        "stays definite",
+        "Claim 1, not reproduced",
+        "MuJoCo: 27 leave, after 0.08 s",
+    ):
         assert words in told
-    for words in ("loses definiteness", "the cause is rounding", "There is no limit", "silent failure", "edge is sharp"):
+    for words in (
+        "loses definiteness",
+        "the cause is rounding",
+        "There is no limit",
+        "silent failure",
+        "edge is sharp",
+    ):
         assert words.lower() not in told.lower().replace("no failure is silent", "")
     assert not any("silent" in check.quantity for check in result.checks)  # nothing failed, so nothing has to be caught

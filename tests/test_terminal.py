@@ -47,7 +47,9 @@ def test_mass(runs, columns, term):
     run = runs["arm", columns, term]
     assert run.status == 0, run.output
     text = words(readable_lines(run))
-    assert re.match(r"mass ok \d+ checks uses .* of a tolerance .* s The two models agree in mass \(1 of 10 experiments\)", text)
+    assert re.match(
+        r"mass ok \d+ checks uses .* of a tolerance .* s The two models agree in mass \(1 of 10 experiments\)", text
+    )
     assert f"Report: arm({columns}, '{term}')/index.html (" in text and text.endswith(" s)")
     assert ("\x1b" in run.output) == (term == "xterm")
 
@@ -128,5 +130,7 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     (tmp_path / "rich.py").write_text("raise RuntimeError('two\\nlines')")  # found first: the current folder
     run = compare("mass", cwd=tmp_path)
     assert run.returncode == 2
-    assert run.stderr.splitlines() == ["python -m compare: cannot go on: RuntimeError: two lines (compare/terminal.py:9)"]
+    assert run.stderr.splitlines() == [
+        "python -m compare: cannot go on: RuntimeError: two lines (compare/terminal.py:9)"
+    ]
     assert ROOT.as_posix() not in run.stderr

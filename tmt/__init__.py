@@ -156,7 +156,9 @@ def _gather(nested, batch, overflow=None) -> np.ndarray:
     finite = np.isfinite(array)
     if not finite.all():
         if overflow is None:
-            raise ValueError("the result is beyond the largest double; smaller numbers in the state or model are expected")
+            raise ValueError(
+                "the result is beyond the largest double; smaller numbers in the state or model are expected"
+            )
         array = np.where(finite, array, overflow)
     own = array.ndim - len(batch)
     return np.moveaxis(array, range(own), range(-own, 0)).copy()

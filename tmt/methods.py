@@ -184,5 +184,7 @@ def method_named(name):
     stepping = METHODS[name]
     known = isinstance(stepping, (RungeKutta, SemiImplicitEuler, ImplicitRungeKutta))
     if not known and not all(callable(getattr(stepping, part, None)) for part in ("slope", "step", "__hash__")):
-        raise ValueError(f"METHODS[{name!r}] is {shown(stepping)}; a hashable method with a slope and a step is expected")
+        raise ValueError(
+            f"METHODS[{name!r}] is {shown(stepping)}; a hashable method with a slope and a step is expected"
+        )
     return stepping

@@ -100,7 +100,10 @@ def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
     for run in (run for run in range(len(codes)) if codes[run] or told[run]):
         last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
         code = int(codes[run])
-        if code in (OVERFLOW, NEWTON) and max(np.abs(q[run, last]).max(), dt * float(np.abs(qd[run, last]).max())) > 2.0**48:
+        if (
+            code in (OVERFLOW, NEWTON)
+            and max(np.abs(q[run, last]).max(), dt * float(np.abs(qd[run, last]).max())) > 2.0**48
+        ):
             code = TURNED  # within the step: there is no sine at its stages
         told[run] = f"at t = {last * dt:g} s: {told[run] or words[code]}"
     return told

@@ -86,7 +86,9 @@ class Tree:
         """
         names = self.hinge_names
         if not isinstance(angles, Mapping):
-            raise ValueError(f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected")
+            raise ValueError(
+                f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected"
+            )
         if unknown := [name for name in angles if name not in names]:
             raise ValueError(f"there is no hinge {shown(unknown[0])} to lock; the hinges are {', '.join(names)}")
         if len(angles) == len(names):
