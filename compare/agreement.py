@@ -70,7 +70,7 @@ class Check:
         wanted = f"{self.tolerance:.3g} {self.unit}".rstrip()
         where = f", {self.scene}" if self.scene else ""
         if self.rule == "equal" and self.value is None and self.note:  # there is nothing but the reason to tell
-            return f"{self.experiment}: not so: {self.quantity}{where}: {self.note}"
+            return f"{self.experiment}: {self.quantity}{where}: no, {self.note}"
         note = f" ({self.note})" if self.note else ""
         rule = self.rule.replace("equal", "equal to")
         return f"{self.experiment}: {self.quantity}{where}: {found}, must be {rule} {wanted}{note}"

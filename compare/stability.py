@@ -142,10 +142,10 @@ def planes(result, schemes) -> None:
     }
 
 
-def equilibria(result, setup) -> None:
+def equilibria(result, setup, names=tuple(POSTURES)) -> None:
     """What each held posture is, and TMT's amplification of a step against MuJoCo's."""
     table = []
-    for name in POSTURES:
+    for name in names:
         at = held(name, posture(name))
         values = at.modes[0]
         table += [
