@@ -1,5 +1,6 @@
 """Generated code on disk: kept where it should be, and run only if nobody else can have put it there."""
 
+import grp
 import os
 import pickle
 import stat
@@ -52,10 +53,20 @@ def test_what_is_made_is_the_users_own_under_any_mask(folder):
     assert cache.load(TEXT).f(1.5) == 3.0 and cache.complaints == []
 
 
+def to_another_group(path):
+    """Give a path to a group that is not the user's own."""
+    own = os.stat(path).st_gid
+    others = [12345] if os.geteuid() == 0 else [group for group in os.getgroups() if group != own]
+    if not others:
+        pytest.skip("the user is in one group only")
+    os.chown(path, -1, others[0])
+
+
 @posix
 @pytest.mark.parametrize("rights, accepted", [(0o755, True), (0o775, False), (0o757, False), (0o1777, False)])
 def test_others_may_read_the_folder_and_not_write(folder, rights, accepted, caplog):
     folder.mkdir(parents=True)
+    to_another_group(folder)
     folder.chmod(rights)
     assert on_disk() == accepted
     assert on_disk("kept = CACHE  # another\n") == accepted
@@ -69,11 +80,26 @@ def test_others_may_read_the_folder_and_not_write(folder, rights, accepted, capl
 @pytest.mark.parametrize("rights, accepted", [(0o755, True), (0o1777, True), (0o777, False), (0o775, False)])
 def test_others_may_not_exchange_a_folder_on_the_way(folder, rights, accepted):
     folder.mkdir(parents=True, mode=0o700)
+    to_another_group(folder.parent)
     folder.parent.chmod(rights)
     assert on_disk() == accepted and len(cache.complaints) == (not accepted)
     if not accepted:
         folder.rmdir()
     assert on_disk() == accepted and folder.exists() == accepted  # nor is it made there
+
+
+@posix
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can say who is in a group")
+@pytest.mark.parametrize(
+    "name, members, accepted",
+    [("root", [], True), ("root", ["root"], True), ("staff", [], False), ("root", ["root", "eve"], False)],
+)
+def test_a_group_of_the_user_alone_may_write(folder, name, members, accepted, monkeypatch):
+    """With the mask 002 that many systems set, a folder is the group's too, and the group is the user's own."""
+    folder.mkdir(parents=True)
+    folder.chmod(0o775)
+    monkeypatch.setattr("grp.getgrgid", lambda number: grp.struct_group((name, "x", number, members)))
+    assert on_disk() == accepted
 
 
 @posix

@@ -67,9 +67,25 @@ def check_own(path, on_the_way=False, shut=False) -> None:
         raise NotOwn(f"{path} belongs to user {about.st_uid}")
     if stat.S_ISLNK(about.st_mode):
         raise NotOwn(f"{path} is a link")
-    # the group's bit counts: it is also what further access rights show as
-    if about.st_mode & 0o022 and not (shut or (on_the_way and about.st_mode & stat.S_ISVTX)):
+    writers = about.st_mode & (0o002 if private(path, about.st_gid) else 0o022)
+    if writers and not (shut or (on_the_way and about.st_mode & stat.S_ISVTX)):
         raise NotOwn(f"{path} can be written by others (mode {stat.S_IMODE(about.st_mode):04o})")
+
+
+def private(path, group) -> bool:
+    """Whether the group of a path is the user's own, without other members, as many systems make one for each user.
+
+    Where there are further access rights the group's bits stand for those.
+    """
+    import grp  # POSIX only
+    import pwd
+
+    try:
+        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
+        further = "system.posix_acl_access" in os.listxattr(path)
+    except (KeyError, OSError, AttributeError):  # no such user or group; not known here
+        return False
+    return group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name} and not further
 
 
 def load(text):
