@@ -12,7 +12,7 @@ from trees import mjcf, random_tree
 import tmt
 from compare import report
 from compare.__main__ import EXPERIMENTS
-from compare.agreement import EPS, FACTOR, Result, bias_scale, reaches
+from compare.agreement import EPS, FACTOR, bias_scale, reaches
 from compare.engine_file import parse
 from compare.engine_parameters import parameters
 from compare.parameters import stated
@@ -107,22 +107,3 @@ def test_mirror_symmetry_hides_a_flipped_beta_axis_from_mass_and_bias(rng):
     lopsided = dataclasses.replace(tmt.ARM, com=((0, 0.02, -0.15), (0.15, 0.01, 0)))
     other = dataclasses.replace(lopsided, axis=flipped.axis)
     assert np.abs(tmt.mass_matrix(q, lopsided) - tmt.mass_matrix(q, other)).max() > 1e-3
-
-
-@pytest.mark.parametrize(
-    "rule, inside, outside",
-    [("at most", 1.0, 1.0 + 1e-15), ("at least", 1.0, 1.0 - 1e-15), ("equal", 1.0, 1.0 + 1e-15)],
-)
-def test_a_check_passes_within_its_tolerance_only(rule, inside, outside):
-    result = Result("mass")
-    for value, passes in ((inside, True), (outside, False), (None, False), (np.nan, False), (np.inf, False)):
-        check = result.check("zero", "Mbar", value, 1.0, "kg m2", rounding=True, rule=rule)
-        assert check.passed is passes and check.record()["passed"] is passes and check.record()["rule"] == rule
-        assert check.over_bar == check.value
-        assert ("no number" in str(check)) == (check.value is None)
-
-
-@pytest.mark.parametrize("tolerance, rule", [(np.inf, "at most"), (np.nan, "at most"), (1.0, "below")])
-def test_a_check_has_a_rule_and_a_finite_tolerance(tolerance, rule):
-    with pytest.raises(ValueError, match="is no rule with a finite tolerance"):
-        Result("mass").check("zero", "Mbar", 0.0, tolerance, "kg m2", rule=rule)

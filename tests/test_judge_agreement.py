@@ -77,6 +77,37 @@ def test_how_much_of_a_tolerance_is_used_is_said_of_rounding_only():
     assert result.check("", "", 0.0, 0.0, "", rounding=True).over_bar is None
 
 
+@pytest.mark.parametrize(
+    "rule, inside, outside",
+    [
+        ("at most", (1.0, 0.0, -9.0), (1.0 + 1e-15, 9.0)),
+        ("at least", (1.0, 9.0), (1.0 - 1e-15, 0.0, -9.0)),
+        ("equal", (1.0,), (1.0 - 1e-15, 1.0 + 1e-15, 0.0)),
+    ],
+)
+def test_a_check_passes_within_its_tolerance_only(rule, inside, outside):
+    result = Result("mass")
+    for passes, values in ((True, inside), (False, outside), (False, (None, np.nan, np.inf, -np.inf))):
+        for value in values:
+            check = result.check("zero", "Mbar", value, 1.0, "kg m2", rounding=True, rule=rule)
+            assert check.passed is passes and check.record()["passed"] is passes and check.record()["rule"] == rule
+            assert check.over_bar == check.value
+            assert ("no number" in str(check)) == (check.value is None)
+
+
+@pytest.mark.parametrize("tolerance, rule", [(np.inf, "at most"), (np.nan, "at most"), (1.0, "below")])
+def test_a_check_has_a_rule_and_a_finite_tolerance(tolerance, rule):
+    with pytest.raises(ValueError, match="is no rule with a finite tolerance"):
+        Result("mass").check("zero", "Mbar", 0.0, tolerance, "kg m2", rule=rule)
+
+
+@pytest.mark.parametrize("place", list(np.ndindex(3, 3)))
+def test_every_component_of_a_state_is_compared(place):
+    values = np.zeros((4, 3, 3))
+    values[(2, *place)] = -3.0
+    assert agreement.largest(values).tolist() == [0.0, 0.0, 3.0, 0.0]
+
+
 # scales, from the stated numbers written out
 
 

@@ -5,7 +5,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 from compare import cost, draw_reduction, engine_cost, known_motion, reduction, sub_blocks
-from compare.agreement import EPS, Result
+from compare.agreement import EPS, Result, Setup
+from compare.engine_file import ARM_XML, parse
 from compare.scenes import HINGES, SCENES
 
 GREEN, ORANGE, BLUE = "#009e73", "#e69f00", "#0072b2"
@@ -73,6 +74,13 @@ def test_errors_fall_at_the_order_of_the_method(order, clear, passes):
     values = [2.0 ** (2 * order) * clear, 2.0**order * clear, clear, 9e-12, 8e-12]  # the last two are rounding
     assert verdicts(known_motion.judge_orders, "elbow swing", {("TMT", "RK4"): values if order else [1.0] * 5}) == {
         "order of the error against the elliptic function, from 4": passes}  # fmt: skip
+
+
+def test_the_order_is_that_of_the_finest_steps_above_rounding():
+    coarse_are_off = [1.0, 0.9, 2.0**4 * 1e-9, 1e-9, 9e-12]
+    assert list(verdicts(known_motion.judge_orders, "elbow swing", {("TMT", "RK4"): coarse_are_off}).values()) == [True]
+    fine_are_off = [1.0, 2.0**-4, 0.9e-9, 0.8e-9, 9e-12]
+    assert list(verdicts(known_motion.judge_orders, "elbow swing", {("TMT", "RK4"): fine_are_off}).values()) == [False]
 
 
 @pytest.mark.parametrize("power, passes", [(2.149, True), (2.151, False), (1.851, True), (1.849, False), (0.0, False)])
@@ -198,3 +206,11 @@ def test_an_empty_section_has_no_figures_and_none_raises():
     assert len(list(reduction.figures(Result("reduction", curves={"swings": {}})))) == 0
     for draw in (draw_reduction.needs, draw_reduction.costs):
         assert len(draw(empty)) == 3
+
+
+def test_a_model_whose_hinges_cannot_be_locked_is_a_failed_check():
+    """A tendon runs over the hinges: it cannot go with one of them."""
+    tendon = '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
+    text = ARM_XML.read_text(encoding="utf-8").replace("</mujoco>", tendon)
+    (failed,) = [check for check in reduction.rows(Setup.small(parse(text)), timed=False).checks if not check.passed]
+    assert failed.quantity == "models whose hinges can be locked" and failed.value == 0 and failed.note

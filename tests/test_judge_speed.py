@@ -123,6 +123,8 @@ def test_an_order_is_measured_where_errors_fall_regularly():
     assert shown([3.1e-2, 2.9e-2 / 16], complete=False) == ([], [])
     assert shown([16 * 2.1e-12, 2.1e-12]) == ([pytest.approx(4.0)], [True, True])
     assert shown([16 * 1.9e-12, 1.9e-12]) == ([], [False])
+    assert shown([2.9e-2, 2.8e-2, 2.8e-2 / 16]) == ([pytest.approx(4.0)], [True, True])  # the finest two count
+    assert shown([2.9e-2, 2.9e-2 / 16, 2.8e-2 / 16])[1] == [False, True]
 
 
 # the error at the assignment's step

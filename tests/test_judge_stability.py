@@ -85,6 +85,11 @@ def test_a_limit_that_no_run_shows_fails_and_is_told(result):
     assert not only(result) and "In 1 cases the runs show no finite limit" in result.notes[0]
 
 
+def test_the_largest_difference_of_a_limit_is_told():
+    (told,) = limits.tell_limits([limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
+    assert "largest difference: 0.500 % undamped" in told and told.startswith("3 finite limits")
+
+
 @BOTH
 def test_growth_in_all_steps_within_a_thousandth(result, share, passes):
     row = {"scene": "upright", "engine": "MuJoCo", "method": "Euler", "dt_s": 0.01, "predicted_growth": 1.1,

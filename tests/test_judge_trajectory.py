@@ -7,11 +7,12 @@ import pytest
 from judged import verdicts
 
 import tmt
+from compare import band as band_of_rounding
 from compare import drift, horizon, leaving, motion, told, trajectory
 from compare.agreement import Result
 from compare.band import band, step_rounding
 from compare.scenes import SCENES, Scene
-from tmt.methods import METHODS
+from tmt.methods import METHODS, amplification
 
 EPS = 2.0**-52
 BY_NAME = {scene.name: scene for scene in SCENES}
@@ -149,6 +150,10 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
         (check,), (row,) = result.checks, result.rows
         assert (check.passed, check.unit, check.note) == (passes, "rad/s", "beta at t = 0.500 s")
         assert row["worst_difference"] == check.value and (row["largest_difference"] is None) == (check.value is None)
+    difference = np.array([[0.2, 0.7, 3.0, 0.0], [0.1, 0.4, 0.0, 0.0], [0.0, 0.5, 0.0, 0.9]])
+    result = Result("trajectory")
+    trajectory.level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, bar, times, {})
+    assert (result.rows[0]["largest_difference"], result.rows[0]["worst_difference"]) == (0.7, 3.0)
     for off, passes in (
         (0.0, True),
         (1e-300, False),
@@ -543,3 +548,14 @@ def test_the_figure_of_growth_says_which_scene_grows_how_much():
         name == "trajectory_growth" and "in 5 s and in 60 s: wild: 10^2.0 and 10^24; calm: 10^0.5 and 10^6." in caption
     )
     assert fig.axes[0].lines[0].get_ydata()[-1] == pytest.approx(6.0)
+
+
+def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():
+    """Upright, held: every step has the same Jacobian, so a small difference grows as the norm of its powers."""
+    q, steps, dt = np.radians([180.0, 0.0, 90.0]), 64, 0.01
+    path = np.tile(q, (steps + 1, 1))
+    tau = tmt.gravity_balance(q)
+    (J,) = amplification(METHODS["rk4"], tmt.ARM, q[None], np.zeros((1, 3)), tau, dt)
+    grown = band_of_rounding.growth(METHODS["rk4"], tmt.ARM, path, 0.0 * path, tau, dt, every=16)
+    expected = [np.log10(np.linalg.norm(np.linalg.matrix_power(J, k), 2)) for k in range(0, steps + 1, 16)]
+    assert grown == pytest.approx(expected, abs=1e-6) and grown[-1] > 2.0

@@ -111,6 +111,40 @@ def test_answers_give_each_number_to_its_engine():
     assert answers["e"].startswith("Mbar: at most 4.0e-16 kg m2 apart (bent); not run")
 
 
+def test_a_row_without_a_number_is_a_run_that_diverged():
+    rows = [{"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": d} for d in (1e-16, None)]
+    answers = verdict.answers([section("mass", rows=rows)]).set_index("part")["answer"]
+    assert answers["e"] == "diverged; not run"
+
+
+def test_what_to_use_gives_each_engine_its_own_time():
+    line = {
+        "scene": "bent",
+        "target_rad": 1e-6,
+        "mujoco": "RK4, 9 steps",
+        "mujoco_ms": 7.0,
+        "tmt": "rk4",
+        "tmt_ms": 2.0,
+    }
+    lines = [line | {"target_rad": 1e-3, "mujoco_ms": 5.0}, line | {"tmt": None}, line]
+    answers = verdict.answers([section("speed", what_should_i_use=lines)])["answer"].tolist()
+    assert answers[-1].startswith(
+        "What should I use? For 1e-06 rad over five seconds (bent): RK4, 9 steps (7 ms), or rk4 (2 ms)"
+    )
+
+
+def test_the_page_is_red_if_a_check_fails_and_tables_are_whole(tmp_path):
+    (tmp_path / "figures").mkdir()
+    rows = [{"a": 0.123456789012345678, "b": k} for k in range(3)]
+    for checks, colour in (((GOOD,), "#009E73"), ((GOOD, BAD), "#D55E00")):
+        html = page.page(tmp_path, [section("mass", *checks, rows=rows)], {"command": "c"}, "words")
+        assert colour in html and html.count("<td>0.123</td>") == 3
+        assert ("Checks that fail" in html) == (len(checks) == 2)
+    report.write(tmp_path, [section("mass", GOOD, rows=rows)], {"command": "c"}, "words")
+    table = pd.read_csv(tmp_path / "tables" / "mass.csv")
+    assert table["a"].tolist() == [rows[0]["a"]] * 3 and table["b"].tolist() == [0, 1, 2]
+
+
 # where a model differs, the number is named
 
 
@@ -160,6 +194,14 @@ def test_causes_come_by_rank_then_by_size():
     both = both.replace('mass="1.9"', 'mass="2.9"')
     found = parameters.rows(Setup(parse(both), states=20)).curves["causes"]
     assert [cause["place"] for cause in found] == ["ref of gamma", "mass of upper arm", "com x of forearm"]
+
+
+def test_touching_is_named_by_its_force():
+    """Two bodies welded by a constraint that the file has switched on."""
+    weld = '<equality><joint joint1="gamma" polycoef="0.3 0 0 0 0"/></equality></mujoco>'
+    text = XML.replace("</mujoco>", weld).replace('constraint="disable" ', "")
+    found = parameters.rows(Setup(parse(text), states=20)).curves["causes"]
+    assert [cause["place"] for cause in found] == ["forces of constraints and contacts"]
 
 
 @pytest.mark.parametrize("off, fails", [(60, False), (70, True)])
