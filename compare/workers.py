@@ -20,25 +20,30 @@ class WorkerEnded(RuntimeError):
 
 
 class Workers(ThreadPoolExecutor):
-    """Processes, and a thread for each that hands it one call after the other.
+    """At most so many processes, each started when the others are busy, and a thread for each that hands it its calls.
 
     Without multiprocessing's locks, which an early end would leave behind in the system.
     """
 
     def __init__(self, count):
         super().__init__(count)
-        self.futures, self.processes, self.idle = [], [], SimpleQueue()
+        self.count, self.futures, self.processes, self.idle = count, [], [], SimpleQueue()
+        interrupt.undo.append(self.kill)
+
+    def start(self) -> None:
+        """One more process."""
         context = get_context("spawn")
         with interrupt.held(), deaf():
-            interrupt.undo.append(self.kill)
-            for _ in range(count):
-                here, there = context.Pipe()
-                self.processes.append(context.Process(target=serve, args=(there,), daemon=True))
-                self.processes[-1].start()
-                there.close()
-                self.idle.put(here)
+            here, there = context.Pipe()
+            self.processes.append(context.Process(target=serve, args=(there,), daemon=True))
+            self.processes[-1].start()
+            there.close()
+            self.idle.put(here)
 
     def submit(self, function, /, *arguments, **named):
+        under_way = sum(not future.done() for future in self.futures)
+        if len(self.processes) < min(self.count, under_way + 1):
+            self.start()
         self.futures.append(super().submit(self.ask, function, arguments, named))
         return self.futures[-1]
 
@@ -71,8 +76,7 @@ def start_workers():
     """Yields a pool of two processes, for `draw` and for scenes that can run side by side."""
     pool = Workers(2)
     try:
-        for _ in range(2):
-            pool.submit(warm_up)
+        pool.submit(warm_up)
         yield pool
     finally:
         pool.kill()
