@@ -239,6 +239,12 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
     )
 
 
+def test_the_fewest_evaluations_are_those_of_the_coarsest_step_that_is_near_enough():
+    result = Result("speed", rows=known_rows())
+    assert draw_speed.fewest(result, "bent, free", 1e-3) == "For 1e-03 rad (bent, free) rk4 needs 1024, dopri8 256. "
+    assert draw_speed.fewest(result, "bent, free", 1e-30) == ""
+
+
 @pytest.mark.parametrize(
     "errors, left, says",
     [

@@ -499,3 +499,28 @@ def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
     drawn = {line.get_label(): (line.get_marker(), line.get_ydata()[0]) for line in fig.axes[0].lines}
     assert drawn == {"RK4": ("None", 0.1), "MuJoCo, same scheme": ("o", 0.2)}
     assert "drifts: RK4" in caption
+
+
+def test_the_farthest_departure_is_told():
+    rows = [fall(1.01, 1.0), fall(2.02, 2.0, engine="MuJoCo"), fall(3.0, 3.0)]
+    told = departure.tell_departures(rows)
+    assert "3 leave in the run and in the prediction, 3 of these" in told
+    assert "the largest difference is 0.020 s (ball catch, MuJoCo rk4" in told
+
+
+@pytest.mark.parametrize("to, found", [(0.3, 1), (-0.3, -1), (np.nan, None)])
+def test_the_side_to_which_an_arm_leaves(to, found):
+    path = np.array([[1.0, 0.0, 0.0], [1.0 + to / 3, 0.0, 0.0], [1.0 + to, 9.0, 9.0]])
+    assert claims.side(path, 0.2, 0.1) == found and claims.side(path, None, 0.1) is None
+
+
+def test_a_failure_is_caught_at_the_first_of_its_signs():
+    """A clock that goes back, and more energy than the arm can have: whichever comes first."""
+    t, still = np.arange(5.0), np.tile(failure.BENT.start[0], (5, 1))
+    for back, fast, first in ((3, 2, 2.0), (2, 3, 2.0), (None, 3, 3.0), (4, None, 4.0), (None, None, None)):
+        time, qd = np.arange(5.0), np.zeros((5, 3))
+        if back is not None:
+            time[back:] -= 2.0
+        if fast is not None:
+            qd[fast:] = 1e3
+        assert failure.caught(failure.BENT, t, {"time": time, "q": still, "qd": qd}) == first

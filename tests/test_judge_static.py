@@ -206,6 +206,10 @@ def test_the_figure_of_distances_says_who_is_how_far_from_what():
     name, fig, caption = draw.distances(result, "random states")
     assert name == "mass_distances" and "at most 5 eps apart (Mbar)" in caption
     assert "the first 2 of the states, TMT is at most 2 eps off and MuJoCo at most 3." in caption
+    larger = {name: np.array([7.0, 9.0]) for name in curves}
+    result.curves["random states"]["Abar"] = larger
+    told = draw.distances(result, "random states")[2]
+    assert "at most 9 eps apart (Abar)" in told and "TMT is at most 9 eps off and MuJoCo at most 9." in told
     for label, values in curves.items():
         (line,) = (line for line in fig.axes[0].lines if line.get_label() == label)
         assert line.get_xdata().tolist() == values

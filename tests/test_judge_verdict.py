@@ -68,6 +68,15 @@ def test_a_report_of_sections_without_rows_is_written_and_says_so(tmp_path):
     assert "no result" in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
+def test_the_verdict_names_the_first_cause_and_counts_the_others():
+    causes = [{"text": f"number {k}"} for k in range(3)]
+    wrong = [section("parameters", BAD), section("mass", GOOD, BAD, BAD)]
+    assert verdict.verdict(wrong, 2, causes) == (
+        "The two models do not agree: 3 of 4 checks fail. Cause: number 0, and 2 more. "
+        "2 further checks fail as a consequence."
+    )
+
+
 CAUSE = {"rank": 2, "place": "mass", "stated": 1.0, "found": 2.0, "text": "mass of forearm: stated 1", "size": 9.0}
 
 
