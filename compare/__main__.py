@@ -20,6 +20,7 @@ import time
 from contextlib import suppress
 
 from .crash import described
+from .streams import readable
 
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
@@ -47,7 +48,7 @@ exit status: 0 all checks pass; 1 a check failed; 2 the request could not be car
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        self.exit(2, f"{self.prog}: {' '.join(message.split())}\n")
+        self.exit(2, f"{self.prog}: {' '.join(readable(message).split())}\n")
 
 
 def not_empty(text):
@@ -90,11 +91,13 @@ def main(arguments=None) -> int:
     except OSError as error:
         name = "" if error.filename is None else f"{error.filename}: "
         line = f"cannot go on: {name}{error.strerror or error}"
+    except ModuleNotFoundError as error:
+        line = f"the package {error.name} is not installed; `python -m pip install -e .` brings what is needed"
     except Exception as error:
         line = f"cannot go on: {described(error)}"
     interrupt.settle()
     with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
-        print(" ".join(f"{parser.prog}: {line}".split()), file=sys.stderr, flush=True)
+        print(" ".join(f"{parser.prog}: {readable(line)}".split()), file=sys.stderr, flush=True)
     return 2
 
 
@@ -150,7 +153,7 @@ def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
         name: attempt(name, module.begin, setup)[1] for name, module in modules.items() if hasattr(module, "begin")
     }
     for name, module in modules.items():
-        setup.tell(f"{name}: {EXPERIMENTS[name]} ({len(sections) + 1} of {len(names)})")
+        setup.tell(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, module.rows, setup)
         sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, crash or result))
@@ -208,7 +211,7 @@ def tell(terminal, section, seconds, causes) -> None:
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
     used = [check.over_bar for check in checks if check.over_bar is not None]
-    most = f"uses {max(used):.2g} of a tolerance" if used else ""
+    most = f"uses {max(used):.2g} of a tolerance" if used and not failed else ""
     word = f"{len(failed)} FAILED" if failed else "ok"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")

@@ -226,7 +226,8 @@ def judge_finer(result, finer) -> None:
         f"in 5 s {'nothing moves in any' if still else 'not every arm stays where it is'}. Steps in 5 s and time to leave "
         f"(TMT +1 ulp, within {LONG:g} s): {times}. What a step adds to an angle, dt qd, is "
         f"{value(last['step_rad']):.1e} rad after 5 s at {round(5 / last['dt_s'])} steps: "
-        f"{'less' if lost else 'not less'} than half a unit in the last place of the angle, {last['half_ulp_rad']:.1e} rad"
+        f"{'less' if lost else 'not less'} than half a unit in the last place of the angle that it would change "
+        f"first, {last['half_ulp_rad']:.1e} rad"
         f"{', so it is lost in the sum' if lost else ''}. (Reproduced: every series leaves at some step, at least one "
         "reverses its side, and with the most steps nothing moves in 5 s; in part: two of these.)"
     )

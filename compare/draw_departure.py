@@ -180,7 +180,7 @@ def tell_finest(rows) -> str:
     last = max((row for row in rows if round(5 / row["dt_s"]) == counts[0]), key=lambda row: value(row["step_rad"]))
     return told + (
         f" At {counts[0]} steps dt qd is {value(last['step_rad']):.1e} rad after 5 s at most; half a unit in the last place "
-        f"of the angle is {last['half_ulp_rad']:.1e} rad."
+        f"of the angle that it would change first is {last['half_ulp_rad']:.1e} rad."
     )
 
 

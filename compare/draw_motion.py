@@ -138,7 +138,7 @@ def drift_caption(drifts, steps) -> str:
     ratios = [theirs / ours if ours else np.nan for ours, theirs in pairs]
     return (
         "Drift of what should be constant (lines: TMT; marks: MuJoCo). The order at which it falls at the finest step, "
-        f"{'; '.join(orders)}. Largest of energy, {'; '.join(worst)}. MuJoCo's drift is {span(ratios, '.3g')} times TMT's."
+        f"{'; '.join(orders)}. Largest of energy, {'; '.join(worst)}. MuJoCo's drift over TMT's: {span(ratios, '.3g')}."
     )
 
 

@@ -143,10 +143,19 @@ def simulate_overhead() -> tuple[float, float]:
     return times["call"], times["loop"]
 
 
+def told_of(by_states) -> str:
+    """Times by the number of states in words, the least first."""
+    (best, least), *others = sorted(by_states.items(), key=lambda pair: pair[1])
+    return (
+        f"{least:.1f} (of {best:,} states" + "".join(f"; {value:.1f} of {states:,}" for states, value in others) + ")"
+    )
+
+
 def told(ns, overhead, operations) -> list[str]:
     """The ratios in words. overhead: seconds of tmt.simulate and of its loop; operations: of the literal and composite form."""
-    many = max(states for _, _, states, _ in ns)
-    lanes = min(ns[FORWARD, LANES, states, 1] for states in {key[2] for key in ns} - {1})
+    many = sorted({key[2] for key in ns} - {1})
+    lanes = {states: ns[FORWARD, LANES, states, 1] for states in many}
+    best = min(lanes, key=lanes.get)
     sentences = [f"Processor: {machine.vectors()}."]
     if (FORWARD, WHOLE, 1, 1) in ns:
         whole, equal, step = (
@@ -157,12 +166,12 @@ def told(ns, overhead, operations) -> list[str]:
             f"Forward dynamics of the arm: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work {equal:.0f} ns, "
             f"the kernel {one:.1f} ns where each evaluation waits for the last ({less(whole, one)}; than the same work "
             f"{less(equal, one)}), {apart:.1f} ns where they are independent ({less(whole, apart)}; {less(equal, apart)}), in "
-            f"lanes {lanes:.1f} ns a state ({less(whole, lanes)})."
+            f"lanes {told_of(lanes)} ns a state ({less(whole, lanes[best])})."
         )
         kernel = ns[STEP, EACH, 1, 1]
         sentences.append(
             f"A step of RK4: mj_step {step:.0f} ns, the kernel {kernel:.0f} ns ({less(step, kernel)}), in lanes "
-            f"{ns[STEP, LANES, many, 1]:.0f} ns a run."
+            f"{told_of({states: ns[STEP, LANES, states, 1] for states in many})} ns a run."
         )
     else:
         sentences.append(

@@ -3,6 +3,7 @@
 import base64
 import html
 import math
+import re
 from pathlib import Path
 from string import Template
 
@@ -96,7 +97,11 @@ def origins(origin) -> pd.DataFrame:
 
 def page(folder, sections, origin, result, causes=()) -> str:
     """The report as one HTML file with its figures inside."""
-    body = ["<h2>Causes</h2>", html_table(of_causes(causes), "text")] if causes else []
+    body = (
+        ["<h2>Causes (1: an option or a convention, 2: a number)</h2>", html_table(of_causes(causes), "text")]
+        if causes
+        else []
+    )
     body += [
         f"<p>{html.escape(INTRO)}</p>",
         '<h2 id="questions">The assignment\'s questions</h2>',
@@ -106,15 +111,15 @@ def page(folder, sections, origin, result, causes=()) -> str:
         failed = failing(section)
         body += [
             f'<h2 id="{section.name}">{html.escape(section.title)}</h2>',
-            f"<p><em>Claim:</em> {html.escape(section.claim)} <strong>{html.escape(outcome(section))}</strong></p>",
-            f"<p><em>Tolerance:</em> {html.escape(section.bar)}</p>",
+            f"<p><em>Claim:</em> {words(section.claim)} <strong>{html.escape(outcome(section))}</strong></p>",
+            f"<p><em>Tolerance:</em> {words(section.bar)}</p>",
         ]
         if len(failed):
             body += ["<p><strong>Checks that fail:</strong></p>", folded(failed, f"{len(failed)} checks")]
         for name, caption in section.figures:
             data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
             image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
-            body.append(f"<figure>{image}<figcaption>{html.escape(caption)}</figcaption></figure>")
+            body.append(f"<figure>{image}<figcaption>{words(caption)}</figcaption></figure>")
         for name, rows in section.tables.items():
             table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
             body += [f"<h3>{heading(name)}</h3>"] if name != section.name else []
@@ -122,7 +127,7 @@ def page(folder, sections, origin, result, causes=()) -> str:
         checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
         body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:
-            body.append("<ul>" + "".join(f"<li>{html.escape(note)}</li>" for note in section.result.notes) + "</ul>")
+            body.append("<ul>" + "".join(f"<li>{words(note)}</li>" for note in section.result.notes) + "</ul>")
     body += ['<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
     links = [("questions", "questions"), *((s.name, s.name) for s in sections), ("provenance", "provenance")]
     return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
@@ -132,6 +137,11 @@ def page(folder, sections, origin, result, causes=()) -> str:
         contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),
         body="\n".join(body),
     )
+
+
+def words(text) -> str:
+    """A sentence in HTML; what stands between backticks is code."""
+    return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
 
 
 def folded(table, summary) -> str:

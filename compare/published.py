@@ -114,9 +114,13 @@ def shared(item, truth, ours, theirs, scale) -> str:
     """Which printed components of an item that is zero but for rounding are met to every digit, and by whom."""
     told = []
     for engine, values in (("exact arithmetic", truth.astype(float)), ("TMT", ours), ("MuJoCo", theirs)):
-        met = [name for name, v, p in zip(AXES, values, item.values) if abs(v - p) <= LAST_DIGIT]
+        met = [name for name, v, p in zip(AXES, values, item.values) if p and abs(v - p) <= LAST_DIGIT]
         turned = [name for name, v, p in zip(AXES, values, item.values) if p and abs(v + p) <= LAST_DIGIT]
-        told.append(f"{engine} {' and '.join(met) if len(met) < len(AXES) else 'all'}" if met else f"{engine} none")
+        told.append(
+            f"{engine} {' and '.join(met) if len(met) < np.count_nonzero(item.values) else 'all'}"
+            if met
+            else f"{engine} none"
+        )
         if turned:
             told[-1] += f", and {' and '.join(turned)} with the other sign"
     printed, exactly = (", ".join(f"{float(v):.4g}" for v in values) for values in (item.values, truth))

@@ -172,7 +172,8 @@ def pair(result, scene, engine, steps, twin, integrators, mine) -> None:
         result.check(where, "time judged", until, required, "s", rule="at least")
         divergence(result, where, ends, dt, steps, mine.width[:, :n].max(axis=1))
         if scene.torque == "free":
-            movement(result, where, min(motion.farthest(path - scene.start[0]) for path in (mine.q, theirs[0])))
+            before = mine.t < min((end for end in ends.values() if end is not None), default=np.inf)
+            movement(result, where, min(motion.farthest(path[before] - scene.start[0]) for path in (mine.q, theirs[0])))
         if first is None:
             first = theirs
             result.curves[(scene.name, twin, steps)] = {

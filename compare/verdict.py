@@ -59,8 +59,9 @@ def verdict(sections, experiments, causes=()) -> str:
         text = f"The two models do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
         if causes:
             more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
-            further = sum(check.experiment != "parameters" for check in differing)
-            follow = f" {further} further checks fail as a consequence." if further else ""
+            others = sum(check.experiment != "parameters" for check in differing)
+            further = "further " if len(differing) > others else ""
+            follow = f" {others} {further}checks fail as a consequence." if others else ""
             text += f"Cause: {causes[0]['text']}{more}.{follow}"
         else:
             text += f"First: {differing[0]}."

@@ -1,6 +1,7 @@
 """Two further processes: they draw the figures of an experiment while the next one computes, and follow scenes."""
 
 import importlib
+import logging
 import os
 import pickle
 import signal
@@ -105,6 +106,7 @@ def deaf():
 
 def serve(connection) -> None:
     """Answer one call after the other."""
+    logging.getLogger("tmt").setLevel(logging.ERROR)  # what the main process says too
     threading.Thread(target=end_with_parent, daemon=True).start()
     while True:
         try:

@@ -30,6 +30,12 @@ def test_experiment_agrees(experiment, small):
     assert [str(check) for check in result.checks if not check.passed] == []
 
 
+def test_a_run_that_diverges_is_no_movement(small):
+    moved = [check.value for check in small("trajectory").checks if check.quantity == "movement"]
+    ended = [row["diverged_at_s"] for row in small("trajectory").rows]
+    assert any(at is not None for at in ended) and max(moved) < 100.0
+
+
 def test_a_report_of_all_experiments_has_every_figure(small, tmp_path):
     """Every figure of a full run is drawn, and the report is written, in one process."""
     (tmp_path / "figures").mkdir()

@@ -198,7 +198,7 @@ NS = {
 def test_what_an_evaluation_costs_is_told():
     told = " ".join(evaluations.told(NS, (50e-6, 10e-6), (488, 133)))
     for words in ("mj_forward takes 1000 ns", "same work 500 ns", "the kernel 50.0 ns", "(20 times less; than the same work 10",
-                  "25.0 ns where they are independent (40 times less; 20 times less)", "lanes 10.0 ns a state (100 times less)",
+                  "25.0 ns where they are independent (40 times less; 20 times less)", "lanes 10.0 (of 1,000 states) ns a state (100 times less)",
                   "mj_step 4000 ns, the kernel 200 ns (20 times less)", "64 steps takes 50 us, its loop alone 10 us",
                   "literal method has 488 operations, that of the composite form 133"):  # fmt: skip
         assert words in told, words
@@ -281,7 +281,7 @@ def test_an_aim_is_met_at_its_ratio_and_missed_below():
     assert len(missed) == 10 and not any(missed.values())
     assert told[0].startswith("Of 10 aims for speed 0 are met; missed: forward dynamics, each evaluation waits")
     assert "bent, free, 1e-06 rad: MuJoCo's cheapest over tmt's: 50 of 50" in told[0]
-    lanes = "forward dynamics: mj_forward over lanes"
+    lanes = "forward dynamics: mj_forward over lanes of 1,000 states"
     assert [aims(1, n, "AVX2")[0][lanes] for n in (121, 119)] == [True, False]
 
 

@@ -80,7 +80,7 @@ def test_the_notes_on_the_published_numbers_follow_the_numbers(engine):
     )
     digits = np.array(ITEMS["f3"].values)
     told = published.shared(ITEMS["f3"], digits + 1.0, digits, -digits, 1.0)
-    assert "exact arithmetic none; TMT all; MuJoCo beta, and alpha and gamma with the other sign" in told
+    assert "exact arithmetic none; TMT all; MuJoCo none, and alpha and gamma with the other sign" in told
     assert "text's omega_1 is 1.9e+00 rad/s from TMT's" in right[2]
     for off, said in ((0.49e-18, "TMT all"), (0.51e-18, "TMT none")):
         assert said in published.shared(ITEMS["f3"], digits, digits + off, digits, 1.0)

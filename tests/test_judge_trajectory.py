@@ -531,7 +531,7 @@ def test_the_figure_of_drift_says_whose_drift_falls_how():
     name, fig, caption = drawn(result, "drift")
     assert name == "trajectory_drift" and "implicit: TMT 1.00 to 1.00, MuJoCo 2.00 to 2.00" in caption
     assert "implicit at dt = 1/8192 s: TMT 2.0e+00 J, MuJoCo 1.0e+00 J" in caption
-    assert "MuJoCo's drift is 0.1 to 2 times TMT's." in caption
+    assert "MuJoCo's drift over TMT's: 0.1 to 2." in caption
     lines = {line.get_label(): line for line in fig.axes[0].lines}
     assert lines["implicit, TMT"].get_ydata().tolist() == [8.0, 4.0, 2.0]
     assert [line.get_ydata().tolist() for line in fig.axes[0].lines if line.get_marker() == "o"][2] == [16.0, 4.0, 1.0]

@@ -86,7 +86,7 @@ def test_results_say_what_was_found(tmp_path):
     text = verdict.verdict(sections, 1, [CAUSE])
     assert text == (
         "The two models do not agree: 1 of 2 checks fail. Cause: mass of forearm: stated 1. "
-        "1 further checks fail as a consequence."
+        "1 checks fail as a consequence."
     )
     report.write(tmp_path, sections, {"command": "c"}, text, [CAUSE])
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
