@@ -198,7 +198,8 @@ NS = {
 def test_what_an_evaluation_costs_is_told():
     told = " ".join(evaluations.told(NS, (50e-6, 10e-6), (488, 133)))
     for words in ("mj_forward takes 1000 ns", "same work 500 ns", "the kernel 50.0 ns", "(20 times less; than the same work 10",
-                  "25.0 ns where they are independent (40 times less; 20 times less)", "lanes 10.0 (of 1,000 states) ns a state (100 times less)",
+                  "25.0 ns where they are independent (40 times less; 20 times less)",
+                  "lanes 10.0 (of 1,000 states) ns a state (100 times less)",
                   "mj_step 4000 ns, the kernel 200 ns (20 times less)", "64 steps takes 50 us, its loop alone 10 us",
                   "literal method has 488 operations, that of the composite form 133"):  # fmt: skip
         assert words in told, words
