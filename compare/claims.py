@@ -70,9 +70,10 @@ def pushes(at) -> np.ndarray:
     return (measure[3:] / np.linalg.norm(measure[3:])).real @ np.linalg.inv(tmt.mass_matrix(at.q))
 
 
-def ulps(difference, tau) -> list[int]:
-    """A difference of torques counted in units of the last place of the torque."""
-    return [round(float(d / np.spacing(abs(t)))) for d, t in zip(difference, tau)]
+def ulps(difference, tau) -> list[int | None]:
+    """A difference of torques counted in units of the last place of the torque; None if it is no number."""
+    counts = [float(d / np.spacing(abs(t))) for d, t in zip(difference, tau)]
+    return [round(count) if np.isfinite(count) else None for count in counts]
 
 
 def finer_steps(mujoco, counts=STEP_COUNTS) -> list:

@@ -41,6 +41,11 @@ class Engine:
     """
 
     def __init__(self, model, hinges, carriers, source=None, bodies=None, locked=None):
+        self.integrator = (
+            model.opt.integrator
+        )  # of the file; where states are evaluated it must not matter, as discrete does
+        model.opt.integrator = INTEGRATORS["RK4"]
+        model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
         self.model, self.data = model, mujoco.MjData(model)
         self.source, self.locked = source, locked or {}  # what the model was read from; {hinge: rad}, taken out of it
         self.hinges, self.carriers = list(hinges), list(carriers)

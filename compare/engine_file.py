@@ -21,6 +21,8 @@ class ModelError(ValueError):
 
 def load(path=ARM_XML) -> Engine:
     """The Engine for an MJCF file; ModelError if it cannot be read or does not have these hinges."""
+    if Path(path).exists() and not (Path(path).is_file() or Path(path).is_dir()):
+        raise ModelError(f"{path} is no file that can be read again; an MJCF file is expected")
     try:
         text = Path(path).read_text(encoding="utf-8", errors="replace")
     except OSError as error:

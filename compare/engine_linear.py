@@ -11,25 +11,32 @@ NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/
 def transition(engine: Engine, q, tau, dt, integrator) -> np.ndarray:
     """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, (2n, 2n).
 
-    q, tau: (n,) rad, N m. By mjd_transitionFD, central differences of 1e-6; it refuses RK4, whose steps are
+    q, tau: (n,) rad, N m. By mjd_transitionFD, central differences of 1e-6; where it refuses (RK4, delays) steps are
     differenced here.
     """
-    n = len(engine.hinges)
     if integrator == "RK4":
-        ends = []
-        for sign in (1.0, -1.0):
-            start = np.concatenate([q, np.zeros(n)]) + sign * NUDGE * np.eye(2 * n)
-            _, *paths = engine.trajectory(start[:, :n], start[:, n:], tau, dt, 1, integrator)
-            ends.append(np.concatenate([path[:, 1] for path in paths], axis=1))
-        return (ends[0] - ends[1]).T / (2.0 * NUDGE)
+        return differenced(engine, q, tau, dt, integrator)
     model, data = mujoco.MjModel.__copy__(engine.model), mujoco.MjData(engine.model)
     model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
     data.qpos[engine.qpos], data.qvel[engine.dofs], data.qfrc_applied[engine.dofs] = q, 0.0, tau
     size = 2 * model.nv + model.na  # activations come last
     A = np.zeros((size, size))
-    mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
+    try:
+        mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
+    except mujoco.FatalError:
+        return differenced(engine, q, tau, dt, integrator)
     order = np.concatenate([engine.dofs, model.nv + engine.dofs])
     return A[np.ix_(order, order)]
+
+
+def differenced(engine, q, tau, dt, integrator) -> np.ndarray:
+    """The same by central differences of steps."""
+    n, ends = len(engine.hinges), []
+    for sign in (1.0, -1.0):
+        start = np.concatenate([q, np.zeros(n)]) + sign * NUDGE * np.eye(2 * n)
+        _, *paths = engine.trajectory(start[:, :n], start[:, n:], tau, dt, 1, integrator)
+        ends.append(np.concatenate([path[:, 1] for path in paths], axis=1))
+    return (ends[0] - ends[1]).T / (2.0 * NUDGE)
 
 
 def left_to_itself(engine: Engine, q, qd, tau, dt, steps, integrator) -> dict:

@@ -6,6 +6,7 @@ gives wrong inertias up to MuJoCo 3.10) and nothing is printed as XML (which has
 """
 
 import os
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -36,10 +37,12 @@ def locked(engine, angles: dict) -> Engine:
 def locked_model(source, angles: dict) -> mujoco.MjModel:
     """The compiled model without the hinges that are named in `angles`, {name: rad}; every body keeps its number.
 
-    Keyframes go, and so do the actuators, sensors and equalities of a locked hinge. ModelError if more refers to it.
+    Keyframes and sensors go, and so do the actuators and equalities of a locked hinge. ModelError if more refers to it.
     """
     try:
-        return compiled_without(read(source), angles)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the compiler's, of the file as it is
+            return compiled_without(read(source), angles)
     except ValueError as error:
         raise ModelError(f"MuJoCo cannot compile {name_of(source)} with {', '.join(angles)} locked: {error}") from None
 
@@ -49,7 +52,7 @@ def compiled_without(spec, angles) -> mujoco.MjModel:
     spec.compiler.fusestatic = False
     whole = spec.compile()  # anchors, axes and frames as they are after defaults, degrees and nested frames
     bound = [a for a in spec.actuators if a.target in angles]
-    bound += [s for s in spec.sensors if s.objname in angles]
+    bound += list(spec.sensors)  # they measure, and change nothing
     bound += [e for e in spec.equalities if {e.name1, e.name2} & set(angles)]
     for element in (*spec.keys, *bound):  # a keyframe has an angle for every hinge
         spec.delete(element)

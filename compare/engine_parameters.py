@@ -25,6 +25,8 @@ def parameters(engine) -> dict:
     turns = engine._turns(d.ximat)
     return {
         **{name: float(not m.opt.disableflags & bit(members)) for name, members in STATED_FLAGS.items()},
+        **absent(m),
+        "parent": parents(m),
         "order": np.argsort(np.argsort(engine.joints)).astype(float),
         "ref": m.qpos0[engine.qpos],
         "axis": d.xaxis[engine.joints].copy(),
@@ -40,10 +42,48 @@ def parameters(engine) -> dict:
         "gravcomp": m.body_gravcomp[engine.bodies],
         "gravity": m.opt.gravity.copy(),
         "tendon armature": m.tendon_armature.sum(),
-        "other mass": m.body_subtreemass[0] - m.body_mass[engine.bodies].sum(),
+        "other mass": m.body_subtreemass[0] - m.body_mass[sorted(set(engine.bodies))].sum(),
         "density": m.opt.density,
         "viscosity": m.opt.viscosity,
     }
+
+
+def parents(m) -> np.ndarray:
+    """For each hinge, in the order of the file, the place of the hinge that it hangs on, -1: the world; (njnt,)."""
+    found = []
+    for j, body in enumerate(m.jnt_bodyid):
+        place = j - 1 if j and m.jnt_bodyid[j - 1] == body else -1
+        while place < 0 and body:
+            body = m.body_parentid[body]
+            if body and m.body_jntnum[body]:
+                place = m.body_jntadr[body] + m.body_jntnum[body] - 1
+        found.append(float(place))
+    return np.array(found)
+
+
+def absent(m) -> dict:
+    """What the method does not have, and no force at random states need show: sums of what there is of it."""
+    names = {"damping beyond linear": "dof_dampingpoly", "stiffness beyond linear": "jnt_stiffnesspoly",
+             "actuator damping": "actuator_damping", "actuator armature": "actuator_armature"}  # fmt: skip
+    sums = {name: float(np.abs(getattr(m, field, np.zeros(1))).sum()) for name, field in names.items()}
+    stages = int(FLAGS["contact"]) | int(FLAGS["constraint"])
+    return sums | {"contact pairs": 0.0 if m.opt.disableflags & stages else float(contact_pairs(m))}
+
+
+def contact_pairs(m) -> int:
+    """How many pairs of geoms may touch, as MuJoCo chooses them: of two bodies that move against each other."""
+    count, weld = m.npair, m.body_weldid
+    parent_filter = not m.opt.disableflags & bit(("FILTERPARENT",))
+    excluded = {int(signature) for signature in m.exclude_signature}
+    for i in range(m.ngeom):
+        for j in range(i + 1, m.ngeom):
+            one, other = sorted((int(m.geom_bodyid[i]), int(m.geom_bodyid[j])))
+            a, b = weld[one], weld[other]
+            over = [weld[m.body_parentid[w]] for w in (a, b)]
+            related = parent_filter and a and b and (a == over[1] or b == over[0])
+            wanted = m.geom_contype[i] & m.geom_conaffinity[j] or m.geom_contype[j] & m.geom_conaffinity[i]
+            count += bool(a != b and wanted and not related and (one << 16) + other not in excluded)
+    return count
 
 
 def bit(members) -> int:
@@ -59,5 +99,5 @@ def options(engine) -> dict:
     m = engine.model
     flags = {f"flag {name}": "enable" if engine.enabled(name) else "disable" for name in FLAGS if name != "gravity"}
     counts = ("ngeom", "nu", "nsensor", "neq", "ntendon")
-    integrator = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
+    integrator = mujoco.mjtIntegrator(engine.integrator).name.removeprefix("mjINT_")
     return flags | {"integrator": integrator} | {name: str(getattr(m, name)) for name in counts}

@@ -19,24 +19,29 @@ BAR = (
     "principal axes and back costs a few roundings; MuJoCo 3.10 turns a fullinertia only to about 1e-8). What must be "
     "absent must be exactly 0. The model is read in the file's own configuration, so that a `ref` is seen as that alone."
 )
+NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
+FLAGS = ("flag gravity", "flag damper", "flag eulerdamp")
 OF_ALL = (
-    "flag gravity",
-    "flag damper",
-    "flag eulerdamp",
+    *FLAGS,
     "gravity",
     "density",
     "viscosity",
     "other mass",
     "tendon armature",
-)
-UNITS = {
-    "flag gravity": "", "flag damper": "", "flag eulerdamp": "", "order": "", "ref": "rad", "axis": "", "anchor": "m",
-    "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad", "limited": "", "mass": "kg",
-    "com": "m", "inertia": "kg m2", "gravcomp": "", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
-    "other mass": "kg", "tendon armature": "kg m2",
+    *NOT_HAD,
+)  # numbers of the whole file
+UNITS = dict.fromkeys((*FLAGS, "order", "parent", "axis", "limited", "gravcomp", *NOT_HAD), "") | {
+    "ref": "rad", "anchor": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad",
+    "mass": "kg", "com": "m", "inertia": "kg m2", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
+    "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
-WHOLE = ("flag gravity", "flag damper", "flag eulerdamp", "order", "limited")  # that are so or not, or a place
-OPTIONS = ("flag gravity", "flag damper", "flag eulerdamp", "order", "ref", "density", "viscosity")  # causes of rank 1
+WHOLE = (*FLAGS, "order", "parent", "limited", "contact pairs")  # that are so or not, a place, or a count
+OPTIONS = (*FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
+EXPLAINED = {  # forces, by the quantities that say why they act
+    "springs, fluid and tendons": ("stiffness", "density", "viscosity", "gravcomp", *NOT_HAD[1:4]),
+    "actuators": (),
+    "constraints and contacts": ("limited", "frictionloss", "contact pairs"),
+}
 
 
 def stated(model=tmt.ARM) -> dict:
@@ -46,13 +51,14 @@ def stated(model=tmt.ARM) -> dict:
     for parent, offset in zip(model.parent, model.offset):
         anchors.append(np.array(offset) + (anchors[parent] if parent >= 0 else 0.0))
     absent = {"ref": n, "armature": n, "frictionloss": n, "stiffness": n, "limited": n, "gravcomp": m}
-    absent |= dict.fromkeys(("density", "viscosity", "other mass", "tendon armature"), 1)
+    absent |= dict.fromkeys(("density", "viscosity", "other mass", "tendon armature", *NOT_HAD), 1)
     return {name: np.zeros(count) for name, count in absent.items()} | {
-        **dict.fromkeys(("flag gravity", "flag damper", "flag eulerdamp"), 1.0),
+        **dict.fromkeys(FLAGS, 1.0),
         "axis": model.axis,
         "anchor": anchors,
         "damping": model.damping,
         "order": range(n),
+        "parent": model.parent,
         "mass": model.mass,
         "com": model.com,
         "inertia": model.inertia,
@@ -83,11 +89,11 @@ def rows(setup) -> Result:
     for source, force in setup.engine.other_forces(sample.q, sample.qd).items():
         most = float(np.abs(force).max())
         check = result.check(sample.name, f"no forces of {source}", most, 0.0, "N m")
-        if not check.passed and not causes:  # nothing read back explains them: they are all there is to say
-            text = f"forces of {source}: none stated, up to {most:.3g} N m found"
-            causes.append(
-                {"rank": 2, "place": f"forces of {source}", "stated": 0.0, "found": most, "text": text, "size": np.inf}
-            )
+        if not check.passed and not any(cause["quantity"] in EXPLAINED[source] for cause in causes):
+            place = f"forces of {source}"
+            text = f"{place}: none stated, up to {most:.3g} N m found"
+            about = {"rank": 2, "place": place, "stated": 0.0, "found": most, "text": text}
+            causes.append(about | {"size": np.inf, "quantity": place})
     for option, value in options(setup.engine).items():
         result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
     result.curves["com"] = compiled["com"]
@@ -108,19 +114,25 @@ def named(owner, quantity, stated, found, off, tolerance) -> list[dict]:
         if not difference <= tolerance:
             place = " ".join(filter(None, (quantity, component(k, len(stated))))) + of
             share = difference / tolerance if tolerance else np.inf
-            causes.append(cause(rank, place, a, b, UNITS[quantity], share, " (the opposite sign)" * flipped))
+            causes.append(cause(rank, quantity, place, a, b, share, " (the opposite sign)" * flipped))
     return causes
 
 
-def cause(rank, place, stated, found, unit, size, remark="") -> dict:
+def cause(rank, quantity, place, stated, found, size, remark="") -> dict:
     """A cause with its sentence; size: its difference over its tolerance."""
-    if place.startswith("flag "):
-        text = f"{place}: stated {'enable' if stated else 'disable'}, compiled {'enable' if found else 'disable'}"
+    unit = UNITS[quantity]
+    if quantity.startswith("flag "):
+        values = ["enable" if number else "disable" for number in (stated, found)]
+    elif quantity == "parent":
+        values = [("the world", *tmt.ARM.hinge_names)[int(number) + 1] for number in (stated, found)]
     else:
-        values = (f"{number:.7g} {unit}".rstrip() for number in (stated, found))
-        text = "{}: stated {}, compiled {}".format(place, *values) + remark
+        values = [f"{number:.7g} {unit}".rstrip() for number in (stated, found)]
+        if values[0] == values[1]:
+            values = [f"{float(number)!r} {unit}".rstrip() for number in (stated, found)]
+    text = "{}: stated {}, compiled {}".format(place, *values) + remark
     found = float(found) if np.isfinite(found) else None
-    return {"rank": rank, "place": place, "stated": float(stated), "found": found, "text": text, "size": float(size)}
+    about = {"rank": rank, "place": place, "stated": float(stated), "found": found, "text": text}
+    return about | {"size": float(size), "quantity": quantity}
 
 
 def component(k, count) -> str:

@@ -88,7 +88,8 @@ def test_results_say_what_was_found(tmp_path):
         "The two models do not agree: 1 of 2 checks fail. Cause: mass of forearm: stated 1. "
         "1 checks fail as a consequence."
     )
-    report.write(tmp_path, sections, {"command": "c"}, text, [CAUSE])
+    second = CAUSE | {"text": "com x of forearm: stated 3"}
+    report.write(tmp_path, sections, {"command": "c"}, text, [CAUSE, second])
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert set(results) == {"passed", "checks", "causes", "skipped", "provenance"}
     assert results["passed"] is False and results["skipped"] == []
@@ -96,13 +97,15 @@ def test_results_say_what_was_found(tmp_path):
     assert set(results["checks"][0]) == {
         "experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note",
     }  # fmt: skip
-    assert results["causes"] == [{name: CAUSE[name] for name in ("rank", "place", "stated", "found", "text")}]
+    fields = ("rank", "place", "stated", "found", "text")
+    assert results["causes"] == [{name: cause[name] for name in fields} for cause in (CAUSE, second)]
     table = pd.read_csv(tmp_path / "tables" / "mass.csv")
     assert table.to_dict("records") == [{"a": 1.25, "engine": "tmt", "ok": True}]
     assert pd.read_csv(tmp_path / "tables" / "extra.csv")["b"][0] == pytest.approx(1 / 3, rel=1e-15)
     for name in ("report.md", "index.html"):
         text = (tmp_path / name).read_text(encoding="utf-8")
-        assert "mass of forearm: stated 1" in text and "Checks that fail" in text and "must" not in text
+        assert "mass of forearm: stated 1" in text and "com x of forearm: stated 3" in text
+        assert "Checks that fail" in text and "must" not in text
     assert len(page.failing(sections[0])) == 1
 
 
@@ -124,6 +127,27 @@ def test_a_row_without_a_number_is_a_run_that_diverged():
     rows = [{"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": d} for d in (1e-16, None)]
     answers = verdict.answers([section("mass", rows=rows)]).set_index("part")["answer"]
     assert answers["e"] == "diverged; not run"
+
+
+def test_each_section_says_what_became_of_its_own_claim(tmp_path):
+    (tmp_path / "figures").mkdir()
+    report.write(tmp_path, [section("mass", GOOD), section("gravity", BAD)], {"command": "c"}, "words")
+    for name in ("report.md", "index.html"):
+        first, second = (tmp_path / name).read_text(encoding="utf-8").split("Gravity")[-2:]
+        assert "It holds: all 1 checks pass." in first and "It does not hold: 1 of 1 checks fail." in second
+
+
+def test_a_run_that_diverged_is_a_disagreement_and_what_cannot_be_locked_is_none():
+    diverged = section("trajectory", ("open loop", None, 1.0, "at most", True))
+    assert verdict.verdict([diverged], 1).startswith("The two models do not agree: 1 of 1 checks fail.")
+    tied = section("reduction", (verdict.LOCKABLE, 0.0, 1.0, "equal", False))
+    assert verdict.verdict([tied], 1).startswith("Not everything could be compared")
+
+
+def test_the_answer_on_motion_names_the_true_errors_of_held_and_of_free_scenes(small):
+    answer = verdict.answers([Section("trajectory", "", "", "", small("trajectory"))]).set_index("part")["answer"]["i"]
+    for scene in ("ball catch, held: ", "bent, held: ", "zero, free: 1.6 and 1.6", "bent, free: 0.27 and 0.27"):
+        assert scene in answer
 
 
 def test_what_to_use_gives_each_engine_its_own_time():
@@ -167,6 +191,15 @@ def causes(old, new):
 
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge" axis="' for name in ("alpha", "beta", "gamma"))
 NAMED = {
+    "armature of the first": (f"{ALPHA}0", f'{ALPHA}0'.replace("type", 'armature="0.1" type'),
+                              [(2, "armature of alpha: stated 0 kg m2, compiled 0.1 kg m2")]),
+    "two numbers": (XML, XML.replace('mass="1.5"', 'mass="1.501"').replace("-9.81", "-9.8"),
+                    [(2, "gravity z: stated -9.81 m/s2, compiled -9.8 m/s2"),
+                     (2, "mass of forearm: stated 1.5 kg, compiled 1.501 kg")]),
+    "last digits": ('mass="1.5"', 'mass="1.50000000001"', [(2, "mass of forearm: stated 1.5 kg, compiled 1.50000000001 kg")]),
+    "forearm on the world": (XML, XML.replace('<body name="fore', '</body><body name="fore')
+                             .replace("</body>\n    </body>", "</body>"),
+                             [(1, "parent of gamma: stated beta, compiled the world")]),
     "nothing": ("</mujoco>", "</mujoco>", []),
     "com": ('pos="0.15 0 0"', 'pos="0.151 0 0"', [(2, "com x of forearm: stated 0.15 m, compiled 0.151 m")]),
     "ref": (GAMMA, GAMMA.replace("type", 'ref="0.5" type'), [(1, "ref of gamma: stated 0 rad, compiled 0.5 rad")]),
@@ -196,6 +229,27 @@ def test_a_servo_is_named_by_its_force():
     servo = '<actuator><position joint="beta" kp="3"/></actuator></mujoco>'
     ((rank, text),) = causes("</mujoco>", servo)
     assert rank == 2 and text.startswith("forces of actuators: none stated, up to ")
+
+
+def test_a_force_that_no_number_explains_is_named_beside_a_number():
+    both = XML.replace('mass="1.5"', 'mass="1.501"')
+    both = both.replace("</mujoco>", '<actuator><position joint="beta" kp="3"/></actuator></mujoco>')
+    found = parameters.rows(Setup(parse(both), states=20)).curves["causes"]
+    assert {cause["place"] for cause in found} == {"forces of actuators", "mass of forearm"}
+
+
+def test_geoms_that_can_touch_are_named_though_they_do_not():
+    """Two spheres that meet nowhere at the states that are compared; excluded, or without the contact stage, they cannot."""
+    sphere = '<geom size="0.001" pos="0.2 0.2 0.2"/>'
+    text = XML.replace("</worldbody>", f"{sphere}</worldbody>").replace(
+        '<inertial pos="0.15', f'{sphere}<inertial pos="0.15'
+    )
+    for flags, places in (("", ["contact pairs"]), ('contact="disable"', []), ('constraint="disable"', [])):
+        edited = text.replace('contact="disable" constraint="disable"', flags)
+        assert [c["place"] for c in parameters.rows(Setup(parse(edited), states=20)).curves["causes"]] == places
+    apart = text.replace('contact="disable" constraint="disable"', "").replace(
+        "</mujoco>", '<contact><exclude body1="world" body2="forearm"/></contact></mujoco>')  # fmt: skip
+    assert parameters.rows(Setup(parse(apart), states=20)).curves["causes"] == []
 
 
 def test_causes_come_by_rank_then_by_size():
