@@ -132,6 +132,21 @@ def test_a_read_only_folder_gets_status_2(tmp_path, capsys):
     assert "Permission denied" in capsys.readouterr().err
 
 
+def test_every_cause_is_in_the_results(tmp_path, capsys):
+    model = tmp_path / "two.xml"
+    model.write_text(ARM_XML.read_text().replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
+    assert main(["gravity", "--quick", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 1
+    results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    assert [cause["place"] for cause in results["causes"]] == ["mass of forearm", "gravity z"]
+    assert "  CAUSE gravity z: stated -9.81 m/s2, compiled -9.8 m/s2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("quick, states", [([], 10_000), (["--quick"], 1000)])
+def test_a_full_run_takes_more_states(tmp_path, quick, states):
+    assert main(["gravity", *quick, "--out", str(tmp_path)]) == 0
+    assert pd.read_csv(tmp_path / "tables" / "gravity.csv")["states"].max() == states
+
+
 def test_help_has_examples(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["--help"])

@@ -265,3 +265,10 @@ def test_what_is_kept_for_the_figures_is_whose_it_says():
     heavy = parse(ARM_XML.read_text().replace('mass="1.5"', 'mass="2.5"'))
     worst = mass.rows(Setup.small(heavy)).curves["worst"]
     assert worst["TMT"][0] == pytest.approx(126.83, abs=0.01) and worst["MuJoCo"][0] > 190.0
+
+
+def test_f4_is_asked_under_the_torque_of_c(small):
+    rows = [row for row in small("published").rows if row["item"] == "f4"]
+    for engine in ("tmt", "mujoco", "exact"):
+        assert max(abs(float(row[engine])) for row in rows) < 1e-12
+    assert max(abs(float(row["tmt"])) for row in small("published").rows if row["item"] == "f1") > 40.0

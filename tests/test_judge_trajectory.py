@@ -2,17 +2,20 @@
 
 import dataclasses
 
+import mpmath
 import numpy as np
 import pytest
 from judged import verdicts
 
 import tmt
 from compare import band as band_of_rounding
-from compare import drift, horizon, leaving, motion, told, trajectory
-from compare.agreement import Result
+from compare import drift, horizon, leaving, motion, reduction, told, trajectory
+from compare.agreement import Result, Setup
 from compare.band import band, step_rounding
+from compare.engine import Engine
+from compare.engine_file import load
 from compare.scenes import SCENES, Scene
-from tmt.methods import METHODS, amplification
+from tmt.methods import METHODS, amplification, one_step
 
 EPS = 2.0**-52
 BY_NAME = {scene.name: scene for scene in SCENES}
@@ -560,3 +563,61 @@ def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():
     grown = band_of_rounding.growth(METHODS["rk4"], tmt.ARM, path, 0.0 * path, tau, dt, every=16)
     expected = [np.log10(np.linalg.norm(np.linalg.matrix_power(J, k), 2)) for k in range(0, steps + 1, 16)]
     assert grown == pytest.approx(expected, abs=1e-6) and grown[-1] > 2.0
+
+
+def test_many_digits_are_many():
+    """The same two steps with 80 digits; 50 are those of the run."""
+    scene = next(scene for scene in SCENES if scene.name == "bent, free")
+    found = horizon.exact_run(scene, "rk4", 2, scene.dt)[-1]
+    with mpmath.workdps(80):
+        q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (*scene.start, scene.tau))
+        for _ in range(2):
+            q, qd = one_step(METHODS["rk4"], scene.model, q, qd, tau, mpmath.mpf(scene.dt))
+        assert max(abs(a - b) for a, b in zip(found, q)) < mpmath.mpf(10) ** -46
+
+
+class Different(Engine):
+    """An engine of which one integrator gives other bits, and whose smaller model has damping."""
+
+    def trajectory(self, *arguments):
+        t, q, qd = super().trajectory(*arguments)
+        return t, q + 1e-15 * (arguments[-1] == "implicitfast"), qd
+
+    def variant(self, *changes, **named):
+        other = super().variant(*changes, **named)
+        other.__class__ = Different
+        return other
+
+    def lock(self, angles):
+        return super().lock(angles).variant(damping=0.1) if angles else self
+
+
+@pytest.fixture
+def different():
+    engine = load()
+    engine.__class__ = Different
+    return engine
+
+
+def test_an_integrator_of_other_bits_is_seen(different):
+    scene = next(scene for scene in SCENES if scene.name == "bent, free")
+    checks = trajectory.follow(scene, different, (64,)).checks
+    failed = [check.scene for check in checks if "same bits" in check.quantity and not check.passed]
+    assert failed == ["bent, free, implicitfast, dt = 5/64 s"]
+
+
+def test_a_smaller_model_of_one_engine_that_is_wrong_is_seen(different):
+    failed = [c for c in reduction.rows(Setup.small(different), timed=False).checks if not c.passed]
+    where = {check.scene for check in failed if check.quantity == "smallest model to whole"}
+    assert "zero, free, MuJoCo, RK4, dt = 5/1024 s" in where and not any("TMT" in scene for scene in where)
+
+
+def test_a_run_is_no_number_from_the_step_at_which_its_clock_stands():
+    engine = load()
+    states = np.ones((1, 4, 7))
+    states[0, :, 0] = [0.1, 0.2, 0.2, 0.3]
+    start = np.zeros((1, 7))
+    q = engine.path(start, states.copy(), 0.1)[1]
+    assert np.isfinite(q[0]).all(axis=1).tolist() == [True, True, True, False, False]
+    states[0, 1, 5] = np.inf
+    assert np.isfinite(engine.path(start, states, 0.1)[2][0]).all(axis=1).tolist() == [True, True, False, False, False]

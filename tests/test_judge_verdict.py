@@ -193,6 +193,9 @@ ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge" axis="' for name in ("
 NAMED = {
     "armature of the first": (f"{ALPHA}0", f'{ALPHA}0'.replace("type", 'armature="0.1" type'),
                               [(2, "armature of alpha: stated 0 kg m2, compiled 0.1 kg m2")]),
+    "anchor along its own axis": (BETA, BETA.replace("type", 'pos="0.01 0 0" type'),
+                                  [(2, "anchor x of beta: stated 0 m, compiled 0.01 m"),
+                                   (2, "com x of upper arm: stated 0 m, compiled -0.01 m")]),
     "two numbers": (XML, XML.replace('mass="1.5"', 'mass="1.501"').replace("-9.81", "-9.8"),
                     [(2, "gravity z: stated -9.81 m/s2, compiled -9.8 m/s2"),
                      (2, "mass of forearm: stated 1.5 kg, compiled 1.501 kg")]),

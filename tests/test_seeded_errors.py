@@ -26,7 +26,9 @@ IN_THE_MJCF = {
     "standard gravity": ("0 0 -9.81", "0 0 -9.80665", ["parameters gravity", "gravity holding torque"]),
     "hinge order": (f"{ALPHA}\n      {BETA}", f"{BETA}\n      {ALPHA}", ["parameters order", "kinematics x_b"]),
     "armature left in": (GAMMA, GAMMA.replace("/>", ' armature="0.01"/>'), ["parameters armature", "mass Mbar"]),
-    "damping left in": (BETA, BETA.replace("/>", ' damping="0.1"/>'), ["parameters damping", "acceleration qdd"]),
+    "damping left in": (
+        BETA, BETA.replace("/>", ' damping="0.1"/>'), ["parameters damping", "acceleration qdd", "trajectory dh/dqd"],
+    ),
     "spring left in": (BETA, BETA.replace("/>", ' stiffness="1"/>'), ["parameters stiffness", "trajectory open loop"]),
     "beta axis flipped": (BETA, BETA.replace('"1 0 0"', '"-1 0 0"'), ["parameters axis", "kinematics x_b", "kinematics B_b"]),
     "gamma axis tilted": (GAMMA, GAMMA.replace('"0 1 0"', '"0 1 0.001"'), ["parameters axis", "kinematics T_b"]),
