@@ -109,7 +109,7 @@ def run(options, command) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
     from .engine_file import ARM_XML, ModelError, load
-    from .folder import FolderError, new_report
+    from .folder import FolderError, made_by, new_report
     from .terminal import Terminal
     from .workers import WorkerEnded, start_workers  # imports are here, so that --help and a wrong word answer at once
 
@@ -118,6 +118,7 @@ def run(options, command) -> int:
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
         engine = load(path)
+        before = made_by(options.out)
         with new_report(options.out) as folder:
             with start_workers() as workers, terminal.progress("imports"):
                 from . import report, verdict
@@ -134,7 +135,8 @@ def run(options, command) -> int:
         raise Refused(error) from None
     terminal.say()
     terminal.say(words, "bold green" if verdict.passed(sections) else "bold red")
-    terminal.say(f"Report: {os.path.join(options.out, 'index.html')} ({time.perf_counter() - started:.1f} s)")
+    place = f" in place of that of `{before}`" if before not in (None, origin["command"]) else ""
+    terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
     return 0 if verdict.passed(sections) else 1
 
 

@@ -234,3 +234,11 @@ def refuse_foreign(out) -> None:
         raise FolderError(
             f"{out} has {foreign[0]}, which is not of an earlier report and would be replaced; another folder is expected"
         )
+
+
+def made_by(out) -> str | None:
+    """The command that made the report in a folder; None if there is none."""
+    try:
+        return str(json.loads((Path(out) / "results.json").read_text(encoding="utf-8"))["provenance"]["command"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

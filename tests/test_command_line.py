@@ -141,10 +141,14 @@ def test_every_cause_is_in_the_results(tmp_path, capsys):
     assert "  CAUSE gravity z: stated -9.81 m/s2, compiled -9.8 m/s2" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("quick, states", [([], 10_000), (["--quick"], 1000)])
-def test_a_full_run_takes_more_states(tmp_path, quick, states):
-    assert main(["gravity", *quick, "--out", str(tmp_path)]) == 0
-    assert pd.read_csv(tmp_path / "tables" / "gravity.csv")["states"].max() == states
+def test_a_full_run_takes_more_states_and_a_report_says_whose_place_it_takes(tmp_path, capsys):
+    for quick, states, said in (
+        (["--quick"], 1000, ""),
+        ([], 10_000, " in place of that of `python -m compare gravity"),
+    ):
+        assert main(["gravity", *quick, "--out", str(tmp_path)]) == 0
+        assert pd.read_csv(tmp_path / "tables" / "gravity.csv")["states"].max() == states
+        assert f"index.html{said}" in " ".join(capsys.readouterr().out.split())
 
 
 def test_help_has_examples(capsys):

@@ -7,7 +7,8 @@ from matplotlib.colors import to_hex
 from compare import cost, draw_reduction, engine_cost, known_motion, reduction, sub_blocks
 from compare.agreement import EPS, Result, Setup
 from compare.engine_file import ARM_XML, parse
-from compare.scenes import HINGES, SCENES
+from compare.scenes import HINGES, SCENES, Scene
+from compare.smallest import needed
 
 GREEN, ORANGE, BLUE = "#009e73", "#e69f00", "#0072b2"
 FLOOR = engine_cost.CONTACT
@@ -214,3 +215,9 @@ def test_a_model_whose_hinges_cannot_be_locked_is_a_failed_check():
     text = ARM_XML.read_text(encoding="utf-8").replace("</mujoco>", tendon)
     (failed,) = [check for check in reduction.rows(Setup.small(parse(text)), timed=False).checks if not check.passed]
     assert failed.quantity == "models whose hinges can be locked" and failed.value == 0 and failed.note
+
+
+def test_a_small_acceleration_is_one():
+    """A torque of a thousandth moves the hanging arm by 1e-2 rad/s2: every hinge is needed, and of none it is undecided."""
+    need = needed(Scene("a light push", "hanging", (1e-3, 1e-3, 1e-3)))
+    assert set(need.moves) == set(HINGES) and need.stays == need.undecided == ()
