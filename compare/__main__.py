@@ -213,7 +213,7 @@ def tell(terminal, section, seconds, causes) -> None:
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
     used = [check.over_bar for check in checks if check.over_bar is not None]
-    most = f"uses {max(used):.2g} of a tolerance" if used and not failed else ""
+    most = f"uses {max(used):.2g} of a tolerance" if any(used) and not failed else ""
     word = f"{len(failed)} FAILED" if failed else "ok"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 from compare import page, parameters, report, verdict
+from compare.__main__ import tell
 from compare.agreement import Result, Setup
 from compare.engine_file import ARM_XML, parse
 from compare.verdict import Section
@@ -43,6 +44,29 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
     text = verdict.verdict(sections, 10)
     assert text.startswith("The two models agree in mass, gravity (2 of 10 experiments): all 3 checks pass.")
     assert "is 0.5 kg m2, 50 % of it (gravity: torque, zero)" in text
+
+
+class Lines(list):
+    """A terminal that keeps what is said."""
+
+    def say(self, text, style=""):
+        self.append(text)
+
+
+def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
+    said = Lines()
+    tell(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
+    assert said == ["mass          ok           2 checks  uses 0.5 of a tolerance      1.2 s"]
+    said.clear()
+    tell(
+        said,
+        section("mass", *[BAD] * 7, ("b", 0.5, 1.0, "at most", True)),
+        1.0,
+        [{"text": "mass of forearm: stated 1"}],
+    )
+    assert said[0].split() == ["mass", "7", "FAILED", "8", "checks", "1.0", "s"]
+    assert said[1] == "  CAUSE mass of forearm: stated 1" and said[-1] == "  and 3 more: in the report"
+    assert said[2:-1] == ["  FAIL mass: Mbar, zero: 2 kg m2, must be at most 1 kg m2"] * 4
 
 
 def test_what_broke_off_fails_and_is_no_disagreement():
