@@ -216,7 +216,7 @@ def _check_inertia(name, inertia):
     if np.abs(inertia - inertia.T).max() > 1e-12 * scale:
         raise ValueError(f"the inertia of {name!r} is not symmetric: {inertia.tolist()}")
     a, b, c = np.linalg.eigvalsh(inertia)
-    if a < -1e-12 * scale or a + b < c - 1e-12 * scale:
+    if a + b < c - 1e-12 * scale:  # as b is at most c, this finds an a below 0 too
         raise ValueError(
             f"the inertia of {name!r} has principal values {a:g}, {b:g}, {c:g}; "
             "each must be at least 0 and none larger than the other two together"

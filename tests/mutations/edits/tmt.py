@@ -4,7 +4,6 @@ from ..edit import Edit
 
 EDITS = (
     Edit("tree", "_check_inertia", "np.abs(inertia - inertia.T).max() > _1", "False", "an inertia need not be symmetric"),
-    Edit("tree", "_check_inertia", "a < _1", "False", "a principal inertia may be negative"),
     Edit("tree", "_check_inertia", "a + b < _1", "False", "one principal inertia may be larger than the other two"),
     Edit("tree", "_numbers", "not np.isfinite(array).all()", "False", "a number of a Tree may be infinite"),
     Edit("given", "states", "not np.isfinite(array).all()", "False", "a state may be infinite"),
