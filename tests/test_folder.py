@@ -5,6 +5,7 @@ import resource
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
@@ -213,26 +214,28 @@ def test_what_stands_in_a_folders_place_is_said(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "link"]
 
 
-@pytest.fixture
+@contextmanager
 def little_space():
-    """No file may be longer than 1000 bytes: to the program as a disk that is full."""
+    """No file may be longer than 1000 bytes in this block, what the tests print included: as on a disk that is full."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path, little_space):
-    with pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
+def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path):
+    with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
         save(work / "results.json", "x" * 5000)
     expected = f"cannot write {tmp_path / 'out' / 'results.json'}: File too large; a report that was there is unchanged"
     assert str(error.value) == expected
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_while_a_figure_is_drawn_is_no_failed_check(tmp_path, little_space, monkeypatch):
+def test_a_full_disk_while_a_figure_is_drawn_is_no_failed_check(tmp_path, monkeypatch):
     module = SimpleNamespace(figures=lambda result: iter([("plot", Figure(), "")]))
     monkeypatch.setitem(sys.modules, "compare.plain", module)
-    with pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
+    with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
         draw("plain", None, work)
     assert f"cannot write {tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value)

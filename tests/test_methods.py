@@ -13,6 +13,7 @@ from compare.band import band
 from tmt import dop853, kernels
 from tmt.implicit import ImplicitRungeKutta
 from tmt.methods import METHODS, AdaptiveRungeKutta, RungeKutta, amplification, one_step
+from tmt.simulation import singular_in
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
@@ -284,3 +285,12 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
     )
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
     assert np.array_equal(dop853.ERROR_5, DOP853.E5[:-1]) and np.array_equal(dop853.ERROR_3, DOP853.E3[:-1])
+
+
+def test_the_last_state_of_a_run_is_looked_at():
+    """The rates change most at the start, and the last state is the one at which Mbar is singular."""
+    q, qd = np.array([[0.5, 1.0, 1.0], [0.5, 0.5, 1.0], [0.5, 0.0, 1.0]]), np.zeros((3, 3))
+    qd[1:] = 1.0
+    place, why = singular_in(wrist(), q, qd)
+    assert place == 2 and why.startswith("Mbar is singular: hinges 'a', 'c' turn")
+    assert singular_in(wrist(), q[:2], qd[:2]) is None
