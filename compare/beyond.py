@@ -114,7 +114,7 @@ def tell_above(rows) -> str:
             f"at {dt:.4g} s "
             + f"{lost} of {len(mine)} runs diverge" * bool(lost)
             + " and " * bool(lost and away)
-            + (f"{len(away)} stay within {max(away):.3f} rad" if away else "")
+            + (f"{len(away)} of {len(mine)} runs stay within {max(away):.3f} rad" if away else "")
         )
     return f"Above it, {'; '.join(told)}." if told else "No step above it was taken."
 
