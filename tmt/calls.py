@@ -17,6 +17,13 @@ from .tree import shown
 NOBODY = np.zeros(0, np.int8)  # asks why a run ended
 
 
+def refused() -> tuple:
+    """What compiled code raises for arguments that it cannot take: older versions of numba have an error of their own."""
+    from numba.core.errors import NumbaError  # here, so that `import tmt` need not wait for numba
+
+    return TypeError, NumbaError
+
+
 class Evaluator(NamedTuple):
     """Compiled evaluations of one quantity of a Tree, see kernels.evaluator."""
 
@@ -38,7 +45,7 @@ def checked_run(compiled, n, adaptive) -> Callable:
             dt = real("dt", dt)
         try:
             return compiled(q, qd, tau, dt, ended)
-        except TypeError as error:
+        except refused() as error:
             raise refusal(error, shapes, q, qd, tau, ended) from None
 
     def run_adaptive(q, qd, tau, dt, tolerance, ended=NOBODY):
@@ -47,7 +54,7 @@ def checked_run(compiled, n, adaptive) -> Callable:
         dt, tolerance = real("dt", dt), real("tolerance", tolerance)
         try:
             return compiled(q, qd, tau, dt, tolerance, ended)
-        except TypeError as error:
+        except refused() as error:
             raise refusal(error, shapes, q, qd, tau, ended) from None
 
     return run_adaptive if adaptive else run
@@ -67,7 +74,7 @@ def checked_evaluator(module, n, m) -> Evaluator:
                 q, qd, tau, out = plain(shapes, q, qd, tau, out)
             try:
                 compiled(q, qd, tau, out)
-            except TypeError as error:
+            except refused() as error:
                 raise refusal(error, shapes, q, qd, tau, out) from None
 
         evaluate.__doc__ = compiled.__doc__
@@ -77,7 +84,7 @@ def checked_evaluator(module, n, m) -> Evaluator:
         q, qd, tau = plain(ends, q, qd, tau)
         try:
             return compiled_chain(q, qd, tau, operator.index(count))
-        except (TypeError, OverflowError) as error:
+        except (*refused(), OverflowError) as error:
             if not isinstance(count, (int, np.integer)) or isinstance(error, OverflowError):
                 raise ValueError(f"count is {shown(count)}; a whole number below 2^63 is expected") from None
             raise refusal(error, ends, q, qd, tau) from None
@@ -87,7 +94,7 @@ def checked_evaluator(module, n, m) -> Evaluator:
             y, tau = plain(halves, y, tau)
         try:
             return compiled_rate(y, tau)
-        except TypeError as error:
+        except refused() as error:
             raise refusal(error, halves, y, tau) from None
 
     each, lanes = of_many(module.each, rows), of_many(module.lanes, columns)
