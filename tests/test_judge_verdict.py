@@ -198,8 +198,8 @@ def test_the_page_is_red_if_a_check_fails_and_tables_are_whole(tmp_path):
         assert colour in html and html.count("<td>0.123</td>") == 3
         assert ("Checks that fail" in html) == (len(checks) == 2)
     report.write(tmp_path, [section("mass", GOOD, rows=rows)], {"command": "c"}, "words")
-    table = pd.read_csv(tmp_path / "tables" / "mass.csv", float_precision="round_trip")
-    assert table["a"].tolist() == [rows[0]["a"]] * 3 and table["b"].tolist() == [0, 1, 2]
+    lines = (tmp_path / "tables" / "mass.csv").read_text(encoding="utf-8").split()
+    assert lines == ["a,b", *(f"{row['a']!r},{row['b']}" for row in rows)]
 
 
 # where a model differs, the number is named
