@@ -1,4 +1,4 @@
-"""Two parties held against each other: states, scales, bars, checks.
+"""Two engines compared: checks and their rules, the states of a run, scales of tolerances.
 
 A difference is judged against 64 x eps x scale. The scale of a quantity is the sum of the absolute
 values of the terms that are added up in it, times the condition number of Mbar where a linear system is
@@ -95,7 +95,7 @@ class Result:
         return self.checks[-1]
 
     def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, truth=None) -> None:
-        """A row and a check: the worst difference of two parties over the states, the closest to its bar.
+        """A row and a check: the worst difference of both engines over the states, the closest to its tolerance.
 
         tmt_values, mujoco_values: (states, ...); scale: a number or (states,); truth: the name of a field of
         tmt.reference.Truth, for one more check of each engine: its distance from the exact value, 64 eps x scale too.

@@ -1,8 +1,9 @@
 """The output folder: a new report takes the place of the old one only when it is complete, whatever ends the run.
 
-While a run lasts, its files are in OUT/.new-XXXXXXXX, and it holds a lock on that folder; one that nobody holds is of a run that
-was killed. In it the report is made in `new`. The exchange moves the old report to `old`, renames `new` to `moving`, moves that
-report out, and renames `moving` to `done`: what is on disk says at every moment how to put the old report back.
+While a run lasts, its files are in a folder `.new-` and eight letters inside the output folder, and it holds a lock on that
+folder; one that nobody holds is of a run that was killed. In it the report is made in `new`. The exchange moves the old report to
+`old`, renames `new` to `moving`, moves that report out, and renames `moving` to `done`: what is on disk says at every moment how
+to put the old report back.
 """
 
 import json
