@@ -180,7 +180,7 @@ def find_causes(setup) -> list:
 
 def attempt(name, act, setup) -> tuple:
     """What an experiment's function returns, and None; if it raises, None and a Result with one failed check."""
-    from .agreement import Result
+    from .agreement import ENDS, Result
     from .workers import WorkerEnded
 
     try:
@@ -189,12 +189,13 @@ def attempt(name, act, setup) -> tuple:
         raise
     except Exception as error:
         result = Result(name, shown=[])
-        result.check("", "runs to its end", None, 0.0, "", described(error), rule="equal")
+        result.check("", ENDS, None, 0.0, "", described(error), rule="equal")
         return None, result
 
 
 def take_figures(terminal, section, drawing) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
+    from .agreement import DRAWN
     from .workers import WorkerEnded
 
     try:
@@ -204,7 +205,7 @@ def take_figures(terminal, section, drawing) -> None:
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:
-        quantity = f"figure {name} is drawn"
+        quantity = f"{DRAWN} {name} is drawn"
         terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
 
 

@@ -31,6 +31,10 @@ RULES = {  # of a verdict: the words between a value and its tolerance, and what
 }
 
 
+# checks that fail where the program could not go on: they say nothing of an agreement
+ENDS, DRAWN, LOCKABLE = "runs to its end", "figure", "models whose hinges can be locked"
+
+
 @dataclass(frozen=True)
 class Check:
     """One verdict, named by what holds when it passes: the value is at most, at least or equal to the tolerance.

@@ -67,7 +67,11 @@ def told(scene, engine, left) -> list[str]:
             sentences.append(f"{name} gives no acceleration there.")
             continue
         size, at = float(np.abs(push).max()), predicted(scene, push)
-        away = f"be {LEFT} rad away at {at:.2f} s" if at is not None else f"stay within {LEFT} rad for {scene.duration:g} s"
+        away = (
+            f"be {LEFT} rad away at {at:.2f} s"
+            if at is not None
+            else f"stay within {LEFT} rad for {scene.duration:g} s"
+        )
         sentences.append(
             f"{name}: the torque leaves an acceleration of {size:.1e} rad/s2 (rounding allows {may:.1e}); by that map alone the "
             f"arm would {away}; it {words(left[name])}{cause(scene, size, may, at, left[name])}."

@@ -11,7 +11,7 @@ from tmt.methods import METHODS
 from tmt.reference import DIGITS
 
 from . import known_motion, sub_blocks
-from .agreement import FACTOR, Result
+from .agreement import FACTOR, LOCKABLE, Result
 from .band import NARROW, band
 from .clock import fastest
 from .cost import INTEGRATORS, TIMED, costs
@@ -53,7 +53,7 @@ def rows(setup, scenes=None, timed=True) -> Result:
     try:
         fill(result, setup, scenes, timed)
     except ModelError as error:  # another model, with something that cannot be taken out with its hinge
-        result.check("every subset", "models whose hinges can be locked", 0, 1, "models", str(error), rule="equal")
+        result.check("every subset", LOCKABLE, 0, 1, "models", str(error), rule="equal")
     return result
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import pandas as pd
 
 from . import motion
+from .agreement import DRAWN, ENDS, LOCKABLE
 
 
 @dataclass
@@ -23,10 +24,6 @@ class Section:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables
         return {name: rows for name, rows in tables.items() if rows}
-
-
-# checks that fail where the program could not go on: they say nothing of an agreement
-ENDS, DRAWN, LOCKABLE = "runs to its end", "figure", "models whose hinges can be locked"
 
 
 def failures(sections) -> tuple[list, list]:

@@ -28,7 +28,7 @@ CHECKS = (
     ("reduction", "judge_run", '"smallest model to whole"'),
     ("reduction", "judge_run", '"time judged"'),
     ("reduction", "judge_movement", '"movement"'),
-    ("reduction", "rows", '"models whose hinges can be locked"'),
+    ("reduction", "rows", "LOCKABLE"),
     ("sub_blocks", "judge", 'f"{_1}, {_2}"'),
     ("trajectory", "pair", '"time judged"'),
     ("trajectory", "divergence", "\"step of divergence, MuJoCo's, is TMT's\""),
