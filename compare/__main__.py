@@ -1,11 +1,8 @@
-"""python -m compare: compare the two models and write a report.
-
-Every experiment is the module of its name: `rows(setup)` computes, `figures(result)` draws.
-"""
+"""python -m compare: compare the two models and write a report."""
 
 import os
 
-from . import interrupt, streams
+from .process import interrupt, streams
 
 if __name__ == "__main__":
     streams.prepare()
@@ -13,29 +10,15 @@ if __name__ == "__main__":
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is rendered: no further process looks for a display
 
 import argparse
-import importlib
 import shlex
 import sys
 import time
 from contextlib import suppress
 
-from .crash import described
-from .streams import readable
+from .experiments import EXPERIMENTS, skipped
+from .process.crash import described
+from .process.streams import readable
 
-SHOWN = 5  # checks of an experiment that fail, on the terminal
-
-EXPERIMENTS = {
-    "parameters": "MuJoCo's compiled model read back beside the stated numbers",
-    "published": "every number that the assignment prints",
-    "kinematics": "positions, angular velocities, Jacobians, convective terms",
-    "mass": "the mass matrix",
-    "gravity": "the torque that holds the arm",
-    "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
-    "trajectory": "five seconds of motion, the same scheme in tmt for every integrator",
-    "speed": "time against error: every method, every step, and what to use",
-    "stability": "step limits, departure from unstable postures, where each method fails",
-    "reduction": "what each scene needs of the model, and what the rest costs",
-}
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
   python -m compare all --quick                  the same with fewer states, in seconds
@@ -108,29 +91,38 @@ class Refused(ValueError):
 def run(options, command) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
-    from .engine_file import ARM_XML, ModelError, load
-    from .folder import FolderError, made_by, new_report
-    from .terminal import Terminal
-    from .workers import WorkerEnded, start_workers  # imports are here, so that --help and a wrong word answer at once
+    from .engines.mujoco import ModelError, load
+    from .process.workers import WorkerEnded, start_workers
+    from .report.folder import FolderError, made_by, new_report
+    from .report.terminal import Terminal  # imports are here, so that --help and a wrong word answer at once
+    from .robots.arm import ARM
 
-    terminal = Terminal()
-    path = options.mjcf or ARM_XML
+    terminal, robot = Terminal(), ARM
+    path = options.mjcf or robot.mjcf
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        engine = load(path)
+        mujoco = load(path, robot.tree)
         before = made_by(options.out)
         with new_report(options.out) as folder:
             with start_workers() as workers, terminal.progress("imports"):
-                from . import report, verdict
-                from .agreement import Setup
+                from . import experiment
+                from .case import SEED
+                from .report import files, provenance, verdict
 
-                origin = report.provenance(command, path)  # of the model as it was read
+                workers.submit(experiment.warm_up)
+                reasons = {name: reason for name in names if (reason := skipped(name, robot))}
+                if options.experiment in reasons:
+                    raise Refused(f"{options.experiment} cannot serve {robot.name}: {reasons[options.experiment]}")
+                shown = str(path) if options.mjcf else "mjcf/arm.xml"
+                origin = provenance.provenance(command, path, shown, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
-                setup = (Setup.quick if options.quick else Setup)(engine, **of_run)
-                sections, causes = examine(names, setup, folder, terminal, workers)
+                make = experiment.Setup.quick if options.quick else experiment.Setup
+                setup = make(robot, experiment.engines(mujoco), **of_run)
+                asked = [name for name in names if name not in reasons]
+                sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS), causes)
             origin["seconds"] = round(time.perf_counter() - started, 1)
-            report.write(folder, sections, origin, words, causes)
+            files.write(folder, sections, robot, origin, words, causes, reasons.items())
     except (ModelError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()
@@ -138,93 +130,6 @@ def run(options, command) -> int:
     place = f" in place of that of `{before}`" if before not in (None, origin["command"]) else ""
     terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
     return 0 if verdict.passed(sections) else 1
-
-
-def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
-    """The section of each experiment, its figures drawn, and the causes of what fails.
-
-    An experiment that raises is one failed check; the others go on.
-    """
-    from .verdict import Section, failures
-    from .workers import draw
-
-    (folder / "figures").mkdir()
-    sections, drawings, causes = [], [], []
-    modules = {name: importlib.import_module(f".{name}", __package__) for name in names}
-    crashed = {
-        name: attempt(name, module.begin, setup)[1] for name, module in modules.items() if hasattr(module, "begin")
-    }
-    for name, module in modules.items():
-        setup.tell(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
-        started = time.perf_counter()
-        result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, module.rows, setup)
-        sections.append(Section(name, module.TITLE, module.CLAIM, module.BAR, crash or result))
-        drawings.append(None if crash else workers.submit(draw, name, result, folder / "figures"))
-        new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
-        causes += new
-        tell(terminal, sections[-1], time.perf_counter() - started, new)
-    setup.tell("figures")
-    for section, drawing in zip(sections, drawings):
-        if drawing is not None:
-            take_figures(terminal, section, drawing)
-    return sections, causes
-
-
-def find_causes(setup) -> list:
-    """What of the model explains that checks fail: each number, as stated and as compiled; the gravest first."""
-    from . import parameters
-
-    result, _ = attempt("parameters", parameters.rows, setup)
-    return result.curves["causes"] if result else []
-
-
-def attempt(name, act, setup) -> tuple:
-    """What an experiment's function returns, and None; if it raises, None and a Result with one failed check."""
-    from .agreement import ENDS, Result
-    from .workers import WorkerEnded
-
-    try:
-        return act(setup), None
-    except WorkerEnded:
-        raise
-    except Exception as error:
-        result = Result(name, shown=[])
-        result.check("", ENDS, None, 0.0, "", described(error), rule="equal")
-        return None, result
-
-
-def take_figures(terminal, section, drawing) -> None:
-    """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
-    from .agreement import DRAWN
-    from .workers import WorkerEnded
-
-    try:
-        section.figures, failed = drawing.result()
-    except (WorkerEnded, OSError):
-        raise
-    except Exception as error:  # the result cannot be sent to where it is drawn
-        failed = [("number 1", described(error))]
-    for name, line in failed:
-        quantity = f"{DRAWN} {name} is drawn"
-        terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
-
-
-def tell(terminal, section, seconds, causes) -> None:
-    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks."""
-    checks = section.result.checks
-    failed = [check for check in checks if not check.passed]
-    used = [check.over_bar for check in checks if check.over_bar is not None]
-    most = f"uses {max(used):.2g} of a tolerance" if any(used) and not failed else ""
-    word = f"{len(failed)} FAILED" if failed else "ok"
-    many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
-    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
-    lines = [f"  CAUSE {cause['text']}" for cause in causes]
-    if not (causes and section.name == "parameters"):  # there the causes are the checks
-        lines += [f"  FAIL {check}" for check in failed]
-    for line in lines[:SHOWN]:
-        terminal.say(line, "red")
-    if len(lines) > SHOWN:
-        terminal.say(f"  and {len(lines) - SHOWN} more: in the report", "red")
 
 
 def run_and_leave() -> None:

@@ -1,0 +1,96 @@
+"""Who computes: one file an engine, and what is asked of each of them.
+
+An engine makes the dynamics of a case; gravity, damping, locked joints and torques are applied there and nowhere else. The
+dynamics know positions q (..., nq), speeds v (..., nv) and torques tau (..., nv), in rad, rad/s and N m, of any leading batch
+shape, in the order of the case's joints; and Mbar a + bias = tau - D v.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..case import Case, Coordinates
+
+LABELS = {"tmt": "TMT", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
+GRID = 64  # equal times, and the start, at which a prepared run is read
+
+
+class Method(NamedTuple):
+    """A method of integration of one engine."""
+
+    engine: str
+    name: str
+    order: int | None  # of its error in the step; None: it chooses its own steps
+    scheme: str  # what it does: methods of the same scheme do the same but for rounding
+    adaptive: bool = False  # it chooses its own steps and takes a tolerance
+
+    @property
+    def label(self) -> str:
+        return f"{LABELS[self.engine]} {self.name}"
+
+
+class Setting(NamedTuple):
+    """How a method follows a motion: so many steps, or a tolerance, in a duration in s."""
+
+    duration: float
+    steps: int | None = None
+    tolerance: float | None = None
+
+
+class Motion(NamedTuple):
+    """One run, or a batch of them. A run that ends early is NaN from there on."""
+
+    t: np.ndarray  # (times,) s
+    q: np.ndarray  # (..., times, nq) rad
+    v: np.ndarray  # (..., times, nv) rad/s
+    evaluations: int | None = None  # of the dynamics in all; None where a method has no such thing
+    ended: str | np.ndarray | None = None  # why a run ended early, or None; of a batch an array of its shape
+    steps: int | None = None  # that the method took; None: not known
+
+
+class Dynamics(Protocol):
+    """One case in one engine. Engines may know more: energy, com_positions, jacobians, convective_terms ..."""
+
+    coordinates: Coordinates
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """Mbar, kg m2, (..., nv, nv)."""
+
+    def bias(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """h, N m, (..., nv)."""
+
+    def acceleration(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
+        """rad/s2, (..., nv), from Mbar a = tau - D v - h."""
+
+    def run(self, q, v, tau, dt: float, steps: int, method: str, tolerance: float | None = None) -> Motion:
+        """Motion under constant torque from q, v, recorded at every multiple of dt."""
+
+    def prepare(self, q, v, tau, setting: Setting, method: str) -> tuple[Callable, Callable[..., Motion]]:
+        """run() follows one motion once more and does nothing else; read(what it returned) is what is judged of it.
+
+        q, v, tau: (n,). read gives the motion at 64 equal times and the start.
+        """
+
+
+class Engine(Protocol):
+    """One engine with its methods of integration."""
+
+    name: str
+    methods: Mapping[str, Method]
+
+    def unavailable(self) -> str | None:
+        """Why it cannot take part here, or None."""
+
+    def of(self, case: Case) -> Dynamics:
+        """The dynamics of a case."""
+
+
+def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:
+    """The first method of an engine that is the same scheme as a given one."""
+    return next(m for m in engines[engine].methods.values() if m.scheme == method.scheme)
+
+
+def one_of_each_scheme(engine: Engine) -> tuple[Method, ...]:
+    """Of methods of one engine that are the same scheme the first."""
+    return tuple({method.scheme: method for method in reversed(engine.methods.values())}.values())[::-1]

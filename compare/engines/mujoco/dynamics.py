@@ -1,0 +1,243 @@
+"""The dynamics of a case in MuJoCo, spoken to in the project's symbols.
+
+    q, v, a <-> qpos, qvel, qacc      h <-> qfrc_bias      tau <-> qfrc_applied
+    M a + h = tau - D v
+
+MuJoCo's derived fields belong to the state of the last mj_forward, not to that of the last step: every
+quantity here is evaluated with mj_forward at the state that is asked for.
+"""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from mujoco.rollout import rollout
+
+from .. import GRID, Motion, Setting
+
+# a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
+_log = mujoco.MjLogConfig.get()
+_log.logto_file = _log.logto_console = False
+_log.set()
+
+# by MuJoCo's names, as far as the installed version has them (discrete: from 3.13)
+NAMES = {"Euler": "EULER", "implicitfast": "IMPLICITFAST", "discrete": "DISCRETE", "implicit": "IMPLICIT", "RK4": "RK4"}
+INTEGRATORS = {
+    name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}")
+    for name, member in NAMES.items()
+    if hasattr(mujoco.mjtIntegrator, f"mjINT_{member}")
+}
+STAGES = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # evaluations of the dynamics in a step
+FLAGS = {
+    "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
+    "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY,
+    "autoreset": mujoco.mjtDisableBit.mjDSBL_AUTORESET,
+}
+
+
+class MujocoDynamics:
+    """MuJoCo with one model of given joints; quantities at any states q, v, tau of shape (..., n).
+
+    Columns follow the names of the coordinates, whatever the order in the file. bodies: their numbers in the model; the axes
+    of a body are those that coincide with the world's at q = 0.
+    """
+
+    def __init__(self, model, coordinates, bodies):
+        # where states are evaluated the file's integrator must not matter, as `discrete` does
+        model.opt.integrator = INTEGRATORS["RK4"]
+        model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
+        self.model, self.data = model, mujoco.MjData(model)
+        self.coordinates, self.bodies = coordinates, list(bodies)
+        joints = [model.joint(name) for name in coordinates.names]
+        self.joints = np.array([joint.id for joint in joints])
+        self.qpos = np.array([joint.qposadr[0] for joint in joints])
+        self.dofs = np.array([joint.dofadr[0] for joint in joints])
+        self._at(np.zeros(len(joints)))
+        self.zero_axes = self._turns(self.data.xmat)
+
+    def enabled(self, flag) -> bool:
+        return not self.model.opt.disableflags & int(FLAGS[flag])
+
+    # quantities at states
+
+    def com_positions(self, q) -> np.ndarray:
+        """CoM positions in the world, m, (..., m, 3): xipos."""
+        return self._each(lambda d: d.xipos[self.bodies], q)
+
+    def angular_velocities(self, q, v) -> np.ndarray:
+        """Angular velocities in body axes, rad/s, (..., m, 3): R' times the angular part of cvel."""
+        return self._each(lambda d: self._to_body(d.cvel[self.bodies, :3]), q, v)
+
+    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
+        """T_b and B_b, (..., m, 3, n): mj_jacBodyCom, its rotational part turned into body axes."""
+
+        def both(d):
+            jacobians = np.zeros((2, len(self.bodies), 3, self.model.nv))
+            for T, B, body in zip(*jacobians, self.bodies):
+                mujoco.mj_jacBodyCom(self.model, d, T, B, body)
+            return self._reduced(jacobians)
+
+        result = self._each(both, q)
+        return result[..., 0, :, :, :], result[..., 1, :, :, :]
+
+    def convective_terms(self, q, v) -> tuple[np.ndarray, np.ndarray]:
+        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
+
+        def both(d):
+            rates = np.zeros((2, len(self.bodies), 3, self.model.nv))
+            for T, B, body in zip(*rates, self.bodies):
+                mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body)
+            return self._reduced(rates) @ d.qvel[self.dofs]
+
+        result = self._each(both, q, v)
+        return result[..., 0, :, :], result[..., 1, :, :]
+
+    def mass_matrix(self, q) -> np.ndarray:
+        """M, kg m2, (..., n, n): mj_fullM."""
+        full = np.zeros((self.model.nv, self.model.nv))
+
+        def dense(d):
+            mujoco.mj_fullM(self.model, d, full)
+            return full[np.ix_(self.dofs, self.dofs)]
+
+        return self._each(dense, q)
+
+    def bias(self, q, v) -> np.ndarray:
+        """h, N m, (..., n): qfrc_bias."""
+        return self._each(lambda d: d.qfrc_bias[self.dofs], q, v)
+
+    def gravity_balance(self, q) -> np.ndarray:
+        """The torque that holds the model, N m, (..., n): qfrc_bias at rest."""
+        return self.bias(q, np.zeros_like(q))
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        """a, rad/s2, (..., n): qacc."""
+        return self._each(lambda d: d.qacc[self.dofs], q, v, tau)
+
+    def inverse(self, q, v, a) -> np.ndarray:
+        """The torque for which a is the acceleration, N m, (..., n): mj_inverse."""
+
+        def torque(d):
+            d.qacc[self.dofs] = d.qfrc_applied[self.dofs]
+            mujoco.mj_inverse(self.model, d)
+            return d.qfrc_inverse[self.dofs]
+
+        return self._each(torque, q, v, a)  # a travels in the place of tau
+
+    def other_forces(self, q, v) -> dict:
+        """What else acts than gravity, torque and damping, by its source, N m, (..., n) each."""
+        D = self.model.dof_damping
+        return {
+            "springs, fluid and tendons": self._each(lambda d: (d.qfrc_passive + D * d.qvel)[self.dofs], q, v),
+            "actuators": self._each(lambda d: d.qfrc_actuator[self.dofs], q, v),
+            "constraints and contacts": self._each(lambda d: d.qfrc_constraint[self.dofs], q, v),
+        }
+
+    def potential_energy(self, q) -> np.ndarray:
+        """V, J, (...): mj_energyPos."""
+        return self._each(lambda d: self._energies(d)[0], q)
+
+    def energy(self, q, v) -> np.ndarray:
+        """Potential and kinetic energy together, J, (...): mj_energyPos and mj_energyVel."""
+        return self._each(lambda d: self._energies(d).sum(), q, v)
+
+    # motion
+
+    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
+        """Motion under constant torque: t (steps + 1,), q and v (..., steps + 1, n), by an integrator of MuJoCo.
+
+        From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
+        """
+        if tolerance is not None:
+            raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
+        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
+        starts, follow = self.runner(q, v, tau, dt, steps, method)
+        *paths, ended = self.path(starts, follow(), dt)
+        q, v = (path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
+        return Motion(dt * np.arange(steps + 1), q, v, len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()], steps)
+
+    def prepare(self, q, v, tau, setting: Setting, method):
+        dt, every = setting.duration / setting.steps, setting.steps // GRID
+        starts, run = self.runner(q, v, tau, dt, setting.steps, method)
+        t = np.linspace(0.0, setting.duration, GRID + 1)
+
+        def read(states):
+            q, v, ended = self.path(starts, states, dt)
+            return Motion(t, q[0, ::every], v[0, ::every], setting.steps * STAGES[method], ended[0], setting.steps)
+
+        return run, read
+
+    def path(self, starts, states, dt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q and v of runs (runs, steps + 1, n), NaN from the moment in which one has diverged, and why it has, or None."""
+        states = np.concatenate([starts[:, None], states], axis=1)
+        advanced = np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0
+        ran = np.isfinite(states).all(axis=2) & advanced
+        ended = np.full(len(states), None, dtype=object)
+        for k in np.flatnonzero(~ran.all(axis=1)):
+            last = int(np.argmin(ran[k]))
+            why = "MuJoCo's clock stands" if not advanced[k, last] else "a number is not finite"
+            ended[k] = f"at t = {dt * (last - 1):g} s: {why}"
+        states[np.cumsum(~ran, axis=1) > 0] = np.nan
+        return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
+
+    def runner(self, q, v, tau, dt, steps, method) -> tuple[np.ndarray, Callable]:
+        """The first states, and a call that follows the motion from them in MuJoCo's C loop, again and again.
+
+        States are MuJoCo's, time first; the call returns those after each step, (runs, steps, ...), without a copy.
+        """
+        model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
+        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[method]
+        model.opt.disableflags |= int(FLAGS["autoreset"])  # a reset would hide the divergence
+        q, v, tau = np.broadcast_arrays(q, v, tau)
+        runs, spec = q.size // q.shape[-1], mujoco.mjtState.mjSTATE_FULLPHYSICS
+        starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
+        # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
+        torques = np.zeros((runs, steps, model.nv))
+        for start, torque, *state in zip(starts, torques, *(a.reshape(runs, -1) for a in (q, v, tau))):
+            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, self.dofs] = state
+            mujoco.mj_getState(model, data, start, spec)
+        # filled, so that the first run does not have to fetch the memory
+        states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
+        applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+        options = {"control_spec": applied, "nstep": steps, "state": states, "sensordata": sensors, "skip_checks": True}
+
+        def run():
+            rollout([model] * runs, [data], starts, torques, **options)
+            return states
+
+        return starts, run
+
+    # how the fields are read
+
+    def _each(self, read, q, v=None, tau=None) -> np.ndarray:
+        """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
+        given = [np.asarray(0.0 if a is None else a, dtype=float) for a in (q, v, tau)]
+        shape = np.broadcast_shapes(*(a.shape for a in given))
+        states = [np.broadcast_to(a, shape).reshape(-1, shape[-1]) for a in given]
+        values = [np.array(read(self._at(*state))) for state in zip(*states)]
+        return np.array(values).reshape(*shape[:-1], *values[0].shape)
+
+    def _at(self, q, v=0.0, tau=0.0):
+        d = self.data
+        d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
+        mujoco.mj_forward(self.model, d)
+        return d
+
+    def _energies(self, d):
+        mujoco.mj_energyPos(self.model, d)
+        mujoco.mj_energyVel(self.model, d)
+        return d.energy
+
+    def _turns(self, xmat):
+        return xmat[self.bodies].reshape(-1, 3, 3).copy()
+
+    def _to_body(self, vectors):
+        """World components to body axes, the axes of the world at q = 0."""
+        turns = self._turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
+        return np.einsum("bji,bj...->bi...", turns, vectors)
+
+    def _reduced(self, pair):
+        """(translation, rotation) rows of Jacobians: joints in our order, rotation in body axes."""
+        T, B = pair[..., self.dofs]
+        return np.stack([T, self._to_body(B)])

@@ -1,0 +1,63 @@
+"""MuJoCo as an engine: a compiled model, and what a case changes in it."""
+
+import mujoco
+
+from ...case import Case
+from .. import Method
+from .dynamics import INTEGRATORS, MujocoDynamics
+from .lock import locked_model
+
+SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme
+    "Euler": "semi_implicit_euler",
+    "implicitfast": "semi_implicit_euler",
+    "discrete": "semi_implicit_euler",
+    "implicit": "implicit",
+    "RK4": "rk4",
+}
+METHODS = {
+    name: Method("mujoco", name, 4 if name == "RK4" else 1, SCHEMES[name]) for name in SCHEMES if name in INTEGRATORS
+}
+
+
+class Mujoco:
+    """MuJoCo with one compiled model of given joints.
+
+    A body is the one that moves with the joint named in `carriers`. source: what the model was read from, a Path or MJCF text.
+    """
+
+    name = "mujoco"
+    methods = METHODS
+
+    def __init__(self, model, joints, carriers, source):
+        self.integrator = model.opt.integrator  # of the file
+        self.model, self.source, self.carriers = model, source, list(carriers)
+        joint_ids = {name: model.joint(name).id for name in joints}
+        self.bodies = [int(model.jnt_bodyid[joint_ids[name]]) for name in carriers]
+        self.known = {}
+
+    def __getstate__(self):
+        return self.__dict__ | {"known": {}}
+
+    def unavailable(self) -> str | None:
+        return None
+
+    def of(self, case: Case) -> MujocoDynamics:
+        """The file's own numbers with what the case changes: they stay what they are, and nothing of the file is hidden.
+
+        A model with locked joints is compiled from the source again, without them. ModelError if that is not possible.
+        """
+        changes = tuple(case.locked.items()), bool(case.scene.gravity), float(case.scene.damping), case.joints
+        if changes not in self.known:
+            self.known[changes] = MujocoDynamics(self.changed(case), case.coordinates, self.bodies)
+        return self.known[changes]
+
+    def changed(self, case) -> mujoco.MjModel:
+        """The model with what the case changes."""
+        if case.locked:
+            model = locked_model(self.source, case.locked)
+        else:
+            model = mujoco.MjModel.__copy__(self.model)
+        if not case.scene.gravity:
+            model.opt.gravity[:] = 0.0
+        model.dof_damping[:] += case.scene.damping
+        return model

@@ -1,0 +1,46 @@
+"""From a file to an engine: MJCF is read, compiled, and refused in one line where it does not have a robot's joints."""
+
+import os
+from pathlib import Path
+
+import mujoco
+
+import tmt
+
+from .engine import Mujoco
+from .lock import ModelError, name_of
+
+
+def load(path, tree: tmt.Tree) -> Mujoco:
+    """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
+    if Path(path).exists() and not (Path(path).is_file() or Path(path).is_dir()):
+        raise ModelError(f"{path} is no file that can be read again; an MJCF file is expected")
+    try:
+        text = Path(path).read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise ModelError(f"cannot read {path}: {error.strerror}; an MJCF file is expected") from None
+    try:
+        model = mujoco.MjModel.from_xml_path(os.fsencode(path))  # bytes: any name, in any locale
+    except ValueError as error:
+        if "<mujoco" not in text:
+            raise ModelError(f"{path} is not MJCF: MuJoCo says {error}") from None
+        raise ModelError(f"MuJoCo cannot compile {path}: {error}") from None
+    return with_hinges(model, Path(path), tree)
+
+
+def parse(text: str, tree: tmt.Tree) -> Mujoco:
+    """The engine for MJCF text."""
+    return with_hinges(mujoco.MjModel.from_xml_string(text), text, tree)
+
+
+def with_hinges(model, source, tree) -> Mujoco:
+    """The engine, if the model moves by exactly the hinges of the Tree; it remembers its source, a Path or MJCF text."""
+    hinges = tree.hinge_names
+    names = [model.joint(j).name for j in range(model.njnt)]
+    kinds = [mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower() for j in range(model.njnt)]
+    if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
+        found = ", ".join(f"{name or 'unnamed'} ({kind})" for name, kind in zip(names, kinds)) or "none"
+        raise ModelError(
+            f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected"
+        )
+    return Mujoco(model, hinges, [hinges[hinge] for hinge in tree.body_hinge], source)

@@ -1,0 +1,88 @@
+"""tmt's own equations, integrated by its compiled loops."""
+
+from functools import partial
+
+import numpy as np
+
+import tmt
+from tmt import kernels
+
+from . import GRID, Method, Motion, Setting
+
+
+class Tmt:
+    """The engine of the stated equations."""
+
+    name = "tmt"
+
+    @property
+    def methods(self) -> dict[str, Method]:
+        return {
+            name: Method(self.name, name, None if method.adaptive else method.order, name, method.adaptive)
+            for name, method in tmt.METHODS.items()
+        }
+
+    def unavailable(self) -> str | None:
+        return None
+
+    def of(self, case) -> "TmtDynamics":
+        return TmtDynamics(case)
+
+
+class TmtDynamics:
+    """A case's Tree, each quantity by the method as it stands."""
+
+    def __init__(self, case):
+        self.tree, self.coordinates = case.tree, case.coordinates
+
+    def com_positions(self, q) -> np.ndarray:
+        return tmt.com_positions(q, self.tree)
+
+    def angular_velocities(self, q, v) -> np.ndarray:
+        return tmt.angular_velocities(q, v, self.tree)
+
+    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
+        return tmt.jacobians(q, self.tree)
+
+    def convective_terms(self, q, v) -> tuple[np.ndarray, np.ndarray]:
+        return tmt.convective_terms(q, v, self.tree)
+
+    def mass_matrix(self, q) -> np.ndarray:
+        return tmt.mass_matrix(q, self.tree)
+
+    def bias(self, q, v) -> np.ndarray:
+        return tmt.bias(q, v, self.tree)
+
+    def gravity_balance(self, q) -> np.ndarray:
+        return tmt.gravity_balance(q, self.tree)
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        return tmt.acceleration(q, v, tau, self.tree)
+
+    def potential_energy(self, q) -> np.ndarray:
+        return tmt.potential_energy(q, self.tree)
+
+    def energy(self, q, v) -> np.ndarray:
+        return tmt.energy(q, v, self.tree)
+
+    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
+        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
+        return Motion(*motion, motion.evaluations, motion.ended, None if tmt.METHODS[method].adaptive else steps)
+
+    def prepare(self, q, v, tau, setting: Setting, method):
+        stepping = tmt.METHODS[method]
+        steps = setting.steps or GRID
+        paths = np.full((2, 1, steps + 1, len(q)), np.nan)
+        paths[:, 0, 0] = q, v
+        arguments = [*paths, np.array(tau)[None], setting.duration / steps]
+        if setting.tolerance is not None:
+            arguments.append(setting.tolerance)
+        run = partial(kernels.stepper(self.tree, method), *arguments)
+        t = np.linspace(0.0, setting.duration, GRID + 1)
+
+        def read(evaluations):
+            taken = steps if setting.steps else evaluations // stepping.stages
+            every = slice(None, None, steps // GRID)
+            return Motion(t, *(path[0, every].copy() for path in paths), evaluations, None, taken)
+
+        return run, read

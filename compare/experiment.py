@@ -1,0 +1,199 @@
+"""What the experiments need, and how they are run: one after the other, long work and drawing beside it."""
+
+import importlib
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from . import states as samples
+from .case import Case
+from .engines import Dynamics, Engine
+from .engines.heyoka import Heyoka
+from .engines.scipy import Scipy
+from .engines.tmt import Tmt
+from .experiments import EXPERIMENTS, module
+from .judge.check import DRAWN, ENDS, Result
+from .process.crash import described
+from .process.workers import WorkerEnded
+from .report.folder import writing
+from .report.verdict import Section, failures
+from .robots import Robot
+
+SHOWN = 5  # checks of an experiment that fail, on the terminal
+
+
+def engines(mujoco: Engine) -> dict[str, Engine]:
+    """All engines by their names; some may be unavailable."""
+    return {engine.name: engine for engine in (mujoco, Tmt(), Scipy(), Heyoka())}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an experiment needs: the robot, the engines, and how much is to be done."""
+
+    robot: Robot
+    engines: Mapping[str, Engine]
+    states: int = 10_000  # random states
+    exact_states: int = 200  # of these, how many are compared with the exact values too
+    map: Callable = map  # where the scenes of an experiment may run side by side
+    quiet: Callable = lambda: None  # waits until nothing runs beside: for timings
+    tell: Callable = lambda text: None  # says how far long work has come
+    background: dict = field(default_factory=dict)  # work under way, by its name
+    finer: tuple = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
+    size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
+
+    @property
+    def is_quick(self) -> bool:
+        return self.size == "quick"
+
+    def of(self, full, quick, small):
+        """What a run of this size takes."""
+        return {"full": full, "quick": quick, "small": small}[self.size]
+
+    @classmethod
+    def quick(cls, robot, engines, **more) -> "Setup":
+        """Fewer of everything, for a first answer in seconds."""
+        return cls(robot, engines, states=1000, exact_states=20, finer=(1,), size="quick", **more)
+
+    @classmethod
+    def small(cls, robot, engines, **more) -> "Setup":
+        """Every path of a full run with few states and steps: for tests."""
+        return cls(robot, engines, states=50, exact_states=2, finer=(1, 2), size="small", **more)
+
+    def compared(self, case: Case | None = None) -> dict[str, Dynamics]:
+        """The dynamics of a case (of the robot as it is) in the two engines that are compared, tmt and mujoco."""
+        case = case or self.robot.case()
+        return {name: self.engines[name].of(case) for name in ("tmt", "mujoco")}
+
+    @cached_property
+    def named(self) -> samples.Sample:
+        return samples.named(self.robot)
+
+    @cached_property
+    def random(self) -> samples.Sample:
+        return samples.random(self.robot, self.states, self.exact_states)
+
+
+def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
+    """The section of each experiment, its figures drawn, and the causes of what fails.
+
+    An experiment that raises is one failed check; the others go on.
+    """
+    (folder / "figures").mkdir()
+    sections, drawings, causes = [], [], []
+    modules = {name: module(name) for name in names}
+    crashed = {
+        name: attempt(name, experiment.begin, setup)[1]
+        for name, experiment in modules.items()
+        if hasattr(experiment, "begin")
+    }
+    for name, experiment in modules.items():
+        setup.tell(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
+        started = time.perf_counter()
+        result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
+        asked = experiment.TITLE, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
+        sections.append(Section(name, *asked, crash or result))
+        drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
+        new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
+        causes += new
+        outcome(terminal, sections[-1], time.perf_counter() - started, new)
+    setup.tell("figures")
+    for section, drawing in zip(sections, drawings):
+        if drawing is not None:
+            take_figures(terminal, section, drawing)
+    return sections, causes
+
+
+def find_causes(setup) -> list:
+    """What of the model explains that checks fail: each number, as stated and as compiled; the gravest first."""
+    result, _ = attempt("parameters", module("parameters").rows, setup)
+    return result.curves["causes"] if result else []
+
+
+def attempt(name, act, setup) -> tuple:
+    """What an experiment's function returns, and None; if it raises, None and a Result with one failed check."""
+    try:
+        return act(setup), None
+    except WorkerEnded:
+        raise
+    except Exception as error:
+        result = Result(name, shown=[])
+        result.check("", ENDS, None, 0.0, "", described(error), rule="equal")
+        return None, result
+
+
+def take_figures(terminal, section, drawing) -> None:
+    """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
+    try:
+        section.figures, failed = drawing.result()
+    except (WorkerEnded, OSError):
+        raise
+    except Exception as error:  # the result cannot be sent to where it is drawn
+        failed = [("number 1", described(error))]
+    for name, line in failed:
+        quantity = f"{DRAWN} {name} is drawn"
+        terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
+
+
+def outcome(terminal, section, seconds, causes) -> None:
+    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks."""
+    checks = section.result.checks
+    failed = [check for check in checks if not check.passed]
+    used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
+    most = f"uses {max(used):.2g} of a tolerance" if any(used) and not failed else ""
+    word = f"{len(failed)} FAILED" if failed else "ok"
+    many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
+    terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
+    lines = [f"  CAUSE {cause['text']}" for cause in causes]
+    if not (causes and section.name == "parameters"):  # there the causes are the checks
+        lines += [f"  FAIL {check}" for check in failed]
+    for line in lines[:SHOWN]:
+        terminal.say(line, "red")
+    if len(lines) > SHOWN:
+        terminal.say(f"  and {len(lines) - SHOWN} more: in the report", "red")
+
+
+# in the process that draws
+
+
+def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[list, list]:
+    """The figures of an experiment on disk: names and captions; and of those that could not be drawn: names and why.
+
+    `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
+    the later ones alone. An error of the disk is raised.
+    """
+    drawn, failed = [], []
+    try:
+        for call in module(experiment).figures(result, robot):
+            name, path = called(call), None
+            try:
+                name, figure, caption = call()
+                path = folder / f"{name}.png"
+                with writing(path):
+                    figure.savefig(path)
+                drawn.append((name, caption))
+            except OSError:
+                raise
+            except Exception as error:
+                if path:
+                    path.unlink(missing_ok=True)
+                failed.append((name, described(error)))
+    except OSError:
+        raise
+    except Exception as error:
+        failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
+    return drawn, failed
+
+
+def called(call) -> str:
+    """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
+    more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
+    more = [value for value in more if isinstance(value, str)]
+    return " ".join([getattr(getattr(call, "func", call), "__name__", "without a name"), *more])
+
+
+def warm_up() -> None:
+    """Load matplotlib while others compute."""
+    importlib.import_module(".report.style", __package__)

@@ -1,0 +1,33 @@
+"""The experiments, one file or folder for each word of the command line.
+
+Each is the module of its name: `rows(setup)` computes, `figures(result, robot)` yields calls that draw; TITLE, `claim(robot)` and
+`tolerance(robot)` say what is asked. It may have `begin(setup)`, which sets long work going, and `skipped(robot)`, which says why
+it cannot serve a robot.
+"""
+
+import importlib
+from types import ModuleType
+
+EXPERIMENTS = {
+    "parameters": "MuJoCo's compiled model read back beside the stated numbers",
+    "published": "every number that the assignment prints",
+    "kinematics": "positions, angular velocities, Jacobians, convective terms",
+    "mass": "the mass matrix",
+    "gravity": "the torque that holds the arm",
+    "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
+    "trajectory": "five seconds of motion, the same scheme in tmt for every integrator",
+    "speed": "time against error: every method, every step, and what to use",
+    "stability": "step limits, departure from unstable postures, where each method fails",
+    "reduction": "what each scene needs of the model, and what the rest costs",
+}
+
+
+def module(name: str) -> ModuleType:
+    """An experiment's module."""
+    return importlib.import_module(f".{name}", __package__)
+
+
+def skipped(name: str, robot) -> str | None:
+    """Why an experiment cannot serve a robot, or None."""
+    why = getattr(module(name), "skipped", None)
+    return why(robot) if why else None

@@ -1,0 +1,149 @@
+"""Checks and their rules, and what an experiment finds: rows, checks, curves and sentences."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tmt.reference import distance
+
+from .scale import EPS, FACTOR
+
+SHOWN = ["scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
+         "tmt_from_exact_eps", "mujoco_from_exact_eps"]  # fmt: skip
+
+RULES = {  # of a verdict: the words between a value and its tolerance, and what passes
+    "at most": lambda value, tolerance: value <= tolerance,
+    "at least": lambda value, tolerance: value >= tolerance,
+    "equal": lambda value, tolerance: value == tolerance,
+}
+
+
+# checks that fail where the program could not go on: they say nothing of an agreement
+ENDS, DRAWN, LOCKABLE = "runs to its end", "figure", "models whose hinges can be locked"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One verdict, named by what holds when it passes: the value is at most, at least or equal to the tolerance.
+
+    value None where a run diverged, or there is no number: that never passes.
+    """
+
+    experiment: str
+    scene: str
+    quantity: str
+    value: float | None
+    tolerance: float
+    unit: str
+    note: str = ""
+    rounding: bool = False  # the tolerance is a bound of rounding, not a printed digit or a count
+    rule: str = "at most"
+
+    def __post_init__(self):
+        if self.rule not in RULES or not np.isfinite(self.tolerance):
+            raise ValueError(f"{self.quantity!r}: {self.rule!r} {self.tolerance} is no rule with a finite tolerance")
+
+    @property
+    def passed(self) -> bool:
+        return self.value is not None and bool(RULES[self.rule](self.value, self.tolerance))
+
+    @property
+    def over_tolerance(self) -> float | None:
+        """How much of a tolerance of rounding is used; None if it is no such tolerance, or zero, or there is no value."""
+        return self.value / self.tolerance if self.rounding and self.tolerance and self.value is not None else None
+
+    def record(self) -> dict:
+        names = ("experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note")
+        return {name: getattr(self, name) for name in names}
+
+    def __str__(self):
+        found = "no number" if self.value is None else f"{self.value:.3g} {self.unit}".rstrip()
+        wanted = f"{self.tolerance:.3g} {self.unit}".rstrip()
+        where = f", {self.scene}" if self.scene else ""
+        if self.rule == "equal" and self.value is None and self.note:  # there is nothing but the reason to tell
+            return f"{self.experiment}: {self.quantity}{where}: no, {self.note}"
+        note = f" ({self.note})" if self.note else ""
+        rule = self.rule.replace("equal", "equal to")
+        return f"{self.experiment}: {self.quantity}{where}: {found}, must be {rule} {wanted}{note}"
+
+
+@dataclass
+class Result:
+    """What an experiment found: rows of its table, checks, and the numbers that its figures draw."""
+
+    experiment: str
+    rows: list = field(default_factory=list)
+    checks: list = field(default_factory=list)
+    curves: dict = field(default_factory=dict)
+    notes: list = field(default_factory=list)  # sentences for the report
+    shown: list | None = None  # columns of the table in the report, if not all; none: only in its file
+    tables: dict = field(default_factory=dict)  # further tables by name: lists of rows
+
+    def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most") -> Check:
+        """Add a check; a value that is None or not finite stands for a run that gave no number, and fails."""
+        value = None if value is None or not np.isfinite(value) else float(value)
+        self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule))
+        return self.checks[-1]
+
+    def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, truth=None) -> None:
+        """A row and a check: the worst difference of the two engines over the states, the closest to its tolerance.
+
+        tmt_values, mujoco_values: (states, ...); scale: a number or (states,); truth: the name of a field of
+        tmt.reference.Truth, for one more check of each engine: its distance from the exact value, 64 eps x scale too.
+        """
+        states = len(sample.q)
+        scale = np.broadcast_to(scale, states)
+        tolerance = FACTOR * EPS * scale
+        apart = {"TMT to MuJoCo": largest(np.subtract(tmt_values, mujoco_values))}
+        if truth:
+            known = sample.truth(truth)
+            for engine, values in (("TMT", tmt_values), ("MuJoCo", mujoco_values)):
+                apart[f"{engine} to exact"] = largest(distance(values[: len(known)], known))
+        in_eps = {name: d / (EPS * scale[: len(d)]) for name, d in apart.items()}
+        difference = apart["TMT to MuJoCo"]
+
+        def closest(quantity, difference):
+            """A check of the state that comes closest to its tolerance, and which one that is."""
+            share = np.where(np.isfinite(difference), difference / tolerance[: len(difference)], np.inf)
+            k = int(np.argmax(share))
+            return self.check(sample.name, quantity, difference[k], tolerance[k], unit, sample.describe(k), True), k
+
+        check, worst = closest(quantity, difference)
+        for name in list(apart)[1:]:
+            closest(f"{quantity}, {name}", apart[name])
+        self.rows.append(
+            {
+                "scene": sample.name,
+                "quantity": quantity,
+                "unit": unit,
+                "states": states,
+                "largest_difference": float(difference.max()) if np.isfinite(difference).all() else None,
+                "worst_difference": check.value,
+                "bar": check.tolerance,
+                "difference_over_bar": check.over_tolerance,
+                "scale": scale[worst],
+                "difference_eps": in_eps["TMT to MuJoCo"].max(),
+                "tmt_from_exact_eps": in_eps["TMT to exact"].max() if truth else None,
+                "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if truth else None,
+                "exact_states": len(known) if truth else None,
+                "worst_state": check.note,
+                "worst_q": numbers(sample.q[worst]),
+                "worst_qd": numbers(sample.qd[worst]),
+                "worst_tau": numbers(sample.tau[worst]),
+                "passed": check.passed,
+            }
+        )
+        curves = {name: np.sort(values) for name, values in in_eps.items()}
+        self.curves.setdefault(sample.name, {})[quantity] = curves
+        self.shown = SHOWN
+
+
+def numbers(values) -> str:
+    """Numbers with all their digits, for whoever wants to see a state again."""
+    return " ".join(repr(float(v)) for v in values)
+
+
+def largest(values) -> np.ndarray:
+    """The largest absolute value of each state, (states, ...) -> (states,)."""
+    values = np.abs(np.asarray(values, dtype=float))
+    return values.reshape(len(values), -1).max(axis=1)

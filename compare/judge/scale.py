@@ -1,0 +1,61 @@
+"""Scales of tolerances: from the stated numbers and TMT's own terms, for each state.
+
+A difference is judged against 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that
+are added up in it, times the condition number of Mbar where a linear system is solved; it is taken for each state and is
+never the quantity itself (which may be zero).
+"""
+
+import numpy as np
+
+import tmt
+
+EPS = float(np.finfo(float).eps)
+FACTOR = 64
+
+
+def reaches(tree: tmt.Tree) -> np.ndarray:
+    """Largest distance of each centre of mass from the origin, m: lengths added along the tree, shape (m,)."""
+    to_hinge = []
+    for parent, offset in zip(tree.parent, tree.offset):
+        to_hinge.append((to_hinge[parent] if parent >= 0 else 0.0) + np.linalg.norm(offset))
+    to_hinge.append(0.0)  # of the world, hinge -1
+    return np.array([to_hinge[hinge] + np.linalg.norm(com) for hinge, com in zip(tree.body_hinge, tree.com)])
+
+
+def gravity_scale(tree: tmt.Tree) -> float:
+    """Sum of m g reach, N m or J."""
+    return float(np.linalg.norm(tree.gravity) * np.dot(tree.mass, reaches(tree)))
+
+
+def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """Convective + Euler + gravity terms of the bias, each by its absolute value, N m, (states,)."""
+    T, B = tmt.jacobians(q, tree)
+    v_conv, w_conv = tmt.convective_terms(q, qd, tree)
+    omega = tmt.angular_velocities(q, qd, tree)
+    inertia = np.array(tree.inertia)
+    moments = np.abs(np.einsum("bij,sbj->sbi", inertia, w_conv))
+    moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
+    newton = np.einsum("sbci,b,sbc->si", np.abs(T), tree.mass, np.abs(v_conv))
+    euler = np.einsum("sbci,sbc->si", np.abs(B), moments)
+    return (newton + euler).max(axis=1) + gravity_scale(tree)
+
+
+def mass_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
+    """Largest entry of Mbar, kg m2, (states,)."""
+    return np.abs(tmt.mass_matrix(q, tree)).max(axis=(1, 2))
+
+
+def condition(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
+    """Condition number of Mbar in the 2-norm, (states,)."""
+    return np.linalg.cond(tmt.mass_matrix(q, tree))
+
+
+def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force, size=None) -> np.ndarray:
+    """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): what errors of eps in Mbar and in the force do to qdd.
+
+    force: scale of the forces, N m, (states,). size: |qdd| where it is known; without it, its bound |Mbar^-1| force,
+    so that the scale is (cond(Mbar) + 1) |Mbar^-1| force. Norms of Mbar are its eigenvalues.
+    """
+    eigenvalues = np.linalg.eigvalsh(tmt.mass_matrix(q, tree))
+    size = force / eigenvalues[:, 0] if size is None else size
+    return (eigenvalues[:, -1] * size + force) / eigenvalues[:, 0]

@@ -1,0 +1,49 @@
+"""Timing: what is compared is timed in turns, so that whatever slows the machine down slows all of them; and the machine."""
+
+import platform
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+ENOUGH = 0.02  # s: what has taken so long in all is timed no more than twice
+ONCE = 0.1  # s: what takes so long is timed once, without a call to warm up: both weigh little beside it
+WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
+
+
+def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
+    """Seconds of each call of each function, at most so many rounds, after one to warm up."""
+    times = [[] for _ in runs]
+    for k in range(rounds + 1):
+        for run, taken in zip(runs, times):
+            if not taken or (len(taken) < 2 and taken[0] < ONCE) or sum(taken) < ENOUGH:
+                begin = time.perf_counter()
+                run()
+                taken.append(time.perf_counter() - begin)
+                if k == 0 and taken[0] < ONCE:
+                    taken.clear()
+    return times
+
+
+def fastest(runs: dict[object, Callable], rounds: int) -> dict[object, float]:
+    """Seconds of the fastest call of each function, by its name."""
+    return {name: min(taken) for name, taken in zip(runs, in_turns(list(runs.values()), rounds))}
+
+
+def cpu() -> str:
+    """The processor's name."""
+    return first_line("model name") or platform.processor() or "unknown"
+
+
+def vectors() -> str:
+    """The processor's name and the widest vectors that it has, as far as the system tells."""
+    flags = (first_line("flags") or first_line("Features")).split()
+    return f"{cpu()}, {next((name for flag, name in WIDTHS if flag in flags), 'width of its vectors unknown')}"
+
+
+def first_line(name) -> str:
+    """The first value of that name that Linux tells of the processor; "" elsewhere."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith(name)), "")

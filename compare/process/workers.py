@@ -1,0 +1,139 @@
+"""Two further processes: they draw the figures of an experiment while the next one computes, and follow scenes."""
+
+import logging
+import os
+import pickle
+import signal
+import threading
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process, resource_tracker
+from queue import SimpleQueue
+
+from . import interrupt
+from .crash import described, place
+
+
+class WorkerEnded(RuntimeError):
+    """One of the processes is no longer there."""
+
+
+class Workers(ThreadPoolExecutor):
+    """At most so many processes, each started when the others are busy, and a thread for each that hands it its calls.
+
+    Without multiprocessing's locks, which an early end would leave behind in the system.
+    """
+
+    def __init__(self, count):
+        super().__init__(count)
+        self.count, self.futures, self.processes, self.idle = count, [], [], SimpleQueue()
+        interrupt.undo.append(self.kill)
+
+    def start(self) -> None:
+        """One more process."""
+        context = get_context("spawn")
+        with interrupt.held(), deaf():
+            here, there = context.Pipe()
+            self.processes.append(context.Process(target=serve, args=(there,), daemon=True))
+            self.processes[-1].start()
+            there.close()
+            self.idle.put(here)
+
+    def submit(self, function, /, *arguments, **named):
+        under_way = sum(not future.done() for future in self.futures)
+        if len(self.processes) < min(self.count, under_way + 1):
+            self.start()
+        self.futures.append(super().submit(self.ask, function, arguments, named))
+        return self.futures[-1]
+
+    def ask(self, *call):
+        """What a call returns or raises in one of the processes."""
+        connection = self.idle.get()
+        try:
+            connection.send(call)
+            returned, value = connection.recv()
+        except (EOFError, OSError):
+            text = "a process that computes beside was ended from outside; a report that was there is unchanged"
+            raise WorkerEnded(text) from None
+        finally:
+            self.idle.put(connection)
+        if returned:
+            return value
+        raise value
+
+    def quiet(self):
+        """Wait until all that was submitted is done: a timing needs the machine for itself."""
+        wait(self.futures)
+
+    def kill(self):
+        for process in self.processes:
+            process.kill()
+
+
+@contextmanager
+def start_workers():
+    """Yields a pool of two processes."""
+    pool = Workers(2)
+    try:
+        yield pool
+    finally:
+        pool.kill()
+        pool.shutdown(cancel_futures=True)
+        for process in pool.processes:
+            process.join()
+        interrupt.undo.remove(pool.kill)
+
+
+@contextmanager
+def deaf():
+    """Processes that are started in this block hear no Ctrl-C: that is the business of the one that started them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # its start would end the blocking
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, interrupt.NUMBERS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# in a worker
+
+
+def serve(connection) -> None:
+    """Answer one call after the other."""
+    logging.getLogger("tmt").setLevel(logging.ERROR)  # what the main process says too
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    while True:
+        try:
+            function, arguments, named = connection.recv()
+            answer = True, function(*arguments, **named)
+        except EOFError:
+            return
+        except Exception as error:
+            answer = False, portable(error)
+        try:
+            connection.send(answer)
+        except BrokenPipeError:
+            return
+        except Exception as error:  # a value that cannot be sent
+            connection.send((False, portable(error)))
+
+
+def end_with_parent() -> None:
+    """End with the main process, however that ends."""
+    parent_process().join()
+    os._exit(1)
+
+
+def portable(error) -> Exception:
+    """An exception that can be sent, and knows where it was raised."""
+    error.place = place(error)
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        text, where = described(error, with_place=False), error.place
+        error = RuntimeError(text)
+        error.place = where
+    return error

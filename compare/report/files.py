@@ -1,0 +1,37 @@
+"""Results to files: CSV, JSON, Markdown and HTML."""
+
+import json
+
+import numpy as np
+import pandas as pd
+
+from .folder import files, save
+from .page import markdown, page
+from .verdict import passed
+
+
+def write(folder, sections, robot, origin, result, causes=(), skipped=()) -> None:
+    """All files of a report, the figures excepted, into a folder that has those; `result`: the verdict in words."""
+    (folder / "tables").mkdir()
+    for section in sections:
+        for name, rows in section.tables.items():
+            save(folder / "tables" / f"{name}.csv", plain(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
+    checks = [check.record() for section in sections for check in section.result.checks]
+    save(folder / "report.md", markdown(sections, robot, origin, result, causes))
+    save(folder / "index.html", page(folder, sections, robot, origin, result, causes))
+    origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
+    results = {
+        "passed": passed(sections),
+        "checks": checks,
+        "causes": [{name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in causes],
+        "skipped": [{"experiment": name, "reason": reason} for name, reason in skipped],
+        "provenance": origin,
+    }
+    save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
+
+
+def plain(table) -> pd.DataFrame:
+    """A table of objects for a CSV file: engines, true and false in small letters, whole numbers beside empty cells."""
+    if "engine" in table:
+        table["engine"] = table["engine"].str.lower()
+    return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)

@@ -1,0 +1,245 @@
+"""The output folder: a new report takes the place of the old one only when it is complete, whatever ends the run.
+
+While a run lasts, its files are in a folder `.new-` and eight letters inside the output folder, and it holds a lock on that
+folder; one that nobody holds is of a run that was killed. In it the report is made in `new`. The exchange moves the old report to
+`old`, renames `new` to `moving`, moves that report out, and renames `moving` to `done`: what is on disk says at every moment how
+to put the old report back.
+"""
+
+import json
+import os
+import re
+import shutil
+import tempfile
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..process import interrupt
+
+try:
+    import fcntl
+except ImportError:  # Windows: what a killed run leaves stays there
+    fcntl = None
+
+OWN = ("report.md", "index.html", "results.json", "tables", "figures")
+STAGES = ("new", "old", "moving", "done")
+TRIES = 20
+
+
+class FolderError(ValueError):
+    """A folder that cannot take a report; the message is one line."""
+
+
+@contextmanager
+def new_report(out):
+    """A fresh folder inside `out`; what is in it takes the old report's place when the block ends well.
+
+    Whatever else is in `out` stays. If the block raises, `out` is as it was. FolderError if `out` cannot be
+    written, or has files under a report's names that are not the old report's.
+    """
+    work = Work(Path(out))
+    interrupt.undo.append(work.remove)
+    try:
+        work.make()
+        yield work.path / "new"
+        work.exchange()
+    except OSError as error:
+        if work.path is None or not isinstance(error.filename, str | Path):
+            raise
+        path = Path(error.filename)
+        if not path.is_relative_to(work.path / "new"):
+            raise
+        path = work.out / path.relative_to(work.path / "new")  # as the reader knows it
+        raise FolderError(f"cannot write {path}: {error.strerror}; a report that was there is unchanged") from None
+    finally:
+        work.remove()
+        interrupt.undo.remove(work.remove)
+
+
+class Work:
+    """The folder of one run, inside `out`."""
+
+    def __init__(self, out):
+        self.out, self.path, self.lock = out, None, None
+        self.made = [path for path in (out, *out.parents) if not os.path.lexists(path)]  # the innermost first
+
+    def make(self):
+        """Make the folder, hold its lock, clear away what killed runs have left."""
+        for attempt in range(TRIES):
+            try:
+                self.out.mkdir(parents=True, exist_ok=True)
+                with locked(self.out):
+                    with interrupt.held():
+                        self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
+                        self.lock = lock(self.path)
+                    (self.path / "new").mkdir()
+                    clear(self.out)
+                    refuse_foreign(self.out)
+                return
+            except OSError as error:
+                # not found: another run has just taken away the folder that it had made
+                if not isinstance(error, FileNotFoundError) or attempt == TRIES - 1:
+                    text = f"cannot write to {self.out}: {what_is_wrong(self.out, error)}"
+                    raise FolderError(f"{text}; a folder that can be written is expected") from None
+
+    def exchange(self):
+        """Move the old report away and the new one in; on an error put everything back."""
+        with locked(self.out), interrupt.held():
+            clear(self.out)
+            refuse_foreign(self.out)
+            new, old, moving = (self.path / name for name in ("new", "old", "moving"))
+            try:
+                old.mkdir()
+                move(self.out, old)
+                new.rename(moving)
+                move(moving, self.out)
+                moving.rename(self.path / "done")
+            except BaseException as error:
+                put_back(self.path, self.out)
+                if not isinstance(error, OSError):
+                    raise
+                text = f"cannot replace the report in {self.out}: {error.strerror}; the old one is unchanged"
+                raise FolderError(text) from None
+            interrupt.settle()
+
+    def remove(self):
+        """Take away what this run has made, but for the report."""
+        if self.path is not None:
+            delete(self.path)
+        if self.lock is not None:
+            os.close(self.lock)
+            self.lock = None
+        for path in self.made:
+            try:
+                path.rmdir()
+            except OSError:  # not empty
+                return
+
+
+def move(source, target) -> None:
+    """Move a report's files, as far as the target does not have them."""
+    for name in OWN:
+        if os.path.lexists(source / name) and not os.path.lexists(target / name):
+            (source / name).rename(target / name)
+
+
+def put_back(work, out) -> None:
+    """The old report as it was before an exchange that did not come to its end."""
+    if (work / "moving").exists():
+        move(out, work / "moving")  # what the new report lacks is what had been moved
+        (work / "moving").rename(work / "new")
+    if (work / "new").exists() and (work / "old").exists():
+        move(work / "old", out)
+
+
+def clear(out) -> None:
+    """Put back and take away what killed runs have left; the folder of a run that is alive is locked, and stays."""
+    for work in sorted(out.glob(".new-*")):
+        if is_of_a_run(work):
+            number = lock(work, wait=False)
+            if number is not None:
+                put_back(work, out)
+                delete(work)
+                os.close(number)
+
+
+def is_of_a_run(path) -> bool:
+    """Whether a folder was made by a run: by its name, and by the names in it."""
+    if not re.fullmatch(r"\.new-[a-z0-9_]{8}", path.name) or path.is_symlink() or not path.is_dir():
+        return False
+    return {child.name for child in path.iterdir()} <= {*STAGES, *OWN}
+
+
+def delete(work) -> None:
+    """Delete a run's folder, unless an old report that could not be put back is in it."""
+    unfinished = (work / "new").exists() or (work / "moving").exists()
+    if unfinished and (work / "old").exists() and any((work / "old").iterdir()):
+        return
+    for _ in range(TRIES):
+        shutil.rmtree(work, ignore_errors=True)
+        if not work.exists():
+            return
+        time.sleep(0.01)  # a process that is about to end still wrote
+
+
+@contextmanager
+def locked(folder):
+    """No other run is here at the same time."""
+    number = lock(folder)
+    try:
+        yield
+    finally:
+        if number is not None:
+            os.close(number)
+
+
+def lock(folder, wait=True) -> int | None:
+    """A file descriptor with the folder's lock; None where somebody else has it, or there are no locks.
+
+    The system takes a lock away when its process ends, however that ends.
+    """
+    if fcntl is None:
+        return None
+    number = None
+    try:
+        number = os.open(folder, os.O_RDONLY)
+        fcntl.flock(number, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        return number
+    except OSError:
+        if number is not None:
+            os.close(number)
+        return None
+
+
+def what_is_wrong(out, error) -> str:
+    """Why there is no such folder, in words: what stands in its place."""
+    for path in (*reversed(out.parents), out):
+        name = "it" if path == out else str(path)
+        if os.path.islink(path) and not os.path.exists(path):
+            return f"{name} is a symbolic link to {os.readlink(path)}, which does not exist"
+        if os.path.exists(path) and not os.path.isdir(path):
+            return f"{name} is a file"
+    return error.strerror
+
+
+@contextmanager
+def writing(path):
+    """An error of the disk in this block names the file, which Python leaves out when it writes."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+
+
+def save(path, text) -> None:
+    """A text file, UTF-8 wherever it is written."""
+    with writing(path):
+        path.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def files(folder) -> list[str]:
+    """What lies in a folder under a report's names, relative to it."""
+    found = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
+    return sorted(str(path.relative_to(folder)) for path in found if path.is_file() or path.is_symlink())
+
+
+def refuse_foreign(out) -> None:
+    """FolderError for a file under a report's names that the report in `out` does not list as its own."""
+    try:
+        own = json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"]["files"]
+        foreign = [name for name in files(out) if name not in own]
+    except (OSError, ValueError, KeyError, TypeError):
+        foreign = files(out)
+    if foreign:
+        raise FolderError(
+            f"{out} has {foreign[0]}, which is not of an earlier report and would be replaced; another folder is expected"
+        )
+
+
+def made_by(out) -> str | None:
+    """The command that made the report in a folder; None if there is none."""
+    try:
+        return str(json.loads((Path(out) / "results.json").read_text(encoding="utf-8"))["provenance"]["command"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

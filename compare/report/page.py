@@ -1,0 +1,160 @@
+"""A report for its readers: Markdown, and HTML as one file."""
+
+import base64
+import html
+import math
+import re
+from pathlib import Path
+from string import Template
+
+import pandas as pd
+
+from .questions import answers
+from .verdict import outcome, passed
+
+TITLE = "TMT and MuJoCo compared on a human arm"
+DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
+DIGITS |= dict.fromkeys(
+    ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
+)
+FOLDED = 30  # rows: a longer table is folded in the HTML
+INTRO = (
+    "A human arm, two rigid bodies on three hinges, modelled twice: as MJCF, run by MuJoCo, and by the TMT method in a "
+    "program that shares nothing with it. Each difference stands beside a tolerance that was fixed beforehand (column bar); "
+    "'exact' is the method in 50-digit arithmetic, and distances from it are in eps = 2.2e-16 of the quantity's scale. Of the "
+    "states in a row, the largest difference is the largest of all; the worst is the one that comes closest to its tolerance."
+)
+
+
+def shown(table, columns=None) -> pd.DataFrame:
+    """A table as text, with the digits that a reader needs."""
+    table = table if columns is None else table[columns]
+
+    def text(value, digits):
+        if isinstance(value, float):
+            if not math.isfinite(value):
+                return ""
+            return f"{value:.0f}" if value.is_integer() and 1.0 <= abs(value) < 1e7 else f"{value:.{digits}g}"
+        return "" if value is None else str(value)
+
+    columns = {c: [text(v, DIGITS.get(c, 3)) for v in table[c].astype(object)] for c in table.columns}
+    return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
+
+
+def of_causes(causes) -> pd.DataFrame:
+    """The causes as a table for readers."""
+    return pd.DataFrame([(cause["rank"], cause["text"]) for cause in causes], columns=["rank", "cause"])
+
+
+def questions(sections, robot) -> pd.DataFrame:
+    """The assignment's questions and their answers as a table for readers."""
+    return pd.DataFrame(answers(sections, robot), columns=["part", "asked", "answered in", "answer"])
+
+
+def failing(section) -> pd.DataFrame:
+    """The checks of a section that fail, as text."""
+    failed = [check.record() for check in section.result.checks if not check.passed]
+    return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
+
+
+def markdown(sections, robot, origin, result, causes=()) -> str:
+    """The report as Markdown; `result`: the verdict; `causes`: of what fails."""
+    lines = [f"# {TITLE}", f"**{result}**"]
+    lines += ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
+    lines += [INTRO, "## The assignment's questions", md_table(questions(sections, robot))]
+    for section in sections:
+        failed = failing(section)
+        lines += [
+            f"## {section.title}",
+            f"*Claim:* {section.claim} **{outcome(section)}**",
+            f"*Tolerance:* {section.tolerance}",
+        ]
+        if len(failed):
+            lines += ["**Checks that fail:**", md_table(failed)]
+        for name, rows in section.tables.items():
+            table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
+            lines += [f"**{heading(name)}**"] if name != section.name else []
+            lines += [md_table(table)] if len(table.columns) else []
+            lines += [f"All columns, {len(rows)} rows: {link(name)}"]
+        lines += [f"- {note}" for note in section.result.notes]
+        for name, caption in section.figures:
+            lines += [f"![{name}](figures/{name}.png)", caption]
+    lines += ["## Where this comes from", md_table(origins(origin))]
+    return "\n\n".join(lines).replace("\n\n- ", "\n- ") + "\n"
+
+
+def heading(name) -> str:
+    """A table's name as words."""
+    return {"what_should_i_use": "What should I use?"}.get(name, name.replace("_", " ").capitalize())
+
+
+def link(name) -> str:
+    return f"[tables/{name}.csv](tables/{name}.csv)"
+
+
+def md_table(table) -> str:
+    cells = [list(table.columns), ["---"] * len(table.columns), *table.astype(str).values.tolist()]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
+
+
+def origins(origin) -> pd.DataFrame:
+    return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
+
+
+def page(folder, sections, robot, origin, result, causes=()) -> str:
+    """The report as one HTML file with its figures inside."""
+    body = (
+        ["<h2>Causes (1: an option or a convention, 2: a number)</h2>", html_table(of_causes(causes), "text")]
+        if causes
+        else []
+    )
+    body += [
+        f"<p>{html.escape(INTRO)}</p>",
+        '<h2 id="questions">The assignment\'s questions</h2>',
+        html_table(questions(sections, robot), "text"),
+    ]
+    for section in sections:
+        failed = failing(section)
+        body += [
+            f'<h2 id="{section.name}">{html.escape(section.title)}</h2>',
+            f"<p><em>Claim:</em> {words(section.claim)} <strong>{html.escape(outcome(section))}</strong></p>",
+            f"<p><em>Tolerance:</em> {words(section.tolerance)}</p>",
+        ]
+        if len(failed):
+            body += ["<p><strong>Checks that fail:</strong></p>", folded(failed, f"{len(failed)} checks")]
+        for name, caption in section.figures:
+            data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
+            image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
+            body.append(f"<figure>{image}<figcaption>{words(caption)}</figcaption></figure>")
+        for name, rows in section.tables.items():
+            table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
+            body += [f"<h3>{heading(name)}</h3>"] if name != section.name else []
+            body += [folded(table, f"Table, {len(table)} rows")] if len(table.columns) else []
+        checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
+        body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
+        if section.result.notes:
+            body.append("<ul>" + "".join(f"<li>{words(note)}</li>" for note in section.result.notes) + "</ul>")
+    body += ['<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
+    links = [("questions", "questions"), *((s.name, s.name) for s in sections), ("provenance", "provenance")]
+    return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
+        title=TITLE,
+        colour="#009E73" if passed(sections) else "#D55E00",
+        verdict=html.escape(result),
+        contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),
+        body="\n".join(body),
+    )
+
+
+def words(text) -> str:
+    """A sentence in HTML; what stands between backticks is code."""
+    return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
+
+
+def folded(table, summary) -> str:
+    """A table in HTML, folded if it is long."""
+    text = html_table(table)
+    return f"<details><summary>{summary}</summary>{text}</details>" if len(table) > FOLDED else text
+
+
+def html_table(table, kind="data") -> str:
+    return f'<div class="scroll">{table.to_html(index=False, border=0, classes=kind)}</div>'

@@ -1,0 +1,81 @@
+"""The answers to the questions of a robot's assignment, and to what a user of MuJoCo asks."""
+
+NOTHING = "no result: the experiment broke off"
+
+
+def answers(sections, robot) -> list[tuple[str, str, str, str]]:
+    """For each part: its letter, what is asked, where it is answered, the answer."""
+    results = {section.name: section.result for section in sections}
+    parts = [(q.part, q.asked, q.answered_in, answer(results, *q.answer)) for q in robot.questions]
+    return [*parts, *choice(results)]
+
+
+def answer(results, kind, *of) -> str:
+    """One answer: ("figure", name), ("printed", items ...) or ("largest", experiment, quantity, {column: value}, ...)."""
+    if kind == "figure":
+        return f"figure '{of[0]}'"
+    if kind == "printed":
+        return printed(results, of)
+    told = "; ".join(apart(results, *of[k : k + 3]) for k in range(0, len(of), 3))
+    return told + far_from_true(results) if "trajectory" in of else told
+
+
+def apart(results, name, quantity, where) -> str:
+    """How far the engines are apart in an experiment at most: of the rows with these values, or of this quantity."""
+    if name not in results:
+        return "not run"
+    where = where or {"quantity": quantity}
+    rows = [row for row in results[name].rows if all(row.get(key) == value for key, value in where.items())]
+    if not rows:
+        return NOTHING
+    if any(row["largest_difference"] is None for row in rows):
+        return "diverged"
+    top = max(rows, key=lambda row: row["largest_difference"])
+    judged = ", while judged" if name == "trajectory" else ""
+    return f"{quantity}: at most {top['largest_difference']:.1e} {top['unit']} apart ({top['scene']}{judged})"
+
+
+def printed(results, items) -> str:
+    """What is printed, beside what the engines find."""
+    if "published" not in results:
+        return "not run"
+    texts = []
+    for item in items:
+        rows = [row for row in results["published"].rows if row["item"] == item]
+        if not rows:
+            return NOTHING
+        values = {
+            name: "(" + ", ".join(f"{row[name]:.6g}" for row in rows) + ")" for name in ("published", "tmt", "mujoco")
+        }
+        texts.append(
+            f"{item}: printed {values['published']}, TMT {values['tmt']}, MuJoCo {values['mujoco']} {rows[0]['unit']}"
+        )
+    return "; ".join(texts)
+
+
+def far_from_true(results) -> str:
+    """What the agreement of two runs with the coarse step does not say: how far both are from the true motion."""
+    errors = results["trajectory"].curves.get("errors") if "trajectory" in results else None
+    if not errors:
+        return ""
+    told = [
+        f"{scene}: " + " and ".join("diverged" if error is None else f"{error:.2g}" for error in of_scene)
+        for scene, of_scene in errors.items()
+    ]
+    return (
+        f". Agreement is not truth: with its 64 steps the runs of TMT and MuJoCo are at most so many rad from the true "
+        f"motion: {'; '.join(told)}"
+    )
+
+
+def choice(results) -> list[tuple]:
+    """What a user of MuJoCo asks: which integrator, which step; one line of the table that answers it."""
+    lines = results["speed"].tables.get("what_should_i_use", []) if "speed" in results else []
+    line = next((line for line in lines if line["target_rad"] == 1e-6 and line["mujoco"] and line["tmt"]), None)
+    if line is None:
+        return []
+    text = (
+        f"What should I use? For {line['target_rad']:.0e} rad over five seconds ({line['scene']}): {line['mujoco']} "
+        f"({line['mujoco_ms']:.2g} ms), or {line['tmt']} ({line['tmt_ms']:.2g} ms); more in the table of that name."
+    )
+    return [("", "which integrator and which step", "speed", text)]

@@ -1,0 +1,80 @@
+"""What a run says while it lasts: lines on stdout, and on a terminal what is under way."""
+
+import os
+import re
+import sys
+from contextlib import contextmanager, suppress
+from textwrap import fill
+
+from rich.console import Console
+from rich.text import Text
+
+from ..process import interrupt
+from ..process.streams import Stream, readable
+
+CLEAR, CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
+
+
+class Terminal:
+    """Says lines on stdout; where stderr is a terminal, shows there what is under way."""
+
+    def __init__(self):
+        self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
+        self.lines, self.beside = (
+            Console(file=stream, force_terminal=stream.isatty(), width=80, height=25) for stream in (self.out, self.err)
+        )
+        self.status = None
+
+    def say(self, text="", style="") -> None:
+        """A line; on a terminal that is narrower: its columns closed up, and broken between words."""
+        text, columns = readable(text), self.out.columns()
+        if columns and len(text) > columns:
+            indent = " " * (len(text) - len(text.lstrip()))
+            text = indent + re.sub(" {2,}", "  ", text.strip())
+            text = fill(
+                text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False
+            )
+        with self.paused():
+            self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
+
+    def show(self, text) -> None:
+        """What is under way, in one line."""
+        if self.status:
+            self.beside.width = max(self.err.columns() or 80, 20)
+            room = self.beside.width - 6  # the spinner, and what a terminal shows of Ctrl-C
+            self.status.update(Text(text if len(text) <= room else text[: room - 3] + "..."))
+
+    @contextmanager
+    def progress(self, text):
+        """The block's progress is shown, if that is possible."""
+        if not self.beside.is_terminal or self.beside.is_dumb_terminal:
+            yield
+            return
+        spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
+        interrupt.undo.append(clear)
+        self.status = self.beside.status("", spinner=spinner)
+        self.show(text)
+        try:
+            with self.status:
+                yield
+        finally:
+            self.status = None
+            interrupt.undo.remove(clear)
+
+    @contextmanager
+    def paused(self):
+        """In this block nothing moves on the terminal."""
+        if self.status:
+            self.status.stop()
+        try:
+            yield
+        finally:
+            if self.status:
+                self.status.start()
+
+
+def clear() -> None:
+    """Take what is in progress from the terminal, at an early end."""
+    Stream.silent = True
+    with suppress(OSError):
+        os.write(2, (CLEAR + CURSOR).encode())

@@ -1,0 +1,82 @@
+"""The outcome of a report in words: its sections, and whether all checks pass."""
+
+from dataclasses import dataclass, field
+
+from ..judge.check import DRAWN, ENDS, LOCKABLE
+
+
+@dataclass
+class Section:
+    """One experiment in the report."""
+
+    name: str
+    title: str
+    claim: str
+    tolerance: str
+    result: object
+    figures: list = field(default_factory=list)  # (file name, caption)
+
+    @property
+    def tables(self) -> dict:
+        """Its tables that have rows, by their names; its own first."""
+        tables = {self.name: self.result.rows} | self.result.tables
+        return {name: rows for name, rows in tables.items() if rows}
+
+
+def failures(sections) -> tuple[list, list]:
+    """The checks that fail: those that compare, and those that say that something broke off."""
+    failed = [check for section in sections for check in section.result.checks if not check.passed]
+    broke = [check for check in failed if check.quantity in (ENDS, LOCKABLE) or check.quantity.startswith(f"{DRAWN} ")]
+    return [check for check in failed if check not in broke], broke
+
+
+def passed(sections) -> bool:
+    return not any(failures(sections))
+
+
+def worst(sections):
+    """The check that uses most of a tolerance of rounding, or None."""
+    checks = [check for section in sections for check in section.result.checks if check.over_tolerance is not None]
+    return max(checks, key=lambda check: check.over_tolerance, default=None)
+
+
+def verdict(sections, experiments, causes=()) -> str:
+    """The outcome in words, with its cause or its worst figure; `experiments`: how many there are in all."""
+    checks = [check for section in sections for check in section.result.checks]
+    names = ", ".join(section.name for section in sections)
+    ran = "" if len(sections) == experiments else f" in {names} ({len(sections)} of {experiments} experiments)"
+    differing, broke = failures(sections)
+    stopped = f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."
+    if differing:
+        text = f"The two models do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
+        if causes:
+            more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
+            others = sum(check.experiment != "parameters" for check in differing)
+            further = "further " if len(differing) > others else ""
+            follow = f" {others} {further}checks fail as a consequence." if others else ""
+            text += f"Cause: {causes[0]['text']}{more}.{follow}"
+        else:
+            text += f"First: {differing[0]}."
+        return f"{text} {stopped}" if broke else text
+    if broke:
+        return f"Not everything could be compared{ran}; the other {len(checks) - len(broke)} checks pass. {stopped}"
+    text = f"The two models agree{ran}: all {len(checks)} checks pass."
+    top = worst(sections)
+    if top is None or top.value == 0.0:
+        return text
+    where = f"{top.quantity}, {top.scene}" + (f", {top.note}" if top.note else "")
+    return (
+        f"{text} The difference that comes closest to its rounding tolerance is {top.value:.2g} {top.unit}".rstrip()
+        + f", {100 * top.over_tolerance:.2g} % of it ({top.experiment}: {where})."
+    )
+
+
+def outcome(section) -> str:
+    """Whether a section's claim holds, in words."""
+    checks = section.result.checks
+    differing, broke = failures([section])
+    if differing:
+        return f"It does not hold: {len(differing)} of {len(checks)} checks fail."
+    if broke:
+        return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
+    return f"It holds: all {len(checks)} checks pass."

@@ -1,0 +1,98 @@
+"""What is known of one robot. Everything that only the assignment's arm has is in arm.py."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import tmt
+
+from ..case import Case, Scene
+
+class Printed(NamedTuple):
+    """One printed answer."""
+
+    item: str
+    quantity: str  # "holding torque", "qdd" or "Mbar"
+    posture: str
+    values: tuple
+    unit: str
+    half_digit: float  # half a unit of the last printed digit; 0: zero but for rounding
+    torque: str = "none"  # or the item whose answer acts
+    to_every_digit: tuple = ()  # who meets a value that is rounding alone, of "exact", "tmt"
+    sizes: tuple = ()  # the components whose size alone exact arithmetic shares
+
+
+class Question(NamedTuple):
+    """One question of an assignment, and where its answer is found."""
+
+    part: str
+    asked: str
+    answered_in: str
+    answer: tuple  # of (kind, ...): ("figure", name), ("printed", items), ("largest", experiment, quantity, {column: value})
+
+
+class Claims(NamedTuple):
+    """What is claimed of a robot that is held at a posture with the torque that balances gravity there, by RK4."""
+
+    dt: float  # s, the step of the claims
+    left: str  # the posture that is left, because of rounding
+    left_after: float  # s, about
+    kept: str  # the posture that is not left
+    end: str  # the posture at which a run from `kept` is said to end
+    printed_torque: str  # the item of the torque at `left` as it is printed
+    of_scenes: Mapping[str, str]  # what is claimed of a scene, in words, by the scene's name
+    figures: Mapping[str, int]  # the number of the figure that shows a scene, by the scene's name
+
+
+class Conditioning(NamedTuple):
+    """Where the condition number of Mbar is said to be largest: two joints by name, their angles, deg; the others at 0."""
+
+    joints: tuple
+    worst: tuple  # and, mirrored, with the other sign of the first
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """One robot: a file, the numbers that are stated of it, and what is asked of it.
+
+    Scenes have tags: "quick": part of a quick run; "digits": compared with many digits of its own scheme; "speed": followed
+    by every method; "regular": errors fall regularly there from coarse steps on; "fewer joints": some of its joints never move.
+    """
+
+    name: str
+    mjcf: Path  # the file that MuJoCo runs
+    tree: tmt.Tree  # the stated numbers
+    postures: Mapping[str, tuple]  # deg, by name; the joints in the order of the Tree
+    scenes: tuple[Scene, ...]
+    symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
+    kinds: Mapping[str, str] = field(default_factory=dict)  # kind (centre, saddle, marginal): posture; else the first of it
+    landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins
+    printed: tuple[Printed, ...] = ()
+    claims: Claims | None = None
+    conditioning: Conditioning | None = None
+    questions: tuple[Question, ...] = ()
+    remarks: Callable | None = None  # (the printed answers, by item; dynamics by engine) -> sentences on what is printed
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return self.tree.hinge_names
+
+    def posture(self, posture: str | tuple = ()) -> np.ndarray:
+        """Joint angles of a posture by its name, or of angles in deg (none: zero): rad, shape (n,)."""
+        angles = self.postures[posture] if isinstance(posture, str) else posture
+        return np.radians(np.array(angles or (0.0,) * len(self.joints), dtype=float))
+
+    def case(self, name: str = "as it is", **changes) -> Case:
+        """The robot with changes, the fields of a Scene."""
+        return Case(self, Scene(name, **changes))
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """Its scenes."""
+        return tuple(Case(self, scene) for scene in self.scenes)
+
+    def symbol(self, joint: str) -> str:
+        return self.symbols.get(joint, joint)

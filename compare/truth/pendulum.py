@@ -1,0 +1,51 @@
+"""A motion that is known without an integrator: the elliptic function of a pendulum."""
+
+import mpmath
+import numpy as np
+from scipy.special import ellipj, ellipkinc
+
+import tmt
+from tmt.reference import DIGITS
+
+
+def pendulum(tree: tmt.Tree) -> tuple[float, float]:
+    """The angle at which a Tree with one hinge hangs, rad, and the frequency of small swings about it, rad/s.
+
+    Plain mechanics of a rigid body on a fixed axis, from the numbers of the Tree and not by the method:
+    I qdd = -|sum m r| |g| sin(q - hanging), with r and g across the axis and I the moment of inertia about it.
+    """
+    axis, gravity = np.array(tree.axis[0]), np.array(tree.gravity)
+    inertia, moment = 0.0, np.zeros(3)
+    for hinge, mass, com, tensor in zip(tree.body_hinge, tree.mass, np.array(tree.com), np.array(tree.inertia)):
+        if hinge == 0:
+            inertia += axis @ tensor @ axis + mass * np.sum(np.cross(axis, com) ** 2)
+            moment += mass * com
+    across, pull = (v - axis * (axis @ v) for v in (moment, gravity))
+    hanging = np.arctan2(axis @ np.cross(across, pull), across @ pull)
+    return float(hanging), float(np.sqrt(np.linalg.norm(across) * np.linalg.norm(pull) / inertia))
+
+
+def swing(t, q, qd, hanging, frequency) -> np.ndarray:
+    """Angle of a pendulum that started at q, qd (rad, rad/s), at times t in s: rad.
+
+    sin(theta / 2) = k sn(frequency t + u, k), theta from hanging; k = sin(half the amplitude). Whittaker, Analytical
+    Dynamics, 44. NaN if it turns over (k of 1 or more).
+    """
+    theta = np.remainder(q - hanging + np.pi, 2 * np.pi) - np.pi
+    height, speed = np.sin(theta / 2), qd / (2 * frequency)
+    k = np.hypot(height, speed)
+    sn = ellipj(frequency * t + ellipkinc(np.arctan2(height, speed), k * k), k * k)[0]
+    return q - theta + 2 * np.arcsin(k * sn) if k < 1.0 else np.full_like(t, np.nan)
+
+
+def exact_swing(t, q, qd, hanging, frequency) -> np.ndarray:
+    """The same with 50 digits of mpmath's elliptic functions."""
+    with mpmath.workdps(DIGITS):
+        q, qd, hanging, frequency = (mpmath.mpf(float(v)) for v in (q, qd, hanging, frequency))
+        turns = mpmath.floor((q - hanging) / (2 * mpmath.pi) + 0.5)
+        theta = q - hanging - 2 * mpmath.pi * turns
+        height, speed = mpmath.sin(theta / 2), qd / (2 * frequency)
+        m = height**2 + speed**2
+        begin = mpmath.ellipf(mpmath.atan2(height, speed), m)
+        sn = [mpmath.ellipfun("sn", u=frequency * mpmath.mpf(float(time)) + begin, m=m) for time in t]
+        return np.array([q - theta + 2 * mpmath.asin(mpmath.sqrt(m) * s) for s in sn], dtype=object)

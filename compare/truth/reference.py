@@ -1,0 +1,174 @@
+"""The runs with many digits that errors are measured against: a table, made anew where a number of the model has changed.
+
+How many digits are right is seen by halving the step: each run stands in the table with the largest difference from a run with
+half as many steps, which bounds the error of the coarser of the two.
+"""
+
+import csv
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tmt.cache import own_file
+from tmt.reference_run import trajectory
+
+from ..case import Case
+
+TABLE = Path(__file__).with_name("reference.csv")
+RECORDS = 64  # of a run, and its start
+COARSEST, FINEST = 256, 2048  # steps of a run of 5 s: the halving begins and ends there
+ENOUGH = 2e-22  # rad, rad/s: a difference from the run with half the steps that need not be smaller
+UNUSABLE = (OSError, RuntimeError, ValueError, csv.Error)  # of a cache folder: none, not the user's own; or of what is in it
+ABOUT = ["scene", "key", "steps", "halving_difference", "t_s"]
+
+
+class Reference(NamedTuple):
+    """One run: every number as the sum of two doubles."""
+
+    t: np.ndarray  # (65,) s
+    high: np.ndarray  # (65, 2 n) rad, rad/s
+    low: np.ndarray  # (65, 2 n)
+    halving: float  # largest difference from the run with half the steps
+    steps: int
+
+    def error(self, q: np.ndarray, joints: Sequence[int]) -> np.ndarray:
+        """The largest error of the angles q (65, m) of m joints by their places at each time, rad, (65,)."""
+        return np.abs((q - self.high[:, joints]) - self.low[:, joints]).max(axis=1)
+
+
+def columns(case: Case) -> list[str]:
+    """The names of the state's columns: angles, then rates."""
+    return [f"{name}_{unit}" for unit in ("rad", "rad_per_s") for name in case.joints]
+
+
+def key(case: Case) -> str:
+    """A hash of every number on which the motion depends."""
+    numbers = case.tree, *(a.tolist() for a in case.start), case.tau.tolist(), case.duration
+    return hashlib.sha256(repr(numbers).encode()).hexdigest()[:16]
+
+
+def references(cases: Sequence[Case], map: Callable = map, tell: Callable = print) -> dict[str, Reference]:
+    """Each case's reference by its name: from the committed table, else from the user's cache folder, else computed, and kept."""
+    rows = read(TABLE)
+    for case in cases:
+        if key(case) not in rows:
+            with suppress(*UNUSABLE):  # it only costs time
+                found = read(kept(case)).get(key(case))
+                if found and begins(found, case):
+                    rows[key(case)] = found
+    missing = [case for case in cases if key(case) not in rows]
+    for case, made in zip(missing, remade(missing, map, tell)):
+        rows[key(case)] = made
+        with suppress(*UNUSABLE):
+            write(kept(case), made)
+    return {case.name: reference(rows[key(case)]) for case in cases}
+
+
+def committed(case: Case) -> Reference | None:
+    """The reference of a case, if it is in the committed table."""
+    rows = read(TABLE).get(key(case))
+    return rows and reference(rows)
+
+
+def begins(rows: list[dict], case: Case) -> bool:
+    """Whether a run starts as the case does, and has its times."""
+    times = np.linspace(0.0, case.duration, RECORDS + 1)
+    try:
+        start = [float(rows[0][name]) for name in columns(case)]
+    except KeyError:
+        return False
+    return start == np.concatenate(case.start).tolist() and [float(row["t_s"]) for row in rows] == times.tolist()
+
+
+def kept(case: Case) -> Path:
+    """Where the reference of a case is kept that the committed table does not have."""
+    return own_file(f"reference_{key(case)}.csv")
+
+
+def remade(cases: Sequence[Case], map: Callable, tell: Callable) -> list[list[dict]]:
+    """The rows of each case, computed: with twice the steps until that changes nothing of importance, at most 2048 in 5 s."""
+    runs = {case.name: [] for case in cases}  # (steps, path), each with twice the steps of the one before
+    going = list(cases)
+    while going:
+        jobs = [(case, RECORDS, count) for case in going for count in next_counts(case, runs[case.name])]
+        for done, ((case, _, count), path) in enumerate(zip(jobs, map(run, jobs)), start=1):
+            runs[case.name].append((count, path))
+            tell(f"runs with many digits: {done} of {len(jobs)}, {count} steps")
+        going = [case for case in going if next_counts(case, runs[case.name])]
+    return [case_rows(case, runs[case.name]) for case in cases]
+
+
+def next_counts(case, runs) -> list[int]:
+    """The numbers of steps with which the case is to be run next: two at first; none where the digits are enough."""
+    scale = max(1, round(case.duration / 5.0 * COARSEST / RECORDS)) * RECORDS / COARSEST
+    if not runs:
+        return [round(scale * COARSEST), round(2 * scale * COARSEST)]
+    (_, coarse), (count, fine) = runs[-2:]
+    enough = abs(fine - coarse).max() <= ENOUGH or 2 * count > scale * FINEST
+    return [] if enough else [2 * count]
+
+
+def case_rows(case, runs) -> list[dict]:
+    """The rows of a case from its two finest runs."""
+    (_, coarse), (count, fine) = runs[-2:]
+    difference = f"{float(abs(fine - coarse).max()):.2e}"
+    about = {"scene": case.name, "key": key(case), "steps": count, "halving_difference": difference}
+    times = np.linspace(0.0, case.duration, RECORDS + 1)
+    return [
+        about | {"t_s": t} | dict(zip(columns(case), (f"{v:.32g}" if v else "0" for v in row)))
+        for t, row in zip(times, fine)
+    ]
+
+
+def run(job) -> np.ndarray:
+    """One run with many digits; a job is a case, the number of records and that of steps."""
+    case, records, steps = job
+    return trajectory(case.tree, *case.start, case.tau, case.duration, records, steps)
+
+
+def reference(rows: list[dict]) -> Reference:
+    """The rows of one case as numbers."""
+    names = [name for name in rows[0] if name not in ABOUT]
+    exact = np.array([[Decimal(row[name]) for name in names] for row in rows])
+    high = exact.astype(float)
+    low = np.array([[float(d - Decimal(h)) for d, h in zip(*pair)] for pair in zip(exact, high.tolist())])
+    times = np.array([float(row["t_s"]) for row in rows])
+    return Reference(times, high, low, float(rows[0]["halving_difference"]), int(rows[0]["steps"]))
+
+
+def read(path: Path) -> dict[str, list[dict]]:
+    """The rows of a table by their key, of each run that is whole and has a finite number wherever one belongs."""
+    if not path.exists():
+        return {}
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    by_key = {row.get("key"): [r for r in rows if r.get("key") == row.get("key")] for row in rows}
+    return {name: of_key for name, of_key in by_key.items() if name and whole(of_key)}
+
+
+def whole(rows: list[dict]) -> bool:
+    """Whether these are the rows of a run: so many, with nothing but finite numbers."""
+    try:
+        numbers = [Decimal(value) for row in rows for name, value in row.items() if name not in ABOUT[:2]]
+    except (TypeError, InvalidOperation):
+        return False
+    return len(rows) == RECORDS + 1 and {*ABOUT} < {*rows[0]} and all(number.is_finite() for number in numbers)
+
+
+def write(path: Path, rows: list[dict]) -> None:
+    """The rows as a table, written aside and moved."""
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    aside = {"dir": path.parent, "suffix": ".new", "delete": False}
+    with tempfile.NamedTemporaryFile("w", newline="", encoding="utf-8", **aside) as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    os.chmod(file.name, 0o644)
+    os.replace(file.name, path)

@@ -1,0 +1,93 @@
+"""The smallest model that has a scene's motion: which joints stay where they start, whatever the others do.
+
+A set of joints stays if, with these at their start value and at rest, their accelerations vanish for all values of the
+others: then the motion with them at rest solves the equations of the whole model, and its solution is the only one. The
+union of two such sets is one too, so there is a largest, and it is found by taking out of all joints those that move
+until none does. "For all values" is decided on the expressions of the traced method, where the acceleration must fold to
+the number 0; "moves" is decided by one state at which 50 digits give another value than 0. A joint of which neither can
+be said is kept: sin of the double nearest to pi is not 0, and terms that only cancel in sum do not fold.
+"""
+
+from typing import NamedTuple
+
+import mpmath
+import numpy as np
+
+from tmt import method
+from tmt.reference import DIGITS
+from tmt.trace import Tape
+
+from ..case import SEED, Case
+
+TRIALS = 3  # random states of the other joints, with 50 digits
+ZERO = mpmath.mpf(10) ** (10 - DIGITS)  # rad/s2: what 50 digits leave of an acceleration that vanishes
+
+
+class Needed(NamedTuple):
+    """Of the free joints of a case: which stay, and why each of the others is needed."""
+
+    stays: tuple
+    moves: dict  # name: why
+    undecided: tuple  # no state was found at which they move, but their acceleration does not fold to 0
+
+
+def needed(case: Case) -> Needed:
+    """Which joints of the case its motion needs."""
+    tree = case.tree
+    names = case.joints
+    moves = {name: f"{name} has a speed at the start" for name, rate in zip(names, case.v) if rate}
+    undecided = ()
+    while still := tuple(name for name in names if name not in moves and name not in undecided):
+        when = "at the start" if len(still) == len(names) else "when the others move"
+        largest = dict.fromkeys(still, 0.0)
+        rng = np.random.default_rng(SEED)
+        for _ in range(TRIALS):
+            q, qd = rng.uniform(-np.pi, np.pi, len(names)), rng.uniform(-10.0, 10.0, len(names))
+            for name, value in exact_accelerations(case, tree, still, q, qd).items():
+                largest[name] = max(largest[name], abs(value))
+        found = {name: f"{name} accelerates by {float(a):.2g} rad/s2 {when}" for name, a in largest.items() if a > ZERO}
+        moves |= found
+        if not found:
+            unfolded = tuple(name for name, number in folded(case, tree, still).items() if number != 0.0)
+            if not unfolded:
+                break
+            undecided += unfolded
+    return Needed(still, moves, undecided)
+
+
+def accelerations(case, tree, still, scalar, q, qd) -> dict:
+    """Accelerations of the joints in `still`, at their start and at rest, the others at q, qd: by name, over any scalar.
+
+    A torque that holds is the model's own bias at the start, over the same scalar: not its rounded value.
+    """
+    start = [scalar(float(angle)) for angle in case.q]
+    q = [s if name in still else v for name, s, v in zip(tree.hinge_names, start, q)]
+    qd = [scalar(0.0) if name in still else v for name, v in zip(tree.hinge_names, qd)]
+    if case.scene.torque == "hold":
+        tau = method.bias(method.bodies(tree, start), tree.gravity)
+    else:
+        tau = [scalar(float(torque)) for torque in case.tau]
+    by_name = dict(zip(tree.hinge_names, method.acceleration(tree, q, qd, tau)))
+    return {name: by_name[name] for name in still}
+
+
+def exact_accelerations(case, tree, still, q, qd) -> dict:
+    """The accelerations with 50 digits, rad/s2."""
+    with mpmath.workdps(DIGITS):
+        q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd))
+        return accelerations(case, tree, still, mpmath.mpf, q, qd)
+
+
+def folded(case, tree, still) -> dict:
+    """The numbers to which the traced accelerations fold; None where one remains an expression."""
+    tape = Tape()
+    q, qd = (tape.inputs(*(f"{name}{i}" for i in range(len(tree.parent)))) for name in ("q", "qd"))
+    return {name: tape.lift(a).number for name, a in accelerations(case, tree, still, tape.lift, q, qd).items()}
+
+
+def reduced(case: Case, need: Needed | None = None) -> Case | None:
+    """The same case with the joints locked that stay; None if it needs all of them, or none. need: what `needed` found."""
+    stays = (need or needed(case)).stays
+    if not stays or len(stays) == len(case.joints):
+        return None
+    return case.changed(name=f"{case.name}, {' and '.join(stays)} locked", locked=case.scene.locked + stays)
