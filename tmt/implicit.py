@@ -5,15 +5,14 @@ q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j.
 the equations linearised at (q, qd) have.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .dual import Dual, jacobian
-from .method import acceleration, mass_matrix_and_bias
 from .space import solve_any
+from .stepping import Method, checked_sums, checked_tableau
 from .trace import Tape
-from .tree import real_numbers, shown
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
@@ -36,31 +35,29 @@ def step({state}, {torque}, dt):
 
 
 @dataclass(frozen=True)
-class ImplicitRungeKutta:
+class ImplicitRungeKutta(Method):
     """An implicit Runge-Kutta method, given by its Butcher tableau, applied to (q, qd) as one first-order system.
 
     Raises ValueError if A is not square, a row of A does not sum to c, or b does not sum to 1.
     """
 
-    order: int
+    order: int = field()  # it must be given, though Method has a default
     A: tuple  # row i: the weights of all stages in stage i
     b: tuple  # the weights of the stages in the step
     c: tuple  # the time of each stage in units of dt
 
+    solves_stages = True
+
     def __post_init__(self):
         checked_tableau(self, "A")
-        stages = len(self.b)
-        if not len(self.A) == stages == len(self.c) or any(len(row) != stages for row in self.A):
+        if not len(self.A) == self.stages == len(self.c) or any(len(row) != self.stages for row in self.A):
             raise ValueError("A must be square, and b and c must have one entry for each of its rows")
-        for i, (row, c) in enumerate(zip(self.A, self.c)):
-            if abs(sum(row) - c) > 1e-14:
-                raise ValueError(f"row {i} of A sums to {sum(row)}, not to c = {c}")
-        if abs(sum(self.b) - 1.0) > 1e-14:
-            raise ValueError(f"b sums to {sum(self.b)}, not to 1")
+        checked_sums(self)
 
-    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """qdd from Mbar qdd = tau - D qd - h."""
-        return acceleration(tree, q, qd, tau, terms)
+    @property
+    def stages(self) -> int:
+        """Evaluations of the dynamics in one iteration of Newton's method."""
+        return len(self.b)
 
     def step(self, slope, q, qd, dt):
         """The state (q, qd) one dt later, on floats, arrays and dual numbers of them.
@@ -75,16 +72,16 @@ class ImplicitRungeKutta:
 
         a, last = self.start(evaluate, q, qd, dt), False
         for _ in range(ITERATIONS):
-            change = self.newton(evaluate, q, qd, dt, a)
+            change = self.newton_step(evaluate, q, qd, dt, a)
             a = [old + new for old, new in zip(a, change)]
             if last:  # once more after the values are found: only then are their derivatives exact
                 return self.finish(q, qd, dt, a)
             last = largest(change) <= CLOSE * (1.0 + largest(a))
         raise ArithmeticError(f"Newton's method does not find the stages at dt = {dt} s")
 
-    def stages(self, q, qd, dt, a):
+    def stage_states(self, q, qd, dt, a):
         """The states (q_i, qd_i) of the stages with accelerations a, all of them in one list."""
-        n, s = len(q), range(len(self.b))
+        n, s = len(q), range(self.stages)
         for i in s:
             twice = [sum(self.A[i][k] * self.A[k][j] for k in s) for j in s]
             yield (
@@ -105,16 +102,16 @@ class ImplicitRungeKutta:
             changes = [weighted(by_q[k], off) + weighted(by_qd[k], faster) for k in range(len(q))]
             return [value + change for value, change in zip(f, changes)], by_q, by_qd
 
-        return self.newton(linear, q, qd, dt, [0.0] * (len(q) * len(self.b)))
+        return self.newton_step(linear, q, qd, dt, [0.0] * (len(q) * self.stages))
 
-    def newton(self, evaluate, q, qd, dt, a):
+    def newton_step(self, evaluate, q, qd, dt, a):
         """The change of the accelerations a by one step of Newton's method.
 
         evaluate(q, qd): qdd and its exact derivatives by q and by qd, n rows of n each.
         """
-        n, s = len(q), range(len(self.b))
+        n, s = len(q), range(self.stages)
         matrix, right = [], []
-        for i, (q_i, qd_i) in zip(s, self.stages(q, qd, dt, a)):
+        for i, (q_i, qd_i) in zip(s, self.stage_states(q, qd, dt, a)):
             f, by_q, by_qd = evaluate(q_i, qd_i)
             for k in range(n):
                 row = []
@@ -128,31 +125,12 @@ class ImplicitRungeKutta:
 
     def finish(self, q, qd, dt, a):
         """The state (q, qd) one dt later, from the accelerations of the stages."""
-        n, s = len(q), range(len(self.b))
+        n, s = len(q), range(self.stages)
         twice = [sum(self.b[k] * self.A[k][j] for k in s) for j in s]
         return (
             [q[k] + dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
             [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)],
         )
-
-
-def checked_tableau(method, *rows) -> None:
-    """Make order, b, c and these rows of a tableau plain numbers: a method is a value, and a key of what is compiled for it."""
-    order = method.order
-    if not isinstance(order, int) or isinstance(order, bool) or not 1 <= order <= 100:
-        raise ValueError(f"order of the method is {shown(order)}; a whole number from 1 to 100 is expected")
-    for name in ("b", "c", *rows):
-        given = getattr(method, name)
-        try:
-            parts = [real_numbers(part) for part in (given if name in rows else [given])]
-        except TypeError:  # one number where rows are expected
-            parts = [None]
-        if any(part is None or part.ndim != 1 or not np.isfinite(part).all() for part in parts):
-            raise ValueError(
-                f"{name} of the method is {shown(given)}; {'rows of ' * (name in rows)}numbers are expected"
-            )
-        parts = tuple(tuple(part.tolist()) for part in parts)
-        object.__setattr__(method, name, parts if name in rows else parts[0])
 
 
 def weighted(weights, values):
@@ -180,7 +158,7 @@ def step_source(tree, stepping, terms) -> str:
     def fresh():
         tape = Tape()
         q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau"))
-        a = tape.inputs(*(f"a{i}" for i in range(n * len(stepping.b))))
+        a = tape.inputs(*(f"a{i}" for i in range(n * stepping.stages)))
         return tape, q, qd, tau, tape.inputs("dt")[0], a
 
     tape, q, qd, tau, dt, _ = fresh()
@@ -196,7 +174,7 @@ def step_source(tree, stepping, terms) -> str:
         rows = [found[n + 2 * n * k : n + 2 * n * (k + 1)] for k in range(n)]
         return found[:n], [row[:n] for row in rows], [row[n:] for row in rows]
 
-    change = stepping.newton(called, q, qd, dt, a)
+    change = stepping.newton_step(called, q, qd, dt, a)
     functions.append(tape.function("newton", [*q, *qd, *tau, dt, *a], change))
     tape, q, qd, tau, dt, _ = fresh()
     functions.append(tape.function("start", [*q, *qd, *tau, dt], stepping.start(called, q, qd, dt)))

@@ -11,8 +11,7 @@ from . import composite
 from .cache import load
 from .calls import Evaluator, checked_evaluator, checked_run
 from .given import checked_model
-from .implicit import ImplicitRungeKutta
-from .methods import AdaptiveRungeKutta, RungeKutta, method_named
+from .methods import method_named
 from .source import LANES as LANES
 from .source import evaluator_source, lanes_source, run_source, slope_code
 from .trace import Code
@@ -33,7 +32,7 @@ def stepper(tree: Tree, method_name: str) -> Callable:
     """
     checked_model(tree)
     stepping = method_named(method_name)
-    return _stepper(tree, stepping, len(tree.parent) > TRACED and type(stepping) is RungeKutta)
+    return _stepper(tree, stepping, len(tree.parent) > TRACED and stepping.loop)
 
 
 @lru_cache(maxsize=64)
@@ -44,14 +43,14 @@ def _stepper(tree, stepping, large):
         compiled = generic.stepper(tree, stepping)
     else:
         compiled = load(run_source(tree, stepping)).run
-    return checked_run(compiled, len(tree.parent), isinstance(stepping, AdaptiveRungeKutta))
+    return checked_run(compiled, len(tree.parent), stepping.adaptive)
 
 
 def lane_stepper(tree: Tree, method_name: str) -> Callable:
     """`run(q, qd, tau, dt)` for a batch that is a multiple of LANES; the same bits. Not for adaptive and implicit methods."""
     checked_model(tree)
     stepping = method_named(method_name)
-    if isinstance(stepping, (AdaptiveRungeKutta, ImplicitRungeKutta)):
+    if not stepping.lanes:
         raise ValueError(f"method {method_name!r} has no lanes; an explicit one with a fixed step is expected")
     return _lane_stepper(tree, stepping)
 

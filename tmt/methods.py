@@ -1,60 +1,55 @@
-"""Integration methods as data, each with one step written over any scalar.
+"""The methods of integration, each a `Method` (see stepping.py) with one step that is written over any scalar.
 
-A method has a `slope`, the acceleration that it uses, and a `step`, which takes the state (q, qd), each a list of n
-scalars, and `slope(q, qd) -> qdd`, and returns the state one dt later. The same lines integrate floats, dual numbers
-(their exact Jacobian), mpmath numbers and traced expressions (the compiled loop of kernels.py).
+The same lines integrate floats, dual numbers (their exact Jacobian), mpmath numbers and traced expressions (the compiled
+loop of kernels.py). METHODS may be given further ones, and objects of a user's own that have a `slope` and a `step`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from . import dop853
 from .dual import seeded
-from .implicit import ImplicitRungeKutta, checked_tableau
-from .method import acceleration, bias_rates, mass_matrix_and_bias, reduced_force
+from .implicit import ImplicitRungeKutta
+from .method import bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
+from .stepping import Method, checked_sums, checked_tableau, completed
 from .tree import shown
 
 
 @dataclass(frozen=True)
-class RungeKutta:
+class RungeKutta(Method):
     """An explicit Runge-Kutta method, given by its Butcher tableau.
 
     Applied to (q, qd) as one first-order system, like MuJoCo's RK4. Raises ValueError if the tableau
     is not explicit, a row of A does not sum to c, or b does not sum to 1.
     """
 
-    order: int
+    order: int = field()  # it must be given, though Method has a default
     A: tuple  # row i: the weights of stages 0 .. i-1 in stage i
     b: tuple  # the weights of the stages in the step
     c: tuple  # the time of each stage in units of dt
+
+    loop = True
 
     def __post_init__(self):
         checked_tableau(self, "A")
         if not len(self.A) == len(self.b) == len(self.c):
             raise ValueError("A, b and c must have one entry for each stage")
-        for i, (row, c) in enumerate(zip(self.A, self.c)):
+        for i, row in enumerate(self.A):
             if len(row) != i:
                 raise ValueError(f"row {i} of A has {len(row)} entries; an explicit method has {i}")
-            if abs(sum(row) - c) > 1e-14:
-                raise ValueError(f"row {i} of A sums to {sum(row)}, not to c = {c}")
-        if abs(sum(self.b) - 1.0) > 1e-14:
-            raise ValueError(f"b sums to {sum(self.b)}, not to 1")
+        checked_sums(self)
 
     def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
         """The matrix of the linear system for the slope: Mbar."""
         return terms(tree, q, [0.0] * len(q))[0]
 
-    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """qdd from Mbar qdd = tau - D qd - h."""
-        return acceleration(tree, q, qd, tau, terms)
-
     def step(self, slope, q, qd, dt):
         """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
-        return self.combined(self.stages(slope, q, qd, dt), q, qd, dt)
+        return self.combined(self.stage_slopes(slope, q, qd, dt), q, qd, dt)
 
-    def stages(self, slope, q, qd, dt):
+    def stage_slopes(self, slope, q, qd, dt):
         """The rates and the accelerations of all stages."""
         rates, changes = [], []
         for row in self.A:
@@ -63,8 +58,9 @@ class RungeKutta:
             changes.append(slope(q_i, qd_i))
         return rates, changes
 
-    def combined(self, stages, q, qd, dt):
-        rates, changes = stages
+    def combined(self, slopes, q, qd, dt):
+        """The state one dt later, from the rates and accelerations of all stages."""
+        rates, changes = slopes
         return advance(q, dt, self.b, rates), advance(qd, dt, self.b, changes)
 
 
@@ -78,6 +74,8 @@ class AdaptiveRungeKutta(RungeKutta):
 
     errors: tuple = ()  # weights of the stages in the two estimates
 
+    adaptive = True
+
     def __post_init__(self):
         super().__post_init__()
         checked_tableau(self, "errors")
@@ -86,13 +84,13 @@ class AdaptiveRungeKutta(RungeKutta):
 
     def attempt(self, slope, q, qd, dt):
         """A step, and the two estimates of its error, each for q and qd."""
-        stages = self.stages(slope, q, qd, dt)
-        estimates = [[*advance([0.0] * len(q), dt, e, rates)] for e in self.errors for rates in stages]
-        return *self.combined(stages, q, qd, dt), *estimates
+        slopes = self.stage_slopes(slope, q, qd, dt)
+        estimates = [[*advance([0.0] * len(q), dt, e, part)] for e in self.errors for part in slopes]
+        return *self.combined(slopes, q, qd, dt), *estimates
 
 
 @dataclass(frozen=True)
-class SemiImplicitEuler:
+class SemiImplicitEuler(Method):
     """qd+ = qd + dt a, then q+ = q + dt qd+, with (Mbar + dt D [+ dt dh/dqd]) a = tau - D qd - h.
 
     Joint damping is implicit in the rates, and so is the bias if `implicit_bias`: what MuJoCo calls Euler,
@@ -100,7 +98,8 @@ class SemiImplicitEuler:
     """
 
     implicit_bias: bool
-    order: int = 1
+
+    damps_implicitly = True
 
     def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
         """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd]."""
@@ -177,14 +176,11 @@ METHODS = {
 }
 
 
-def method_named(name):
-    """The method of that name in METHODS, as it is there now; ValueError if there is none, or no method."""
+def method_named(name: str) -> Method:
+    """The method of that name in METHODS, as it is there now, with all fields; ValueError if there is none, or no method."""
     if not isinstance(name, str) or name not in METHODS:
         raise ValueError(f"unknown method {shown(name)}; known are {', '.join(METHODS)}")
-    stepping = METHODS[name]
-    known = isinstance(stepping, (RungeKutta, SemiImplicitEuler, ImplicitRungeKutta))
-    if not known and not all(callable(getattr(stepping, part, None)) for part in ("slope", "step", "__hash__")):
-        raise ValueError(
-            f"METHODS[{name!r}] is {shown(stepping)}; a hashable method with a slope and a step is expected"
-        )
-    return stepping
+    try:
+        return completed(METHODS[name])
+    except ValueError as error:
+        raise ValueError(f"METHODS[{name!r}] is {shown(METHODS[name])}; {error}") from None

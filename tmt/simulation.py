@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 
 from . import given, singular
 from .arm import ARM
-from .implicit import ImplicitRungeKutta
-from .methods import AdaptiveRungeKutta, method_named
+from .methods import method_named
 from .templates import NEWTON, OVERFLOW, SMALL, TURNED
 from .tree import Tree
 
@@ -45,8 +44,7 @@ def simulate(
     """
     stepping = method_named(method)
     steps, dt = given.whole("steps", steps), given.positive("dt", dt, "a step in s")
-    adaptive = isinstance(stepping, AdaptiveRungeKutta)
-    if tolerance is not None and not adaptive:
+    if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     tolerance = 1e-9 if tolerance is None else given.positive("tolerance", tolerance, "a number")
     state = given.states(model, q=q, qd=qd, tau=tau)
@@ -61,10 +59,10 @@ def simulate(
     from . import kernels  # here, so that `import tmt` need not wait for numba
 
     codes, evaluations = np.zeros(runs, np.int8), 0
-    if adaptive:
+    if stepping.adaptive:
         evaluations = kernels.stepper(model, method)(*arguments, dt, tolerance, codes)
     else:
-        worth = runs * steps >= kernels.WORTH and n <= kernels.TRACED and not isinstance(stepping, ImplicitRungeKutta)
+        worth = runs * steps >= kernels.WORTH and n <= kernels.TRACED and stepping.lanes
         in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
         if in_lanes:
             part = [array[:in_lanes] for array in arguments]

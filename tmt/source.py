@@ -1,9 +1,8 @@
 """The source of compiled modules: straight-line code that is traced, in the loops of templates.py."""
 
 from . import composite
-from .implicit import ImplicitRungeKutta, step_source
+from .implicit import step_source
 from .method import acceleration
-from .methods import AdaptiveRungeKutta
 from .templates import (
     ADAPTIVE,
     CHECK,
@@ -35,9 +34,9 @@ def slope_code(tree, stepping, terms=composite.mass_matrix_and_bias) -> Code:
 def run_source(tree, stepping) -> str:
     """The module that follows one state at a time: slope, step, and the loop over both."""
     n = len(tree.parent)
-    if isinstance(stepping, ImplicitRungeKutta):
+    if stepping.solves_stages:
         words = _words(n) | {"why": f"{NEWTON} if math.isnan({_sum('q', n)}) else {_why(n)}"}
-        loop = RUN.format(**words, used=", used", cost=f"1 + used * {len(stepping.b)}")
+        loop = RUN.format(**words, used=", used", cost=f"1 + used * {stepping.stages}")
         return HEADER + step_source(tree, stepping, composite.mass_matrix_and_bias) + loop
     tape = Tape()
     q, qd, tau, dt = _inputs(tape, tree)
@@ -45,9 +44,8 @@ def run_source(tree, stepping) -> str:
     def slope(q, qd):
         return tape.call("slope", [*q, *qd, *tau, dt], n)
 
-    adaptive = isinstance(stepping, AdaptiveRungeKutta)
-    results = (stepping.attempt if adaptive else stepping.step)(slope, q, qd, dt)
-    name = "attempt" if adaptive else "step"
+    name = "attempt" if stepping.adaptive else "step"
+    results = getattr(stepping, name)(slope, q, qd, dt)
     step = tape.function(name, [*q, *qd, *tau, dt], [value for part in results for value in part])
     inline = '@njit(forceinline=True, error_model="numpy")\n'
     return "\n\n".join(
@@ -62,8 +60,8 @@ def run_source(tree, stepping) -> str:
 def _loop(stepping, n) -> str:
     """The loop of `run_source` over the states of n hinges."""
     words = _words(n)
-    if not isinstance(stepping, AdaptiveRungeKutta):
-        return RUN.format(**words, used="", cost=_stages(stepping))
+    if not stepping.adaptive:
+        return RUN.format(**words, used="", cost=stepping.stages)
     states = [f"{name}{i}" for name in ("q", "qd") for i in range(n)]
 
     def squares(error):
@@ -75,16 +73,11 @@ def _loop(stepping, n) -> str:
         **{name: ", ".join(f"{name}_{s}" for s in states) for name in ("new", "errors5", "errors3")},
         squares5=squares("errors5"),
         squares3=squares("errors3"),
-        stages=len(stepping.b),
+        stages=stepping.stages,
         small=SMALL,
         components=2 * n,
         exponent=-1.0 / stepping.order,
     )
-
-
-def _stages(stepping) -> int:
-    """Evaluations of the dynamics in one step."""
-    return len(getattr(stepping, "b", "1"))
 
 
 def lanes_source(tree, stepping) -> str:
@@ -113,7 +106,7 @@ def lanes_source(tree, stepping) -> str:
             stages.append(STAGE.format(W=LANES, j=j, arguments=arguments, known=known, offset=j * n * LANES))
     words = _words(n) | {
         "W": LANES,
-        "cost": _stages(stepping),
+        "cost": stepping.stages,
         "size_x": 3 * n * LANES,
         "size_y": 2 * n * LANES,
         "size_k": len(asked) * n * LANES,
