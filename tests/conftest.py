@@ -1,12 +1,12 @@
-import importlib
 from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
-from compare.agreement import Setup
-from compare.engine_file import load
+from compare import experiment
+from compare.engines.mujoco import load
+from compare.robots.arm import ARM
 
 # no example database in the checkout; the same examples in every run
 settings.register_profile("project", database=None, derandomize=True, deadline=None, max_examples=50)
@@ -14,20 +14,26 @@ settings.load_profile("project")
 
 
 @pytest.fixture(scope="session")
-def engine():
-    return load()
+def mujoco():
+    """MuJoCo with the arm's file."""
+    return load(ARM.mjcf, ARM.tree)
 
 
 @pytest.fixture(scope="session")
-def small(engine):
+def engines(mujoco):
+    return experiment.engines(mujoco)
+
+
+@pytest.fixture(scope="session")
+def small(engines):
     """small(name): the result of an experiment in a small run, every path with few states and steps; made once."""
-    return cache(lambda name: importlib.import_module(f"compare.{name}").rows(Setup.small(engine)))
+    return cache(lambda name: experiment.module(name).rows(experiment.Setup.small(ARM, engines)))
 
 
 @pytest.fixture
-def setup(engine):
+def setup(engines):
     """A setup with few states, enough to see any error that is not rounding."""
-    return Setup(engine, states=200, exact_states=5, steps=(64,), size="quick")
+    return experiment.Setup(ARM, engines, states=200, exact_states=5, finer=(1,), size="quick")
 
 
 @pytest.fixture
