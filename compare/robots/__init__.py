@@ -1,7 +1,7 @@
 """What is known of one robot. Everything that only the assignment's arm has is in arm.py."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,6 +10,7 @@ import numpy as np
 import tmt
 
 from ..case import Case, Scene
+
 
 class Printed(NamedTuple):
     """One printed answer."""
@@ -68,13 +69,13 @@ class Robot:
     postures: Mapping[str, tuple]  # deg, by name; the joints in the order of the Tree
     scenes: tuple[Scene, ...]
     symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
-    kinds: Mapping[str, str] = field(default_factory=dict)  # kind (centre, saddle, marginal): posture; else the first of it
+    kinds: Mapping[str, str] = field(default_factory=dict)  # centre, saddle, marginal: the posture that stands for it
     landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     conditioning: Conditioning | None = None
     questions: tuple[Question, ...] = ()
-    remarks: Callable | None = None  # (the printed answers, by item; dynamics by engine) -> sentences on what is printed
+    remarks: Callable | None = None  # (printed answers by item, dynamics by engine) -> sentences on what is printed
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -93,6 +94,10 @@ class Robot:
     def cases(self) -> tuple[Case, ...]:
         """Its scenes."""
         return tuple(Case(self, scene) for scene in self.scenes)
+
+    def with_scenes(self, scenes: tuple[Scene, ...]) -> "Robot":
+        """The same robot with more scenes."""
+        return replace(self, scenes=self.scenes + scenes)
 
     def symbol(self, joint: str) -> str:
         return self.symbols.get(joint, joint)
