@@ -130,11 +130,13 @@ def run(options, command) -> int:
                 of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
                 make = experiment.Setup.quick if options.quick else experiment.Setup
                 setup = make(robot, experiment.engines(mujoco), **of_run)
+                for name, reason in reasons.items():
+                    terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
                 sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS), causes)
             origin["seconds"] = round(time.perf_counter() - started, 1)
-            files.write(folder, sections, robot, origin, words, causes, reasons.items())
+            files.write(folder, sections, robot, origin, words, causes, list(reasons.items()))
     except (ModelError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()

@@ -57,7 +57,7 @@ def failing(section) -> pd.DataFrame:
     return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
 
 
-def markdown(sections, robot, origin, result, causes=()) -> str:
+def markdown(sections, robot, origin, result, causes=(), skipped=()) -> str:
     """The report as Markdown; `result`: the verdict; `causes`: of what fails."""
     lines = [f"# {TITLE}", f"**{result}**"]
     lines += ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
@@ -79,6 +79,7 @@ def markdown(sections, robot, origin, result, causes=()) -> str:
         lines += [f"- {note}" for note in section.result.notes]
         for name, caption in section.figures:
             lines += [f"![{name}](figures/{name}.png)", caption]
+    lines += ["## Skipped", *(f"- {name}: {reason}." for name, reason in skipped)] if skipped else []
     lines += ["## Where this comes from", md_table(origins(origin))]
     return "\n\n".join(lines).replace("\n\n- ", "\n- ") + "\n"
 
@@ -101,7 +102,7 @@ def origins(origin) -> pd.DataFrame:
     return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
 
 
-def page(folder, sections, robot, origin, result, causes=()) -> str:
+def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
     """The report as one HTML file with its figures inside."""
     body = (
         ["<h2>Causes (1: an option or a convention, 2: a number)</h2>", html_table(of_causes(causes), "text")]
@@ -134,6 +135,9 @@ def page(folder, sections, robot, origin, result, causes=()) -> str:
         body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:
             body.append("<ul>" + "".join(f"<li>{words(note)}</li>" for note in section.result.notes) + "</ul>")
+    if skipped:
+        reasons = "".join(f"<li>{name}: {words(reason)}.</li>" for name, reason in skipped)
+        body.append(f'<h2 id="skipped">Skipped</h2><ul>{reasons}</ul>')
     body += ['<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
     links = [("questions", "questions"), *((s.name, s.name) for s in sections), ("provenance", "provenance")]
     return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
