@@ -68,6 +68,7 @@ class Robot:
     tree: tmt.Tree  # the stated numbers
     postures: Mapping[str, tuple]  # deg, by name; the joints in the order of the Tree
     scenes: tuple[Scene, ...]
+    described: str = ""  # in a sentence: "a human arm"
     symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
     kinds: Mapping[str, str] = field(default_factory=dict)  # centre, saddle, marginal: the posture that stands for it
     landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins

@@ -113,6 +113,7 @@ ARM = Robot(
     tree=tmt.ARM,
     postures=POSTURES,
     scenes=SCENES,
+    described="a human arm",
     symbols={"alpha": "α", "beta": "β", "gamma": "γ"},
     kinds={"centre": "bent", "saddle": "ball catch", "marginal": "zero"},
     landmarks=landmarks,
