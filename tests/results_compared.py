@@ -1,7 +1,7 @@
 """Two runs of the same program compared: which checks each makes, and their values, through a map of names that were changed.
 
-`python tests/results_compared.py BEFORE.json AFTER.json` prints every check without a partner and every value that differs by more
-than rounding; both files are a report's results.json. The map is for reports from before compare was divided into its parts.
+`python tests/results_compared.py BEFORE.json AFTER.json` prints every check without a partner and every value that differs
+by more than rounding; both files are a report's results.json. The map is for reports from before compare was divided into its parts.
 """
 
 import json
@@ -25,7 +25,7 @@ def name_of(check: dict, renamed=()) -> tuple:
 
 
 def compared(before: list[dict], after: list[dict], renamed=RENAMED) -> dict[str, list]:
-    """Checks by what became of them: lost, new, "passed differs", and those whose value or tolerance differs by more than rounding."""
+    """Checks by what became of them: lost, new, with another outcome, with another value or tolerance than rounding explains."""
     old, new = Counter(name_of(check, renamed) for check in before), Counter(name_of(check) for check in after)
     found = {"lost": sorted((old - new).elements()), "new": sorted((new - old).elements()), "passed": [], "values": []}
     by_name = {name_of(check): check for check in after}
