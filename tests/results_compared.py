@@ -1,7 +1,7 @@
 """Two runs of the same program compared: which checks each makes, and their values, through a map of names that were changed.
 
 `python tests/results_compared.py BEFORE.json AFTER.json` prints every check without a partner and every value that differs
-by more than rounding; both files are a report's results.json. The map is for reports from before compare was divided into its parts.
+by more than rounding; both files are a report's results.json. The map is for reports that are older than compare's folders.
 """
 
 import json
