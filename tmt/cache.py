@@ -140,7 +140,7 @@ def from_disk(name, text, folder):
 
 
 def own_machine_code(folder, name) -> Path:
-    """The folder for machine code, which nobody else can enter; NotOwn unless it and its files of that name are the user's own."""
+    """The folder for machine code, which nobody else can enter; NotOwn unless it and its files of that name are the user's."""
     inside = folder / "__pycache__"
     inside.mkdir(mode=0o700, exist_ok=True)
     check_own(inside)

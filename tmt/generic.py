@@ -53,4 +53,9 @@ def stepper(tree, stepping) -> Callable:
     """run(q, qd, tau, dt, ended) of a Tree and a method that has `loop`, as in kernels.stepper."""
     stages = len(stepping.b)
     A = np.array([[*row, *[0.0] * (stages - len(row))] for row in stepping.A])
-    return partial(compiled().run_tableau, arrays(tree), A, np.array(stepping.b))
+    loop = compiled().run_tableau
+    run = partial(loop, arrays(tree), A, np.array(stepping.b))
+    # of no run: compiled for these types and then for no others, which it would take as they are (whole numbers, say)
+    run(*np.empty((2, 0, 1, len(tree.parent))), np.empty((0, len(tree.parent))), 0.0, np.empty(0, np.int8))
+    loop.disable_compile()
+    return run

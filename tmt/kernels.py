@@ -37,10 +37,7 @@ def stepper(tree: Tree, method_name: str) -> Callable:
 
 @lru_cache(maxsize=64)
 def _stepper(tree, stepping, large):
-    if large:
-        compiled = generic.stepper(tree, stepping)
-    else:
-        compiled = load(run_source(tree, stepping)).run
+    compiled = generic.stepper(tree, stepping) if large else load(run_source(tree, stepping)).run
     return checked_run(compiled, len(tree.parent), stepping.adaptive)
 
 
