@@ -34,9 +34,9 @@ class Motion(_Path):
         motion.ended, motion.evaluations = ended, evaluations
         return motion
 
-    def __getnewargs__(self):
-        """What a copy is made from, in this process or another."""
-        return *self, self.ended, self.evaluations
+    def __reduce__(self):
+        """How a copy is made, in this process or another."""
+        return type(self), (*self, self.ended, self.evaluations)
 
 
 def simulate(
