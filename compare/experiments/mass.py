@@ -78,12 +78,12 @@ def rows(setup) -> Result:
     for sample in (*setup.named.each(), setup.random):
         ours, theirs = (dynamics.mass_matrix(sample.q) for dynamics in compared.values())
         result.agree(sample, "Mbar", "kg m2", ours, theirs, mass_scale(robot.tree, sample.q), truth="mass_matrix")
-    check_symmetry(result, ours)  # MuJoCo's is one triangle written twice: symmetric by construction
-    for name, M in (("tmt", ours), ("mujoco", theirs)):
-        check_definiteness(result, LABELS[name], M)
+    check_symmetry(result, compared["tmt"].mass_matrix(setup.random.q))  # MuJoCo's is one triangle written twice
+    for name, dynamics in compared.items():
+        check_definiteness(result, LABELS[name], dynamics.mass_matrix(setup.random.q))
         if robot.conditioning:
-            value, worst = worst_condition(robot, compared[name].mass_matrix)
-            mirrored = float(np.linalg.cond(compared[name].mass_matrix(at_angles(robot, worst * [-1.0, 1.0]))))
+            value, worst = worst_condition(robot, dynamics.mass_matrix)
+            mirrored = float(np.linalg.cond(dynamics.mass_matrix(at_angles(robot, worst * [-1.0, 1.0]))))
             check_conditioning(result, robot, LABELS[name], value, worst)
             result.curves.setdefault("worst", {})[name] = (value, worst, mirrored)
     if robot.conditioning:
@@ -91,7 +91,8 @@ def rows(setup) -> Result:
         result.curves["condition"] = condition_grid(robot, compared["tmt"].mass_matrix, degrees)
     else:
         result.notes.append(
-            f"Where the condition number of Mbar is largest is not checked, and not drawn: of the {robot.name} nobody states it."
+            f"Nothing is stated of where the condition number of Mbar of the {robot.name} is largest: that is neither checked "
+            "nor drawn."
         )
     return result
 

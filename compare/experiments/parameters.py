@@ -15,8 +15,9 @@ from ..robots import Robot
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
 FLAGS = ("flag gravity", "flag damper", "flag eulerdamp")
-OF_ALL = (*FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *NOT_HAD)  # numbers of the whole file
-OF_BODIES = ("mass", "com", "inertia", "gravcomp")  # the others are of joints
+# numbers of the whole file, and those of bodies; the others are of joints
+OF_ALL = (*FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *NOT_HAD)
+OF_BODIES = ("mass", "com", "inertia", "gravcomp")
 UNITS = dict.fromkeys((*FLAGS, "order", "parent", "axis", "limited", "gravcomp", *NOT_HAD), "") | {
     "ref": "rad", "anchor": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad",
     "mass": "kg", "com": "m", "inertia": "kg m2", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-import tmt
 from tmt.reference import distance, exact
 
 from ..engines import Dynamics
@@ -182,10 +181,11 @@ def digits_in_words(item: Printed, of: Answer, robot: Robot) -> str:
         met_by.append(f"{finder} {which}" + (f", and {' and '.join(turned)} with the other sign" if turned else ""))
     printed, exactly = (", ".join(f"{float(v):.4g}" for v in values) for values in (item.values, of.exact))
     turns = angles(robot)
-    doubles = f"{listed(turns)} {'are no doubles' if len(turns) > 1 else 'is no double'}, and at the doubles nearest to them "
+    no = "are no doubles" if len(turns) > 1 else "is no double"
+    doubles = f"{listed(turns)} {no}, and at the doubles nearest to them " if turns else ""
     return (
         f"{item.item}, printed ({printed}) {item.unit}, is met to every digit by: {'; '.join(met_by)}. Rounding of the torque "
-        f"allows {of.rounding:.1e} {item.unit}; {doubles if turns else ''}exact arithmetic gives ({exactly}) {item.unit}."
+        f"allows {of.rounding:.1e} {item.unit}; {doubles}exact arithmetic gives ({exactly}) {item.unit}."
     )
 
 

@@ -70,7 +70,9 @@ class Robot:
     postures: Mapping[str, tuple]  # deg, by name; the joints in the order of the Tree
     scenes: tuple[Scene, ...]
     symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
-    kinds: Mapping[str, str] = field(default_factory=dict)  # kind (centre, saddle, marginal): posture; else the first of it
+    kinds: Mapping[str, str] = field(
+        default_factory=dict
+    )  # the posture of a kind: centre, saddle, marginal; else the first
     landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins
     sketched: tuple[str, ...] = ()  # the postures of the sketch; none: the first two
     axes: tuple[str, str, str] = ("x", "y", "z")  # of the inertial frame, as they are written there
