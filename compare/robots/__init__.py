@@ -20,10 +20,11 @@ class Printed(NamedTuple):
     posture: str
     values: tuple
     unit: str
-    half_digit: float  # half a unit of the last printed digit; 0: zero but for rounding
-    torque: str = "none"  # or the item whose answer acts
-    to_every_digit: tuple = ()  # who meets a value that is rounding alone, of "exact", "tmt"
-    sizes: tuple = ()  # the components whose size alone exact arithmetic shares
+    half_digit: float  # half a unit of the last printed digit
+    torque: str = "none"  # or the item whose answer acts: the torque that holds its posture
+    is_rounding: bool = False  # zero but for rounding: compared with the exact value, not with what is printed
+    to_every_digit: tuple = ()  # who meets the digits of what is rounding alone, of "exact", "tmt"
+    sizes: tuple = ()  # the joints whose component exact arithmetic shares in its size alone
 
 
 class Question(NamedTuple):
@@ -72,6 +73,8 @@ class Robot:
     symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
     kinds: Mapping[str, str] = field(default_factory=dict)  # centre, saddle, marginal: the posture that stands for it
     landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins
+    sketched: tuple[str, ...] = ()  # the postures of the sketch; none: the first two
+    axes: tuple[str, str, str] = ("x", "y", "z")  # of the inertial frame, as they are written there
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     conditioning: Conditioning | None = None
