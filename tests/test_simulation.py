@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.band import band
+from compare.judge.rounding import band
 from tmt import kernels
 from tmt.methods import METHODS, one_step
 from tmt.simulation import singular_in
