@@ -79,7 +79,7 @@ class Robot:
     claims: Claims | None = None
     conditioning: Conditioning | None = None
     questions: tuple[Question, ...] = ()
-    remarks: Callable | None = None  # (printed answers by item, dynamics by engine) -> sentences on what is printed
+    remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
 
     @property
     def joints(self) -> tuple[str, ...]:
