@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.band import band
+from compare.judge.rounding import band
 from tmt import dop853, kernels
 from tmt.implicit import ImplicitRungeKutta
 from tmt.methods import METHODS, AdaptiveRungeKutta, RungeKutta, amplification, one_step

@@ -90,11 +90,12 @@ def growth(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: f
     the run has diverged.
     """
     product, scale = np.eye(2 * q.shape[1]), 0.0
+    finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
     result = np.full((len(q) - 1) // every + 1, np.nan)
     result[0] = 0.0
     for k, J in enumerate(amplification(stepping, tree, q[:-1], qd[:-1], tau, dt), start=1):
         product = J @ product
-        if not np.isfinite(product).all():
+        if not (finite[k] and np.isfinite(product).all()):
             break
         if k % every == 0:
             size = np.linalg.norm(product, 2)

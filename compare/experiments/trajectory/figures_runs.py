@@ -58,7 +58,7 @@ def run(result, case):
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     lines_of_legend = -(-(len(case.joints) + 4) // COLUMNS)
     fig.subplots_adjust(
-        left=0.105, right=0.985, bottom=0.075, top=0.93 - 0.03 * lines_of_legend, hspace=0.12, wspace=0.08
+        left=0.105, right=0.985, bottom=0.075, top=(93 - 3 * lines_of_legend) / 100, hspace=0.12, wspace=0.08
     )
     axes = fig.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
     until = []
