@@ -63,7 +63,7 @@ class Scene:
     locked: tuple = ()  # names of the joints that stay at the start
     duration: float = 5.0  # s
     dt: float = 5.0 / 64  # s, the coarsest step; runs with finer ones divide it
-    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along
+    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along; 0: any
     tags: tuple = ()  # what it serves for, see robots
 
     def __post_init__(self):
@@ -89,8 +89,8 @@ class Scene:
         self.refuse("dt", self.duration / self.dt > MOST_STEPS, f"{steps} into at most {MOST_STEPS:,}")
         left = abs(self.steps * self.dt - self.duration)
         self.refuse("dt", self.steps < 1 or left > 1e-9 * self.duration, steps)
-        judged = self.judged is None or (is_number(self.judged) and 0.0 < self.judged <= self.duration)
-        self.refuse("judged", not judged, f"None, or a time in s above 0 and at most {self.duration:g}")
+        judged = self.judged is None or (is_number(self.judged) and 0.0 <= self.judged <= self.duration)
+        self.refuse("judged", not judged, f"None, or a time in s of at least 0 and at most {self.duration:g}")
         for name in ("locked", "tags"):
             value = getattr(self, name)
             texts = isinstance(value, tuple | list) and all(isinstance(part, str) for part in value)

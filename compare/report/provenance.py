@@ -16,7 +16,10 @@ PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath
 
 
 def provenance(command: str, model, shown: str, seed: int) -> dict:
-    """What a reader needs to repeat the run: command, model (a file, and how it is shown), versions, machine, commit, seed; `seconds` come at its end."""
+    """What a reader needs to repeat the run: command, model, versions, machine, commit, seed; `seconds` come at its end.
+
+    model: the file; shown: how the report calls it.
+    """
     return {
         "command": readable(command),
         "model": readable(shown),

@@ -29,12 +29,14 @@ SCENES = (
 PRINTED = (
     Printed("c", "holding torque", "zero", (-2.2072, 0.0, -2.2072), "N m", 0.5e-4),
     Printed("f1", "qdd", "zero", (0.0, 0.0, 41.8436), "rad/s2", 0.5e-4),
-    Printed("f2", "qdd", "hanging", (0.1641e-14, 0.0, 0.3021e-14), "rad/s2", 0.0, sizes=("alpha",)),
-    Printed("f3", "qdd", "upright", (-0.3456e-14, 0.0, 0.0192e-14), "rad/s2", 0.0, to_every_digit=("exact", "tmt")),
-    Printed("f4", "qdd", "zero", (0.0, 0.0, 0.0), "rad/s2", 0.0, torque="c"),
+    Printed("f2", "qdd", "hanging", (0.1641e-14, 0.0, 0.3021e-14), "rad/s2", 0.5e-18, is_rounding=True,
+            sizes=("alpha",)),
+    Printed("f3", "qdd", "upright", (-0.3456e-14, 0.0, 0.0192e-14), "rad/s2", 0.5e-18, is_rounding=True,
+            to_every_digit=("exact", "tmt")),
+    Printed("f4", "qdd", "zero", (0.0, 0.0, 0.0), "rad/s2", 0.0, torque="c", is_rounding=True),
     Printed("g", "Mbar", "zero", ((0.2445, 0.0, 0.0527), (0.0, 0.1938, 0.0), (0.0527, 0.0, 0.0527)), "kg m2", 0.5e-4),
     Printed("h", "holding torque", "ball catch", (-2.6164, 1.9627, 0.8135), "N m", 0.5e-4),
-)
+)  # fmt: skip
 QUESTIONS = (
     Question("a", "sketch of the arm with its hinges", "parameters", ("figure", "arm")),
     Question("b", "positions of the centres of mass", "kinematics", ("largest", "kinematics", "x_b", {})),
@@ -73,7 +75,7 @@ def landmarks(q) -> dict:
 def remarks(answers, dynamics) -> list[str]:
     """The slips of the original, with what is right.
 
-    answers: of each printed item (exact, TMT's, MuJoCo's values); dynamics: of the arm, by engine.
+    answers: by item, what TMT (`.tmt`) and MuJoCo (`.mujoco`) find; dynamics: of the arm, by engine.
     """
     q, qd = ARM.posture("ball catch"), np.ones(3)
     c, s = np.cos(q[1]), np.sin(q[1])
@@ -87,7 +89,7 @@ def remarks(answers, dynamics) -> list[str]:
         name: ", ".join(f"{np.abs(values - omega).max():.1e} rad/s from {of}'s" for of, omega in right.items())
         for name, values in texts.items()
     }
-    _, ours, theirs = answers["c"]
+    ours, theirs = answers["c"].tmt, answers["c"].mujoco
     printed = PRINTED[0].values[0]
     signs = ["the sign" if printed * value > 0.0 else "not the sign" for value in (ours[0], theirs[0])]
     return [
@@ -113,9 +115,12 @@ ARM = Robot(
     tree=tmt.ARM,
     postures=POSTURES,
     scenes=SCENES,
+    described="a human arm",
     symbols={"alpha": "α", "beta": "β", "gamma": "γ"},
     kinds={"centre": "bent", "saddle": "ball catch", "marginal": "zero"},
     landmarks=landmarks,
+    sketched=("zero", "ball catch"),
+    axes=("x north", "y west", "z up"),
     printed=PRINTED,
     claims=CLAIMS,
     conditioning=Conditioning(("beta", "gamma"), (90.0, 90.0)),
