@@ -48,7 +48,7 @@ def begin(setup) -> None:
     schemes = [method.scheme for method in one_of_each_scheme(setup.engines["mujoco"])]
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = setup.of(cases, [], cases)
-    duration, steps = setup.of(horizon.MINUTE, horizon.MINUTE, horizon.TEN_SECONDS)
+    duration, steps = setup.of(horizon.GROWTH_RUN, horizon.GROWTH_RUN, horizon.SHORT_GROWTH_RUN)
     setup.background["trajectory"] = {
         "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer), cases),
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
@@ -66,7 +66,9 @@ def rows(setup) -> Result:
         begin(setup)
     work = setup.background.pop("trajectory")
     compare_derivatives(result, setup.robot, setup.engines)
-    drift.drift(result, setup.robot, setup.engines, setup.of(drift.STEPS, drift.STEPS, drift.FEW_STEPS))
+    drift.drift(
+        result, setup.robot, setup.engines, setup.of(drift.DRIFT_STEPS, drift.DRIFT_STEPS, drift.FEW_DRIFT_STEPS)
+    )
     result.curves["runs"] = {}
     for part in work["runs"]:
         result.rows += part.rows

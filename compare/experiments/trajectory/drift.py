@@ -10,9 +10,9 @@ import tmt
 from ...engines import LABELS, Engine, one_of_each_scheme, same_scheme
 from ...judge.run import ORDER_MARGIN
 
-DURATION = 1.0  # s: short enough for the order to show, long enough to move
-STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method
-FEW_STEPS = STEPS | {1: (512, 1024, 2048)}
+DRIFT_DURATION = 1.0  # s: short enough for the order to show, long enough to move
+DRIFT_STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method
+FEW_DRIFT_STEPS = DRIFT_STEPS | {1: (512, 1024, 2048)}
 OF_EULER = 1e-3  # of Euler's drift: RK4's is below, with fewer steps
 
 
@@ -20,7 +20,9 @@ def drift(result, robot, engines: Mapping[str, Engine], steps: Mapping[int, tupl
     """Energy and, without gravity, momentum of the first joint along free, undamped runs; steps: so many, by the order."""
     drifts = {}  # (scene, quantity, unit): method of MuJoCo: engine: a value for each of the steps
     methods = one_of_each_scheme(engines["mujoco"])
-    for case in (case for case in robot.cases if case.is_free and not any(case.tree.damping)):
+    # in a scene of a user's own the order need not show in a second
+    cases = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
+    for case in (case for case in cases if not any(case.tree.damping)):
         dynamics = {name: engines[name].of(case) for name in ("tmt", "mujoco")}
         quantities = constants(case)
         for method in methods:
@@ -46,7 +48,7 @@ def constants(case) -> dict[tuple, Callable]:
 
 def run(case, dynamics, method, count) -> tuple:
     """q and v of a second in so many steps."""
-    return dynamics.run(*case.start, case.tau, DURATION / count, count, method.name)[1:3]
+    return dynamics.run(*case.start, case.tau, DRIFT_DURATION / count, count, method.name)[1:3]
 
 
 def check_drifts(result, drifts) -> None:
@@ -55,7 +57,7 @@ def check_drifts(result, drifts) -> None:
         euler = next(method for method in of_scene if method.scheme == "semi_implicit_euler")
         for method, engines in of_scene.items():
             for engine, values in engines.items():
-                where = f"{scene}, {method.name}, {LABELS[engine]}, {DURATION:g} s"
+                where = f"{scene}, {method.name}, {LABELS[engine]}, {DRIFT_DURATION:g} s"
                 off = abs(found_order(values) - method.order)
                 result.check(where, f"order of the drift of {quantity}, from {method.order}", off, ORDER_MARGIN, "")
                 if method.scheme == "rk4":

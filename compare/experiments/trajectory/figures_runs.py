@@ -4,18 +4,19 @@ from itertools import cycle
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ...engines import LABELS
 from ...judge.run import step_in_words
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, joint_lines
-from .drift import DURATION, found_order
-from .horizon import EARLY, power
+from .drift import DRIFT_DURATION, found_order
+from .horizon import GROWN_EARLY, power
 from .leaving import left_in_words
 from .sentences import agreement, rad
 
 SCHEME_LINES = dict(zip(("semi_implicit_euler", "implicit", "rk4"), LINES))  # colour and dash
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
-COLUMNS = 4  # of a legend
+LEGEND_COLUMNS = 4  # of a legend
 
 
 def over_time(ax, t, ours, theirs, case):
@@ -37,7 +38,7 @@ def held(result, case, number):
     ax = fig.subplots()
     over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]), case)
     ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, curve["t"][-1]))
-    fig.legend(loc="outside upper center", ncols=COLUMNS)
+    fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS)
     ours, theirs = result.curves["errors"][case.name]
     end = f"{curve['t'][-1]:g}"
     caption = (
@@ -56,7 +57,7 @@ def run(result, case):
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
     columns = [result.curves["runs"][key] for key in of_case if key[-1] == steps]
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
-    lines_of_legend = -(-(len(case.joints) + 4) // COLUMNS)
+    lines_of_legend = -(-(len(case.joints) + 4) // LEGEND_COLUMNS)
     fig.subplots_adjust(
         left=0.105, right=0.985, bottom=0.075, top=(93 - 3 * lines_of_legend) / 100, hspace=0.12, wspace=0.08
     )
@@ -81,11 +82,13 @@ def run(result, case):
         if c["judged_until_s"] < case.duration:
             lines.axvspan(c["judged_until_s"], case.duration, color=GREY, alpha=0.15)
         lines.set(xlabel="time, s", xlim=(0, case.duration))
+        if len(f"{case.duration:g}") > 2:  # the last number of a column would meet the first of the next
+            lines.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))
         until.append(f"{c['integrator']} to {c['judged_until_s']:.2f} s")
     for ax, label in zip(axes[:, 0], ("angle, rad", "rate, rad/s", "angle: difference, rad")):
         ax.set_ylabel(label)
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
-    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=COLUMNS)
+    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=LEGEND_COLUMNS)
     return file_name("trajectory", case.name), fig, run_caption(result, case, until)
 
 
@@ -121,15 +124,15 @@ def drift(result):
     for ax, ((scene, quantity, unit), of_scene) in zip(axes.flat, drifts.items()):
         for k, (method, engines) in enumerate(of_scene.items()):
             colour, dash = SCHEME_LINES[method.scheme]
-            dt = DURATION / np.array(steps[method])
+            dt = DRIFT_DURATION / np.array(steps[method])
             ax.loglog(dt, engines["tmt"], linestyle=dash, color=colour, label=f"{method.name}, TMT")
             ax.loglog(dt, engines["mujoco"], "o", mfc="none", color=colour, label=None if k else "MuJoCo")
         ax.set_title(f"{scene}: {quantity}, {unit}", fontsize=8)
         ax.set_xticks([2e-4, 1e-3, 4e-3], ["2e-4", "1e-3", "4e-3"])
         ax.minorticks_off()
-    fig.supylabel(f"largest drift in {DURATION:g} s", fontsize=9)
+    fig.supylabel(f"largest drift in {DRIFT_DURATION:g} s", fontsize=9)
     fig.supxlabel("dt, s", fontsize=9)
-    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=COLUMNS)
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=LEGEND_COLUMNS)
     return "trajectory_drift", fig, drift_caption(drifts, steps)
 
 
@@ -145,7 +148,7 @@ def drift_caption(drifts, steps) -> str:
         energy = {name: max(of[method][name][-1] for (_, what, _), of in drifts.items() if what == "energy")
                   for name in of_engine}  # fmt: skip
         of_energy = ", ".join(f"{LABELS[name]} {value:.1e} J" for name, value in energy.items())
-        largest.append(f"{method.name} at dt = 1/{steps[method][-1] / DURATION:g} s: {of_energy}")
+        largest.append(f"{method.name} at dt = 1/{steps[method][-1] / DRIFT_DURATION:g} s: {of_energy}")
     pairs = [
         pair for of in drifts.values() for engines in of.values() for pair in zip(engines["tmt"], engines["mujoco"])
     ]
@@ -180,7 +183,7 @@ def growth(result):
         ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")
         ax.text(0.5, digits + 0.8, text, fontsize=8)
     ax.set(xlabel="time, s", ylabel="log10 of the growth", xlim=(0, t[-1]), ylim=(-20, 65))
-    early = int(np.searchsorted(t, EARLY))
+    early = int(np.searchsorted(t, GROWN_EARLY))
     each = "; ".join(
         f"{name}: {power(curves[name][early], 1)} and {power(curves[name][-1], 0)}" for name in reversed(ends)
     )

@@ -14,9 +14,9 @@ from ...judge.rounding import growth
 from ...judge.run import step_in_words
 
 GROWTH_EVERY = 16  # steps between two recorded values of a growth
-MINUTE = (60.0, 6144)  # s and steps of RK4, for the growth of errors
-TEN_SECONDS = (10.0, 512)
-EARLY = 5.0  # s: the other time at which a growth is reported
+GROWTH_RUN = (60.0, 6144)  # s and steps of RK4, for the growth of errors
+SHORT_GROWTH_RUN = (10.0, 512)  # of a small run
+GROWN_EARLY = 5.0  # s: the other time at which a growth is reported
 CARRIED = {16: "doubles (16 digits)", 30: "30 digits"}
 MOST_EXACT_STEPS = 64  # of a run with many digits
 TOO_FAST = 1e4  # rad/s: a run with many digits that is faster has diverged
@@ -40,7 +40,7 @@ def growth_of_errors(result, cases, curves, duration, steps) -> None:
 
 def growth_in_words(t, curves) -> list[str]:
     """How much small differences have grown after 5 s and at the end, and which scenes have a horizon."""
-    early = int(np.searchsorted(t, EARLY))
+    early = int(np.searchsorted(t, GROWN_EARLY))
     each = "; ".join(f"{name}: {power(g[early], 1)} and {power(g[-1], 1)}" for name, g in curves.items())
     horizons = {name: {digits: reach(t, g, digits) for digits in CARRIED} for name, g in curves.items()}
     found = [

@@ -64,7 +64,7 @@ def test_momentum_about_the_first_hinge_is_constant_where_nothing_turns_the_arm(
 
 def test_a_robot_without_a_free_scene_has_no_drift_and_the_notes_say_so(engines):
     still, result = dataclasses.replace(ARM, scenes=(CASES["bent, held"].scene,)), Result("trajectory")
-    drift.drift(result, still, engines, drift.FEW_STEPS)
+    drift.drift(result, still, engines, drift.FEW_DRIFT_STEPS)
     assert result.checks == [] and result.curves["drift"]["drifts"] == {}
     assert result.notes == ["No scene of this arm is free and without damping: there is no drift to measure."]
 
@@ -73,7 +73,7 @@ def test_the_figure_of_drift_says_whose_drift_falls_how():
     made = drifts()
     of = made["bent, free", "energy", "J"]
     of[METHODS["implicit"]] = {"tmt": [8.0, 4.0, 2.0], "mujoco": [16.0, 4.0, 1.0]}
-    steps = {method: drift.STEPS[method.order] for method in of}
+    steps = {method: drift.DRIFT_STEPS[method.order] for method in of}
     result = Result("trajectory", curves={"drift": {"drifts": made, "steps": steps}})
     name, fig, caption = draw(result)
     assert name == "trajectory_drift" and "implicit: TMT 1.00 to 1.00, MuJoCo 2.00 to 2.00" in caption

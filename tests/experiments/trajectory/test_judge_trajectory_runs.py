@@ -1,5 +1,7 @@
 """A scene followed by both engines: each level by its own bound, every rule applied, whose number stands where."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from trajectory_curves import CASES, DAMPED, FREE, HELD
@@ -9,7 +11,7 @@ from compare.engines.mujoco import Mujoco, load, parse
 from compare.engines.mujoco.dynamics import MujocoDynamics
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
-from compare.experiments.trajectory import runs
+from compare.experiments.trajectory import drift, runs
 from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
@@ -55,6 +57,16 @@ def test_the_time_that_is_judged_is_at_least_what_the_scene_asks_for(judged, pas
     case = HELD.changed(judged=judged)
     checks = judged_with(mujoco, side(case), case)
     assert (checks["time judged"].value, checks["time judged"].passed) == (3.125, passes)
+
+
+def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco, engines):
+    case = DAMPED.changed(judged=0.0, damping=0.0, tags=("own",))
+    levels = {f"{level}, TMT to MuJoCo" for level in ("derivative", "one step", "open loop")}
+    assert judged_with(mujoco, side(case), case).keys() == levels
+    assert judged_with(mujoco, side(FREE), FREE).keys() == levels | {"time judged", "movement"}
+    result, robot = Result("trajectory"), dataclasses.replace(ARM, scenes=(case.scene,))
+    drift.drift(result, robot, engines, drift.FEW_DRIFT_STEPS)
+    assert result.checks == []
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():
