@@ -60,8 +60,10 @@ class Conditioning(NamedTuple):
 class Robot:
     """One robot: a file, the numbers that are stated of it, and what is asked of it.
 
-    Scenes have tags: "quick": part of a quick run; "digits": compared with many digits of its own scheme; "speed": followed
-    by every method; "regular": errors fall regularly there from coarse steps on; "fewer joints": some of its joints never move.
+    Scenes may have tags: "full only": a quick run leaves it out; "digits": compared with many digits of its own scheme (a small
+    run takes the last of them); "speed": followed by every method; "regular": errors fall regularly there from coarse steps on;
+    "fewer joints": some of its joints never move; "own": a user's, of which nothing is expected but agreement. A scene without
+    tags is part of every run.
     """
 
     name: str
