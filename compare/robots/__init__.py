@@ -40,6 +40,7 @@ class Claims(NamedTuple):
     """What is claimed of a robot that is held at a posture with the torque that balances gravity there, by RK4."""
 
     dt: float  # s, the step of the claims
+    duration: float  # s, of a run of the claims
     left: str  # the posture that is left, because of rounding
     left_after: float  # s, about
     kept: str  # the posture that is not left
