@@ -151,7 +151,7 @@ def test_a_constant_has_one_meaning_in_all_of_compare():
 
 
 def test_no_file_is_long():
-    reasons = {}
+    reasons = {"trace.py": "the tape, one class"}
     for path in [*FILES, *(ROOT / "tmt").glob("*.py")]:
         lines = len(path.read_text(encoding="utf-8").splitlines())
         assert lines <= 260 or path.name in reasons, f"{dotted(path)}: {lines} lines"

@@ -49,10 +49,10 @@ def commit() -> str | None:
     if not (root / ".git").exists():
         return None
     try:
-        told = [
+        said = [
             subprocess.run(["git", "-C", root, *words], capture_output=True, check=True).stdout.decode().strip()
             for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", ":/", ":!/reports"])
         ]
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
-    return told[0] + (" with uncommitted changes" if told[1] else "")
+    return said[0] + (" with uncommitted changes" if said[1] else "")
