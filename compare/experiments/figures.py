@@ -16,9 +16,9 @@ from ..judge.scale import EPS, FACTOR, gravity_scale
 from ..report.style import BLUE, GREY, ORANGE, RED, WIDTH, joint_lines
 from ..robots import Robot
 
-FLOOR = 1e-3  # eps: where differences of exactly zero are drawn
-COLUMNS = 6  # of a legend
+ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
 ELEVATION, AZIMUTH = 20.0, -70.0  # deg, from where the sketch is seen
+CENTRED = {"ha": "center", "va": "center"}
 _E, _A = np.radians([ELEVATION, AZIMUTH])
 RIGHT = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
 UP = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
@@ -30,9 +30,8 @@ def sketch(robot: Robot) -> tuple[str, Figure, str]:
     parts = {name: (chains(robot, q), tmt.com_positions(q, robot.tree)) for name, q in poses.items()}
     size = max(np.ptp(np.concatenate([*lines, coms]), axis=0).max() for lines, coms in parts.values()) or 1.0  # m
     arrows = {name: axes(robot, q, 0.57 * size) for name, q in poses.items()}
-    drawn = np.concatenate(
-        [p for name, (lines, coms) in parts.items() for p in (*lines, coms, arrows[name].sum(axis=1))]
-    )
+    tips = [arrow.sum(axis=1) for arrow in arrows.values()]
+    drawn = np.concatenate([*tips, *(part for lines, coms in parts.values() for part in (*lines, coms))])
     half, middle = 0.55 * np.ptp(drawn, axis=0).max(), (drawn.max(axis=0) + drawn.min(axis=0)) / 2
     fontsize = 13 if all(len(robot.symbol(joint)) <= 2 for joint in robot.joints) else 9
     fig = Figure(figsize=(WIDTH, 3.9))
@@ -40,13 +39,11 @@ def sketch(robot: Robot) -> tuple[str, Figure, str]:
     for k, (name, (lines, coms)) in enumerate(parts.items()):
         ax = fig.add_subplot(1, len(poses), k + 1, projection="3d", facecolor="none")
         for line in lines:
-            ax.plot(*line.T, color=GREY, linewidth=6, solid_capstyle="round", alpha=0.6)
+            ax.plot(*line.T, color=(GREY, 0.6), linewidth=6, solid_capstyle="round")
         for joint, (origin, axis) in zip(robot.joints, arrows[name]):
             colour = joint_lines(robot)[joint][0]
             ax.quiver(*origin, *axis, color=colour, linewidth=2, arrow_length_ratio=0.2)
-            ax.text(
-                *(origin + 1.3 * axis), robot.symbol(joint), color=colour, fontsize=fontsize, ha="center", va="center"
-            )
+            ax.text(*(origin + 1.3 * axis), robot.symbol(joint), color=colour, fontsize=fontsize, **CENTRED)
         for number, com in enumerate(coms, start=1):
             ax.scatter(*com, color="black", s=25, depthshade=False)
             ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
@@ -139,7 +136,7 @@ def distances(result: Result, sample: str, quantities: list[str] | None = None) 
     styles = (("TMT to MuJoCo", "black", "-"), ("TMT to exact", BLUE, "--"), ("MuJoCo to exact", ORANGE, "-."))
     for ax, quantity in zip(axes.flat, quantities):
         for name, colour, dash in styles:
-            values = np.maximum(curves[quantity][name], FLOOR)
+            values = np.maximum(curves[quantity][name], ZERO_AT)
             share = np.arange(1, len(values) + 1) / len(values)
             ax.step(values, share, where="post", color=colour, linestyle=dash, label=name)
         ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
@@ -156,7 +153,7 @@ def distances(result: Result, sample: str, quantities: list[str] | None = None) 
     caption = (
         f"Share of the {sample} whose difference is at most so many eps. The engines are at most {worst[0]:.3g} eps apart "
         f"({worst[1]}). Against the exact value, at the first {known} of the states, TMT is at most {ours:.3g} eps off and "
-        f"MuJoCo at most {theirs:.3g}. Differences of exactly zero are drawn at {FLOOR:g}."
+        f"MuJoCo at most {theirs:.3g}. Differences of exactly zero are drawn at {ZERO_AT:g}."
     )
     return f"{result.experiment}_distances", fig, caption
 
@@ -196,13 +193,13 @@ def holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     for i, (joint, (colour, _)) in enumerate(joint_lines(robot).items()):
         ours, theirs = (np.array([of[name][i] for of in postures.values()]) for name in ("tmt", "mujoco"))
         x = places + width * (i - (len(robot.joints) - 1) / 2)
-        ax.bar(x, ours, width=0.92 * width, color=colour, alpha=0.75, label=f"{robot.symbol(joint)}, TMT")
+        ax.bar(x, ours, width=0.92 * width, color=(colour, 0.75), label=f"{robot.symbol(joint)}, TMT")
         mark = {"markersize": 50 * width, "markeredgewidth": 2, "label": "MuJoCo" if i == 0 else None}
         ax.plot(x, theirs, "_", color="black", **mark)
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.set_xticks(places, postures)
     ax.set(ylabel="holding torque, N m")
-    fig.legend(loc="outside upper center", ncols=min(len(robot.joints) + 1, COLUMNS))
+    fig.legend(loc="outside upper center", ncols=min(len(robot.joints) + 1, 6))
     apart = max(np.abs(of["tmt"] - of["mujoco"]).max() for of in postures.values())
     caption = (
         f"Torque that holds each named posture: TMT (bars) and MuJoCo (black marks), at most {apart:.1e} N m apart. "

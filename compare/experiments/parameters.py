@@ -7,24 +7,23 @@ import numpy as np
 
 import tmt
 
-from ..engines.mujoco.parameters import options, parameters
+from ..engines.mujoco.parameters import STATED_FLAGS, options, parameters
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
-FLAGS = ("flag gravity", "flag damper", "flag eulerdamp")
 # numbers of the whole file, and those of bodies; the others are of joints
-OF_ALL = (*FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *NOT_HAD)
+OF_ALL = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *NOT_HAD)
 OF_BODIES = ("mass", "com", "inertia", "gravcomp")
-UNITS = dict.fromkeys((*FLAGS, "order", "parent", "axis", "limited", "gravcomp", *NOT_HAD), "") | {
+QUANTITIES = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *NOT_HAD), "") | {
     "ref": "rad", "anchor": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad",
     "mass": "kg", "com": "m", "inertia": "kg m2", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
-WHOLE = (*FLAGS, "order", "parent", "limited", "contact pairs")  # that are so or not, a place, or a count
-OPTIONS = (*FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
+WHOLE = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")  # that are so or not, a place, or a count
+OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
 EXPLAINED = {  # forces, by the quantities that say why they act
     "springs, fluid and tendons": ("stiffness", "density", "viscosity", "gravcomp", *NOT_HAD[1:4]),
     "actuators": (),
@@ -60,7 +59,7 @@ def stated(tree: tmt.Tree) -> dict:
     absent = {"ref": n, "armature": n, "frictionloss": n, "stiffness": n, "limited": n, "gravcomp": m}
     absent |= dict.fromkeys(("density", "viscosity", "other mass", "tendon armature", *NOT_HAD), 1)
     return {name: np.zeros(count) for name, count in absent.items()} | {
-        **dict.fromkeys(FLAGS, 1.0),
+        **dict.fromkeys(STATED_FLAGS, 1.0),
         "axis": tree.axis,
         "anchor": anchors,
         "damping": tree.damping,
@@ -86,7 +85,7 @@ def rows(setup) -> Result:
     tree, dynamics = setup.robot.tree, setup.compared()["mujoco"]
     compiled = parameters(dynamics)
     expected_of, causes = stated(tree), []
-    for quantity, unit in UNITS.items():
+    for quantity, unit in QUANTITIES.items():
         expected = np.asarray(expected_of[quantity], dtype=float)
         found = np.asarray(compiled[quantity], dtype=float)
         names = owners(tree, quantity)
@@ -134,7 +133,7 @@ def causes_in(tree, owner, quantity, stated, found, off, tolerance) -> list[dict
 
 def cause(tree, rank, quantity, place, stated, found, size, remark="") -> dict:
     """A cause with its sentence; size: its difference over its tolerance."""
-    unit = UNITS[quantity]
+    unit = QUANTITIES[quantity]
     if quantity.startswith("flag "):
         values = ["enable" if number else "disable" for number in (stated, found)]
     elif quantity == "parent":

@@ -19,7 +19,7 @@ TITLE = "Published numbers: does either engine contradict the assignment?"
 
 def skipped(robot: Robot) -> str | None:
     """Why the experiment cannot serve a robot, or None."""
-    return None if robot.printed else "no printed numbers are known of it"
+    return None if robot.printed else f"no printed numbers of the {robot.name} are known"
 
 
 def claim(robot: Robot) -> str:

@@ -40,6 +40,7 @@ class Claims(NamedTuple):
     """What is claimed of a robot that is held at a posture with the torque that balances gravity there, by RK4."""
 
     dt: float  # s, the step of the claims
+    duration: float  # s, of a run of the claims
     left: str  # the posture that is left, because of rounding
     left_after: float  # s, about
     kept: str  # the posture that is not left
@@ -81,7 +82,7 @@ class Robot:
     claims: Claims | None = None
     conditioning: Conditioning | None = None
     questions: tuple[Question, ...] = ()
-    remarks: Callable | None = None  # (printed answers by item, dynamics by engine) -> sentences on what is printed
+    remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
 
     @property
     def joints(self) -> tuple[str, ...]:

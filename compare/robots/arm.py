@@ -52,6 +52,7 @@ QUESTIONS = (
 )  # fmt: skip
 CLAIMS = Claims(
     dt=5 / 64,
+    duration=5.0,
     left="ball catch",
     left_after=4.5,
     kept="bent",
