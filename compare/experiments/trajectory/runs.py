@@ -85,7 +85,9 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     )  # fmt: skip
 
 
-def compare(result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide) -> None:
+def compare(
+    result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
+) -> None:
     """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step."""
     tau, dt, every, n = case.tau, case.duration / steps, steps // case.steps, len(case.joints)
     t, times, first = mine.t, mine.t[::every], None
