@@ -12,7 +12,7 @@ from ...judge.check import Result
 from ...judge.run import deviation, number_or_none
 from ...robots import Robot
 from .leaving import causes_in_words, left_in_words
-from .runs import FINEST, counts
+from .runs import STEPS_AT_MOST, counts
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
 
@@ -120,7 +120,7 @@ def of_left_out(cases: Sequence[Case], finer: Sequence[int]) -> list[str]:
     """Which scenes are followed with fewer step sizes than others."""
     names = [case.name for case in cases if len(counts(case, finer)) < len(finer)]
     return (
-        [f"Runs of more than {FINEST} steps, finer than a scene's own, are left out: {', '.join(names)}."]
+        [f"Runs of more than {STEPS_AT_MOST} steps, finer than a scene's own, are left out: {', '.join(names)}."]
         if names
         else []
     )
