@@ -56,7 +56,7 @@ class Scene:
 
     name: str
     posture: str | tuple = ()  # a posture's name, or an angle in deg for each joint; (): all joints at zero
-    torque: str | tuple = "free"  # "free": none; "hold": TMT's gravity balance at the start, given to all engines; or N m
+    torque: str | tuple = "free"  # "free": none; "hold": TMT's gravity balance at the start, for all engines; or N m
     speed: tuple = ()  # deg/s at the start; (): at rest
     damping: float = 0.0  # N m s/rad, added to that of every joint
     gravity: bool = True  # the robot's own, or none
@@ -130,8 +130,9 @@ class Case:
             scene.refuse("posture", not known, accepted)
         for name, unit in (("posture", "deg"), ("torque", "N m"), ("speed", "deg/s")):
             value = getattr(scene, name)
-            empty = name != "torque" and value == ()
-            scene.refuse(name, not isinstance(value, str) and len(value) != len(names) and not empty, f"{count}, in {unit}")
+            left_out = name != "torque" and value == ()
+            known = isinstance(value, str) or len(value) == len(names) or left_out
+            scene.refuse(name, not known, f"{count}, in {unit}")
         unknown = [name for name in scene.locked if name not in names]
         most = f"a tuple of at most {len(names) - 1} of {', '.join(names)}"
         scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)

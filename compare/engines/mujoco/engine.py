@@ -57,10 +57,7 @@ class Mujoco:
 
     def changed(self, case) -> mujoco.MjModel:
         """The model with what the case changes."""
-        if case.locked:
-            model = locked_model(self.source, case.locked)
-        else:
-            model = mujoco.MjModel.__copy__(self.model)
+        model = locked_model(self.source, case.locked) if case.locked else mujoco.MjModel.__copy__(self.model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
         model.dof_damping[:] += case.scene.damping

@@ -21,22 +21,22 @@ TITLE = "Reduction: no more model than a scene needs"
 def claim(robot: Robot) -> str:
     """What is claimed."""
     return (
-        "A hinge may be locked if, with it at its start value and at rest, its acceleration vanishes for all values of the other "
-        "hinges. The program finds these hinges on the expressions of the traced method, which fold to the number 0, and confirms "
-        f"them with {DIGITS} digits at random states. The model without them has the same motion, in both engines. A held posture "
-        "needs no integrator: it stays. A single free hinge is a physical pendulum, whose angle is an elliptic function of time. "
-        "And whatever else is added in MuJoCo costs time, and changes nothing unless something is touched."
+        "A hinge may be locked if, with it at its start value and at rest, its acceleration vanishes for all values of the "
+        "other hinges. The program finds these hinges on the expressions of the traced method, which fold to the number 0, and "
+        f"confirms them with {DIGITS} digits at random states. The model without them has the same motion, in both engines. A "
+        "held posture needs no integrator: it stays. A single free hinge is a physical pendulum, whose angle is an elliptic "
+        "function of time. And whatever else is added in MuJoCo costs time, and changes nothing unless something is touched."
     )
 
 
 def tolerance(robot: Robot) -> str:
     """What the differences are compared with."""
     return (
-        f"Sub-blocks of Mbar and bias: {FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute terms "
-        "of the bias, of the whole model. Runs of the smaller and the whole model, by the same method: the band of rounding of "
-        f"the whole one (see trajectory), judged while it is below {NARROW:g} rad, for as long as the scene states. Errors "
-        "against an exact solution fall with the step at the method's order, and with the square of the amplitude where the "
-        "solution is linear. Additions that exert no force leave the same bits. Timings are no checks."
+        f"Sub-blocks of Mbar and bias: {FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute "
+        "terms of the bias, of the whole model. Runs of the smaller and the whole model, by the same method: the band of "
+        f"rounding of the whole one (see trajectory), judged while it is below {NARROW:g} rad, for as long as the scene states. "
+        "Errors against an exact solution fall with the step at the method's order, and with the square of the amplitude where "
+        "the solution is linear. Additions that exert no force leave the same bits. Timings are no checks."
     )
 
 

@@ -120,9 +120,8 @@ def small_oscillations(result, setup, amplitudes=AMPLITUDES, steps=OSCILLATION_S
     robot, tree = setup.robot, setup.robot.tree
     posture = equilibrium(robot)
     if posture is None:
-        result.notes.append(
-            f"Small oscillations are left out: the {robot.name} has damping, or no named posture that needs no torque and is stable."
-        )
+        why = "its damping" if any(tree.damping) else "no named posture is stable without a torque"
+        result.notes.append(f"Small oscillations of the {robot.name} are not compared with its linear modes: {why}.")
         return
     q, rest, away = robot.posture(posture), np.zeros(len(robot.joints)), np.ones(len(robot.joints))
     frequencies, _ = modes(tree, q)
@@ -144,7 +143,7 @@ def small_oscillations(result, setup, amplitudes=AMPLITUDES, steps=OSCILLATION_S
     }  # fmt: skip
     result.notes.append(
         f"About {posture} the linear modes have {', '.join(f'{f:.4f}' for f in frequencies)} rad/s. Let go {amplitudes[-1]} rad "
-        f"away in each hinge, TMT's {robot.name} is {off['tmt'][-1]:.2e} of that from them at most in {duration:g} s, MuJoCo's "
+        f"away in each hinge, TMT's {robot.name} is {off['tmt'][-1]:.2e} of that from them at most in {duration:.3g} s, MuJoCo's "
         f"{off['mujoco'][-1]:.2e}."
     )
 
@@ -157,13 +156,10 @@ def equilibrium(robot: Robot) -> str | None:
     tree = robot.tree
     if any(tree.damping):
         return None
-    needless = FACTOR * EPS * gravity_scale(tree)
-    rest = [
-        name
-        for name in robot.postures
-        if np.abs(tmt.gravity_balance(robot.posture(name), tree)).max() <= needless and held(robot, name).kind == "centre"
-    ]
-    return min(rest, key=lambda name: float(tmt.potential_energy(robot.posture(name), tree)), default=None)
+    torques = {name: np.abs(tmt.gravity_balance(robot.posture(name), tree)).max() for name in robot.postures}
+    rest = [name for name, torque in torques.items() if torque <= FACTOR * EPS * gravity_scale(tree)]
+    stable = [name for name in rest if held(robot, name).kind == "centre"]
+    return min(stable, key=lambda name: float(tmt.potential_energy(robot.posture(name), tree)), default=None)
 
 
 def odd(tree: tmt.Tree, q: np.ndarray) -> bool:

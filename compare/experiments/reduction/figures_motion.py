@@ -1,6 +1,5 @@
 """Figures of motions that are known exactly: swings of a single joint, small oscillations."""
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
@@ -58,7 +57,7 @@ def small_oscillations(result, robot):
     halves = "" if small["sides"] == 1 else " Of two motions, let go on either side, half the difference is taken."
     caption = (
         f"Small oscillations about {small['posture']} against the linear modes of the stated {robot.name} ({modes} rad/s): the "
-        f"relative distance in {small['duration']:g} s goes with the amplitude to the power {powers}, where the same {robot.name} "
-        f"has 2. It is {least} at {amplitude[-1]:g} rad.{halves}"
+        f"relative distance in {small['duration']:.3g} s goes with the amplitude to the power {powers}, where the same "
+        f"{robot.name} has 2. It is {least} at {amplitude[-1]:g} rad.{halves}"
     )
     return "reduction_modes", fig, caption

@@ -19,11 +19,11 @@ def compare(result, setup, angles: int) -> None:
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)
     for locked in subsets(robot.joints):
-        where, found = f"{' and '.join(locked)} locked", {}  # (quantity, pair): differences and scales, for each choice of angles
+        found = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
             q = robot.case().coordinates.random(rng, STATES_OF_SUBSET)
             v = rng.uniform(-10.0, 10.0, q.shape)
-            case = robot.case(where, posture=tuple(np.degrees(q[0])), locked=locked)
+            case = robot.case(words_of(locked), posture=tuple(np.degrees(q[0])), locked=locked)
             for quantity, pair, apart, scale in differences(setup, case, q, v):
                 found.setdefault((quantity, pair), []).append((apart, scale))
         counts = {
@@ -46,12 +46,16 @@ def subsets(joints) -> list[tuple[str, ...]]:
     return sorted(chosen, key=len)
 
 
+def words_of(locked) -> str:
+    return f"{' and '.join(locked)} locked"
+
+
 def check_blocks(result, locked, quantity: str, pair: str, apart, scale, counts) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
     worst = int(np.argmax(np.where(np.isfinite(apart), apart / tolerance, np.inf)))
-    where, unit = f"{' and '.join(locked)} locked", BLOCK_UNITS[quantity]
-    check = result.check(where, f"{quantity}, {pair}", apart[worst], tolerance[worst], unit, rounding=True)
+    unit, name = BLOCK_UNITS[quantity], f"{quantity}, {pair}"
+    check = result.check(words_of(locked), name, apart[worst], tolerance[worst], unit, rounding=True)
     result.tables["reduction_subsets"].append(
         {
             "locked": " ".join(locked),
@@ -75,17 +79,19 @@ def differences(setup, case: Case, q, v):
         q[:, joints.index(name)], v[:, joints.index(name)] = angle, 0.0
     block, state = np.ix_(range(len(q)), free, free), (q[:, free], v[:, free])
     whole, left = setup.compared(), setup.compared(case)
-    blocks = {name: dynamics.mass_matrix(q)[block] for name, dynamics in whole.items()}
-    biases = {name: dynamics.bias(q, v)[:, free] for name, dynamics in whole.items()}
-    sides = {
-        "Mbar": (blocks, {name: dynamics.mass_matrix(state[0]) for name, dynamics in left.items()}, mass_scale(tree, q)),
-        "bias": (biases, {name: dynamics.bias(*state) for name, dynamics in left.items()}, bias_scale(tree, q, v)),
+    of_whole = {
+        "Mbar": [whole[name].mass_matrix(q)[block] for name in ("tmt", "mujoco")],
+        "bias": [whole[name].bias(q, v)[:, free] for name in ("tmt", "mujoco")],
     }
-    for quantity, (of_whole, of_left, scale) in sides.items():
+    of_left = {
+        "Mbar": [left[name].mass_matrix(state[0]) for name in ("tmt", "mujoco")],
+        "bias": [left[name].bias(*state) for name in ("tmt", "mujoco")],
+    }
+    for quantity, scale in (("Mbar", mass_scale(tree, q)), ("bias", bias_scale(tree, q, v))):
         pairs = {
-            "TMT, reduced to whole": (of_left["tmt"], of_whole["tmt"]),
-            "MuJoCo, reduced to whole": (of_left["mujoco"], of_whole["mujoco"]),
-            "reduced, TMT to MuJoCo": (of_left["tmt"], of_left["mujoco"]),
+            "TMT, reduced to whole": (of_left[quantity][0], of_whole[quantity][0]),
+            "MuJoCo, reduced to whole": (of_left[quantity][1], of_whole[quantity][1]),
+            "reduced, TMT to MuJoCo": of_left[quantity],
         }
         for pair, (one, other) in pairs.items():
             yield quantity, pair, largest(one - other), scale

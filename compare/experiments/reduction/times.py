@@ -5,12 +5,11 @@ from functools import lru_cache
 import tmt
 from tmt.kernels import slope_source
 
-from ...case import Case
 from ...engines import Setting, same_scheme
 from ...judge.timing import fastest
 
 TWO_INTEGRATORS = ("Euler", "RK4")  # of MuJoCo, a cheap and an accurate one, with the same schemes in tmt
-TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a timed run: short enough to pass between a busy machine's interruptions
+TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a timed run: it passes between the interruptions of a busy machine
 FINER_RUNS = 16  # steps of a run for each of the case's own
 
 
