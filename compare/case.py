@@ -122,12 +122,12 @@ class Case:
     scene: Scene
 
     def __post_init__(self):
-        names, scene, postures = self.robot.joints, self.scene, self.robot.postures
+        names, scene = self.robot.joints, self.scene
         count = f"{len(names)} numbers, one per joint ({', '.join(names)})"
         if isinstance(scene.posture, str):
-            accepted = " or ".join([*filter(None, [", ".join(postures)]), f"{count}, in deg"])
-            known = scene.posture in postures and len(postures[scene.posture]) == len(names)
-            scene.refuse("posture", not known, accepted)
+            postures = [name for name, angles in self.robot.postures.items() if len(angles) == len(names)]
+            accepted = f"{', '.join(postures)} or {count}, in deg" if postures else f"{count}, in deg"
+            scene.refuse("posture", scene.posture not in postures, accepted)
         for name, unit in (("posture", "deg"), ("torque", "N m"), ("speed", "deg/s")):
             value = getattr(scene, name)
             left_out = name != "torque" and value == ()

@@ -81,13 +81,14 @@ def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     return Mujoco(spec.compile(), engine.joints, engine.carriers, None)
 
 
-def contacts(dynamics: MujocoDynamics, q, v, tau, dt: float, steps: int, integrator: str) -> float:
-    """How many contacts there are in a step of a run, on average."""
+def contacts(dynamics: MujocoDynamics, q, v, tau, dt: float, steps: int, integrator: str) -> tuple[float, bool]:
+    """How many contacts there are in a step of a run, on average, and whether any of them pushes a joint."""
     model, data = mujoco.MjModel.__copy__(dynamics.model), mujoco.MjData(dynamics.model)
     model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
     data.qpos[dynamics.qpos], data.qvel[dynamics.dofs], data.qfrc_applied[dynamics.dofs] = q, v, tau
-    total = 0
+    total, pushed = 0, False
     for _ in range(steps):
         mujoco.mj_step(model, data)
         total += data.ncon
-    return total / steps
+        pushed |= bool(data.ncon and data.qfrc_constraint.any())
+    return total / steps, pushed

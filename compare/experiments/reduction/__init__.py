@@ -13,7 +13,7 @@ from ...robots import Robot
 from . import exact_motion, sub_blocks
 from .cost import costs
 from .needs import of_case
-from .times import TWO_INTEGRATORS, times
+from .times import TWO_INTEGRATORS, time_models
 
 TITLE = "Reduction: no more model than a scene needs"
 
@@ -66,7 +66,7 @@ def fill(result: Result, setup, cases, timed: bool) -> None:
     if timed:
         setup.quiet()
         rounds = setup.of(160, 16, 2)
-        times(result, models, setup, rounds)
+        time_models(result, models, setup, rounds)
         costs(result, setup, rounds)
 
 

@@ -23,7 +23,7 @@ def scheme_of(engines, integrator: str) -> str:
     return engines["mujoco"].methods[integrator].scheme
 
 
-def times(result, models, setup, rounds) -> None:
+def time_models(result, models, setup, rounds) -> None:
     """The rows: all models of all cases, timed in turn, against the whole model of the same case."""
     calls = {}
     for name, case in models:
