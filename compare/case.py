@@ -63,7 +63,7 @@ class Scene:
     locked: tuple = ()  # names of the joints that stay at the start
     duration: float = 5.0  # s
     dt: float = 5.0 / 64  # s, the coarsest step; runs with finer ones divide it
-    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along
+    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along; 0: any
     tags: tuple = ()  # what it serves for, see robots
 
     def __post_init__(self):
@@ -93,8 +93,8 @@ class Scene:
         self.refuse("dt", self.duration / self.dt > MOST_STEPS, f"{steps} into at most {MOST_STEPS:,}")
         left = abs(self.steps * self.dt - self.duration)
         self.refuse("dt", self.steps < 1 or left > 1e-9 * self.duration, steps)
-        judged = self.judged is None or (is_number(self.judged) and 0.0 < self.judged <= self.duration)
-        self.refuse("judged", not judged, f"None, or a time in s above 0 and at most {self.duration:g}")
+        judged = self.judged is None or (is_number(self.judged) and 0.0 <= self.judged <= self.duration)
+        self.refuse("judged", not judged, f"None, or a time in s of at least 0 and at most {self.duration:g}")
         object.__setattr__(self, "judged", None if self.judged is None else float(self.judged))
         for name in ("locked", "tags"):
             value = getattr(self, name)
@@ -163,11 +163,6 @@ class Case:
         return self.scene.torque == "hold" and not any(self.scene.speed)
 
     @property
-    def is_own(self) -> bool:
-        """Whether a user has added its scene: nothing is known of it beforehand."""
-        return "own" in self.scene.tags
-
-    @property
     def joints(self) -> tuple[str, ...]:
         """The names of the joints that are not locked."""
         return tuple(name for name in self.robot.joints if name not in self.scene.locked)
@@ -226,9 +221,7 @@ class Case:
         return values[[self.robot.joints.index(name) for name in self.joints]]
 
     def required(self, scheme: str, dt: float) -> float:
-        """For how long a run must be judged, s: with a step of 0.01 s or more only RK4 is stable that long. 0 of a user's own."""
-        if self.is_own:
-            return 0.0
+        """For how long a run must be judged, s: with a step of 0.01 s or more only RK4 is stable that long."""
         judged = self.duration if self.scene.judged is None else self.scene.judged
         return judged if scheme == "rk4" or dt < 0.01 else min(judged, 0.3)
 

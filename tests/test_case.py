@@ -54,8 +54,8 @@ def test_every_field_takes_a_value_or_says_in_one_line_what_it_accepts(field):
     [
         ({"name": 3}, "scene 3: name is 3; a text in one line that is not empty is expected"),
         ({"name": "a\nb"}, r"scene 'a\nb': name is 'a\nb'; a text in one line that is not empty is expected"),
-        ({"judged": "x"}, "scene 'mine': judged is 'x'; None, or a time in s above 0 and at most 5 is expected"),
-        ({"judged": 6.0}, "scene 'mine': judged is 6.0; None, or a time in s above 0 and at most 5 is expected"),
+        ({"judged": "x"}, "scene 'mine': judged is 'x'; None, or a time in s of at least 0 and at most 5 is expected"),
+        ({"judged": 6.0}, "scene 'mine': judged is 6.0; None, or a time in s of at least 0 and at most 5 is expected"),
         ({"gravity": "no"}, "scene 'mine': gravity is 'no'; True, the model's own, or False, none is expected"),
         ({"locked": None}, "scene 'mine': locked is None; a tuple of names is expected"),
         ({"locked": ("wrist",)}, "scene 'mine': locked is ('wrist',); a tuple of at most 2 of alpha, beta, gamma is expected"),
@@ -119,10 +119,13 @@ def test_a_torque_in_newton_metres_acts_on_the_free_joints():
     assert np.allclose(tmt.acceleration(*held.start, held.tau, held.tree), 0.0, atol=1e-12) and held.tau.any()
 
 
-def test_a_scene_of_ones_own_is_judged_as_long_as_it_can_be():
-    assert ARM.case("known", duration=2.0, dt=0.5).required("rk4", 0.5) == 2.0
-    own = ARM.case("own", duration=2.0, dt=0.5, tags=("own",))
-    assert own.is_own and own.required("rk4", 0.5) == 0.0 and not any(case.is_own for case in ARM.cases)
+def test_how_long_a_run_must_be_judged():
+    short = {"duration": 2.0, "dt": 0.5}
+    assert ARM.case("all", **short).required("rk4", 0.5) == ARM.case("all", **short).required("implicit", 0.005) == 2.0
+    assert ARM.case("all", **short).required("implicit", 0.5) == 0.3  # stable for no longer with so long a step
+    for judged in (1.5, 0.0):
+        assert ARM.case("some", judged=judged, **short).required("rk4", 0.5) == judged
+    assert ARM.case("own", judged=0.0, **short).required("implicit", 0.5) == 0.0
 
 
 # any robot

@@ -176,6 +176,13 @@ def of_kind(robot, kind: str) -> str | None:
     return robot.kinds.get(kind) or next((name for name, found in kinds(robot).items() if found == kind), None)
 
 
+def all_of_kind(robot, kind: str) -> tuple[str, ...]:
+    """The postures of a kind, the one that stands for it first."""
+    first = of_kind(robot, kind)
+    others = (name for name, found in kinds(robot).items() if found == kind and name != first)
+    return () if first is None else (first, *others)
+
+
 def region(name, z: np.ndarray) -> np.ndarray:
     """Growth in one step of a single hinge whose eigenvalues times dt are z and its conjugate, shape of z.
 

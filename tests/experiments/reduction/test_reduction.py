@@ -87,7 +87,7 @@ SCENES = (
     Scene("rest", "sideways", "hold", **SHORT),
     Scene("knee swing", (0, 0, 0, 60), locked=("yaw", "hip", "roll"), **SHORT),
     Scene("plane", (0, 50, 0, 20), tags=("fewer joints",), **SHORT),
-    Scene("own", (10, 20, 0, 40), (0.5, 0, 0, 0.1), (0, 10, 0, 0), damping=0.2, locked=("roll",), tags=("own",), **SHORT),
+    Scene("own", (10, 20, 0, 40), (0.5, 0, 0, 0.1), (0, 10, 0, 0), damping=0.2, locked=("roll",), judged=0.0, tags=("own",), **SHORT),
 )
 
 

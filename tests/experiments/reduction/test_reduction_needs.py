@@ -59,7 +59,7 @@ def test_the_planar_arm_moves_as_the_whole_one(engines):
     assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
 
 
-OWN = {"damping": 0.1, "duration": 0.5, "dt": 1 / 64, "tags": ("own",)}
+OWN = {"damping": 0.1, "duration": 0.5, "dt": 1 / 64, "judged": 0.0, "tags": ("own",)}
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ EDITS = (
     ),
     Edit("parameters", "rows", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
     Edit("parameters", "rows", "sorted(causes, key=_1)", "causes", "causes in the order in which they are found"),
-    Edit("parameters", "named", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
+    Edit("parameters", "causes_in", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
     Edit("parameters", "cause", "[f'{number:.7g} {unit}'.rstrip() for number in (stated, found)]",
          "[f'{number:.7g} {unit}'.rstrip() for number in (found, stated)]", "stated and compiled are exchanged"),
-    Edit("engine", "Engine.other_forces", "d.qfrc_actuator[_1]", "0 * d.qfrc_actuator[_1]", "actuators exert no force"),
-    Edit("engine", "Engine.other_forces", "d.qfrc_constraint[_1]", "0 * d.qfrc_constraint[_1]", "contacts exert no force"),
+    Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_actuator[_1]", "0 * d.qfrc_actuator[_1]", "actuators exert no force"),
+    Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_constraint[_1]", "0 * d.qfrc_constraint[_1]", "contacts exert no force"),
 )  # fmt: skip

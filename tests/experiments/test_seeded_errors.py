@@ -1,19 +1,14 @@
 """A check that never failed on a seeded error is not a check: each edit must make a named one fail."""
 
-import dataclasses
-import importlib
 import inspect
 
 import pytest
+from edited import XML, setup_of
 
-from compare.agreement import EPS, Setup
-from compare.engine_file import ARM_XML, parse
-from compare.scenes import SCENES
-from compare.trajectory import follow
-from tmt import kernels, method
-from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler
+from compare.experiment import Setup
+from compare.experiments import module
+from tmt import method
 
-XML = ARM_XML.read_text()
 ALPHA = '<joint name="alpha" type="hinge" axis="0 1 0"/>'
 BETA = '<joint name="beta" type="hinge" axis="1 0 0"/>'
 GAMMA = '<joint name="gamma" type="hinge" axis="0 1 0"/>'
@@ -103,7 +98,7 @@ IN_THE_METHOD = {
 
 def failing(setup, experiment) -> list[str]:
     """The checks of an experiment that fail, as 'experiment quantity'."""
-    checks = importlib.import_module(f"compare.{experiment}").rows(setup).checks
+    checks = module(experiment).rows(setup).checks
     return [
         f"{experiment} {c.scene.strip('(') if experiment == 'published' else c.quantity}"
         for c in checks
@@ -117,79 +112,29 @@ def assert_named(setup, expected):
         assert any(name.startswith(named) for name in found), f"{named!r} did not fail; these did: {found}"
 
 
-def small(engine):
-    return Setup(engine, states=50, exact_states=2, steps=(64,), size="quick")
+def few(model=XML):
+    return setup_of(model, make=Setup, states=50, exact_states=2, finer=(1,), size="quick")
 
 
 @pytest.mark.parametrize("old, new, expected", IN_THE_MJCF.values(), ids=IN_THE_MJCF)
 def test_error_in_the_mjcf(old, new, expected):
     assert XML.count(old) == 1
-    assert_named(small(parse(XML.replace(old, new))), expected)
+    assert_named(few(XML.replace(old, new)), expected)
 
 
 @pytest.mark.parametrize("old, new, expected", IN_THE_METHOD.values(), ids=IN_THE_METHOD)
-def test_error_in_the_method(old, new, expected, engine):
+def test_error_in_the_method(old, new, expected):
     text = inspect.getsource(method)
     assert text.count(old) == 1
     try:
         exec(compile(text.replace(old, new), method.__file__, "exec"), method.__dict__)
-        assert_named(small(engine), expected)
+        assert_named(few(), expected)
     finally:
         exec(compile(text, method.__file__, "exec"), method.__dict__)
 
 
-@dataclasses.dataclass(frozen=True)
-class Altered(SemiImplicitEuler):
-    """A wrong scheme: damping explicit, or the derivative of the bias dropped."""
-
-    drop: str = ""
-
-    def matrix(self, tree, *arguments):
-        if self.drop == "damping":
-            tree = dataclasses.replace(tree, damping=(0.0, 0.0, 0.0))
-        wanted = dataclasses.replace(self, implicit_bias=self.implicit_bias and self.drop != "bias")
-        return SemiImplicitEuler.matrix(wanted, tree, *arguments)
-
-
-@dataclasses.dataclass(frozen=True)
-class Hasty(RungeKutta):
-    """A wrong scheme: its step is a little too long."""
-
-    def step(self, slope, q, qd, dt):
-        return RungeKutta.step(self, slope, q, qd, dt * (1.0 + 1e6 * EPS))
-
-
-RK4 = {"order": 4, "A": METHODS["rk4"].A, "b": METHODS["rk4"].b, "c": METHODS["rk4"].c}
-WRONG_TWINS = {
-    "damping explicit": ("semi_implicit_euler", Altered(False, drop="damping"), "bent, damped, Euler"),
-    "derivative of the bias dropped": ("implicit", Altered(True, drop="bias"), "bent, free, implicit"),
-    "stages swapped": ("rk4", RungeKutta(**RK4 | {"b": (1 / 3, 1 / 6, 1 / 6, 1 / 3)}), "bent, free, RK4"),
-    "another method of order 4, Kutta's 3/8 rule": (
-        "rk4",
-        RungeKutta(
-            4, ((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8), (0.0, 1 / 3, 2 / 3, 1.0)
-        ),
-        "bent, free, RK4",
-    ),
-    "dt off by one ulp times 1e6": ("rk4", Hasty(**RK4), "bent, free, RK4"),
-}
-
-
-@pytest.mark.parametrize("twin, wrong, where", WRONG_TWINS.values(), ids=WRONG_TWINS)
-def test_a_wrong_twin_leaves_the_band(twin, wrong, where, engine, monkeypatch):
-    scene = next(scene for scene in SCENES if where.startswith(scene.name))
-    assert [str(c) for c in follow(scene, engine, (64,)).checks if not c.passed] == []
-    monkeypatch.setitem(METHODS, twin, wrong)
-    kernels.stepper.cache_clear()
-    try:
-        failed = {c.quantity for c in follow(scene, engine, (64,)).checks if not c.passed and c.scene.startswith(where)}
-    finally:
-        kernels.stepper.cache_clear()
-    assert {"one step, TMT to MuJoCo", "open loop, TMT to MuJoCo"} <= failed
-
-
 def test_mirror_symmetry_needs_the_kinematics():
     """A flipped beta axis passes mass and acceleration: what hides it is said in design, and shown here."""
-    flipped = small(parse(XML.replace(BETA, BETA.replace('"1 0 0"', '"-1 0 0"'))))
+    flipped = few(XML.replace(BETA, BETA.replace('"1 0 0"', '"-1 0 0"')))
     assert failing(flipped, "mass") == []
     assert failing(flipped, "kinematics") != []

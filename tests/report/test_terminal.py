@@ -9,10 +9,11 @@ from functools import partial
 import pytest
 from runs import ROOT, SECOND, compare, in_shell, on_terminal, readable_lines, screen, words
 
-from compare.engine_file import ARM_XML, load
+from compare.engines.mujoco import load
+from compare.robots.arm import ARM
 
 LINE = "interrupted; a report that was there is unchanged"
-HEAVY = ARM_XML.read_text().replace('mass="1.5"', 'mass="1.6"')
+HEAVY = ARM.mjcf.read_text().replace('mass="1.5"', 'mass="1.6"')
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,7 @@ def runs(tmp_path_factory):
     plain, umlauts = tmp_path_factory.mktemp("plain"), tmp_path_factory.mktemp("Zoë") / "Über"
     umlauts.mkdir()
     for name in (umlauts / "Käfer.xml", umlauts / os.fsdecode(b"\xff.xml")):
-        name.write_bytes(ARM_XML.read_bytes())
+        name.write_bytes(ARM.mjcf.read_bytes())
     (plain / "heavy.xml").write_text(HEAVY)
     arm, heavy = ("mass", "--quick", "--out"), ("mass", "--quick", "--mjcf", "heavy.xml", "--out")
     old = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"
@@ -111,8 +112,9 @@ def test_a_check_that_failed_is_status_1_though_nobody_hears_of_it(runs):
 
 def test_a_model_of_any_name_can_be_locked(tmp_path):
     path = tmp_path / os.fsdecode(b"\xff\xc3\xa4.xml")
-    path.write_bytes(ARM_XML.read_bytes())
-    assert load(path).lock({"beta": 0.1}).hinges == ["alpha", "gamma"]
+    path.write_bytes(ARM.mjcf.read_bytes())
+    locked = ARM.case("locked", locked=("beta",), posture="bent")
+    assert load(path, ARM.tree).of(locked).coordinates.names == ("alpha", "gamma")
 
 
 @pytest.mark.parametrize("line, status", [
@@ -131,6 +133,6 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     run = compare("mass", cwd=tmp_path)
     assert run.returncode == 2
     assert run.stderr.splitlines() == [
-        "python -m compare: cannot go on: RuntimeError: two lines (compare/terminal.py:9)"
+        "python -m compare: cannot go on: RuntimeError: two lines (compare/report/terminal.py:9)"
     ]
     assert ROOT.as_posix() not in run.stderr

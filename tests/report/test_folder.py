@@ -1,6 +1,5 @@
 """A report takes the old one's place when it is complete, and nothing else is touched."""
 
-import json
 import resource
 import signal
 import subprocess
@@ -11,23 +10,10 @@ from types import SimpleNamespace
 import pytest
 from matplotlib.figure import Figure
 from runs import ENVIRONMENT
+from small_report import OLD, files, fill, old_report
 
-from compare.folder import FolderError, new_report, save
-from compare.workers import draw
-
-
-def fill(work, text):
-    """A small report that lists its files."""
-    (work / "tables").mkdir()
-    (work / "tables" / "mass.csv").write_text(text)
-    listed = ["report.md", "results.json", "tables/mass.csv"]
-    (work / "results.json").write_text(json.dumps({"provenance": {"files": listed}, "text": text}))
-
-
-def files(folder):
-    """What is in a folder; of results.json only the text of `fill`."""
-    found = {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*") if p.is_file()}
-    return {name: json.loads(text)["text"] if name == "results.json" else text for name, text in found.items()}
+from compare.experiment import draw
+from compare.report.folder import FolderError, new_report, save
 
 
 def test_a_new_report_replaces_the_old_one_and_keeps_other_files(tmp_path):
@@ -80,8 +66,8 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
 
 RUN = """
 import json, os, sys
-from compare import interrupt
-from compare.folder import new_report
+from compare.process import interrupt
+from compare.report.folder import new_report
 
 out, number, at = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 renamed = 0
@@ -105,13 +91,7 @@ with new_report(out) as work:
     sys.addaudithook(hook)
 print(renamed)
 """
-OLD = {"tables/mass.csv": "old", "results.json": "old"}
 NEW = {"tables/mass.csv": "new", "results.json": "new", "report.md": "new"}
-
-
-def old_report(out):
-    with new_report(out) as work:
-        fill(work, "old")
 
 
 def run(out, number=0, at=-1):
@@ -234,8 +214,8 @@ def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path):
 
 
 def test_a_full_disk_while_a_figure_is_drawn_is_no_failed_check(tmp_path, monkeypatch):
-    module = SimpleNamespace(figures=lambda result: iter([("plot", Figure(), "")]))
-    monkeypatch.setitem(sys.modules, "compare.plain", module)
+    module = SimpleNamespace(figures=lambda result, robot: iter([lambda: ("plot", Figure(), "")]))
+    monkeypatch.setitem(sys.modules, "compare.experiments.plain", module)
     with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
-        draw("plain", None, work)
+        draw("plain", None, None, work)
     assert f"cannot write {tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value)

@@ -1,11 +1,13 @@
 """Each quantity is compared with what the other engine says of that quantity: one that is off fails its own checks alone."""
 
 import pytest
+from edited import XML, setup_of
 
 import tmt
-from compare import acceleration, gravity, kinematics, mass, parameters
-from compare.agreement import Setup
-from compare.engine_file import ARM_XML, parse
+from compare.engines.mujoco import parse
+from compare.experiment import Setup
+from compare.experiments import acceleration, gravity, kinematics, mass, parameters
+from compare.robots.arm import ARM
 
 OFF = 1e-6  # far above rounding
 
@@ -18,23 +20,32 @@ def off(values, place=None):
 
 
 class Off:
-    """An engine that gives one quantity a little off; weightless: only without gravity."""
+    """MuJoCo that gives one quantity a little off, with gravity or only without."""
 
-    def __init__(self, engine, name, place=None, weightless=False):
-        self.engine, self.name, self.place, self.weightless = engine, name, place, weightless
+    name = "mujoco"
+
+    def __init__(self, mujoco, quantity, place=None, weightless=False):
+        self.mujoco, self.changed, self.weightless = mujoco, (quantity, place), weightless
+
+    def of(self, case):
+        dynamics = self.mujoco.of(case)
+        return dynamics if case.scene.gravity == self.weightless else OffDynamics(dynamics, *self.changed)
+
+
+class OffDynamics:
+    """Dynamics that give one quantity a little off."""
+
+    def __init__(self, dynamics, quantity, place):
+        self.dynamics, self.quantity, self.place = dynamics, quantity, place
 
     def __getattr__(self, name):
-        if name == "variant" and self.weightless:
-            return lambda **changes: Off(self.engine.variant(**changes), self.name)
-        given = getattr(self.engine, name)
-        if name != self.name or self.weightless:
-            return given
-        return lambda *states: off(given(*states), self.place)
+        given = getattr(self.dynamics, name)
+        return given if name != self.quantity else lambda *states: off(given(*states), self.place)
 
 
-def failing(experiment, engine) -> set:
+def failing(experiment, mujoco) -> set:
     """The quantities whose comparison of both engines fails."""
-    result = experiment.rows(Setup(engine, states=20, exact_states=1))
+    result = experiment.rows(setup_of(mujoco, make=Setup, states=20, exact_states=1))
     return {check.quantity for check in result.checks if not check.passed and not check.quantity.endswith("to exact")}
 
 
@@ -59,9 +70,9 @@ def failing(experiment, engine) -> set:
         (acceleration, ("potential_energy",), {"potential energy"}),
     ],
 )
-def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(engine, experiment, changed, quantities):
-    assert failing(experiment, engine) == set()
-    assert failing(experiment, Off(engine, *changed)) == quantities
+def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(mujoco, experiment, changed, quantities):
+    assert failing(experiment, mujoco) == set()
+    assert failing(experiment, Off(mujoco, *changed)) == quantities
 
 
 @pytest.mark.parametrize(
@@ -72,13 +83,12 @@ def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(engine, experimen
                                         "dp_alpha/dt at TMT's qdd, no gravity"}),
     ],
 )  # fmt: skip
-def test_a_quantity_of_tmt_that_is_off_fails_its_own_checks(engine, monkeypatch, experiment, name, quantities):
+def test_a_quantity_of_tmt_that_is_off_fails_its_own_checks(mujoco, monkeypatch, experiment, name, quantities):
     right = getattr(tmt, name)
     monkeypatch.setattr(tmt, name, lambda *states: off(right(*states)))
-    assert failing(experiment, engine) == quantities
+    assert failing(experiment, mujoco) == quantities
 
 
-XML = ARM_XML.read_text(encoding="utf-8")
 BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
 GEOM = '<geom size="0.001" pos="0.5 0.5 0"/>'
@@ -115,7 +125,7 @@ READ = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("quantity", parameters.UNITS)
+@pytest.mark.parametrize("quantity", parameters.QUANTITIES)
 def test_each_number_of_the_compiled_model_is_compared(quantity):
     if quantity == "flag damper":  # one flag for springs and dampers before there were two
         changes = [("<flag", f'<flag {name}="disable"') for name in ("damper", "passive")]
@@ -124,10 +134,10 @@ def test_each_number_of_the_compiled_model_is_compared(quantity):
     for old, new in changes:
         assert old in XML
         try:
-            engine = parse(XML.replace(old, new))
+            model = parse(XML.replace(old, new), ARM.tree)
         except ValueError:
             continue
-        result = parameters.rows(Setup(engine, states=5))
+        result = parameters.rows(setup_of(model, make=Setup, states=5))
         assert quantity in {check.quantity for check in result.checks if not check.passed}
         return
     if quantity not in parameters.NOT_HAD:

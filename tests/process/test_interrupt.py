@@ -8,24 +8,26 @@ import time
 
 import pytest
 from runs import ENVIRONMENT, SECOND, command, ended, started
-from test_folder import OLD, files, old_report
+from small_report import OLD, files, old_report
 
 from compare.__main__ import main
 
 LINE = "interrupted; a report that was there is unchanged"
 ROLLOUT = """
-from compare import interrupt
+from compare.process import interrupt
 
 interrupt.answer()
 import numpy as np
-from compare.engine_file import load
+from compare.engines.mujoco import load
+from compare.robots.arm import ARM
 
-_, run = load().runner(np.zeros(3), np.zeros(3), np.zeros(3), 1e-4, 500_000, "RK4")
+dynamics = load(ARM.mjcf, ARM.tree).of(ARM.case())
+_, run = dynamics.runner(np.zeros(3), np.zeros(3), np.zeros(3), 1e-4, 500_000, "RK4")
 print("now", flush=True)
 run()  # some seconds in C
 """
 COMPILATION = """
-from compare import interrupt
+from compare.process import interrupt
 
 interrupt.answer()
 import numba
@@ -101,7 +103,7 @@ def test_what_kill_9_leaves_is_cleared_by_the_next_run(tmp_path):
 
 def test_a_signal_that_is_ignored_stays_ignored():
     text = (
-        "import os, signal; from compare import interrupt; interrupt.answer(); "
+        "import os, signal; from compare.process import interrupt; interrupt.answer(); "
         "os.kill(os.getpid(), signal.SIGINT); os.kill(os.getpid(), signal.SIGHUP); print('well')"
     )
     line = ["bash", "-c", "trap '' INT HUP; exec \"$@\"", "-", sys.executable, "-c", text]
