@@ -68,7 +68,7 @@ class Scene:
 
     def __post_init__(self):
         named = isinstance(self.name, str) and self.name.strip() and self.name.isprintable()
-        self.refuse("name", not named, "a text in one line that is not empty")
+        self.refuse("name", not named, "a text that is not empty, in one line")
         choices = {
             "posture": "the name of a posture, or an angle in deg for each joint",
             "torque": "free, hold, or a torque in N m for each joint",

@@ -52,8 +52,8 @@ def test_every_field_takes_a_value_or_says_in_one_line_what_it_accepts(field):
 @pytest.mark.parametrize(
     "wrong, says",
     [
-        ({"name": 3}, "scene 3: name is 3; a text in one line that is not empty is expected"),
-        ({"name": "a\nb"}, r"scene 'a\nb': name is 'a\nb'; a text in one line that is not empty is expected"),
+        ({"name": 3}, "scene 3: name is 3; a text that is not empty, in one line is expected"),
+        ({"name": "a\nb"}, r"scene 'a\nb': name is 'a\nb'; a text that is not empty, in one line is expected"),
         ({"judged": "x"}, "scene 'mine': judged is 'x'; None, or a time in s of at least 0 and at most 5 is expected"),
         ({"judged": 6.0}, "scene 'mine': judged is 6.0; None, or a time in s of at least 0 and at most 5 is expected"),
         ({"gravity": "no"}, "scene 'mine': gravity is 'no'; True, the model's own, or False, none is expected"),

@@ -15,14 +15,14 @@ from ...judge.timing import fastest
 from ...robots import Robot
 from .times import TIMED_STEPS, TWO_INTEGRATORS
 
-FALL_STEPS = 1024  # of the run whose bits are compared
-SETTLED = 0.5  # N m s/rad, with which the robot comes to rest on the floor
+FALL_TIME, FALL_STEPS = 5.0, 1024  # s, long enough to come to rest on the floor; of the run whose bits are compared
+SETTLED = 0.5  # N m s/rad, with which the robot comes to rest
 
 
 def costs(result, setup, rounds: int) -> None:
     """A table: time of a step with each thing added, as a ratio to the minimal model, and bits of a fall."""
     case = fall(setup.robot)
-    dt, timed = case.duration / FALL_STEPS, TIMED_STEPS["mujoco"]
+    dt, timed = case.scene.dt, TIMED_STEPS["mujoco"]
     engines = with_additions(setup.engines["mujoco"], *sizes(setup.robot.tree))
     models = {name: engine.of(case) for name, engine in engines.items()}
     # all are timed from where the robot rests on the floor that is in reach, so that there the contact stays
@@ -50,10 +50,14 @@ def costs(result, setup, rounds: int) -> None:
 
 
 def fall(robot: Robot) -> Case:
-    """The whole robot let go under gravity: where errors fall regularly, else its first such scene, else its first posture."""
+    """The whole robot let go under gravity for five seconds.
+
+    As in the scene where errors fall regularly, else in its first scene that lets it go, else from its first posture.
+    """
     falls = [case for case in robot.cases if case.is_free and case.scene.gravity and not case.locked]
     regular = [case for case in falls if "regular" in case.scene.tags]
-    return (regular + falls + [robot.case("let go", posture=next(iter(robot.postures), ()))])[0]
+    case = (regular + falls + [robot.case("let go", posture=next(iter(robot.postures), ()))])[0]
+    return case.changed(duration=FALL_TIME, dt=FALL_TIME / FALL_STEPS, judged=None)
 
 
 def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
