@@ -99,7 +99,7 @@ class Held:
         small = NEGLIGIBLE * np.abs(values).max()
         if values.real.max() > small:
             return "saddle"
-        return "marginal" if np.abs(values).min() < small else "centre"
+        return "marginal" if np.abs(values).min() <= small else "centre"
 
     def step(self, name, dt) -> np.ndarray:
         """What one step of a method of tmt does to a small deviation, (..., 2n, 2n) for dt of shape (...)."""

@@ -10,8 +10,8 @@ from ...judge.check import Result
 from ...truth.linear import held
 from . import beyond, choice, claims, departure, failure, falling, limits, long_runs
 from .claims_judged import check_claims
-from .equilibria import equilibria, planes
-from .subjects import DAMPINGS, places, subjects
+from .equilibria import check_equilibria, planes
+from .subjects import DAMPINGS, places, subjects_of
 
 TITLE = "Stability: where methods fail"
 FINE_DEPARTURES = (1e-2, 1e-3)  # s, beside the coarsest step
@@ -51,7 +51,7 @@ def methods_of(setup) -> tuple:
 
 def begin(setup) -> None:
     """Set the runs going side by side. A quick run takes fewer methods and scenes, and no map, minute or fine step."""
-    robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects(setup.robot)
+    robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects_of(setup.robot)
     methods, each, coarse = methods_of(setup), choice.of_schemes(engines), choice.coarsest(robot).scene.dt
     points = of(
         places(seen.centres, seen.saddles),
@@ -122,7 +122,7 @@ def rows(setup) -> Result:
     work = setup.background.pop("stability")
     seen, methods = work["subjects"], methods_of(setup)
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
-    equilibria(result, setup)
+    check_equilibria(result, setup)
     limits.check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
     departure.check_departures(result, [row for part in work["departure"] for row in part] + falls)
@@ -151,7 +151,7 @@ def figures(result, robot):
     # matplotlib is for the process that draws
     from . import figures_claims, figures_departure, figures_failure, figures_limits
 
-    tables, curves, seen = result.tables, result.curves, subjects(robot)
+    tables, curves, seen = result.tables, result.curves, subjects_of(robot)
     falls = [row for row in tables.get("departure", ()) if seen.marginal and row["scene"] == seen.marginal.name]
     drawn = {
         figures_limits.limits: bool(seen.centre),
