@@ -157,8 +157,7 @@ def check_limits(result, robot, parts) -> None:
     growths = [row for part in parts for row in part["growths"]]
     for row in growths:
         where, off = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s", row.pop("total_off")
-        quantity = f"growth in {row['steps']} steps, observed / predicted - 1"
-        result.check(where, quantity, off, GROWTH_TOLERANCE, "")
+        result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
     result.tables["stability_growth"] = growths
     result.notes[:0] = limits_in_words(robot, result.rows)
     result.notes += growth_in_words(growths)
