@@ -81,6 +81,9 @@ def test_the_equilibrium_is_the_lowest_that_is_stable():
     down, up = (0, 0, 0), (180, 0, 0)
     assert exact_motion.equilibrium(another(CHAIN, up=up, bent=(0, 20, 0), down=down)) == "down"
     assert exact_motion.equilibrium(another(CHAIN, up=up, bent=(0, 20, 0))) is None
+    cross = dataclasses.replace(CHAIN, body_hinge=(0, 2))  # with the first body up the others may hang too, stable but higher
+    assert exact_motion.equilibrium(another(cross, flipped=(180, 180, 0), down=down)) == "down"
+    assert exact_motion.equilibrium(another(cross, flipped=(180, 180, 0), up=up)) == "flipped"
     assert exact_motion.equilibrium(another(dataclasses.replace(CHAIN, damping=(0, 0.1, 0)), down=down)) is None
     assert exact_motion.equilibrium(another(dataclasses.replace(CHAIN, gravity=(0, 0, 0)), down=down)) is None
 
