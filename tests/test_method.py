@@ -160,7 +160,9 @@ def test_fifty_digits_contain_the_floats(rng):
     force = bias_scale(tmt.ARM, q[None], qd[None]) + np.abs(tau).max()
     assert distance(tmt.mass_matrix(q), truth.mass_matrix).max() < ALLOWED * tmt.mass_matrix(q).max()
     assert distance(tmt.bias(q, qd), truth.bias).max() < ALLOWED * force
-    assert distance(tmt.acceleration(q, qd, tau), truth.acceleration).max() < ALLOWED * acceleration_scale(tmt.ARM, q[None], force)
+    assert distance(tmt.acceleration(q, qd, tau), truth.acceleration).max() < ALLOWED * acceleration_scale(
+        tmt.ARM, q[None], force
+    )
     assert distance(tmt.potential_energy(q), truth.potential_energy) < ALLOWED * gravity_scale(tmt.ARM)
     assert distance(truth.mass_matrix.astype(float), truth.mass_matrix).max() > 0.0  # the truth has more digits
 

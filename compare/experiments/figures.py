@@ -20,8 +20,8 @@ ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
 ELEVATION, AZIMUTH = 20.0, -70.0  # deg, from where the sketch is seen
 CENTRED = {"ha": "center", "va": "center"}
 _E, _A = np.radians([ELEVATION, AZIMUTH])
-RIGHT = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
-UP = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
+RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
+UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
 def sketch(robot: Robot) -> tuple[str, Figure, str]:
@@ -51,7 +51,7 @@ def sketch(robot: Robot) -> tuple[str, Figure, str]:
             names, (chain,) = robot.landmarks(poses[name]), lines
             for text, point, (right, up) in zip(names, chain, beside(chain, arrows[name])):
                 side = {"ha": "left" if right > 0.0 else "right", "va": "bottom" if up > 0.5 else "center"}
-                ax.text(*(point + 0.1 * size * (right * RIGHT + up * UP)), text, color=GREY, fontsize=8, **side)
+                ax.text(*(point + 0.1 * size * (right * RIGHTWARD + up * UPWARD)), text, color=GREY, fontsize=8, **side)
         ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(poses[name]))})°")
         ax.set(**{f"{which}label": f"{axis}, m" for which, axis in zip("xyz", robot.axes)})
         ax.set(**{f"{which}lim": (centre - half, centre + half) for which, centre in zip("xyz", middle)})
@@ -97,14 +97,14 @@ def beside(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
 
     Away from the links and from the arrows, (n, 2, 3), that meet in the point; to the left if these are balanced.
     """
-    away = np.tile(-0.01 * RIGHT, (len(chain), 1))
+    away = np.tile(-0.01 * RIGHTWARD, (len(chain), 1))
     links = np.diff(chain, axis=0)
     links /= np.maximum(np.linalg.norm(links, axis=1), 1e-12)[:, None]
     away[:-1] -= links
     away[1:] += links
     for origin, axis in arrows:
         away -= np.isclose(chain, origin).all(axis=1)[:, None] * axis / np.linalg.norm(axis)
-    on_paper = away @ np.stack([RIGHT, UP], axis=1)
+    on_paper = away @ np.stack([RIGHTWARD, UPWARD], axis=1)
     return on_paper / np.linalg.norm(on_paper, axis=1)[:, None]
 
 

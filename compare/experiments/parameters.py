@@ -22,7 +22,8 @@ QUANTITIES = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited",
     "mass": "kg", "com": "m", "inertia": "kg m2", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
-WHOLE = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")  # that are so or not, a place, or a count
+# that are so or not, a place, or a count
+WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
 OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
 EXPLAINED = {  # forces, by the quantities that say why they act
     "springs, fluid and tendons": ("stiffness", "density", "viscosity", "gravcomp", *NOT_HAD[1:4]),
@@ -91,7 +92,7 @@ def rows(setup) -> Result:
         names = owners(tree, quantity)
         for owner, e, f in zip(names, expected.reshape(len(names), -1), found.reshape(len(names), -1)):
             off, tolerance = np.abs(e - f), FACTOR * EPS * np.abs(e).max()
-            whole = quantity in WHOLE
+            whole = quantity in WHOLE_NUMBERS
             value, bound, rule = (f[0], e[0], "equal") if whole else (off.max(), tolerance, "at most")
             result.check(owner, quantity, value, bound, unit, rounding=not whole, rule=rule)
             for k, (a, b) in enumerate(zip(e, f)):

@@ -61,8 +61,10 @@ def is_noise(item: Printed) -> bool:
 
 
 def shared(robot: Robot) -> tuple[list, list]:
-    """Of what is rounding alone: the items that are met to every digit, whether by TMT too; the items and the entries
-    whose size is met."""
+    """What exact arithmetic shares of numbers that are rounding alone: every digit, or the size of entries.
+
+    Items and whether TMT has the digits too; items and their entries in words.
+    """
     ordinals = ("first", "second", "third", *(f"{k}th" for k in range(4, len(robot.joints) + 1)))
     every = [(item.item, "tmt" in item.to_every_digit) for item in robot.printed if item.to_every_digit]
     entries = [[f"the {ordinals[robot.joints.index(joint)]} entry" for joint in item.sizes] for item in robot.printed]

@@ -108,7 +108,9 @@ def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
     robot = crane(tmp_path)
     name, fig, caption = draw.sketch(robot)
     assert name == "crane" and [ax.get_title().split(":")[0] for ax in fig.axes] == ["down", "raised"]
-    assert "swing about x at the origin, then lift about y at the origin, then bend about y at (0, 0, -0.4) m" in caption
+    assert (
+        "swing about x at the origin, then lift about y at the origin, then bend about y at (0, 0, -0.4) m" in caption
+    )
     assert caption.endswith("centres of mass of the boom (1), the jib (2) and the tool (3).")
     lines = draw.chains(robot, np.zeros(4))
     assert [line[1].tolist() for line in lines] == [[0, 0, 0], [0, 0, -0.4], [0, 0, -0.4 - 0.3], [0, 0.05, -0.7 - 0.08]]
@@ -116,7 +118,7 @@ def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
 
 def test_labels_stand_away_from_what_meets_in_a_point():
     chain = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, -2.0]])
-    arrow = np.array([[chain[1], draw.RIGHT]])
+    arrow = np.array([[chain[1], draw.RIGHTWARD]])
     first, middle, last = draw.beside(chain, arrow)
     assert first[1] > 0.9 and last[1] < -0.9  # beyond the ends of the chain
     assert middle[0] == pytest.approx(-1.0)  # on the other side of the arrow

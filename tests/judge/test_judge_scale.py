@@ -38,7 +38,9 @@ def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
 def test_the_scales_of_mass_and_acceleration():
     M = tmt.mass_matrix(Q)
     assert np.array_equal(scale.mass_scale(TREE, Q), [abs(m).max() for m in M])
-    assert np.allclose(scale.condition(TREE, Q), [np.linalg.norm(m, 2) * np.linalg.norm(np.linalg.inv(m), 2) for m in M])
+    assert np.allclose(
+        scale.condition(TREE, Q), [np.linalg.norm(m, 2) * np.linalg.norm(np.linalg.inv(m), 2) for m in M]
+    )
     inverse, norm = (np.array([np.linalg.norm(f(m), 2) for m in M]) for f in (np.linalg.inv, lambda m: m))
     force = np.linspace(1.0, 20.0, 20)
     assert np.allclose(scale.acceleration_scale(TREE, Q, force), (inverse * norm + 1.0) * inverse * force)

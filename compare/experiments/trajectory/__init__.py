@@ -1,11 +1,13 @@
 """Motion by the same scheme on both sides: a method of tmt for every integrator of MuJoCo."""
 
+from collections.abc import Iterator
 from functools import partial
 
 from ...engines import one_of_each_scheme
 from ...judge.check import Result
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES
+from ...robots import Robot
 from . import drift, errors, horizon, sentences
 from .derivative import compare_derivatives
 from .runs import follow
@@ -14,7 +16,8 @@ TITLE = "Trajectories: the same scheme for every integrator of MuJoCo"
 FEW_EXACT_STEPS = 8  # with many digits, in a small run
 
 
-def claim(robot) -> str:
+def claim(robot: Robot) -> str:
+    """What is claimed."""
     of_rk4 = "the assignment's" if robot.claims else "the classical one"
     return (
         "For every integrator of MuJoCo the same scheme stands on the TMT side (Euler, implicitfast and discrete are one "
@@ -25,7 +28,8 @@ def claim(robot) -> str:
     )
 
 
-def tolerance(robot) -> str:
+def tolerance(robot: Robot) -> str:
+    """What the differences are compared with."""
     return (
         "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
         "the sum of the absolute terms of the force, and 8 eps of the sums of the step. Open loop: a band computed along the "
@@ -86,7 +90,7 @@ def rows(setup) -> Result:
     return result
 
 
-def figures(result, robot):
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Those of the assignment that show a held posture, one for each scene, drift, and the growth of errors."""
     from . import figures_runs as draw  # matplotlib is for the processes that draw; `figures` is this function
 

@@ -7,8 +7,11 @@ import numpy as np
 
 import tmt
 
-from ...engines import LABELS, Engine, one_of_each_scheme, same_scheme
+from ...case import Case
+from ...engines import LABELS, Dynamics, Engine, Method, one_of_each_scheme, same_scheme
+from ...judge.check import Result
 from ...judge.run import ORDER_MARGIN
+from ...robots import Robot
 
 DRIFT_DURATION = 1.0  # s: short enough for the order to show, long enough to move
 DRIFT_STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method
@@ -16,7 +19,7 @@ FEW_DRIFT_STEPS = DRIFT_STEPS | {1: (512, 1024, 2048)}
 OF_EULER = 1e-3  # of Euler's drift: RK4's is below, with fewer steps
 
 
-def drift(result, robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
+def drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
     """Energy and, without gravity, momentum of the first joint along free, undamped runs; steps: so many, by the order."""
     drifts = {}  # (scene, quantity, unit): method of MuJoCo: engine: a value for each of the steps
     methods = one_of_each_scheme(engines["mujoco"])
@@ -38,7 +41,7 @@ def drift(result, robot, engines: Mapping[str, Engine], steps: Mapping[int, tupl
         result.notes.append(f"No scene of this {robot.name} is free and without damping: there is no drift to measure.")
 
 
-def constants(case) -> dict[tuple, Callable]:
+def constants(case: Case) -> dict[tuple, Callable]:
     """What stays constant in a free case without damping: (name, unit): a function of q and v along a run."""
     first, found = case.robot.joints[0], {("energy", "J"): partial(tmt.energy, model=case.tree)}
     if not any(case.tree.gravity) and first in case.joints:
@@ -46,12 +49,12 @@ def constants(case) -> dict[tuple, Callable]:
     return found
 
 
-def run(case, dynamics, method, count) -> tuple:
+def run(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
     """q and v of a second in so many steps."""
     return dynamics.run(*case.start, case.tau, DRIFT_DURATION / count, count, method.name)[1:3]
 
 
-def check_drifts(result, drifts) -> None:
+def check_drifts(result: Result, drifts: dict) -> None:
     """The drift halves with the step as the order says; RK4's is far below that of Euler, which takes more steps."""
     for (scene, quantity, _), of_scene in drifts.items():
         euler = next(method for method in of_scene if method.scheme == "semi_implicit_euler")

@@ -1,10 +1,15 @@
 """How far the runs with the coarsest step of RK4 are from the true motion, where that is known."""
 
+from collections.abc import Iterator
+
+from ...case import Case
+from ...judge.check import Result
 from ...judge.run import deviation, number_or_none
+from ...robots import Robot
 from ...truth import reference
 
 
-def held(result, robot) -> dict[str, tuple]:
+def held(result: Result, robot: Robot) -> dict[str, tuple]:
     """Of each held scene, whose true motion is rest: {scene: (TMT, MuJoCo)}, rad.
 
     The largest angle over the run; None of a run that has diverged.
@@ -16,7 +21,7 @@ def held(result, robot) -> dict[str, tuple]:
     }
 
 
-def free(result, robot) -> dict[str, tuple]:
+def free(result: Result, robot: Robot) -> dict[str, tuple]:
     """The same of the other scenes whose true motion stands in the table of runs with more than 20 digits."""
     errors = {}
     for case, curve in coarsest(result, robot):
@@ -28,7 +33,7 @@ def free(result, robot) -> dict[str, tuple]:
     return errors
 
 
-def coarsest(result, robot):
+def coarsest(result: Result, robot: Robot) -> Iterator[tuple[Case, dict]]:
     """Each case that was run, with the curve of its coarsest step of RK4."""
     runs = result.curves["runs"]
     for case in robot.cases:

@@ -80,7 +80,7 @@ def run(result, case):
         )
         lines.semilogy(c["t"][:: c["every"]][1:], band[1:], "--", color=ORANGE, label="band of rounding")
         if c["judged_until_s"] < case.duration:
-            lines.axvspan(c["judged_until_s"], case.duration, color=GREY, alpha=0.15)
+            lines.axvspan(c["judged_until_s"], case.duration, color=(GREY, 0.15))
         lines.set(xlabel="time, s", xlim=(0, case.duration))
         if len(f"{case.duration:g}") > 2:  # the last number of a column would meet the first of the next
             lines.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))

@@ -1,6 +1,6 @@
 """How far digits reach: the growth of a small difference, and runs of the same scheme with many digits."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import mpmath
 import numpy as np
@@ -10,6 +10,7 @@ from tmt.methods import METHODS, one_step
 from tmt.reference import DIGITS, distance
 
 from ...case import Case
+from ...judge.check import Result
 from ...judge.rounding import growth
 from ...judge.run import step_in_words
 
@@ -30,7 +31,7 @@ def grown(case: Case, duration: float, steps: int) -> np.ndarray:
         return growth(METHODS["rk4"], case.tree, *path, case.tau, dt, GROWTH_EVERY)
 
 
-def growth_of_errors(result, cases, curves, duration, steps) -> None:
+def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, duration: float, steps: int) -> None:
     """log10 of the growth of a small difference over 5 s and the whole time, scene by scene, and in words."""
     t = np.linspace(0.0, duration, steps // GROWTH_EVERY + 1)
     curves = {case.name: curve for case, curve in zip(cases, curves)}
@@ -78,7 +79,7 @@ def time_in_words(t, grown, time) -> str:
     return f"more than {known_until(t, grown):.0f} s" if time is None else f"about {time:.0f} s"
 
 
-def many_digits(result, cases, runs) -> None:
+def many_digits(result: Result, cases: Sequence[Case], runs: Iterable[dict]) -> None:
     """Both runs beside a run of the same scheme with many digits: which engine carries the rounding.
 
     runs: of each case its paths with many digits, by the scheme.
@@ -94,7 +95,7 @@ def many_digits(result, cases, runs) -> None:
             check_digits(result, where, off, curve["band"][: last + 1], dt)
 
 
-def check_digits(result, where, off, band, dt) -> None:
+def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: float) -> None:
     """The state of each engine's run that comes closest to the band of rounding, {engine: distances in rad, (states,)}."""
     for label, apart in (("TMT", off["tmt"]), ("MuJoCo", off["mujoco"])):
         ratio = np.divide(apart, band, out=np.zeros_like(apart), where=band > 0)

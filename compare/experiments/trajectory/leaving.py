@@ -13,7 +13,7 @@ from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT
 from ...truth.linear import stiffness
 
-INSTANT = 1e-6  # s: a step in which nothing moves
+NO_TIME = 1e-6  # s: a step in which nothing moves
 STEADY = 1e-3  # per second: a slower growth is none in these runs
 NEAR_PREDICTION = 2  # steps: so near the time that is predicted from rounding, rounding is the cause
 
@@ -22,7 +22,7 @@ def pushes(case: Case, engines: Mapping[str, Engine]) -> dict[str, np.ndarray]:
     """The acceleration that each engine finds at the start under the torque that is to hold, rad/s2, (n,)."""
     ours, theirs = (engines[name].of(case) for name in ("tmt", "mujoco"))
     return {
-        "tmt": ours.run(*case.start, case.tau, INSTANT, 1, "rk4").v[1] / INSTANT,
+        "tmt": ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
         "mujoco": theirs.acceleration(*case.start, case.tau),
     }
 

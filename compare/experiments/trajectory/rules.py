@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...judge.check import Result
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES
 
@@ -19,7 +20,9 @@ def judged(times: np.ndarray, width: np.ndarray, ends: Mapping[str, float | None
     return max(1, int(np.argmin(np.append((width < NARROW) & alive, False))))
 
 
-def check_divergence(result, where, ends, dt, steps, width) -> None:
+def check_divergence(
+    result: Result, where: str, ends: Mapping[str, float | None], dt: float, steps: int, width: np.ndarray
+) -> None:
     """Both diverge at the same step, if one does while the band (recorded,) is narrow: then rounding decides nothing."""
     end = ends_first(ends)
     if end == np.inf:
@@ -31,19 +34,23 @@ def check_divergence(result, where, ends, dt, steps, width) -> None:
         result.check(where, "step of divergence, MuJoCo's, is TMT's", theirs, ours, "", note, rule="equal")
 
 
-def check_movement(result, where, moved) -> None:
+def check_movement(result: Result, where: str, moved: float) -> None:
     """A free run moves: one that stays shows nothing."""
     result.check(where, "movement", moved, MOVES, "rad", rule="at least")
 
 
-def check_same_bits(result, where, integrator, first, other) -> None:
+def check_same_bits(result: Result, where: str, integrator: str, first: list, other: list) -> None:
     """Integrators that are one scheme here give the same bits: q and v of both."""
     differ = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(first, other))
     result.check(where, f"the same bits as {integrator}", differ, 0.0, "arrays that differ", rule="equal")
 
 
-def check_level(result, where, about, joints, difference, tolerance, times, ending) -> None:
-    """A row and a check: the component and state of the recorded ones that come closest to their tolerance."""
+def check_level(result: Result, where: str, about: dict, joints, difference, tolerance, times, ending: dict) -> None:
+    """A row and a check: the component and state of the recorded ones that come closest to their tolerance.
+
+    about, ending: the first and the last columns of the row; difference: (states, n) rad/s2, or (states, 2n) rad and rad/s;
+    tolerance: the same, or of a shape that stands for it; times: of the states, s.
+    """
     level, n = about["level"], len(joints)
     difference = np.abs(difference)
     tolerance = np.broadcast_to(tolerance, difference.shape)

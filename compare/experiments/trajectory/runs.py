@@ -15,7 +15,7 @@ from ...judge.run import departure, deviation_alive, diverged_at, step_in_words
 from ...truth.smallest import reduced
 from .rules import check_divergence, check_level, check_movement, check_same_bits, ends_first, judged
 
-FINEST = 8192  # steps of a run that is finer than the scene's own
+STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
 
 
 class TmtSide(NamedTuple):
@@ -36,7 +36,7 @@ class TmtSide(NamedTuple):
 
 def counts(case: Case, finer: Sequence[int]) -> list[int]:
     """The numbers of steps of a case's runs: multiples of its own; at most 8192, its own excepted."""
-    return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= FINEST]
+    return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= STEPS_AT_MOST]
 
 
 def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], known: dict | None = None) -> Result:
@@ -85,7 +85,9 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     )  # fmt: skip
 
 
-def compare(result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide) -> None:
+def compare(
+    result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
+) -> None:
     """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step."""
     tau, dt, every, n = case.tau, case.duration / steps, steps // case.steps, len(case.joints)
     t, times, first = mine.t, mine.t[::every], None

@@ -1,18 +1,23 @@
 """What a trajectory's runs say: claims about held postures, errors beside agreement, the methods of order 1."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from tmt.methods import METHODS
 
-from ...engines import LABELS
+from ...case import Case
+from ...engines import LABELS, Engine
+from ...judge.check import Result
 from ...judge.run import deviation, number_or_none
+from ...robots import Robot
 from .leaving import causes_in_words, left_in_words
-from .runs import FINEST, counts
+from .runs import STEPS_AT_MOST, counts
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
 
 
-def notes(result, robot, engines, finer) -> list[str]:
+def notes(result: Result, robot: Robot, engines: Mapping[str, Engine], finer: Sequence[int]) -> list[str]:
     """All of them, of the runs that these engines have given."""
     runs, cases = result.curves["runs"], {case.name: case for case in robot.cases}
     held = [case for case in robot.cases if case.is_held and (case.name, "rk4", case.steps) in runs]
@@ -25,7 +30,7 @@ def notes(result, robot, engines, finer) -> list[str]:
     ]
 
 
-def of_held(case, engines, curve) -> str:
+def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     """What a run of a held posture says, of what is claimed of it if it is."""
     claims = case.robot.claims.of_scenes if case.robot.claims else {}
     about = f"Claim: {claims[case.name]}. Here" if case.name in claims else f"{case.name[0].upper()}{case.name[1:]}"
@@ -38,12 +43,12 @@ def of_held(case, engines, curve) -> str:
     )
 
 
-def rad(value) -> str:
+def rad(value: float | None) -> str:
     """An angle in words; None: the run has diverged."""
     return "no number (it diverged)" if value is None else f"{value:.1e} rad"
 
 
-def of_errors(runs, found, cases) -> list[str]:
+def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
     """How far the coarsest steps of RK4 are from the true motion, beside how far the engines are apart.
 
     found: {scene: (TMT, MuJoCo)}.
@@ -72,13 +77,13 @@ def of_errors(runs, found, cases) -> list[str]:
     ]
 
 
-def agreement(curve) -> float:
+def agreement(curve: dict) -> float:
     """How far the engines are apart while they are judged, rad."""
     last = int(np.searchsorted(curve["t"], curve["judged_until_s"] * (1 + 1e-9), side="right"))
     return float(np.abs(curve["tmt"][0][:last] - curve["mujoco"][0][:last])[:: curve["every"]].max())
 
 
-def of_first_order(runs, cases) -> list[str]:
+def of_first_order(runs: dict, cases: Mapping[str, Case]) -> list[str]:
     """For how long the methods of order 1 are judged at the coarsest step in the scenes that are let go, and how they end."""
     schemes = dict.fromkeys(scheme for _, scheme, _ in runs if METHODS[scheme].order == 1)
     free = [case for case in cases.values() if case.is_free]
@@ -111,11 +116,11 @@ def ends_in_words(ended) -> str:
     return f"diverges: {', '.join(at)}"
 
 
-def of_left_out(cases, finer) -> list[str]:
+def of_left_out(cases: Sequence[Case], finer: Sequence[int]) -> list[str]:
     """Which scenes are followed with fewer step sizes than others."""
     names = [case.name for case in cases if len(counts(case, finer)) < len(finer)]
     return (
-        [f"Runs of more than {FINEST} steps, finer than a scene's own, are left out: {', '.join(names)}."]
+        [f"Runs of more than {STEPS_AT_MOST} steps, finer than a scene's own, are left out: {', '.join(names)}."]
         if names
         else []
     )

@@ -18,6 +18,8 @@ EDITS = (
     Edit("parameters", "causes_in", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
     Edit("parameters", "cause", "[f'{number:.7g} {unit}'.rstrip() for number in (stated, found)]",
          "[f'{number:.7g} {unit}'.rstrip() for number in (found, stated)]", "stated and compiled are exchanged"),
-    Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_actuator[_1]", "0 * d.qfrc_actuator[_1]", "actuators exert no force"),
-    Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_constraint[_1]", "0 * d.qfrc_constraint[_1]", "contacts exert no force"),
+    Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_actuator[_1]", "0 * d.qfrc_actuator[_1]",
+         "actuators exert no force"),
+    Edit("engines.mujoco.dynamics", "MujocoDynamics.other_forces", "d.qfrc_constraint[_1]", "0 * d.qfrc_constraint[_1]",
+         "contacts exert no force"),
 )  # fmt: skip
