@@ -7,7 +7,7 @@ from matplotlib.patches import Patch
 
 from ...engines import LABELS
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR
-from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH
+from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, plain
 
 KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
@@ -26,8 +26,8 @@ def needs(result, robot):
         for x, joint in enumerate(joints):
             left.plot(x, y, markersize=9, linestyle="none", **KINDS_OF_JOINT[kind_of_joint(joint, found)])
     left.set(xlim=(-0.6, len(joints) - 0.4), ylim=(max(1, len(scenes)) - 0.5, -0.5))
-    left.set_xticks(range(len(joints)), [robot.symbol(joint) for joint in joints])
-    left.set_yticks(range(len(scenes)), scenes)
+    left.set_xticks(range(len(joints)), [plain(robot.symbol(joint)) for joint in joints])
+    left.set_yticks(range(len(scenes)), [plain(name) for name in scenes])
     left.tick_params(length=0)
     for y, name in enumerate(scenes):
         draw_times(right, result, name, y)
