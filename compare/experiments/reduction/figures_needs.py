@@ -105,17 +105,8 @@ def costs(result):
         rows = {row["added"]: row for row in table if row["integrator"] == integrator}
         for y, name in enumerate(names):
             row = rows[name]
-            hatch = None if row["same_bits"] else "////"
-            ax.barh(
-                y + offset,
-                row["ratio"] - 1.0,
-                left=1.0,
-                height=0.36,
-                color=colour,
-                alpha=0.8,
-                hatch=hatch,
-                edgecolor="white",
-            )
+            look = {"facecolor": (colour, 0.8), "edgecolor": "white", "hatch": None if row["same_bits"] else "////"}
+            ax.barh(y + offset, row["ratio"] - 1.0, left=1.0, height=0.36, **look)
             ax.text(max(row["ratio"], 1.0) + 0.01 * most, y + offset, f"{row['ratio']:.2f}", va="center", fontsize=7)
     ax.set_yticks(range(len(names)), names)
     ax.axvline(1.0, color="black", linewidth=0.8)
@@ -125,7 +116,7 @@ def costs(result):
         xlim=(0.9, 1.08 * most),
     )
     ax.grid(axis="y", visible=False)
-    handles = [Patch(color=colour, alpha=0.8, label=name) for name, colour in (("Euler", BLUE), ("RK4", GREEN))]
+    handles = [Patch(color=(colour, 0.8), label=name) for name, colour in (("Euler", BLUE), ("RK4", GREEN))]
     handles.append(Patch(facecolor=GREY, hatch="////", edgecolor="white", label="changes the motion"))
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
     ratio = {(row["added"], row["integrator"]): row["ratio"] for row in table}
