@@ -27,7 +27,7 @@ INTEGRATORS = {
     for name, member in NAMES.items()
     if hasattr(mujoco.mjtIntegrator, f"mjINT_{member}")
 }
-STAGES = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # evaluations of the dynamics in a step
+EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 FLAGS = {
     "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
     "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
@@ -149,23 +149,23 @@ class MujocoDynamics:
 
         From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
         """
-        refuse_tolerance(tolerance, method)
+        if tolerance is not None:
+            raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
         shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
         starts, follow = self.runner(q, v, tau, dt, steps, method)
         *paths, ended = self.path(starts, follow(), dt)
         q, v = (path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
-        evaluations, ended = len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()]
+        evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(shape[:-1])[()]
         return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
 
     def prepare(self, q, v, tau, setting: Setting, method):
-        refuse_tolerance(setting.tolerance, method)
         dt, every = setting.duration / setting.steps, setting.steps // GRID
         starts, run = self.runner(q, v, tau, dt, setting.steps, method)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(states):
             q, v, ended = self.path(starts, states, dt)
-            return Motion(t, q[0, ::every], v[0, ::every], setting.steps * STAGES[method], ended[0], setting.steps)
+            return Motion(t, q[0, ::every], v[0, ::every], setting.steps * EVALUATIONS[method], ended[0], setting.steps)
 
         return run, read
 
@@ -242,8 +242,3 @@ class MujocoDynamics:
         """(translation, rotation) rows of Jacobians: joints in our order, rotation in body axes."""
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
-
-
-def refuse_tolerance(tolerance, method) -> None:
-    if tolerance is not None:
-        raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")

@@ -46,6 +46,6 @@ EDITS = (
          "the ratio of the drifts is inverted"),
     Edit("draw_motion", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
     Edit("draw_speed", "fewest", "min(good, default=None)", "max(good, default=None)", "the most evaluations are told as fewest"),
-    Edit("draw_reduction", "gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
+    Edit("figures_needs", "gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
          "the least gain is told as the best"),
 )  # fmt: skip
