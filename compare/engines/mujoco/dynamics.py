@@ -149,8 +149,7 @@ class MujocoDynamics:
 
         From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
         """
-        if tolerance is not None:
-            raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
+        refuse_tolerance(method, tolerance)
         shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
         starts, follow = self.runner(q, v, tau, dt, steps, method)
         *paths, ended = self.path(starts, follow(), dt)
@@ -158,7 +157,8 @@ class MujocoDynamics:
         return Motion(dt * np.arange(steps + 1), q, v, len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()], steps)
 
     def prepare(self, q, v, tau, setting: Setting, method):
-        dt, every = setting.duration / setting.steps, setting.steps // GRID
+        refuse_tolerance(method, setting.tolerance)
+        every, dt = setting.every, setting.duration / setting.steps
         starts, run = self.runner(q, v, tau, dt, setting.steps, method)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
@@ -241,3 +241,9 @@ class MujocoDynamics:
         """(translation, rotation) rows of Jacobians: joints in our order, rotation in body axes."""
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
+
+
+def refuse_tolerance(method, tolerance) -> None:
+    """Raise ValueError if a tolerance is given: none of the integrators takes one."""
+    if tolerance is not None:
+        raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
