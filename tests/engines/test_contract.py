@@ -27,7 +27,9 @@ FOLLOWED = [
     (method, name)
     for method in METHODS
     for name in CASES
-    if name == "as it is" or method in [m for m in METHODS if m.engine == method.engine][:1] or method.scheme == "semi_implicit_euler"
+    if name == "as it is"
+    or method in [m for m in METHODS if m.engine == method.engine][:1]
+    or method.scheme == "semi_implicit_euler"
 ]
 
 

@@ -154,7 +154,9 @@ class MujocoDynamics:
         starts, follow = self.runner(q, v, tau, dt, steps, method)
         *paths, ended = self.path(starts, follow(), dt)
         q, v = (path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
-        return Motion(dt * np.arange(steps + 1), q, v, len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()], steps)
+        return Motion(
+            dt * np.arange(steps + 1), q, v, len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()], steps
+        )
 
     def prepare(self, q, v, tau, setting: Setting, method):
         refuse_tolerance(method, setting.tolerance)
