@@ -19,11 +19,13 @@ from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import readable
 
+FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
   python -m compare all --quick                  the same with fewer states, in seconds
   python -m compare mass --out /tmp/mass         one experiment, report elsewhere
-  python -m compare all --mjcf my_arm.xml        your MJCF against the stated arm
+  python -m compare all --mjcf my_arm.xml        your MJCF compared with the stated arm
+  python -m compare speed --scenes my.toml       your own scenes beside those of the arm
 
 exit status: 0 all checks pass; 1 a check failed; 2 the request could not be carried out
 """
@@ -63,9 +65,17 @@ def main(arguments=None) -> int:
         "--mjcf",
         type=not_empty,
         metavar="FILE",
-        help="another model of the same three hinges, compared with the stated arm",
+        help="another model of the same hinges, compared with the stated arm",
+    )
+    parser.add_argument(
+        "--scenes",
+        type=not_empty,
+        metavar="FILE",
+        help="scenes of your own (TOML), beside those of the arm in trajectory, speed and reduction",
     )
     options = parser.parse_args(arguments)
+    if options.scenes and options.experiment not in (*FOLLOWING_SCENES, "all"):
+        parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
     try:
         return run(options, command)
@@ -94,13 +104,15 @@ def run(options, command) -> int:
     from .engines.mujoco import ModelError, load
     from .process.workers import WorkerEnded, start_workers
     from .report.folder import FolderError, made_by, new_report
-    from .report.terminal import Terminal  # imports are here, so that --help and a wrong word answer at once
-    from .robots.arm import ARM
+    from .report.terminal import Terminal
+    from .robots.arm import ARM  # imports are here, so that --help and a wrong word answer at once
+    from .scene_file import SceneError, read
 
-    terminal, robot = Terminal(), ARM
-    path = options.mjcf or robot.mjcf
+    terminal = Terminal()
+    path = options.mjcf or ARM.mjcf
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
+        robot = ARM.with_scenes(read(options.scenes, ARM)) if options.scenes else ARM
         mujoco = load(path, robot.tree)
         before = made_by(options.out)
         with new_report(options.out) as folder:
@@ -118,12 +130,14 @@ def run(options, command) -> int:
                 of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
                 make = experiment.Setup.quick if options.quick else experiment.Setup
                 setup = make(robot, experiment.engines(mujoco), **of_run)
+                for name, reason in reasons.items():
+                    terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
                 sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS), causes)
             origin["seconds"] = round(time.perf_counter() - started, 1)
-            files.write(folder, sections, robot, origin, words, causes, reasons.items())
-    except (ModelError, FolderError, WorkerEnded) as error:
+            files.write(folder, sections, robot, origin, words, causes, list(reasons.items()))
+    except (ModelError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()
     terminal.say(words, "bold green" if verdict.passed(sections) else "bold red")

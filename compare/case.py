@@ -56,22 +56,23 @@ class Scene:
 
     name: str
     posture: str | tuple = ()  # a posture's name, or an angle in deg for each joint; (): all joints at zero
-    torque: str | tuple = "free"  # "free": none; "hold": TMT's gravity balance at the start, given to all engines; or N m
+    torque: str | tuple = "free"  # "free": none; "hold": TMT's gravity balance at the start, for all engines; or N m
     speed: tuple = ()  # deg/s at the start; (): at rest
     damping: float = 0.0  # N m s/rad, added to that of every joint
     gravity: bool = True  # the robot's own, or none
     locked: tuple = ()  # names of the joints that stay at the start
     duration: float = 5.0  # s
     dt: float = 5.0 / 64  # s, the coarsest step; runs with finer ones divide it
-    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along
+    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along; 0: any
     tags: tuple = ()  # what it serves for, see robots
 
     def __post_init__(self):
-        self.refuse("name", not isinstance(self.name, str) or not self.name.strip(), "a text that is not empty")
+        named = isinstance(self.name, str) and self.name.strip() and self.name.isprintable()
+        self.refuse("name", not named, "a text that is not empty, in one line")
         choices = {
-            "posture": "the name of a posture, or numbers in deg, one per joint",
-            "torque": "free, hold, or numbers in N m, one per joint",
-            "speed": "numbers in deg/s, one per joint",
+            "posture": "the name of a posture, or an angle in deg for each joint",
+            "torque": "free, hold, or a torque in N m for each joint",
+            "speed": "a speed in deg/s for each joint",
         }
         for name, accepted in choices.items():
             value = getattr(self, name)
@@ -83,19 +84,23 @@ class Scene:
         for name in ("duration", "dt"):
             value = getattr(self, name)
             self.refuse(name, not is_number(value) or value <= 0.0, "a time in s above 0")
+            object.__setattr__(self, name, float(value))
         self.refuse("damping", not is_number(self.damping) or self.damping < 0.0, "at least 0 N m s/rad")
+        object.__setattr__(self, "damping", float(self.damping))
         self.refuse("gravity", not isinstance(self.gravity, bool | np.bool_), "True, the model's own, or False, none")
+        object.__setattr__(self, "gravity", bool(self.gravity))
         steps = f"a step that divides {self.duration:g} s"
         self.refuse("dt", self.duration / self.dt > MOST_STEPS, f"{steps} into at most {MOST_STEPS:,}")
         left = abs(self.steps * self.dt - self.duration)
         self.refuse("dt", self.steps < 1 or left > 1e-9 * self.duration, steps)
-        judged = self.judged is None or (is_number(self.judged) and 0.0 < self.judged <= self.duration)
-        self.refuse("judged", not judged, f"None, or a time in s above 0 and at most {self.duration:g}")
+        judged = self.judged is None or (is_number(self.judged) and 0.0 <= self.judged <= self.duration)
+        self.refuse("judged", not judged, f"None, or a time in s of at least 0 and at most {self.duration:g}")
+        object.__setattr__(self, "judged", None if self.judged is None else float(self.judged))
         for name in ("locked", "tags"):
             value = getattr(self, name)
             texts = isinstance(value, tuple | list) and all(isinstance(part, str) for part in value)
             self.refuse(name, not texts, "a tuple of names")
-            object.__setattr__(self, name, tuple(value))
+            object.__setattr__(self, name, tuple(dict.fromkeys(value)))
 
     def refuse(self, name, wrong, accepted) -> None:
         """Raise ValueError if a field is wrong: what it is, and what is expected."""
@@ -117,18 +122,20 @@ class Case:
     scene: Scene
 
     def __post_init__(self):
-        names, scene, postures = self.robot.joints, self.scene, self.robot.postures
+        names, scene = self.robot.joints, self.scene
         count = f"{len(names)} numbers, one per joint ({', '.join(names)})"
         if isinstance(scene.posture, str):
-            accepted = f"{', '.join(postures)} or {count}, in deg"
+            postures = [name for name, angles in self.robot.postures.items() if len(angles) == len(names)]
+            accepted = f"{', '.join(postures)} or {count}, in deg" if postures else f"{count}, in deg"
             scene.refuse("posture", scene.posture not in postures, accepted)
         for name, unit in (("posture", "deg"), ("torque", "N m"), ("speed", "deg/s")):
             value = getattr(scene, name)
-            empty = name != "torque" and value == ()
-            scene.refuse(name, not isinstance(value, str) and len(value) != len(names) and not empty, f"{count}, in {unit}")
+            left_out = name != "torque" and value == ()
+            known = isinstance(value, str) or len(value) == len(names) or left_out
+            scene.refuse(name, not known, f"{count}, in {unit}")
         unknown = [name for name in scene.locked if name not in names]
         most = f"a tuple of at most {len(names) - 1} of {', '.join(names)}"
-        scene.refuse("locked", unknown or len(set(scene.locked)) >= len(names), most)
+        scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)
         moving = [name for name, rate in zip(names, scene.speed) if rate and name in scene.locked]
         scene.refuse("speed", moving, f"no speed of a locked joint ({', '.join(scene.locked)})")
 
@@ -225,18 +232,17 @@ class Case:
 
 def is_number(value) -> bool:
     """Whether a value is one finite real number; neither text nor true and false."""
-    return np.ndim(value) == 0 and are_numbers((value,))
+    try:
+        number = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
 
 
 def are_numbers(values) -> bool:
-    """Whether the values are finite real numbers in a row; neither text nor true and false."""
-    if isinstance(values, tuple | list) and not values:
-        return True
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return array.ndim == 1 and array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
+    """Whether the values are such numbers in a row."""
+    row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
+    return row and all(is_number(value) for value in values)
 
 
 def shorten(text: str, length: int = 60) -> str:

@@ -11,7 +11,10 @@ from .robots import Robot
 
 
 class Sample:
-    """States at which engines are compared, with the exact values of the first `exact_states`."""
+    """States at which engines are compared, with the exact values of the first `exact_states`.
+
+    tree: the stated numbers. q, qd, tau: (states, n), rad, rad/s, N m. states: their names, if they have any.
+    """
 
     def __init__(self, tree, name, q, qd, tau, exact_states, states=()):
         self.tree, self.name, self.q, self.qd, self.tau = tree, name, q, qd, tau
@@ -19,13 +22,15 @@ class Sample:
 
     @cached_property
     def truths(self) -> list:
+        """A tmt.reference.Truth for each of the first states."""
         known = slice(self.exact_states)
         return [exact(self.tree, *state) for state in zip(self.q[known], self.qd[known], self.tau[known])]
 
-    def truth(self, quantity) -> np.ndarray:
+    def truth(self, quantity: str) -> np.ndarray:
+        """One of its fields, of mpmath numbers: (exact_states, ...)."""
         return np.array([getattr(truth, quantity) for truth in self.truths])
 
-    def describe(self, i) -> str:
+    def describe(self, i: int) -> str:
         """Where state i is, for a reader who wants to see it again."""
         if self.states:
             return self.states[i]

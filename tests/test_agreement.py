@@ -1,7 +1,6 @@
 """Every experiment agrees with MuJoCo, and so does the method on random trees."""
 
 import dataclasses
-import importlib
 import re
 from pathlib import Path
 
@@ -10,14 +9,16 @@ import pytest
 from trees import mjcf, random_tree
 
 import tmt
-from compare import report
-from compare.__main__ import EXPERIMENTS
-from compare.agreement import EPS, FACTOR, bias_scale, reaches
-from compare.engine_file import parse
-from compare.engine_parameters import parameters
-from compare.parameters import stated
-from compare.verdict import Section, verdict
-from compare.workers import draw
+from compare.engines.mujoco import parse
+from compare.engines.mujoco.parameters import parameters
+from compare.experiment import draw
+from compare.experiments import EXPERIMENTS, module
+from compare.experiments.parameters import stated
+from compare.judge.scale import EPS, FACTOR, bias_scale, reaches
+from compare.report import files
+from compare.report.verdict import Section, verdict
+from compare.robots import Robot
+from compare.robots.arm import ARM
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -41,14 +42,14 @@ def test_a_report_of_all_experiments_has_every_figure(small, tmp_path):
     (tmp_path / "figures").mkdir()
     sections = []
     for name in EXPERIMENTS:
-        module = importlib.import_module(f"compare.{name}")
-        section = Section(name, module.TITLE, module.CLAIM, module.BAR, small(name))
-        section.figures, failed = draw(name, section.result, tmp_path / "figures")
+        of = module(name)
+        section = Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), small(name))
+        section.figures, failed = draw(name, section.result, ARM, tmp_path / "figures")
         assert failed == []
         sections.append(section)
     words = verdict(sections, len(EXPERIMENTS))
     assert words.startswith(f"The two models agree: all {sum(len(s.result.checks) for s in sections)} checks pass.")
-    report.write(tmp_path, sections, {"command": "a small run"}, words)
+    files.write(tmp_path, sections, ARM, {"command": "a small run"}, words)
     drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
     of_more_scenes = {"speed_ball_catch_free", "speed_bent_damped"}
     assert drawn | of_more_scenes == {path.stem for path in (ROOT / "reports/example/figures").iterdir()}
@@ -59,10 +60,10 @@ def test_a_report_of_all_experiments_has_every_figure(small, tmp_path):
     assert "not run" not in text and "no result" not in text
 
 
-def test_the_two_sets_of_numbers_are_one(engine):
-    """tmt/arm.py and mjcf/arm.xml hold the arm twice; this ties them."""
-    compiled = parameters(engine)
-    for quantity, value in stated().items():
+def test_the_two_sets_of_numbers_are_one(mujoco):
+    """tmt/arm.py and mjcf/arm.xml have the arm's numbers twice; this ties them."""
+    compiled = parameters(mujoco.of(ARM.case()))
+    for quantity, value in stated(tmt.ARM).items():
         assert np.allclose(compiled[quantity], value, rtol=1e-15, atol=1e-16), quantity
 
 
@@ -74,11 +75,12 @@ def test_states_move(setup):
     assert np.abs(tmt.energy(sample.q, sample.qd)).mean() > 1.0
 
 
-def test_parties_are_near_but_not_the_same_bits(setup):
-    """Were every difference zero, one party would be compared with itself."""
+def test_engines_are_near_but_not_the_same_bits(setup):
+    """Were every difference zero, one engine would be compared with itself."""
     q, qd = setup.random.q, setup.random.qd
-    assert np.abs(tmt.mass_matrix(q) - setup.engine.mass_matrix(q)).max() > 0.0
-    assert np.abs(tmt.bias(q, qd) - setup.engine.bias(q, qd)).max() > 0.0
+    ours, theirs = setup.compared().values()
+    assert np.abs(ours.mass_matrix(q) - theirs.mass_matrix(q)).max() > 0.0
+    assert np.abs(ours.bias(q, qd) - theirs.bias(q, qd)).max() > 0.0
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -87,18 +89,18 @@ def test_random_trees(seed):
     rng = np.random.default_rng(seed)
     tree = random_tree(rng, bodies=int(rng.integers(1, 6)), damping=1.0)
     n = len(tree.hinge_names)
-    engine = parse(mjcf(tree), tree.hinge_names, [tree.hinge_names[h] for h in tree.body_hinge])
+    engine = parse(mjcf(tree), tree).of(Robot("tree", Path("none"), tree, {}, ()).case())
     q, qd, tau = rng.uniform(-3, 3, (3, 20, n))
 
     M = tmt.mass_matrix(q, tree)
     size = np.abs(M).max(axis=(1, 2))
     assert (np.abs(M - engine.mass_matrix(q)).max(axis=(1, 2)) < FACTOR * EPS * size).all()
-    h, force = tmt.bias(q, qd, tree), bias_scale(q, qd, tree)
+    h, force = tmt.bias(q, qd, tree), bias_scale(tree, q, qd)
     assert (np.abs(h - engine.bias(q, qd)).max(axis=1) < FACTOR * EPS * force).all()
     qdd = tmt.acceleration(q, qd, tau, tree)
     values = np.linalg.eigvalsh(M)
-    bar = FACTOR * EPS * values[:, -1] / values[:, 0] * (force + 6.0) / values[:, 0]
-    assert (np.abs(qdd - engine.acceleration(q, qd, tau)).max(axis=1) < bar).all()
+    tolerance = FACTOR * EPS * values[:, -1] / values[:, 0] * (force + 6.0) / values[:, 0]
+    assert (np.abs(qdd - engine.acceleration(q, qd, tau)).max(axis=1) < tolerance).all()
     assert np.abs(tmt.com_positions(q, tree) - engine.com_positions(q)).max() < FACTOR * EPS * reaches(tree).max()
     for ours, theirs in zip(tmt.convective_terms(q, qd, tree), engine.convective_terms(q, qd)):
         assert np.abs(ours - theirs).max() < FACTOR * EPS * (3.0 * n) ** 2 * reaches(tree).max()

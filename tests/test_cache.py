@@ -10,21 +10,12 @@ import time
 from pathlib import Path
 
 import pytest
+from cache_folder import Planted, new_folder, posix, ran  # noqa: F401 (the fixture `folder`)
 
 from tmt import cache
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXT = 'from numba import njit\n\n@njit("float64(float64)", cache=CACHE)\ndef f(x):\n    return 2.0 * x\n'
-posix = pytest.mark.skipif(os.name != "posix", reason="rights are bits on POSIX only")
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """A cache folder that is not there yet, with nothing said about any."""
-    monkeypatch.setenv("TMT_CACHE", str(tmp_path / "new" / "cache"))
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setattr(cache, "complaints", [])
-    return tmp_path / "new" / "cache"
 
 
 def mode(path) -> int:
@@ -126,20 +117,6 @@ def test_a_link_counts_as_what_it_leads_to(folder, tmp_path, monkeypatch):
     assert not on_disk() and not list(shared.iterdir())
 
 
-ran = []
-
-
-def record(what):
-    ran.append(what)
-
-
-class Planted:
-    """Runs `record` when it is unpickled."""
-
-    def __reduce__(self):
-        return record, ("planted",)
-
-
 WAYS = ["nothing", "folder", "machine code", "its folder", "source", "link", "owner", "numba's folder"]
 
 
@@ -150,7 +127,6 @@ def test_planted_code_is_not_run(folder, tmp_path, monkeypatch, open_to_others):
     (index,), (source,) = folder.glob("__pycache__/*.nbi"), folder.glob("*.py")
     index.write_bytes(pickle.dumps(Planted()))
     index.parent.chmod(0o755)
-    ran.clear()
     if open_to_others == "link":
         index.rename(tmp_path / "elsewhere")
         index.symlink_to(tmp_path / "elsewhere")

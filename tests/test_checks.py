@@ -1,15 +1,14 @@
 """Which checks a run makes: a committed list, so that none is dropped unseen. `python tests/test_checks.py` remakes it."""
 
-import importlib
 import re
 from pathlib import Path
 
 import pytest
 
-from compare.__main__ import EXPERIMENTS
-from compare.agreement import Setup
-from compare.engine import INTEGRATORS
-from compare.engine_file import load
+from compare.engines.mujoco import load
+from compare.experiment import Setup, engines, module
+from compare.experiments import EXPERIMENTS
+from compare.robots.arm import ARM
 
 LISTED = Path(__file__).with_name("checks_of_a_small_run.txt")
 MEASURED = re.compile(r"\d+\.\d+(e[-+]?\d+)?|\d+e[-+]?\d+")
@@ -23,8 +22,8 @@ def named(result) -> set[str]:
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
-def test_every_check_that_is_listed_is_made_and_no_other(experiment, small):
-    missing = {"discrete"} - set(INTEGRATORS)  # older than MuJoCo 3.13
+def test_every_check_that_is_listed_is_made_and_no_other(experiment, small, mujoco):
+    missing = {"discrete"} - set(mujoco.methods)  # older than MuJoCo 3.13
     lines = LISTED.read_text(encoding="utf-8").splitlines()
     listed = {line for line in lines if line.startswith(f"{experiment} |")}
     listed = {line for line in listed if not any(name in line for name in missing)}
@@ -32,6 +31,6 @@ def test_every_check_that_is_listed_is_made_and_no_other(experiment, small):
 
 
 if __name__ == "__main__":
-    engine = load()
-    found = [named(importlib.import_module(f"compare.{name}").rows(Setup.small(engine))) for name in EXPERIMENTS]
+    of_arm = Setup.small(ARM, engines(load(ARM.mjcf, ARM.tree)))
+    found = [named(module(name).rows(of_arm)) for name in EXPERIMENTS]
     LISTED.write_text("".join(f"{line}\n" for lines in found for line in sorted(lines)), encoding="utf-8")

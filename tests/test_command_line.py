@@ -13,10 +13,11 @@ from matplotlib.figure import Figure
 from runs import ROOT, on_terminal, readable_lines, words
 
 from compare import __main__ as command_line
-from compare import workers
-from compare.__main__ import EXPERIMENTS, main
-from compare.agreement import Result
-from compare.engine_file import ARM_XML
+from compare import experiment
+from compare.__main__ import main
+from compare.experiments import EXPERIMENTS
+from compare.judge.check import Result
+from compare.robots.arm import ARM
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +100,12 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
         (["mass", "--fast"], "unrecognized arguments: --fast"),
         (["mass", "--mjcf", ""], "--mjcf: it is empty"),
         (["mass", "--out", ""], "--out: it is empty"),
+        (
+            ["mass", "--scenes", "my.toml"],
+            "--scenes is for trajectory, speed, reduction and all; mass follows no scene",
+        ),
+        (["speed", "--scenes", ""], "--scenes: it is empty"),
+        (["speed", "--scenes", "my.toml"], "cannot read my.toml: No such file or directory"),
         (["mass", "--mjcf", "missing.xml"], "cannot read missing.xml: No such file or directory"),
         (["mass", "--mjcf", str(ROOT / "pyproject.toml")], "is not MJCF"),
         (["mass", "--mjcf", str(ROOT)], "Is a directory"),
@@ -119,7 +126,7 @@ def test_what_cannot_be_done_gets_one_line_and_status_2(arguments, says, capsys,
 
 def test_other_hinges_get_status_2(tmp_path, capsys):
     model = tmp_path / "other.xml"
-    model.write_text(ARM_XML.read_text().replace('name="gamma"', 'name="wrist"'))
+    model.write_text(ARM.mjcf.read_text().replace('name="gamma"', 'name="wrist"'))
     assert main(["mass", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 2
     assert "wrist (hinge); hinges alpha, beta, gamma and no others are expected" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -134,7 +141,7 @@ def test_a_read_only_folder_gets_status_2(tmp_path, capsys):
 
 def test_every_cause_is_in_the_results(tmp_path, capsys):
     model = tmp_path / "two.xml"
-    model.write_text(ARM_XML.read_text().replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
+    model.write_text(ARM.mjcf.read_text().replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
     assert main(["gravity", "--quick", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 1
     results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
     assert [cause["place"] for cause in results["causes"]] == ["mass of forearm", "gravity z"]
@@ -175,7 +182,18 @@ def broken(at):
             assert value == (1, 0)
         return Result(at, shown=[], curves={"locked": lambda: None})  # which cannot be sent to where it is drawn
 
-    return SimpleNamespace(TITLE=at, CLAIM="None.", BAR="None.", begin=lambda setup: breaks("begin"), rows=rows)
+    return SimpleNamespace(**asked(at), begin=lambda setup: breaks("begin"), rows=rows)
+
+
+def asked(name):
+    """What every experiment says of itself."""
+    return {"TITLE": name, "claim": lambda robot: "None.", "tolerance": lambda robot: "None."}
+
+
+def only(monkeypatch, *names):
+    """These are all experiments that there are."""
+    for module in (command_line, experiment):
+        monkeypatch.setattr(module, "EXPERIMENTS", dict.fromkeys(names, ""))
 
 
 def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeypatch):
@@ -186,9 +204,9 @@ def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeyp
         "sending": ("figure number 1 is drawn", r".*pickle.*"),
     }
     for name in expected:
-        monkeypatch.setitem(sys.modules, f"compare.{name}", broken(name))
-    monkeypatch.setattr(command_line, "EXPERIMENTS", dict.fromkeys([*expected, "published"], ""))
-    monkeypatch.setattr(command_line, "find_causes", lambda setup: [])
+        monkeypatch.setitem(sys.modules, f"compare.experiments.{name}", broken(name))
+    only(monkeypatch, *expected, "published")
+    monkeypatch.setattr(experiment, "find_causes", lambda setup: [])
     assert main(["all", "--quick", "--out", str(tmp_path / "out")]) == 1
     results = json.loads((tmp_path / "out/results.json").read_text())
     failed = [check for check in results["checks"] if not check["passed"]]
@@ -199,7 +217,7 @@ def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeyp
     for check, (name, (quantity, note)) in zip(failed, expected.items()):
         found = [check[part] for part in ("scene", "quantity", "value", "tolerance", "unit", "rule")]
         assert found == ["", quantity, None, 0, "", "equal"]
-        assert re.fullmatch(note + r"( \(compare/\w+\.py:\d+\))?", check["note"])
+        assert re.fullmatch(note + r"( \(compare/[\w/]+\.py:\d+\))?", check["note"])
         assert f"FAIL {name}: {quantity}" in out and f"## {name}" in page
 
 
@@ -207,26 +225,30 @@ def plot(result, name):
     return name, Figure(), "A caption."
 
 
-def late(result):
-    yield "first", Figure(), "A caption."
+def half(result, name):
+    return name, SimpleNamespace(savefig=lambda path: path.write_bytes(b"a half") / 0), "A caption."
+
+
+def late(result, robot):
+    yield partial(plot, result, "first")
     yield partial(plot, result, "second")
     yield partial(plot, None)  # one argument too few
-    yield "third", SimpleNamespace(savefig=lambda path: path.write_bytes(b"a half") / 0), "A caption."
+    yield partial(half, result, "third")
     yield partial(plot, result, "fourth")
     raise ValueError("no more")
 
 
 def test_a_figure_that_raises_leaves_the_others_alone(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "compare.broken", SimpleNamespace(figures=late))
-    drawn, failed = workers.draw("broken", None, tmp_path)
+    monkeypatch.setitem(sys.modules, "compare.experiments.broken", SimpleNamespace(figures=late))
+    drawn, failed = experiment.draw("broken", None, None, tmp_path)
     assert drawn == [(name, "A caption.") for name in ("first", "second", "fourth")]
-    assert [name for name, _ in failed] == ["plot", "third", "number 6"]
+    assert [name for name, _ in failed] == ["plot", "half third", "number 6"]
     assert failed[0][1].startswith("TypeError: plot() missing") and failed[2][1].startswith("ValueError: no more")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["first.png", "fourth.png", "second.png"]
 
 
 def test_a_model_that_an_experiment_does_not_expect_gets_a_report(tmp_path, capsys):
-    text = ARM_XML.read_text().replace("<flag contact", '<flag gravity="disable" contact')
+    text = ARM.mjcf.read_text().replace("<flag contact", '<flag gravity="disable" contact')
     actuator = '<actuator><general joint="gamma" dyntype="integrator"/></actuator>'
     (tmp_path / "model.xml").write_text(text.replace("</mujoco>", f"{actuator}</mujoco>"))
     assert main(["stability", "--quick", "--mjcf", str(tmp_path / "model.xml"), "--out", str(tmp_path / "out")]) == 1
@@ -239,8 +261,24 @@ def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsy
     def killed(setup):
         return list(setup.map(os._exit, [3]))
 
-    monkeypatch.setitem(sys.modules, "compare.broken", SimpleNamespace(rows=killed))
-    monkeypatch.setattr(command_line, "EXPERIMENTS", {"broken": "it breaks"})
+    monkeypatch.setitem(sys.modules, "compare.experiments.broken", SimpleNamespace(rows=killed, **asked("broken")))
+    only(monkeypatch, "broken")
     assert main(["broken", "--quick", "--out", str(tmp_path / "out")]) == 2
     assert "a process that computes beside was ended from outside" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_experiment_that_cannot_serve_a_robot_is_skipped_or_refused(tmp_path, capsys, monkeypatch):
+    serving = SimpleNamespace(
+        **asked("never"), rows=lambda setup: 1 / 0, skipped=lambda robot: f"{robot.name} has no wings"
+    )
+    monkeypatch.setitem(sys.modules, "compare.experiments.never", serving)
+    only(monkeypatch, "never", "published")
+    assert main(["all", "--quick", "--out", str(tmp_path / "out")]) == 0
+    results = json.loads((tmp_path / "out/results.json").read_text())
+    assert results["skipped"] == [{"experiment": "never", "reason": "arm has no wings"}]
+    assert {check["experiment"] for check in results["checks"]} == {"published"}
+    assert "arm has no wings" in capsys.readouterr().out
+    assert main(["never", "--quick", "--out", str(tmp_path / "other")]) == 2
+    assert "never cannot serve arm: arm has no wings" in capsys.readouterr().err
+    assert not (tmp_path / "other").exists()

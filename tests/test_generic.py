@@ -6,6 +6,7 @@ from trees import random_tree
 
 import tmt
 from tmt import generic, kernels
+from tmt.methods import METHODS
 
 
 @pytest.mark.parametrize("bodies", [0, 1, 4, 9])
@@ -33,3 +34,27 @@ def test_large_trees_take_the_generic_loop(rng, monkeypatch):
     for a, b in zip(traced[1:], looped[1:]):
         assert np.allclose(a, b, rtol=1e-9, atol=1e-9, equal_nan=True) and not np.array_equal(a, b, equal_nan=True)
     assert np.isnan(looped.q[1, -1]).all()
+
+
+def test_the_generic_loop_takes_its_own_arrays_only(monkeypatch):
+    """Those of other types would be taken as they are: whole numbers would stay whole."""
+    monkeypatch.setattr(kernels, "TRACED", 0)
+    run, tau = kernels.stepper(tmt.ARM, "rk4"), np.zeros((1, 3))
+    assert run(np.ones((1, 5, 3)), np.ones((1, 5, 3)), tau, 0.1) == 16
+    for kind in (int, np.float32, np.complex128):
+        with pytest.raises(
+            ValueError, match=r"q has shape \(1, 5, 3\) and numbers of type .*; a contiguous array of float64"
+        ):
+            run(np.ones((1, 5, 3), kind), np.ones((1, 5, 3)), tau, 0.1)
+    with pytest.raises(ValueError, match="qd is not contiguous"):
+        run(np.ones((1, 5, 3)), np.ones((1, 10, 3))[:, ::2], tau, 0.1)
+
+
+@pytest.mark.parametrize("name", ["rk4", "dopri8", "explicit_euler"])
+def test_the_generic_loop_follows_the_tableau(name, rng, monkeypatch):
+    q, qd, tau = rng.uniform(-1, 1, (3, 5, 3))
+    traced = tmt.simulate(q, qd, tau, 0.01, 20, name)
+    monkeypatch.setattr(kernels, "TRACED", 0)
+    looped = tmt.simulate(q, qd, tau, 0.01, 20, name)
+    assert looped.evaluations == traced.evaluations == 5 * 20 * METHODS[name].stages
+    assert np.allclose(traced.q, looped.q, rtol=0, atol=1e-11) and not np.array_equal(traced.q, looped.q)

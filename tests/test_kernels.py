@@ -46,8 +46,8 @@ def test_traced_acceleration_is_the_method(rng, damping):
         assert np.abs(expected).max() > 0.1
         force = bias_scale(tree, np.array([q]), np.array([qd]))[0] + 10.0
         eigenvalues = np.linalg.eigvalsh(tmt.mass_matrix(q, tree))
-        bar = FACTOR * EPS * eigenvalues[-1] / eigenvalues[0] * force / eigenvalues[0]
-        assert np.abs(np.array(acceleration(*q, *qd, *tau, 0.01)) - expected).max() < bar
+        allowed = FACTOR * EPS * eigenvalues[-1] / eigenvalues[0] * force / eigenvalues[0]
+        assert np.abs(np.array(acceleration(*q, *qd, *tau, 0.01)) - expected).max() < allowed
 
 
 @pytest.mark.parametrize("name", METHODS)

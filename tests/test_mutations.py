@@ -35,9 +35,9 @@ def test_every_edit_applies_and_says_what_it_breaks():
 
 def test_every_test_is_in_one_stage_but_those_that_judge_nothing():
     judge, rest = (stage.files for stage in stages(PROJECT))
-    assert "tests/test_judge_agreement.py" in judge and "tests/test_command_line.py" in rest
+    assert "tests/judge/test_judge_check.py" in judge and "tests/test_command_line.py" in rest
     every = {str(path.relative_to(PROJECT)) for path in (PROJECT / "tests").rglob("test_*.py")}
-    aside = {f"tests/test_{name}.py" for name in ("mutations", "structure", "interrupt")}
+    aside = {f"tests/{name}.py" for name in ("test_mutations", "test_structure", "process/test_interrupt")}
     assert every - {*judge} - {*rest} == aside and not {*judge} & {*rest}
 
 

@@ -1,4 +1,4 @@
-"""Random trees and their MJCF, so that the method is judged on more than one arm."""
+"""Random trees and their MJCF, so that the method is tested on more than one arm."""
 
 import numpy as np
 

@@ -1,8 +1,9 @@
 """Generated code on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
-A module's name is the hash of its text, of the compiled code that it takes from `sine`, and of numba's version; numba keeps
-the machine code beside it. What lies there is run, so the folder must be the user's own: others may neither write to it nor
-put another in its place. Without such a folder the code is compiled anew in each process: it only costs time.
+The name of a generated module is the hash of its text, of the compiled code that it takes from `sine`, and of numba's
+version; numba keeps its machine code beside it, and that of loops.py (see machine_code.py). What lies there is run, so the
+folder must be the user's own: others may neither write to it nor put another in its place. Without such a folder the code is
+compiled anew in each process: it only costs time.
 """
 
 import hashlib
@@ -121,17 +122,9 @@ def from_disk(name, text, folder):
     config.reload_config()  # it is read when something is compiled: too late
     if config.CACHE_DIR:  # $NUMBA_CACHE_DIR: numba takes that one instead
         own_folder(Path(config.CACHE_DIR))
-    path, inside = folder / f"{name}.py", folder / "__pycache__"
-    inside.mkdir(mode=0o700, exist_ok=True)
-    check_own(inside)
-    if not os.access(inside, os.W_OK):  # numba would look in another folder, of its own choice
-        raise PermissionError(f"{inside} cannot be written")
-    shut = not inside.stat().st_mode & 0o077
-    for file in (path, *inside.glob(f"{name}.*")):
-        if os.path.lexists(file):
-            check_own(file, shut=shut and file != path)
-    if os.name == "posix" and not shut:
-        inside.chmod(0o700)  # numba's files get the usual rights, with which the group may be allowed to write
+    path, inside = folder / f"{name}.py", own_machine_code(folder, name)
+    if os.path.lexists(path):
+        check_own(path)
     if not path.exists() or path.read_bytes() != text.encode():
         clear(folder)
         # written aside and moved, so that a process that reads meanwhile sees all of it or nothing
@@ -144,6 +137,21 @@ def from_disk(name, text, folder):
         for file in inside.glob(f"{name}.*"):
             file.unlink()
         raise
+
+
+def own_machine_code(folder, name) -> Path:
+    """The folder for machine code, which nobody else can enter; NotOwn unless it and its files of that name are the user's."""
+    inside = folder / "__pycache__"
+    inside.mkdir(mode=0o700, exist_ok=True)
+    check_own(inside)
+    if not os.access(inside, os.W_OK):  # numba would look in another folder, of its own choice
+        raise PermissionError(f"{inside} cannot be written")
+    shut = not inside.stat().st_mode & 0o077
+    for file in inside.glob(f"{name}.*"):
+        check_own(file, shut=shut)
+    if os.name == "posix" and not shut:
+        inside.chmod(0o700)  # numba's files get the usual rights, with which the group may be allowed to write
+    return inside
 
 
 def executed(name, text, path):

@@ -1,7 +1,7 @@
 """Calls of compiled code with what a user gives.
 
 Compiled code takes contiguous float64 arrays that can be written, and checks their shapes itself. Nothing but arrays may reach
-it: numba has crashed on stranger objects, and takes masked arrays without their mask. So types are compared first, and an array
+it: numba has crashed on other objects, and takes masked arrays without their mask. So types are compared first, and an array
 is looked at more closely only where it was refused: a call that is right costs about 0.2 microseconds more.
 """
 
@@ -14,7 +14,7 @@ from numpy import ndarray
 
 from .tree import shown
 
-NOBODY = np.zeros(0, np.int8)  # asks why a run ended
+NOT_ASKED = np.zeros(0, np.int8)  # where nobody wants to know why runs ended
 
 
 def refused() -> tuple:
@@ -38,7 +38,7 @@ def checked_run(compiled, n, adaptive) -> Callable:
     path = f"(runs, steps + 1, {n})"
     shapes = {"q": path, "qd": path, "tau": f"(runs, {n})", "ended": "(runs,)"}
 
-    def run(q, qd, tau, dt, ended=NOBODY):
+    def run(q, qd, tau, dt, ended=NOT_ASKED):
         if not type(q) is type(qd) is type(tau) is type(ended) is ndarray:
             q, qd, tau, ended = plain(shapes, q, qd, tau, ended)
         if type(dt) is not float:
@@ -48,7 +48,7 @@ def checked_run(compiled, n, adaptive) -> Callable:
         except refused() as error:
             raise refusal(error, shapes, q, qd, tau, ended) from None
 
-    def run_adaptive(q, qd, tau, dt, tolerance, ended=NOBODY):
+    def run_adaptive(q, qd, tau, dt, tolerance, ended=NOT_ASKED):
         if not type(q) is type(qd) is type(tau) is type(ended) is ndarray:
             q, qd, tau, ended = plain(shapes, q, qd, tau, ended)
         dt, tolerance = real("dt", dt), real("tolerance", tolerance)

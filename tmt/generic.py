@@ -6,12 +6,10 @@ It does what composite.py says; the loops themselves are in loops.py.
 
 from collections.abc import Callable
 from functools import lru_cache, partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from .cache import load
 from .composite import carried_by_hinge
 
 
@@ -44,15 +42,20 @@ def arrays(tree) -> Arrays:
     )
 
 
-@lru_cache(maxsize=1)
 def compiled():
-    """The loops of loops.py, compiled: a module."""
-    text = Path(__file__).with_name("loops.py").read_text(encoding="utf-8")
-    return load("\n".join(line for line in text.splitlines() if not line.startswith("CACHE ")) + "\n")
+    """The module of the compiled loops; imported when it is first asked for, as numba takes its time."""
+    from . import loops
+
+    return loops
 
 
 def stepper(tree, stepping) -> Callable:
-    """run(q, qd, tau, dt, ended) of a Tree and a RungeKutta, as in kernels.stepper."""
+    """run(q, qd, tau, dt, ended) of a Tree and a method that has `loop`, as in kernels.stepper."""
     stages = len(stepping.b)
     A = np.array([[*row, *[0.0] * (stages - len(row))] for row in stepping.A])
-    return partial(compiled().run_tableau, arrays(tree), A, np.array(stepping.b))
+    loop = compiled().run_tableau
+    run = partial(loop, arrays(tree), A, np.array(stepping.b))
+    # of no run: compiled for these types and then for no others, which it would take as they are (whole numbers, say)
+    run(*np.empty((2, 0, 1, len(tree.parent))), np.empty((0, len(tree.parent))), 0.0, np.empty(0, np.int8))
+    loop.disable_compile()
+    return run

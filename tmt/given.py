@@ -76,7 +76,7 @@ def whole(name, value) -> int:
 
 
 def paths(runs, steps, n) -> np.ndarray:
-    """Room for q and qd of so many runs, NaN, (2, runs, steps + 1, n); ValueError if there is no memory for it."""
+    """NaN for the q and qd of so many runs, (2, runs, steps + 1, n); ValueError if there is no memory for it."""
     size = 2 * runs * (steps + 1) * n * 8
     try:
         if size > memory():

@@ -72,7 +72,7 @@ class ImplicitRungeKutta(Method):
 
         a, last = self.start(evaluate, q, qd, dt), False
         for _ in range(ITERATIONS):
-            change = self.newton_step(evaluate, q, qd, dt, a)
+            change = self.newton(evaluate, q, qd, dt, a)
             a = [old + new for old, new in zip(a, change)]
             if last:  # once more after the values are found: only then are their derivatives exact
                 return self.finish(q, qd, dt, a)
@@ -102,9 +102,9 @@ class ImplicitRungeKutta(Method):
             changes = [weighted(by_q[k], off) + weighted(by_qd[k], faster) for k in range(len(q))]
             return [value + change for value, change in zip(f, changes)], by_q, by_qd
 
-        return self.newton_step(linear, q, qd, dt, [0.0] * (len(q) * self.stages))
+        return self.newton(linear, q, qd, dt, [0.0] * (len(q) * self.stages))
 
-    def newton_step(self, evaluate, q, qd, dt, a):
+    def newton(self, evaluate, q, qd, dt, a):
         """The change of the accelerations a by one step of Newton's method.
 
         evaluate(q, qd): qdd and its exact derivatives by q and by qd, n rows of n each.
@@ -174,7 +174,7 @@ def step_source(tree, stepping, terms) -> str:
         rows = [found[n + 2 * n * k : n + 2 * n * (k + 1)] for k in range(n)]
         return found[:n], [row[:n] for row in rows], [row[n:] for row in rows]
 
-    change = stepping.newton_step(called, q, qd, dt, a)
+    change = stepping.newton(called, q, qd, dt, a)
     functions.append(tape.function("newton", [*q, *qd, *tau, dt, *a], change))
     tape, q, qd, tau, dt, _ = fresh()
     functions.append(tape.function("start", [*q, *qd, *tau, dt], stepping.start(called, q, qd, dt)))

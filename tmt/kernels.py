@@ -7,7 +7,7 @@ LANES states side by side, which the compiler turns into SIMD instructions. Both
 from collections.abc import Callable
 from functools import lru_cache
 
-from . import composite
+from . import composite, generic
 from .cache import load
 from .calls import Evaluator, checked_evaluator, checked_run
 from .given import checked_model
@@ -27,8 +27,8 @@ def stepper(tree: Tree, method_name: str) -> Callable:
 
     q, qd: (runs, steps + 1, n), of which [:, 0] is given; tau (runs, n); all contiguous, float64; rad, s, N m. It returns how
     often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its tolerance too:
-    `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is told why each run ended, see templates.
-    For many hinges an explicit method of fixed step takes the generic loop, which needs no compilation.
+    `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is filled with why each run ended, see templates.
+    For many hinges a method that has `loop` takes the generic loop, which needs no compilation.
     """
     checked_model(tree)
     stepping = method_named(method_name)
@@ -37,17 +37,12 @@ def stepper(tree: Tree, method_name: str) -> Callable:
 
 @lru_cache(maxsize=64)
 def _stepper(tree, stepping, large):
-    if large:
-        from . import generic  # here, because it is compiled when it is imported for the first time
-
-        compiled = generic.stepper(tree, stepping)
-    else:
-        compiled = load(run_source(tree, stepping)).run
+    compiled = generic.stepper(tree, stepping) if large else load(run_source(tree, stepping)).run
     return checked_run(compiled, len(tree.parent), stepping.adaptive)
 
 
 def lane_stepper(tree: Tree, method_name: str) -> Callable:
-    """`run(q, qd, tau, dt)` for a batch that is a multiple of LANES; the same bits. Not for adaptive and implicit methods."""
+    """`run(q, qd, tau, dt)` for a batch that is a multiple of LANES; the same bits. For methods that have `lanes`."""
     checked_model(tree)
     stepping = method_named(method_name)
     if not stepping.lanes:

@@ -1,17 +1,14 @@
-"""The compiled loops of generic.py: read as text and compiled by way of the cache folder, like the generated kernels.
-
-`tree` is a generic.Arrays; vectors are rows of arrays.
-"""
+"""The compiled loops of generic.py. `tree` is a generic.Arrays; vectors are rows of arrays."""
 
 import math
 
 import numpy as np
-from numba import njit
 
-CACHE = False  # taken out when it is loaded
+from .machine_code import compiled
+from .templates import OVERFLOW
 
 
-@njit(cache=CACHE, error_model="numpy")
+@compiled
 def mass_matrix_and_bias(tree, q, qd, M, h):
     """Mbar (n, n) and h (n,) of one state; of Mbar the entries between a hinge and its ancestors, below the diagonal."""
     n = len(tree.parent)
@@ -96,7 +93,7 @@ def mass_matrix_and_bias(tree, q, qd, M, h):
                         second[p, j, k] += product[j, m] * R[i, k, m]
 
 
-@njit(cache=CACHE, error_model="numpy")
+@compiled
 def add_cross(to, a, b):
     """to += a x b."""
     to[0] += a[1] * b[2] - a[2] * b[1]
@@ -104,7 +101,7 @@ def add_cross(to, a, b):
     to[2] += a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=CACHE, error_model="numpy")
+@compiled
 def hand_down(R, offset, force, moment):
     """Force and moment about the origin of the parent's frame, in its axes, in place."""
     for vector in (force, moment):
@@ -114,7 +111,7 @@ def hand_down(R, offset, force, moment):
     add_cross(moment, offset, force)
 
 
-@njit(cache=CACHE, error_model="numpy")
+@compiled
 def forward_dynamics(tree, q, qd, tau, qdd):
     """qdd (n,) of one state, from Mbar qdd = tau - D qd - h, factorised from the tips inward along the ancestors."""
     n = len(q)
@@ -140,7 +137,7 @@ def forward_dynamics(tree, q, qd, tau, qdd):
         qdd[k] /= M[k, k]
 
 
-@njit(cache=CACHE, error_model="numpy", nogil=True)
+@compiled
 def run_tableau(tree, A, b, q, qd, tau, dt, ended):
     """Fill q and qd (batch, steps + 1, n) by an explicit Runge-Kutta method, while finite; evaluations of the dynamics."""
     n = len(tree.parent)
@@ -170,19 +167,19 @@ def run_tableau(tree, A, b, q, qd, tau, dt, ended):
             if not size < np.inf:
                 q[i, k], qd[i, k] = np.nan, np.nan
                 if len(ended):
-                    ended[i] = 1  # templates.OVERFLOW
+                    ended[i] = OVERFLOW
                 break
     return evaluations
 
 
-@njit(cache=CACHE, error_model="numpy")
+@compiled
 def repeat_forward_dynamics(tree, q, qd, tau, qdd, count):
     """The same state so many times, for timing."""
     for _ in range(count):
         forward_dynamics(tree, q, qd, tau, qdd)
 
 
-@njit(cache=CACHE, error_model="numpy")
+@compiled
 def repeat_mass_matrix_and_bias(tree, q, qd, M, h, count):
     """The same state so many times, for timing."""
     for _ in range(count):

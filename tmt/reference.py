@@ -1,4 +1,4 @@
-"""Many digits: the truth that both parties are measured against."""
+"""Every quantity of a state with 50 digits: what values in doubles are compared with."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""A run with many digits: the truth that every method's error is measured against.
+"""A run with many digits, from which the error of every method is measured.
 
 Python's decimal numbers are one more scalar: in C, and several times faster than mpmath's at this length.
 """

@@ -29,6 +29,15 @@ class Motion(_Path):
     ended: str | np.ndarray | None
     evaluations: int
 
+    def __new__(cls, t, q, qd, ended, evaluations):
+        motion = super().__new__(cls, t, q, qd)
+        motion.ended, motion.evaluations = ended, evaluations
+        return motion
+
+    def __reduce__(self):
+        """How a copy is made, in this process or another."""
+        return type(self), (*self, self.ended, self.evaluations)
+
 
 def simulate(
     q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
@@ -71,9 +80,8 @@ def simulate(
         evaluations += kernels.stepper(model, method)(*rest, dt, codes[in_lanes:])
     ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
     shape = *batch, steps + 1, n
-    motion = Motion(dt * np.arange(steps + 1), path_q.reshape(shape), path_qd.reshape(shape))
-    motion.ended, motion.evaluations = ended.reshape(batch)[()], evaluations
-    return motion
+    t, q, qd = dt * np.arange(steps + 1), path_q.reshape(shape), path_qd.reshape(shape)
+    return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
 
 
 def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
@@ -81,13 +89,13 @@ def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
 
     q, qd: the paths (runs, steps + 1, n); codes: why the compiled loop ended each, 0: it did not.
     """
-    told = np.full(len(codes), None, dtype=object)
+    why = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
-        return told
+        return why
     if not tree.never_singular:
         for run in range(len(codes)):
             if found := singular_in(tree, q[run], qd[run]):
-                k, told[run] = found
+                k, why[run] = found
                 q[run, k + 1 :] = qd[run, k + 1 :] = np.nan
     words = {
         OVERFLOW: "the motion diverges: within a step its numbers overflow, or its angles pass 2^49 rad",
@@ -95,16 +103,14 @@ def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
     }
-    for run in (run for run in range(len(codes)) if codes[run] or told[run]):
+    for run in (run for run in range(len(codes)) if codes[run] or why[run]):
         last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
         code = int(codes[run])
-        if (
-            code in (OVERFLOW, NEWTON)
-            and max(np.abs(q[run, last]).max(), dt * float(np.abs(qd[run, last]).max())) > 2.0**48
-        ):
+        reach = max(np.abs(q[run, last]).max(), dt * float(np.abs(qd[run, last]).max()))
+        if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages
-        told[run] = f"at t = {last * dt:g} s: {told[run] or words[code]}"
-    return told
+        why[run] = f"at t = {last * dt:g} s: {why[run] or words[code]}"
+    return why
 
 
 def singular_in(tree, q, qd) -> tuple[int, str] | None:

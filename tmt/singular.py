@@ -74,7 +74,7 @@ def found(tree, M) -> np.ndarray:
     return (values[..., :1] <= ZERO_BELOW * len(root)) & (turning > CLEAR)
 
 
-def told(tree, turning) -> str:
+def reason(tree, turning) -> str:
     """Which hinges, as given by `found`, turn without moving mass, in words."""
     names = [repr(name) for name, turns in zip(tree.hinge_names, turning) if turns]
     if len(names) == 1:
@@ -87,7 +87,7 @@ def check_tree(tree) -> None:
     with np.errstate(all="ignore"):
         size = scales(tree)
         if not size.all():
-            raise ValueError(f"{told(tree, size == 0.0)}; Mbar is singular at every q")
+            raise ValueError(f"{reason(tree, size == 0.0)}; Mbar is singular at every q")
         if not np.isfinite(size).all() or size.min() < np.finfo(float).tiny / CLEAR:
             raise ValueError(
                 f"Mbar of the Tree has sizes from {size.min():.3g} to {size.max():.3g} kg m2; doubles cannot hold that"
@@ -98,7 +98,7 @@ def check_tree(tree) -> None:
         q = 2 * np.pi * np.outer((0.7548776662466927, 0.5698402909980532), 1 + np.arange(len(size)))
         turning = found(tree, mass_matrices(tree, q))
     if turning.any(axis=-1).all():
-        raise ValueError(f"{told(tree, turning[0])}; Mbar is singular at every q")
+        raise ValueError(f"{reason(tree, turning[0])}; Mbar is singular at every q")
 
 
 def first(tree, q, M=None) -> tuple[int, str] | None:
@@ -107,4 +107,4 @@ def first(tree, q, M=None) -> tuple[int, str] | None:
         return None
     turning = found(tree, mass_matrices(tree, q) if M is None else M)
     bad = turning.any(axis=-1)
-    return (int(np.argmax(bad)), told(tree, turning[np.argmax(bad)])) if bad.any() else None
+    return (int(np.argmax(bad)), reason(tree, turning[np.argmax(bad)])) if bad.any() else None

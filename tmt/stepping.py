@@ -21,7 +21,7 @@ class Method:
 
     order = 1  # the error of a run falls with dt to this power
     adaptive = False  # chooses its own steps, takes a tolerance and has an `attempt`, as AdaptiveRungeKutta does
-    solves_stages = False  # its stages solve an equation: it has `start`, `newton_step` and `finish`, as in implicit.py
+    solves_stages = False  # its stages solve an equation: it has `start`, `newton` and `finish`, as in implicit.py
     damps_implicitly = False  # its slope takes the joint damping at the rates one dt later
     loop = False  # can be followed by the loop for any tree, from its A and b; not inherited, as `step` may be another
 
@@ -60,7 +60,7 @@ FIELDS = dict.fromkeys(("adaptive", "solves_stages", "damps_implicitly", "loop",
     "stages": int,
 }
 EXPECTED = "a hashable method with a slope and a step is expected"
-NEEDS = {"adaptive": ("attempt",), "solves_stages": ("start", "newton_step", "finish"), "loop": ("A", "b")}
+NEEDS = {"adaptive": ("attempt",), "solves_stages": ("start", "newton", "finish"), "loop": ("A", "b")}
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class Code(NamedTuple):
 
 
 class Tape:
-    """The expressions of one trace, each held once, in an order in which they can be computed.
+    """The expressions of one trace, each kept once, in an order in which they can be computed.
 
     number: the type of the model's numbers: float, or an exact one that can be made from a float.
     """

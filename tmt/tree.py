@@ -164,7 +164,7 @@ def real_numbers(values) -> np.ndarray | None:
         return array.astype(float) if array.dtype.kind in "fiu" else None
     except MemoryError:
         raise
-    except Exception:  # whatever the conversion of a stranger's object raises
+    except Exception:  # whatever the conversion of a user's own object raises
         return None
 
 

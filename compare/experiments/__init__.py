@@ -13,7 +13,7 @@ EXPERIMENTS = {
     "published": "every number that the assignment prints",
     "kinematics": "positions, angular velocities, Jacobians, convective terms",
     "mass": "the mass matrix",
-    "gravity": "the torque that holds the arm",
+    "gravity": "the torque that holds each posture",
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
     "trajectory": "five seconds of motion, the same scheme in tmt for every integrator",
     "speed": "time against error: every method, every step, and what to use",

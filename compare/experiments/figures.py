@@ -1,4 +1,7 @@
-"""Figures of the experiments that are one file: the sketch, differences, the condition number, holding torques."""
+"""Figures of the experiments that are one file: the sketch, differences, the condition number, holding torques.
+
+Each function returns (file name, figure, caption).
+"""
 
 import matplotlib
 import numpy as np
@@ -7,64 +10,122 @@ from matplotlib.figure import Figure
 import tmt
 from tmt import method
 
+from ..engines import LABELS
+from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, gravity_scale
-from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH, joint_lines
+from ..report.style import BLUE, GREY, ORANGE, RED, WIDTH, joint_lines
+from ..robots import Robot
 
-FLOOR = 1e-3  # eps: where differences of exactly zero are drawn
+ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
+ELEVATION, AZIMUTH = 20.0, -70.0  # deg, from where the sketch is seen
+CENTRED = {"ha": "center", "va": "center"}
+_E, _A = np.radians([ELEVATION, AZIMUTH])
+RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
+UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
-def sketch():
-    """The arm with its hinge axes, from the method's own frames."""
+def sketch(robot: Robot) -> tuple[str, Figure, str]:
+    """The robot with its hinge axes in two postures, from the method's own frames."""
+    poses = {name: robot.posture(name) for name in robot.sketched or tuple(robot.postures)[:2]}
+    parts = {name: (chains(robot, q), tmt.com_positions(q, robot.tree)) for name, q in poses.items()}
+    size = max(np.ptp(np.concatenate([*lines, coms]), axis=0).max() for lines, coms in parts.values()) or 1.0  # m
+    arrows = {name: axes(robot, q, 0.57 * size) for name, q in poses.items()}
+    tips = [arrow.sum(axis=1) for arrow in arrows.values()]
+    drawn = np.concatenate([*tips, *(part for lines, coms in parts.values() for part in (*lines, coms))])
+    half, middle = 0.55 * np.ptp(drawn, axis=0).max(), (drawn.max(axis=0) + drawn.min(axis=0)) / 2
+    fontsize = 13 if all(len(robot.symbol(joint)) <= 2 for joint in robot.joints) else 9
     fig = Figure(figsize=(WIDTH, 3.9))
     fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.95, wspace=0.05)
-    offsets = {  # of the labels, m, clear of the links
-        "zero": {"shoulder": (-0.12, 0.0, 0.0), "elbow": (-0.09, 0.0, 0.0), "hand": (0.0, 0.0, -0.06)},
-        "ball catch": {"shoulder": (-0.13, 0.0, 0.0), "elbow": (0.11, 0.0, 0.0), "hand": (0.08, 0.0, 0.03)},
-    }
-    for k, (name, labels) in enumerate(offsets.items()):
-        ax = fig.add_subplot(1, 2, k + 1, projection="3d")
-        q = posture(name).tolist()
-        joints = np.array([list(p) for p in arm.points(q)], dtype=float)
-        ax.plot(*joints.T, color=GREY, linewidth=6, solid_capstyle="round", alpha=0.6)
-        for frame, (hinge, colour, _) in zip(method.hinge_frames(tmt.ARM, q), HINGES):
-            origin, axis = np.array(list(frame.origin)), 0.22 * np.array(list(frame.axis))
+    for k, (name, (lines, coms)) in enumerate(parts.items()):
+        ax = fig.add_subplot(1, len(poses), k + 1, projection="3d", facecolor="none")
+        for line in lines:
+            ax.plot(*line.T, color=(GREY, 0.6), linewidth=6, solid_capstyle="round")
+        for joint, (origin, axis) in zip(robot.joints, arrows[name]):
+            colour = joint_lines(robot)[joint][0]
             ax.quiver(*origin, *axis, color=colour, linewidth=2, arrow_length_ratio=0.2)
-            ax.text(*(origin + 1.3 * axis), GREEK[hinge], color=colour, fontsize=13, ha="center", va="center")
-        for com, body in zip(tmt.com_positions(q), ("1", "2")):
+            ax.text(*(origin + 1.3 * axis), robot.symbol(joint), color=colour, fontsize=fontsize, **CENTRED)
+        for number, com in enumerate(coms, start=1):
             ax.scatter(*com, color="black", s=25, depthshade=False)
-            ax.text(*(com + [0.05, 0.0, -0.045]), body, fontsize=9)
-        for point, (text, offset) in zip(joints, labels.items()):
-            ax.text(*(point + offset), text, color=GREY, ha="center", va="center", fontsize=8)
-        ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(q))})°")
-        ax.set(xlabel="x north, m", ylabel="y west, m", zlabel="z up, m")
-        ax.set(xlim=(-0.3, 0.4), ylim=(-0.35, 0.35), zlim=(-0.4, 0.3))
+            ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
+        if robot.landmarks:
+            names, (chain,) = robot.landmarks(poses[name]), lines
+            for text, point, (right, up) in zip(names, chain, beside(chain, arrows[name])):
+                side = {"ha": "left" if right > 0.0 else "right", "va": "bottom" if up > 0.5 else "center"}
+                ax.text(*(point + 0.1 * size * (right * RIGHTWARD + up * UPWARD)), text, color=GREY, fontsize=8, **side)
+        ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(poses[name]))})°")
+        ax.set(**{f"{which}label": f"{axis}, m" for which, axis in zip("xyz", robot.axes)})
+        ax.set(**{f"{which}lim": (centre - half, centre + half) for which, centre in zip("xyz", middle)})
         for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-            axis.set_major_locator(matplotlib.ticker.MultipleLocator(0.2))
-        ax.view_init(elev=20, azim=-70)
+            axis.set_major_locator(matplotlib.ticker.MaxNLocator(4, steps=[1, 2, 5, 10]))
+        ax.view_init(elev=ELEVATION, azim=AZIMUTH)
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
+    bodies = [f"the {body} ({number})" for number, body in enumerate(robot.tree.body_names, start=1)]
+    of = " and ".join(filter(None, (", ".join(bodies[:-1]), bodies[-1])))
     caption = (
-        f"The arm and its hinges, drawn from the method's own kinematics: {', then '.join(hinges())}. Dots: centres of mass "
-        f"of the {tmt.ARM.body_names[0]} (1) and the {tmt.ARM.body_names[1]} (2)."
+        f"The {robot.name} and its hinges, drawn from the method's own kinematics: {', then '.join(hinges(robot))}. Dots: "
+        f"centres of mass of {of}."
     )
-    return "arm", fig, caption
+    return robot.name.replace(" ", "_"), fig, caption
 
 
-def hinges() -> list[str]:
-    """What each hinge turns about and where it is, in words, outward from the shoulder."""
-    rest = [0.0] * len(HINGES)
-    joints = dict(zip(("shoulder", "elbow", "hand"), map(list, arm.points(rest))))
+def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
+    """The lines of a robot at joint angles q, rad: points in m, (k, 3) each.
+
+    Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move.
+    """
+    if robot.landmarks:
+        return [np.array(list(robot.landmarks(q).values()))]
+    tree = robot.tree
+    origins = np.array([list(frame.origin) for frame in method.hinge_frames(tree, q.tolist())], dtype=float)
+    links = [np.stack([origins[parent], origins[joint]]) for joint, parent in enumerate(tree.parent) if parent >= 0]
+    ends = [
+        np.stack([origins[joint], com])
+        for joint, com in zip(tree.body_hinge, tmt.com_positions(q, tree))
+        if joint >= 0 and joint not in tree.parent
+    ]
+    return links + ends
+
+
+def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:
+    """Origin and axis of each hinge at joint angles q, rad: (n, 2, 3), m, the axes of this length."""
+    frames = method.hinge_frames(robot.tree, q.tolist())
+    return np.array([[list(frame.origin), [length * c for c in frame.axis]] for frame in frames], dtype=float)
+
+
+def beside(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
+    """Where on paper the labels of a chain's points, (k, 3) m, stand free: to the right and up, (k, 2), of length 1.
+
+    Away from the links and from the arrows, (n, 2, 3), that meet in the point; to the left if these are balanced.
+    """
+    away = np.tile(-0.01 * RIGHTWARD, (len(chain), 1))
+    links = np.diff(chain, axis=0)
+    links /= np.maximum(np.linalg.norm(links, axis=1), 1e-12)[:, None]
+    away[:-1] -= links
+    away[1:] += links
+    for origin, axis in arrows:
+        away -= np.isclose(chain, origin).all(axis=1)[:, None] * axis / np.linalg.norm(axis)
+    on_paper = away @ np.stack([RIGHTWARD, UPWARD], axis=1)
+    return on_paper / np.linalg.norm(on_paper, axis=1)[:, None]
+
+
+def hinges(robot: Robot) -> list[str]:
+    """What each hinge turns about and where it is at zero, in words, in their order."""
+    rest = robot.posture()
+    landmarks = robot.landmarks(rest) if robot.landmarks else {"origin": np.zeros(3)}
     words = []
-    for (hinge, *_), frame in zip(HINGES, method.hinge_frames(tmt.ARM, rest)):
-        axis, origin = [float(v) for v in frame.axis], list(frame.origin)
-        about = "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else f"({', '.join(f'{v:g}' for v in axis)})"
-        place = next(
-            (name for name, point in joints.items() if np.allclose(point, origin)), "neither shoulder nor elbow"
-        )
-        words.append(f"{GREEK[hinge]} about {about} at the {place}")
+    for joint, frame in zip(robot.joints, method.hinge_frames(robot.tree, rest.tolist())):
+        axis, origin = ([float(v) + 0.0 for v in vector] for vector in (frame.axis, frame.origin))
+        about = "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else triple(axis)
+        near = (f"at the {name}" for name, point in landmarks.items() if np.allclose(point, origin))
+        words.append(f"{robot.symbol(joint)} about {about} {next(near, f'at {triple(origin)} m')}")
     return words
 
 
-def distances(result, sample, quantities=None):
+def triple(values) -> str:
+    return f"({', '.join(f'{v:.3g}' for v in values)})"
+
+
+def distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
     """How far apart the engines are over all states, and how far each is from the exact value."""
     curves = result.curves[sample]
     quantities = quantities or [name for name, c in curves.items() if "TMT to exact" in c]
@@ -75,7 +136,7 @@ def distances(result, sample, quantities=None):
     styles = (("TMT to MuJoCo", "black", "-"), ("TMT to exact", BLUE, "--"), ("MuJoCo to exact", ORANGE, "-."))
     for ax, quantity in zip(axes.flat, quantities):
         for name, colour, dash in styles:
-            values = np.maximum(curves[quantity][name], FLOOR)
+            values = np.maximum(curves[quantity][name], ZERO_AT)
             share = np.arange(1, len(values) + 1) / len(values)
             ax.step(values, share, where="post", color=colour, linestyle=dash, label=name)
         ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
@@ -87,70 +148,75 @@ def distances(result, sample, quantities=None):
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     worst = max((curves[q]["TMT to MuJoCo"][-1], q) for q in quantities)
-    ours, theirs = (max(curves[q][f"{p} to exact"][-1] for q in quantities) for p in ("TMT", "MuJoCo"))
+    ours, theirs = (max(curves[q][f"{label} to exact"][-1] for q in quantities) for label in ("TMT", "MuJoCo"))
     known = len(curves[quantities[0]]["TMT to exact"])
     caption = (
         f"Share of the {sample} whose difference is at most so many eps. The engines are at most {worst[0]:.3g} eps apart "
         f"({worst[1]}). Against the exact value, at the first {known} of the states, TMT is at most {ours:.3g} eps off and "
-        f"MuJoCo at most {theirs:.3g}. Differences of exactly zero are drawn at {FLOOR:g}."
+        f"MuJoCo at most {theirs:.3g}. Differences of exactly zero are drawn at {ZERO_AT:g}."
     )
     return f"{result.experiment}_distances", fig, caption
 
 
-def condition_map(result):
-    """The condition number of Mbar over beta and gamma."""
-    beta, gamma, values = result.curves["condition"]
-    beta, gamma = np.degrees(beta), np.degrees(gamma)
-    worst = np.degrees(result.curves["worst"]["TMT"][1])
+def condition_map(result: Result, robot: Robot) -> tuple[str, Figure, str]:
+    """The condition number of Mbar over the two joints on which it is said to depend."""
+    *angles, values = result.curves["condition"]
+    first, second = np.degrees(angles)
+    x, y = (robot.symbol(joint) for joint in robot.conditioning.joints)
+    worst = np.degrees(result.curves["worst"]["tmt"][1])
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     ax = fig.subplots()
-    image = ax.pcolormesh(beta, gamma, values, cmap="viridis", shading="nearest", rasterized=True)
-    lines = ax.contour(beta, gamma, values, levels=[10, 20, 40, 80], colors="white", linewidths=0.7)
+    image = ax.pcolormesh(first, second, values, cmap="viridis", shading="nearest", rasterized=True)
+    lines = ax.contour(first, second, values, levels=[10, 20, 40, 80], colors="white", linewidths=0.7)
     ax.clabel(lines, fontsize=7)
     ax.plot(*worst, marker="o", color=RED, markersize=8, markeredgecolor="white")
-    ax.set(xlabel="β, deg", ylabel="γ, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
+    ax.set(xlabel=f"{x}, deg", ylabel=f"{y}, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
     fig.colorbar(image, label="condition number of Mbar")
-    told = []
-    for engine, (value, at, mirrored) in result.curves["worst"].items():
-        beta, gamma = np.degrees(at)
-        other = "the same at -β" if abs(mirrored - value) <= 1e-6 * value else f"{mirrored:.2f} at -β"
-        told.append(f"{engine}'s is {value:.2f} at β = {beta:.1f}°, γ = {gamma:.1f}°, and {other}")
-    caption = f"Condition number of TMT's Mbar over β and γ, α = 0. The maximum (dot: TMT's): {'; '.join(told)}."
+    largest = []
+    for name, (value, at, mirrored) in result.curves["worst"].items():
+        a, b = np.degrees(at)
+        other = f"the same at -{x}" if abs(mirrored - value) <= 1e-6 * value else f"{mirrored:.2f} at -{x}"
+        largest.append(f"{LABELS[name]}'s is {value:.2f} at {x} = {a:.1f}°, {y} = {b:.1f}°, and {other}")
+    others = "".join(f", {robot.symbol(joint)} = 0" for joint in robot.joints if joint not in robot.conditioning.joints)
+    caption = (
+        f"Condition number of TMT's Mbar over {x} and {y}{others}. The maximum (dot: TMT's): {'; '.join(largest)}."
+    )
     return "mass_condition", fig, caption
 
 
-def holding_torques(result):
+def holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Holding torques at the named postures."""
     postures = result.curves["postures"]
     fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
     ax = fig.subplots()
-    places = np.arange(len(postures))
-    for i, (hinge, colour, _) in enumerate(HINGES):
-        ours, theirs = (np.array([pair[k][i] for pair in postures.values()]) for k in (0, 1))
-        x = places + 0.26 * (i - 1)
-        ax.bar(x, ours, width=0.24, color=colour, alpha=0.75, label=f"{GREEK[hinge]}, TMT")
-        ax.plot(x, theirs, "_", color="black", markersize=13, markeredgewidth=2, label="MuJoCo" if i == 0 else None)
+    places, width = np.arange(len(postures)), 0.78 / len(robot.joints)
+    for i, (joint, (colour, _)) in enumerate(joint_lines(robot).items()):
+        ours, theirs = (np.array([of[name][i] for of in postures.values()]) for name in ("tmt", "mujoco"))
+        x = places + width * (i - (len(robot.joints) - 1) / 2)
+        ax.bar(x, ours, width=0.92 * width, color=(colour, 0.75), label=f"{robot.symbol(joint)}, TMT")
+        mark = {"markersize": 50 * width, "markeredgewidth": 2, "label": "MuJoCo" if i == 0 else None}
+        ax.plot(x, theirs, "_", color="black", **mark)
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.set_xticks(places, postures)
     ax.set(ylabel="holding torque, N m")
-    fig.legend(loc="outside upper center", ncols=4)
-    apart = max(np.abs(ours - theirs).max() for ours, theirs in postures.values())
+    fig.legend(loc="outside upper center", ncols=min(len(robot.joints) + 1, 6))
+    apart = max(np.abs(of["tmt"] - of["mujoco"]).max() for of in postures.values())
     caption = (
         f"Torque that holds each named posture: TMT (bars) and MuJoCo (black marks), at most {apart:.1e} N m apart. "
-        + needless(postures)
+        + needless(postures, robot)
     )
     return "gravity_postures", fig, caption
 
 
-def needless(postures) -> str:
+def needless(postures: dict, robot: Robot) -> str:
     """Which postures need no torque, but for rounding, in both engines or in one, in words."""
-    zero = FACTOR * EPS * gravity_scale()
+    zero = FACTOR * EPS * gravity_scale(robot.tree)
     rest = {
-        engine: [name for name, pair in postures.items() if np.abs(pair[k]).max() <= zero]
-        for k, engine in enumerate(("TMT", "MuJoCo"))
+        name: [posture for posture, of in postures.items() if np.abs(of[name]).max() <= zero]
+        for name in ("tmt", "mujoco")
     }
-    told = [
-        f"{engine} needs none, but for rounding, at: {', '.join(names) or 'no posture'}."
-        for engine, names in rest.items()
+    words = [
+        f"{LABELS[name]} needs none, but for rounding, at: {', '.join(at) or 'no posture'}."
+        for name, at in rest.items()
     ]
-    return " ".join(told) if rest["TMT"] != rest["MuJoCo"] else told[0].replace("TMT needs", "Both need")
+    return " ".join(words) if rest["tmt"] != rest["mujoco"] else words[0].replace("TMT needs", "Both need")

@@ -1,5 +1,6 @@
 """The mass matrix."""
 
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
@@ -7,38 +8,64 @@ from scipy.optimize import minimize
 
 import tmt
 
-from .agreement import EPS, FACTOR, Result, mass_scale
-
-WORST = np.radians([90.0, 90.0])  # (beta, gamma) of the largest condition number; so is (-beta, gamma)
-LARGEST = float(np.linalg.cond(tmt.mass_matrix(np.array([0.0, *WORST]))))
-NEAR = np.radians(0.01)  # of WORST: what a search finds of a flat maximum
+from ..engines import LABELS
+from ..judge.check import Result
+from ..judge.scale import EPS, FACTOR, mass_scale
+from ..robots import Robot
 
 TITLE = "Mass matrix: is Mbar MuJoCo's M?"
-CLAIM = (
-    "Mbar = sum T' m T + B' I B equals mj_fullM at every posture; it is symmetric and positive definite; its condition "
-    f"number, which multiplies every rounding error of an acceleration, has its maximum {LARGEST:.2f} at beta = +-90 deg, "
-    "gamma = 90 deg."
-)
-BAR = (
-    "64 eps x the largest entry of Mbar at that state. Definite: the smallest eigenvalue is at least 64 eps of the largest. "
-    "Condition number: 64 eps x its square; its place, found by search: 0.01 deg."
-)
+SAME_PLACE = np.radians(0.01)  # what a search finds of the place of a flat maximum
 
 
-def condition_grid(mass_matrix, degrees) -> tuple:
-    """(beta, gamma, condition numbers) on a grid, alpha = 0."""
+def claim(robot: Robot) -> str:
+    """What is claimed of any robot, and of where its condition number is largest if that is known."""
+    text = "Mbar = sum T' m T + B' I B equals mj_fullM at every posture; it is symmetric and positive definite"
+    if robot.conditioning is None:
+        return f"{text}."
+    (first, second), (x, y) = robot.conditioning
+    return (
+        f"{text}; its condition number, which multiplies every rounding error of an acceleration, has its maximum "
+        f"{largest_condition(robot):.2f} at {first} = +-{x:g} deg, {second} = {y:g} deg."
+    )
+
+
+def tolerance(robot: Robot) -> str:
+    """By what the claim is judged."""
+    text = (
+        "64 eps x the largest entry of Mbar at that state. Definite: the smallest eigenvalue is at least 64 eps of the "
+        "largest."
+    )
+    if robot.conditioning is None:
+        return text
+    return f"{text} Condition number: 64 eps x its square; its place, found by search: 0.01 deg."
+
+
+def at_angles(robot: Robot, angles: np.ndarray) -> np.ndarray:
+    """Joint angles, rad, (..., n), with these of the two joints of the robot's conditioning, (..., 2); the others at 0."""
+    q = np.zeros((*np.shape(angles)[:-1], len(robot.joints)))
+    q[..., [robot.joints.index(name) for name in robot.conditioning.joints]] = angles
+    return q
+
+
+def largest_condition(robot: Robot) -> float:
+    """The condition number of the stated Mbar where it is said to be largest."""
+    return float(np.linalg.cond(tmt.mass_matrix(at_angles(robot, np.radians(robot.conditioning.worst)), robot.tree)))
+
+
+def condition_grid(robot: Robot, mass_matrix: Callable, degrees: float) -> tuple:
+    """Angles of the two joints, rad, (k,) each, and condition numbers on their grid, (k, k), the second joint's by rows."""
     angles = np.radians(np.arange(-180.0, 180.0 + degrees, degrees))
-    gamma, beta = np.meshgrid(angles, angles, indexing="ij")
-    return angles, angles, np.linalg.cond(mass_matrix(np.stack([0.0 * beta, beta, gamma], axis=-1)))
+    second, first = np.meshgrid(angles, angles, indexing="ij")
+    return angles, angles, np.linalg.cond(mass_matrix(at_angles(robot, np.stack([first, second], axis=-1))))
 
 
-def worst_condition(mass_matrix) -> tuple:
-    """The largest condition number and its (beta, gamma), rad: the best point of a grid, then a local search."""
-    beta, gamma, values = condition_grid(mass_matrix, degrees=20.0)
+def worst_condition(robot: Robot, mass_matrix: Callable) -> tuple:
+    """The largest condition number and its two angles, rad: the best point of a grid, then a local search."""
+    first, second, values = condition_grid(robot, mass_matrix, degrees=20.0)
     row, column = np.unravel_index(values.argmax(), values.shape)
     found = minimize(
-        lambda x: -np.linalg.cond(mass_matrix(np.array([0.0, *x]))),
-        [beta[column], gamma[row]],
+        lambda x: -np.linalg.cond(mass_matrix(at_angles(robot, x))),
+        [first[column], second[row]],
         method="Nelder-Mead",
         options={"xatol": 1e-6, "fatol": 1e-12},
     )
@@ -47,48 +74,57 @@ def worst_condition(mass_matrix) -> tuple:
 
 def rows(setup) -> Result:
     """Agreement at each named posture and at random states; symmetry, definiteness, conditioning."""
-    result = Result("mass")
+    result, robot, compared = Result("mass"), setup.robot, setup.compared()
     for sample in (*setup.named.each(), setup.random):
-        ours, theirs = tmt.mass_matrix(sample.q), setup.engine.mass_matrix(sample.q)
-        result.agree(sample, "Mbar", "kg m2", ours, theirs, mass_scale(sample.q), truth="mass_matrix")
-    symmetric(
-        result, tmt.mass_matrix(setup.random.q)
-    )  # MuJoCo's is one triangle written twice: symmetric by construction
-    for engine, mass_matrix in (("TMT", tmt.mass_matrix), ("MuJoCo", setup.engine.mass_matrix)):
-        definite(result, engine, mass_matrix(setup.random.q))
-        value, worst = worst_condition(mass_matrix)
-        mirrored = float(np.linalg.cond(mass_matrix(np.array([0.0, -worst[0], worst[1]]))))
-        conditioned(result, engine, value, worst)
-        result.curves.setdefault("worst", {})[engine] = (value, worst, mirrored)
-    result.curves["condition"] = condition_grid(tmt.mass_matrix, degrees=setup.of(3.0, 3.0, 15.0))
+        ours, theirs = (dynamics.mass_matrix(sample.q) for dynamics in compared.values())
+        result.agree(sample, "Mbar", "kg m2", ours, theirs, mass_scale(robot.tree, sample.q), truth="mass_matrix")
+    check_symmetry(result, compared["tmt"].mass_matrix(setup.random.q))  # MuJoCo's is one triangle written twice
+    for name, dynamics in compared.items():
+        check_definiteness(result, LABELS[name], dynamics.mass_matrix(setup.random.q))
+        if robot.conditioning:
+            value, worst = worst_condition(robot, dynamics.mass_matrix)
+            mirrored = float(np.linalg.cond(dynamics.mass_matrix(at_angles(robot, worst * [-1.0, 1.0]))))
+            check_conditioning(result, robot, LABELS[name], value, worst)
+            result.curves.setdefault("worst", {})[name] = (value, worst, mirrored)
+    if robot.conditioning:
+        degrees = setup.of(3.0, 3.0, 15.0)
+        result.curves["condition"] = condition_grid(robot, compared["tmt"].mass_matrix, degrees)
+    else:
+        result.notes.append(
+            f"Nothing is stated of where the condition number of Mbar of the {robot.name} is largest: that is neither checked "
+            "nor drawn."
+        )
     return result
 
 
-def symmetric(result, M) -> None:
+def check_symmetry(result: Result, M: np.ndarray) -> None:
     """TMT computes both triangles: they must be the same but for rounding."""
     skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2)) / np.abs(M).max(axis=(1, 2))
     what = "TMT: Mbar - Mbar' over its largest entry"
     result.check("random states", what, skew.max(), FACTOR * EPS, "", rounding=True)
 
 
-def definite(result, engine, M) -> None:
+def check_definiteness(result: Result, label: str, M: np.ndarray) -> None:
     """Mbar is positive definite beyond doubt: its least eigenvalue over its largest, the least of all states."""
     values = np.linalg.eigvalsh(M)
-    what = f"{engine}: least eigenvalue of Mbar over the largest"
+    what = f"{label}: least eigenvalue of Mbar over the largest"
     result.check("random states", what, (values[:, 0] / values[:, -1]).min(), FACTOR * EPS, "", rule="at least")
 
 
-def conditioned(result, engine, value, worst) -> None:
-    """The largest condition number and its (beta, gamma), rad, are those of the stated arm; beta of either sign."""
-    at = f"beta = {np.degrees(worst[0]):.3f}, gamma = {np.degrees(worst[1]):.3f} deg"
-    bar = FACTOR * EPS * LARGEST**2
-    result.check("worst posture", f"{engine}: condition number - {LARGEST:.2f}", abs(value - LARGEST), bar, "", at)
-    off = np.abs([abs(worst[0]), worst[1]] - WORST).max()
-    result.check("worst posture", f"{engine}: distance from (+-90, 90) deg", off, NEAR, "rad", at)
+def check_conditioning(result: Result, robot: Robot, label: str, value: float, worst: np.ndarray) -> None:
+    """The largest condition number and its two angles, rad, are those of the stated robot; the first of either sign."""
+    (first, second), (x, y) = robot.conditioning
+    largest = largest_condition(robot)
+    at = f"{first} = {np.degrees(worst[0]):.3f}, {second} = {np.degrees(worst[1]):.3f} deg"
+    bound = FACTOR * EPS * largest**2
+    result.check("worst posture", f"{label}: condition number - {largest:.2f}", abs(value - largest), bound, "", at)
+    off = np.abs([abs(worst[0]), worst[1]] - np.radians([x, y])).max()
+    result.check("worst posture", f"{label}: distance from (+-{x:g}, {y:g}) deg", off, SAME_PLACE, "rad", at)
 
 
-def figures(result):
-    from . import draw  # matplotlib is for the process that draws
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
+    from . import figures as draw  # matplotlib is for the process that draws
 
     yield partial(draw.distances, result, "random states")
-    yield partial(draw.condition_map, result)
+    if robot.conditioning:
+        yield partial(draw.condition_map, result, robot)

@@ -1,42 +1,30 @@
 """The compiled model read back beside the stated numbers."""
 
+from collections.abc import Iterator
+from functools import partial
+
 import numpy as np
 
 import tmt
 
-from .agreement import EPS, FACTOR, Result
-from .engine_parameters import options, parameters
+from ..engines.mujoco.parameters import STATED_FLAGS, options, parameters
+from ..judge.check import Result
+from ..judge.scale import EPS, FACTOR
+from ..robots import Robot
 
-TITLE = "Parameters: is MuJoCo's compiled arm the stated arm?"
-CLAIM = (
-    "The MJCF file, as MuJoCo compiled it, has the stated masses, centres of mass, inertia tensors (turned back into body "
-    "axes, R diag R'), hinge axes, anchors, order, zero and gravity, and nothing that the method does not have: no "
-    "armature, friction, springs, limits or further masses, and at random states no force of springs, fluid, tendons, "
-    "actuators (without control signals and activations), constraints or contacts."
-)
-BAR = (
-    "64 eps x the largest entry of the quantity (the compiler stores each number once; turning the inertia to its "
-    "principal axes and back costs a few roundings; MuJoCo 3.10 turns a fullinertia only to about 1e-8). What must be "
-    "absent must be exactly 0. The model is read in the file's own configuration, so that a `ref` is seen as that alone."
-)
+TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
-FLAGS = ("flag gravity", "flag damper", "flag eulerdamp")
-OF_ALL = (
-    *FLAGS,
-    "gravity",
-    "density",
-    "viscosity",
-    "other mass",
-    "tendon armature",
-    *NOT_HAD,
-)  # numbers of the whole file
-UNITS = dict.fromkeys((*FLAGS, "order", "parent", "axis", "limited", "gravcomp", *NOT_HAD), "") | {
+# numbers of the whole file, and those of bodies; the others are of joints
+OF_ALL = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *NOT_HAD)
+OF_BODIES = ("mass", "com", "inertia", "gravcomp")
+QUANTITIES = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *NOT_HAD), "") | {
     "ref": "rad", "anchor": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad",
     "mass": "kg", "com": "m", "inertia": "kg m2", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
-WHOLE = (*FLAGS, "order", "parent", "limited", "contact pairs")  # that are so or not, a place, or a count
-OPTIONS = (*FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
+# that are so or not, a place, or a count
+WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
+OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
 EXPLAINED = {  # forces, by the quantities that say why they act
     "springs, fluid and tendons": ("stiffness", "density", "viscosity", "gravcomp", *NOT_HAD[1:4]),
     "actuators": (),
@@ -44,49 +32,75 @@ EXPLAINED = {  # forces, by the quantities that say why they act
 }
 
 
-def stated(model=tmt.ARM) -> dict:
-    """The same quantities from the stated numbers: arrays per hinge, per body, or one."""
-    n, m = len(model.hinge_names), len(model.body_names)
+def claim(robot: Robot) -> str:
+    """What is claimed of any robot."""
+    return (
+        "The MJCF file, as MuJoCo compiled it, has the stated masses, centres of mass, inertia tensors (turned back into body "
+        "axes, R diag R'), hinge axes, anchors, order, zero and gravity, and nothing that the method does not have: no "
+        "armature, friction, springs, limits or further masses, and at random states no force of springs, fluid, tendons, "
+        "actuators (without control signals and activations), constraints or contacts."
+    )
+
+
+def tolerance(robot: Robot) -> str:
+    """By what the claim is judged."""
+    return (
+        "64 eps x the largest entry of the quantity (the compiler stores each number once; turning the inertia to its "
+        "principal axes and back costs a few roundings; MuJoCo 3.10 turns a fullinertia only to about 1e-8). What must be "
+        "absent must be exactly 0. The model is read in the file's own configuration, so that a `ref` is seen as that alone."
+    )
+
+
+def stated(tree: tmt.Tree) -> dict:
+    """The same quantities as `parameters` of MuJoCo's model, from the stated numbers: arrays per hinge, per body, or one."""
+    n, m = len(tree.hinge_names), len(tree.body_names)
     anchors = []
-    for parent, offset in zip(model.parent, model.offset):
+    for parent, offset in zip(tree.parent, tree.offset):
         anchors.append(np.array(offset) + (anchors[parent] if parent >= 0 else 0.0))
     absent = {"ref": n, "armature": n, "frictionloss": n, "stiffness": n, "limited": n, "gravcomp": m}
     absent |= dict.fromkeys(("density", "viscosity", "other mass", "tendon armature", *NOT_HAD), 1)
     return {name: np.zeros(count) for name, count in absent.items()} | {
-        **dict.fromkeys(FLAGS, 1.0),
-        "axis": model.axis,
+        **dict.fromkeys(STATED_FLAGS, 1.0),
+        "axis": tree.axis,
         "anchor": anchors,
-        "damping": model.damping,
+        "damping": tree.damping,
         "order": range(n),
-        "parent": model.parent,
-        "mass": model.mass,
-        "com": model.com,
-        "inertia": model.inertia,
-        "gravity": model.gravity,
+        "parent": tree.parent,
+        "mass": tree.mass,
+        "com": tree.com,
+        "inertia": tree.inertia,
+        "gravity": tree.gravity,
     }
+
+
+def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
+    """The names of what has a quantity: the world, the bodies or the joints."""
+    if quantity in OF_ALL:
+        return ("world",)
+    return tree.body_names if quantity in OF_BODIES else tree.hinge_names
 
 
 def rows(setup) -> Result:
     """One row for each number; one check for each quantity of each hinge or body; the causes that follow."""
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
-    compiled = parameters(setup.engine)
-    expected_of, causes = stated(), []
-    owners = {len(tmt.ARM.hinge_names): tmt.ARM.hinge_names, len(tmt.ARM.body_names): tmt.ARM.body_names}
-    for quantity, unit in UNITS.items():
+    tree, dynamics = setup.robot.tree, setup.compared()["mujoco"]
+    compiled = parameters(dynamics)
+    expected_of, causes = stated(tree), []
+    for quantity, unit in QUANTITIES.items():
         expected = np.asarray(expected_of[quantity], dtype=float)
         found = np.asarray(compiled[quantity], dtype=float)
-        names = ("world",) if quantity in OF_ALL else owners[len(expected)]
+        names = owners(tree, quantity)
         for owner, e, f in zip(names, expected.reshape(len(names), -1), found.reshape(len(names), -1)):
             off, tolerance = np.abs(e - f), FACTOR * EPS * np.abs(e).max()
-            whole = quantity in WHOLE
+            whole = quantity in WHOLE_NUMBERS
             value, bound, rule = (f[0], e[0], "equal") if whole else (off.max(), tolerance, "at most")
             result.check(owner, quantity, value, bound, unit, rounding=not whole, rule=rule)
             for k, (a, b) in enumerate(zip(e, f)):
                 about = {"of": owner, "quantity": quantity, "component": component(k, len(e))}
                 result.rows.append(about | {"stated": a, "compiled": b, "difference": b - a, "unit": unit})
-            causes += named(owner, quantity, e, f, off, tolerance)
+            causes += causes_in(tree, owner, quantity, e, f, off, tolerance)
     sample = setup.random
-    for source, force in setup.engine.other_forces(sample.q, sample.qd).items():
+    for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         most = float(np.abs(force).max())
         check = result.check(sample.name, f"no forces of {source}", most, 0.0, "N m")
         if not check.passed and not any(cause["quantity"] in EXPLAINED[source] for cause in causes):
@@ -94,14 +108,14 @@ def rows(setup) -> Result:
             text = f"{place}: none stated, up to {most:.3g} N m found"
             about = {"rank": 2, "place": place, "stated": 0.0, "found": most, "text": text}
             causes.append(about | {"size": np.inf, "quantity": place})
-    for option, value in options(setup.engine).items():
+    for option, value in options(setup.engines["mujoco"], dynamics).items():
         result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
     result.curves["com"] = compiled["com"]
     result.curves["causes"] = sorted(causes, key=lambda cause: (cause["rank"], -cause["size"]))
     return result
 
 
-def named(owner, quantity, stated, found, off, tolerance) -> list[dict]:
+def causes_in(tree, owner, quantity, stated, found, off, tolerance) -> list[dict]:
     """The causes in one quantity of one hinge or body: each number that is off by more than the tolerance.
 
     Rank 1: an option, or a convention of a hinge (its order, its sign, its zero); 2: one number.
@@ -114,17 +128,17 @@ def named(owner, quantity, stated, found, off, tolerance) -> list[dict]:
         if not difference <= tolerance:
             place = " ".join(filter(None, (quantity, component(k, len(stated))))) + of
             share = difference / tolerance if tolerance else np.inf
-            causes.append(cause(rank, quantity, place, a, b, share, " (the opposite sign)" * flipped))
+            causes.append(cause(tree, rank, quantity, place, a, b, share, " (the opposite sign)" * flipped))
     return causes
 
 
-def cause(rank, quantity, place, stated, found, size, remark="") -> dict:
+def cause(tree, rank, quantity, place, stated, found, size, remark="") -> dict:
     """A cause with its sentence; size: its difference over its tolerance."""
-    unit = UNITS[quantity]
+    unit = QUANTITIES[quantity]
     if quantity.startswith("flag "):
         values = ["enable" if number else "disable" for number in (stated, found)]
     elif quantity == "parent":
-        values = [("the world", *tmt.ARM.hinge_names)[int(number) + 1] for number in (stated, found)]
+        values = [("the world", *tree.hinge_names)[int(number) + 1] for number in (stated, found)]
     else:
         values = [f"{number:.7g} {unit}".rstrip() for number in (stated, found)]
         if values[0] == values[1]:
@@ -135,14 +149,14 @@ def cause(rank, quantity, place, stated, found, size, remark="") -> dict:
     return about | {"size": float(size), "quantity": quantity}
 
 
-def component(k, count) -> str:
+def component(k: int, count: int) -> str:
     """The k-th of 1, 3 or 9 components by name."""
     if count == 1:
         return ""
     return "xyz"[k] if count == 3 else "xyz"[k // 3] + "xyz"[k % 3]
 
 
-def figures(result):
-    from . import draw  # matplotlib is for the process that draws
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
+    from . import figures as draw  # matplotlib is for the process that draws
 
-    yield draw.sketch
+    yield partial(draw.sketch, robot)

@@ -8,8 +8,8 @@ from tmt.reference import distance
 
 from .scale import EPS, FACTOR
 
-SHOWN = ["scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
-         "tmt_from_exact_eps", "mujoco_from_exact_eps"]  # fmt: skip
+AGREEMENT = ["scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
+             "tmt_from_exact_eps", "mujoco_from_exact_eps"]  # fmt: skip
 
 RULES = {  # of a verdict: the words between a value and its tolerance, and what passes
     "at most": lambda value, tolerance: value <= tolerance,
@@ -135,7 +135,7 @@ class Result:
         )
         curves = {name: np.sort(values) for name, values in in_eps.items()}
         self.curves.setdefault(sample.name, {})[quantity] = curves
-        self.shown = SHOWN
+        self.shown = AGREEMENT
 
 
 def numbers(values) -> str:

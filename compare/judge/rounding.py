@@ -86,13 +86,19 @@ def band(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: flo
 def growth(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int) -> np.ndarray:
     """log10 of how much a small difference of the state at the start has grown, at every so many steps.
 
-    The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled on the way so that it may grow without limit.
+    The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled on the way so that it may grow without limit. NaN from where
+    the run has diverged.
     """
-    product, scale, result = np.eye(2 * q.shape[1]), 0.0, [0.0]
-    for k, J in enumerate(amplification(stepping, tree, q[:-1], qd[:-1], tau, dt)):
+    product, scale = np.eye(2 * q.shape[1]), 0.0
+    finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
+    result = np.full((len(q) - 1) // every + 1, np.nan)
+    result[0] = 0.0
+    for k, J in enumerate(amplification(stepping, tree, q[:-1], qd[:-1], tau, dt), start=1):
         product = J @ product
-        if (k + 1) % every == 0:
+        if not (finite[k] and np.isfinite(product).all()):
+            break
+        if k % every == 0:
             size = np.linalg.norm(product, 2)
             product, scale = product / size, scale + np.log10(size)
-            result.append(scale)
-    return np.array(result)
+            result[k // every] = scale
+    return result

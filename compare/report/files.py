@@ -17,8 +17,8 @@ def write(folder, sections, robot, origin, result, causes=(), skipped=()) -> Non
         for name, rows in section.tables.items():
             save(folder / "tables" / f"{name}.csv", plain(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
     checks = [check.record() for section in sections for check in section.result.checks]
-    save(folder / "report.md", markdown(sections, robot, origin, result, causes))
-    save(folder / "index.html", page(folder, sections, robot, origin, result, causes))
+    save(folder / "report.md", markdown(sections, robot, origin, result, causes, skipped))
+    save(folder / "index.html", page(folder, sections, robot, origin, result, causes, skipped))
     origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
     results = {
         "passed": passed(sections),

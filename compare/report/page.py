@@ -12,18 +12,34 @@ import pandas as pd
 from .questions import answers
 from .verdict import outcome, passed
 
-TITLE = "TMT and MuJoCo compared on a human arm"
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
 DIGITS |= dict.fromkeys(
     ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
 )
 FOLDED = 30  # rows: a longer table is folded in the HTML
-INTRO = (
-    "A human arm, two rigid bodies on three hinges, modelled twice: as MJCF, run by MuJoCo, and by the TMT method in a "
-    "program that shares nothing with it. Each difference stands beside a tolerance that was fixed beforehand (column bar); "
-    "'exact' is the method in 50-digit arithmetic, and distances from it are in eps = 2.2e-16 of the quantity's scale. Of the "
-    "states in a row, the largest difference is the largest of all; the worst is the one that comes closest to its tolerance."
-)
+
+
+def title(robot) -> str:
+    return f"TMT and MuJoCo compared on {robot.described or robot.name}"
+
+
+def introduction(robot) -> str:
+    """What is compared, and how its tables are read."""
+    tree, named = robot.tree, robot.described or robot.name
+    bodies, hinges = (in_words(count) for count in (len(tree.body_names), len(tree.hinge_names)))
+    return (
+        f"{named[:1].upper()}{named[1:]}, {bodies} rigid bodies on {hinges} hinges, modelled twice: as MJCF, run by MuJoCo, and "
+        "by the TMT method in a program that shares nothing with it. Each difference stands beside a tolerance that was "
+        "fixed beforehand (column bar); 'exact' is the method in 50-digit arithmetic, and distances from it are in eps = "
+        "2.2e-16 of the quantity's scale. Of the states in a row, the largest difference is the largest of all; the worst is "
+        "the one that comes closest to its tolerance."
+    )
+
+
+def in_words(count: int) -> str:
+    """A small number in words."""
+    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+    return words[count] if count < len(words) else str(count)
 
 
 def shown(table, columns=None) -> pd.DataFrame:
@@ -47,8 +63,13 @@ def of_causes(causes) -> pd.DataFrame:
 
 
 def questions(sections, robot) -> pd.DataFrame:
-    """The assignment's questions and their answers as a table for readers."""
+    """What was asked and the answers, as a table for readers."""
     return pd.DataFrame(answers(sections, robot), columns=["part", "asked", "answered in", "answer"])
+
+
+def asked_by(robot) -> str:
+    """The heading of the questions."""
+    return "The assignment's questions" if robot.questions else "Questions"
 
 
 def failing(section) -> pd.DataFrame:
@@ -57,11 +78,13 @@ def failing(section) -> pd.DataFrame:
     return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
 
 
-def markdown(sections, robot, origin, result, causes=()) -> str:
+def markdown(sections, robot, origin, result, causes=(), skipped=()) -> str:
     """The report as Markdown; `result`: the verdict; `causes`: of what fails."""
-    lines = [f"# {TITLE}", f"**{result}**"]
+    lines = [f"# {title(robot)}", f"**{result}**"]
     lines += ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
-    lines += [INTRO, "## The assignment's questions", md_table(questions(sections, robot))]
+    lines += [introduction(robot)]
+    asked = questions(sections, robot)
+    lines += [f"## {asked_by(robot)}", md_table(asked)] if len(asked) else []
     for section in sections:
         failed = failing(section)
         lines += [
@@ -79,6 +102,7 @@ def markdown(sections, robot, origin, result, causes=()) -> str:
         lines += [f"- {note}" for note in section.result.notes]
         for name, caption in section.figures:
             lines += [f"![{name}](figures/{name}.png)", caption]
+    lines += ["## Skipped", *(f"- {name}: {reason}." for name, reason in skipped)] if skipped else []
     lines += ["## Where this comes from", md_table(origins(origin))]
     return "\n\n".join(lines).replace("\n\n- ", "\n- ") + "\n"
 
@@ -101,18 +125,16 @@ def origins(origin) -> pd.DataFrame:
     return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
 
 
-def page(folder, sections, robot, origin, result, causes=()) -> str:
+def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
     """The report as one HTML file with its figures inside."""
     body = (
         ["<h2>Causes (1: an option or a convention, 2: a number)</h2>", html_table(of_causes(causes), "text")]
         if causes
         else []
     )
-    body += [
-        f"<p>{html.escape(INTRO)}</p>",
-        '<h2 id="questions">The assignment\'s questions</h2>',
-        html_table(questions(sections, robot), "text"),
-    ]
+    asked = questions(sections, robot)
+    body.append(f"<p>{html.escape(introduction(robot))}</p>")
+    body += [f'<h2 id="questions">{html.escape(asked_by(robot))}</h2>', html_table(asked, "text")] if len(asked) else []
     for section in sections:
         failed = failing(section)
         body += [
@@ -134,10 +156,17 @@ def page(folder, sections, robot, origin, result, causes=()) -> str:
         body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:
             body.append("<ul>" + "".join(f"<li>{words(note)}</li>" for note in section.result.notes) + "</ul>")
+    if skipped:
+        reasons = "".join(f"<li>{name}: {words(reason)}.</li>" for name, reason in skipped)
+        body.append(f'<h2 id="skipped">Skipped</h2><ul>{reasons}</ul>')
     body += ['<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
-    links = [("questions", "questions"), *((s.name, s.name) for s in sections), ("provenance", "provenance")]
+    links = [
+        *[("questions", "questions")] * bool(len(asked)),
+        *((s.name, s.name) for s in sections),
+        ("provenance", "provenance"),
+    ]
     return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
-        title=TITLE,
+        title=title(robot),
         colour="#009E73" if passed(sections) else "#D55E00",
         verdict=html.escape(result),
         contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),

@@ -16,7 +16,10 @@ PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath
 
 
 def provenance(command: str, model, shown: str, seed: int) -> dict:
-    """What a reader needs to repeat the run: command, model (a file, and how it is shown), versions, machine, commit, seed; `seconds` come at its end."""
+    """What a reader needs to repeat the run: command, model, versions, machine, commit, seed; `seconds` come at its end.
+
+    model: the file; shown: how the report calls it.
+    """
     return {
         "command": readable(command),
         "model": readable(shown),
@@ -46,10 +49,10 @@ def commit() -> str | None:
     if not (root / ".git").exists():
         return None
     try:
-        told = [
+        said = [
             subprocess.run(["git", "-C", root, *words], capture_output=True, check=True).stdout.decode().strip()
             for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", ":/", ":!/reports"])
         ]
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
-    return told[0] + (" with uncommitted changes" if told[1] else "")
+    return said[0] + (" with uncommitted changes" if said[1] else "")

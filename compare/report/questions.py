@@ -16,8 +16,8 @@ def answer(results, kind, *of) -> str:
         return f"figure '{of[0]}'"
     if kind == "printed":
         return printed(results, of)
-    told = "; ".join(apart(results, *of[k : k + 3]) for k in range(0, len(of), 3))
-    return told + far_from_true(results) if "trajectory" in of else told
+    texts = "; ".join(apart(results, *of[k : k + 3]) for k in range(0, len(of), 3))
+    return texts + far_from_true(results) if "trajectory" in of else texts
 
 
 def apart(results, name, quantity, where) -> str:
@@ -58,13 +58,14 @@ def far_from_true(results) -> str:
     errors = results["trajectory"].curves.get("errors") if "trajectory" in results else None
     if not errors:
         return ""
-    told = [
+    of_scenes = [
         f"{scene}: " + " and ".join("diverged" if error is None else f"{error:.2g}" for error in of_scene)
         for scene, of_scene in errors.items()
     ]
+    coarsest = min(steps for _, _, steps in results["trajectory"].curves["runs"])
     return (
-        f". Agreement is not truth: with its 64 steps the runs of TMT and MuJoCo are at most so many rad from the true "
-        f"motion: {'; '.join(told)}"
+        f". Agreement is not truth: with its {coarsest} steps the runs of TMT and MuJoCo are at most so many rad from the true "
+        f"motion: {'; '.join(of_scenes)}"
     )
 
 

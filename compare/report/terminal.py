@@ -41,8 +41,8 @@ class Terminal:
         """What is under way, in one line."""
         if self.status:
             self.beside.width = max(self.err.columns() or 80, 20)
-            room = self.beside.width - 6  # the spinner, and what a terminal shows of Ctrl-C
-            self.status.update(Text(text if len(text) <= room else text[: room - 3] + "..."))
+            space = self.beside.width - 6  # the spinner, and what a terminal shows of Ctrl-C
+            self.status.update(Text(text if len(text) <= space else text[: space - 3] + "..."))
 
     @contextmanager
     def progress(self, text):

@@ -1,7 +1,7 @@
 """What is known of one robot. Everything that only the assignment's arm has is in arm.py."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import tmt
 
 from ..case import Case, Scene
 
+
 class Printed(NamedTuple):
     """One printed answer."""
 
@@ -19,10 +20,11 @@ class Printed(NamedTuple):
     posture: str
     values: tuple
     unit: str
-    half_digit: float  # half a unit of the last printed digit; 0: zero but for rounding
-    torque: str = "none"  # or the item whose answer acts
-    to_every_digit: tuple = ()  # who meets a value that is rounding alone, of "exact", "tmt"
-    sizes: tuple = ()  # the components whose size alone exact arithmetic shares
+    half_digit: float  # half a unit of the last printed digit
+    torque: str = "none"  # or the item whose answer acts: the torque that holds its posture
+    is_rounding: bool = False  # zero but for rounding: compared with the exact value, not with what is printed
+    to_every_digit: tuple = ()  # who meets the digits of what is rounding alone, of "exact", "tmt"
+    sizes: tuple = ()  # the joints whose component exact arithmetic shares in its size alone
 
 
 class Question(NamedTuple):
@@ -38,6 +40,7 @@ class Claims(NamedTuple):
     """What is claimed of a robot that is held at a posture with the torque that balances gravity there, by RK4."""
 
     dt: float  # s, the step of the claims
+    duration: float  # s, of a run of the claims
     left: str  # the posture that is left, because of rounding
     left_after: float  # s, about
     kept: str  # the posture that is not left
@@ -58,8 +61,10 @@ class Conditioning(NamedTuple):
 class Robot:
     """One robot: a file, the numbers that are stated of it, and what is asked of it.
 
-    Scenes have tags: "quick": part of a quick run; "digits": compared with many digits of its own scheme; "speed": followed
-    by every method; "regular": errors fall regularly there from coarse steps on; "fewer joints": some of its joints never move.
+    Scenes may have tags: "full only": a quick run leaves it out; "digits": compared with many digits of its own scheme (a small
+    run takes the last of them); "speed": followed by every method; "regular": errors fall regularly there from coarse steps on;
+    "fewer joints": some of its joints never move; "own": a user's, of which nothing is expected but agreement. A scene without
+    tags is part of every run.
     """
 
     name: str
@@ -67,15 +72,18 @@ class Robot:
     tree: tmt.Tree  # the stated numbers
     postures: Mapping[str, tuple]  # deg, by name; the joints in the order of the Tree
     scenes: tuple[Scene, ...]
+    described: str = ""  # in a sentence: "a human arm"
     symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
-    kinds: Mapping[str, str] = field(default_factory=dict)  # kind (centre, saddle, marginal): posture; else the first of it
+    kinds: Mapping[str, str] = field(default_factory=dict)  # centre, saddle, marginal: the posture that stands for it
     landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins
+    sketched: tuple[str, ...] = ()  # the postures of the sketch; none: the first two
+    axes: tuple[str, str, str] = ("x", "y", "z")  # of the inertial frame, as they are written there
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     conditioning: Conditioning | None = None
     aims: Mapping[tuple[str, float], float] = field(default_factory=dict)  # (scene, rad): MuJoCo's time over tmt's, aimed at
     questions: tuple[Question, ...] = ()
-    remarks: Callable | None = None  # (the printed answers, by item; dynamics by engine) -> sentences on what is printed
+    remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -94,6 +102,10 @@ class Robot:
     def cases(self) -> tuple[Case, ...]:
         """Its scenes."""
         return tuple(Case(self, scene) for scene in self.scenes)
+
+    def with_scenes(self, scenes: tuple[Scene, ...]) -> "Robot":
+        """The same robot with more scenes."""
+        return replace(self, scenes=self.scenes + scenes)
 
     def symbol(self, joint: str) -> str:
         return self.symbols.get(joint, joint)

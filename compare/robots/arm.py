@@ -17,24 +17,26 @@ POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "bent": (30, 20, 60),
 }
 SCENES = (
-    Scene("zero, free", "zero", "free", tags=("speed", "fewer joints")),
-    Scene("ball catch, free", "ball catch", "free", tags=("quick", "digits", "speed")),
-    Scene("bent, free", "bent", "free", tags=("quick", "digits", "speed", "regular")),
-    Scene("ball catch, held", "ball catch", "hold", judged=2.5, tags=("quick",)),  # unstable: rounding grows fast
-    Scene("bent, held", "bent", "hold", tags=("quick",)),
-    Scene("bent, damped", "bent", "free", damping=0.5, tags=("speed",)),
-    Scene("thrown, no gravity", "bent", "free", speed=(100.0, 200.0, -150.0), gravity=False, judged=4.5),
-    Scene("elbow swing", "zero", "free", locked=("alpha", "beta"), tags=("fewer joints",)),
+    Scene("zero, free", "zero", "free", tags=("full only", "speed", "fewer joints")),
+    Scene("ball catch, free", "ball catch", "free", tags=("digits", "speed")),
+    Scene("bent, free", "bent", "free", tags=("digits", "speed", "regular")),
+    Scene("ball catch, held", "ball catch", "hold", judged=2.5),  # unstable: rounding grows fast
+    Scene("bent, held", "bent", "hold"),
+    Scene("bent, damped", "bent", "free", damping=0.5, tags=("full only", "speed")),
+    Scene("thrown, no gravity", "bent", "free", (100.0, 200.0, -150.0), gravity=False, judged=4.5, tags=("full only",)),
+    Scene("elbow swing", "zero", "free", locked=("alpha", "beta"), tags=("full only", "fewer joints")),
 )
 PRINTED = (
     Printed("c", "holding torque", "zero", (-2.2072, 0.0, -2.2072), "N m", 0.5e-4),
     Printed("f1", "qdd", "zero", (0.0, 0.0, 41.8436), "rad/s2", 0.5e-4),
-    Printed("f2", "qdd", "hanging", (0.1641e-14, 0.0, 0.3021e-14), "rad/s2", 0.0, sizes=("alpha",)),
-    Printed("f3", "qdd", "upright", (-0.3456e-14, 0.0, 0.0192e-14), "rad/s2", 0.0, to_every_digit=("exact", "tmt")),
-    Printed("f4", "qdd", "zero", (0.0, 0.0, 0.0), "rad/s2", 0.0, torque="c"),
+    Printed("f2", "qdd", "hanging", (0.1641e-14, 0.0, 0.3021e-14), "rad/s2", 0.5e-18, is_rounding=True,
+            sizes=("alpha",)),
+    Printed("f3", "qdd", "upright", (-0.3456e-14, 0.0, 0.0192e-14), "rad/s2", 0.5e-18, is_rounding=True,
+            to_every_digit=("exact", "tmt")),
+    Printed("f4", "qdd", "zero", (0.0, 0.0, 0.0), "rad/s2", 0.0, torque="c", is_rounding=True),
     Printed("g", "Mbar", "zero", ((0.2445, 0.0, 0.0527), (0.0, 0.1938, 0.0), (0.0527, 0.0, 0.0527)), "kg m2", 0.5e-4),
     Printed("h", "holding torque", "ball catch", (-2.6164, 1.9627, 0.8135), "N m", 0.5e-4),
-)
+)  # fmt: skip
 QUESTIONS = (
     Question("a", "sketch of the arm with its hinges", "parameters", ("figure", "arm")),
     Question("b", "positions of the centres of mass", "kinematics", ("largest", "kinematics", "x_b", {})),
@@ -50,6 +52,7 @@ QUESTIONS = (
 )  # fmt: skip
 CLAIMS = Claims(
     dt=5 / 64,
+    duration=5.0,
     left="ball catch",
     left_after=4.5,
     kept="bent",
@@ -78,7 +81,7 @@ def landmarks(q) -> dict:
 def remarks(answers, dynamics) -> list[str]:
     """The slips of the original, with what is right.
 
-    answers: of each printed item (exact, TMT's, MuJoCo's values); dynamics: of the arm, by engine.
+    answers: by item, what TMT (`.tmt`) and MuJoCo (`.mujoco`) find; dynamics: of the arm, by engine.
     """
     q, qd = ARM.posture("ball catch"), np.ones(3)
     c, s = np.cos(q[1]), np.sin(q[1])
@@ -92,7 +95,7 @@ def remarks(answers, dynamics) -> list[str]:
         name: ", ".join(f"{np.abs(values - omega).max():.1e} rad/s from {of}'s" for of, omega in right.items())
         for name, values in texts.items()
     }
-    _, ours, theirs = answers["c"]
+    ours, theirs = answers["c"].tmt, answers["c"].mujoco
     printed = PRINTED[0].values[0]
     signs = ["the sign" if printed * value > 0.0 else "not the sign" for value in (ours[0], theirs[0])]
     return [
@@ -118,9 +121,12 @@ ARM = Robot(
     tree=tmt.ARM,
     postures=POSTURES,
     scenes=SCENES,
+    described="a human arm",
     symbols={"alpha": "α", "beta": "β", "gamma": "γ"},
     kinds={"centre": "bent", "saddle": "ball catch", "marginal": "zero"},
     landmarks=landmarks,
+    sketched=("zero", "ball catch"),
+    axes=("x north", "y west", "z up"),
     printed=PRINTED,
     claims=CLAIMS,
     conditioning=Conditioning(("beta", "gamma"), (90.0, 90.0)),

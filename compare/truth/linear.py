@@ -99,7 +99,7 @@ class Held:
         small = NEGLIGIBLE * np.abs(values).max()
         if values.real.max() > small:
             return "saddle"
-        return "marginal" if np.abs(values).min() < small else "centre"
+        return "marginal" if np.abs(values).min() <= small else "centre"
 
     def step(self, name, dt) -> np.ndarray:
         """What one step of a method of tmt does to a small deviation, (..., 2n, 2n) for dt of shape (...)."""
@@ -174,6 +174,13 @@ def kinds(robot) -> dict[str, str]:
 def of_kind(robot, kind: str) -> str | None:
     """The posture that stands for a kind: the robot's choice, else the first of that kind; None: there is none."""
     return robot.kinds.get(kind) or next((name for name, found in kinds(robot).items() if found == kind), None)
+
+
+def all_of_kind(robot, kind: str) -> tuple[str, ...]:
+    """The postures of a kind, the one that stands for it first."""
+    first = of_kind(robot, kind)
+    others = (name for name, found in kinds(robot).items() if found == kind and name != first)
+    return () if first is None else (first, *others)
 
 
 def region(name, z: np.ndarray) -> np.ndarray:

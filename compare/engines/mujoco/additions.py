@@ -1,29 +1,37 @@
 """What may be added to a model in MuJoCo, each as an edit of the file's MjSpec."""
 
+from collections.abc import Callable
+
 import mujoco
+import numpy as np
 
-from .engine import FLAGS, INTEGRATORS, Engine
-from .engine_lock import read
+from .dynamics import FLAGS, INTEGRATORS, MujocoDynamics
+from .engine import Mujoco
+from .lock import read
 
-STAGES = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # of a step, that the minimal model leaves out
-RADIUS = 0.03  # m, of the capsules
-FAR, NEAR = -2.0, -0.4  # m, height of a floor that the arm cannot reach, and of one that it falls on
-NOTHING = "nothing (minimal)"
+LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
+MINIMAL = "nothing (minimal)"
 AGAIN = "nothing, timed again"
-CONTACT = "default flags + capsules + floor in reach"
+CAPSULES = "default flags + capsules"
+ON_FLOOR = f"{CAPSULES} + floor in reach"
 
 
-def with_additions(engine) -> dict:
-    """Engines that have one thing more than the minimal model, the loaded one without contact and constraint stages."""
+def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> dict[str, Mujoco]:
+    """Engines that have one thing more than the minimal model, the loaded one without contact and constraint stages.
+
+    radius: of the capsules, m; near, far: heights of a floor in reach and of one out of reach, m. No joint of these engines can
+    be locked.
+    """
 
     def capsules(spec):
         for body in engine.bodies:
-            ends = [0.0] * 3 + list(2.0 * engine.model.body_ipos[body])  # as long again beyond the centre of mass
-            spec.bodies[body].add_geom(
-                type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=ends, size=[RADIUS, 0.0, 0.0], mass=0.0
-            )
+            end = 2.0 * engine.model.body_ipos[body]  # as long again beyond the centre of mass
+            shape = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "fromto": [0.0] * 3 + list(end)}
+            if np.linalg.norm(end) < radius:  # too short for a capsule
+                shape = {"type": mujoco.mjtGeom.mjGEOM_SPHERE}
+            spec.bodies[body].add_geom(**shape, size=[radius, 0.0, 0.0], mass=0.0)
 
-    def floor(spec, height=FAR):
+    def floor(spec, height=far):
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[0.0, 0.0, height], size=[2.0, 2.0, 0.1])
 
     def stage(spec, name):
@@ -34,11 +42,11 @@ def with_additions(engine) -> dict:
 
     def sensors(spec):
         for kind in (mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL):
-            for hinge in engine.hinges:
-                spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=hinge)
+            for joint in engine.joints:
+                spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
 
     def motor(spec):
-        spec.add_actuator(target=engine.hinges[-1], trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        spec.add_actuator(target=engine.joints[-1], trntype=mujoco.mjtTrn.mjTRN_JOINT)
 
     def default(spec):
         spec.option.disableflags = spec.option.enableflags = 0
@@ -46,39 +54,41 @@ def with_additions(engine) -> dict:
     def default_with(*more):
         return lambda spec: [edit(spec) for edit in (default, *more)]
 
+    many = {1: "a capsule", 2: "two capsules"}.get(len(engine.bodies), f"{len(engine.bodies)} capsules")
     edits = {
-        NOTHING: lambda spec: None,
+        MINIMAL: lambda spec: None,
         AGAIN: lambda spec: None,
-        "two capsules": capsules,
+        many: capsules,
         "a floor": floor,
         "contact stage": lambda spec: stage(spec, "contact"),
         "constraint stage": lambda spec: stage(spec, "constraint"),
         "energy flag": energy,
-        f"{2 * len(engine.hinges)} sensors": sensors,
+        f"{2 * len(engine.joints)} sensors": sensors,
         "a motor": motor,
         "default flags": default,
-        "default flags + capsules": default_with(capsules),
-        "default flags + capsules + floor out of reach": default_with(capsules, floor),
-        CONTACT: default_with(capsules, lambda spec: floor(spec, NEAR)),
+        CAPSULES: default_with(capsules),
+        f"{CAPSULES} + floor out of reach": default_with(capsules, floor),
+        ON_FLOOR: default_with(capsules, lambda spec: floor(spec, near)),
     }
     return {name: edited(engine, edit) for name, edit in edits.items()}
 
 
-def edited(engine, edit) -> Engine:
+def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     """The engine's model from its file, its contact and constraint stages off, with an edit."""
     spec = read(engine.source)
-    spec.option.disableflags |= STAGES
+    spec.option.disableflags |= LEFT_OUT
     edit(spec)
-    return Engine(spec.compile(), engine.hinges, engine.carriers, engine.source)
+    return Mujoco(spec.compile(), engine.joints, engine.carriers, None)
 
 
-def contacts(engine, q, qd, tau, dt, steps, integrator) -> float:
-    """How many contacts there are in a step of a run, on average."""
-    model, data = mujoco.MjModel.__copy__(engine.model), mujoco.MjData(engine.model)
+def contacts(dynamics: MujocoDynamics, q, v, tau, dt: float, steps: int, integrator: str) -> tuple[float, bool]:
+    """How many contacts there are in a step of a run, on average, and whether any of them pushes a joint."""
+    model, data = mujoco.MjModel.__copy__(dynamics.model), mujoco.MjData(dynamics.model)
     model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
-    data.qpos[engine.qpos], data.qvel[engine.dofs], data.qfrc_applied[engine.dofs] = q, qd, tau
-    total = 0
+    data.qpos[dynamics.qpos], data.qvel[dynamics.dofs], data.qfrc_applied[dynamics.dofs] = q, v, tau
+    total, pushed = 0, False
     for _ in range(steps):
         mujoco.mj_step(model, data)
         total += data.ncon
-    return total / steps
+        pushed |= bool(data.ncon and data.qfrc_constraint.any())
+    return total / steps, pushed

@@ -149,17 +149,16 @@ class MujocoDynamics:
 
         From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
         """
-        refuse_tolerance(method, tolerance)
+        refuse_tolerance(tolerance, method)
         shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
         starts, follow = self.runner(q, v, tau, dt, steps, method)
         *paths, ended = self.path(starts, follow(), dt)
         q, v = (path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
-        return Motion(
-            dt * np.arange(steps + 1), q, v, len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()], steps
-        )
+        evaluations, ended = len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()]
+        return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
 
     def prepare(self, q, v, tau, setting: Setting, method):
-        refuse_tolerance(method, setting.tolerance)
+        refuse_tolerance(setting.tolerance, method)
         every, dt = setting.every, setting.duration / setting.steps
         starts, run = self.runner(q, v, tau, dt, setting.steps, method)
         t = np.linspace(0.0, setting.duration, GRID + 1)
@@ -245,7 +244,6 @@ class MujocoDynamics:
         return np.stack([T, self._to_body(B)])
 
 
-def refuse_tolerance(method, tolerance) -> None:
-    """Raise ValueError if a tolerance is given: none of the integrators takes one."""
+def refuse_tolerance(tolerance, method) -> None:
     if tolerance is not None:
         raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")

@@ -17,12 +17,14 @@ SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme
 METHODS = {
     name: Method("mujoco", name, 4 if name == "RK4" else 1, SCHEMES[name]) for name in SCHEMES if name in INTEGRATORS
 }
+MODELS = 64  # that are kept: those of the cases that were asked for last
 
 
 class Mujoco:
     """MuJoCo with one compiled model of given joints.
 
-    A body is the one that moves with the joint named in `carriers`. source: what the model was read from, a Path or MJCF text.
+    A body is the one that moves with the joint named in `carriers`. source: what the model was read from, a Path or MJCF text;
+    None if it was changed since then, so that no joint can be taken out.
     """
 
     name = "mujoco"
@@ -30,7 +32,7 @@ class Mujoco:
 
     def __init__(self, model, joints, carriers, source):
         self.integrator = model.opt.integrator  # of the file
-        self.model, self.source, self.carriers = model, source, list(carriers)
+        self.model, self.source, self.joints, self.carriers = model, source, tuple(joints), list(carriers)
         joint_ids = {name: model.joint(name).id for name in joints}
         self.bodies = [int(model.jnt_bodyid[joint_ids[name]]) for name in carriers]
         self.known = {}
@@ -47,16 +49,15 @@ class Mujoco:
         A model with locked joints is compiled from the source again, without them. ModelError if that is not possible.
         """
         changes = tuple(case.locked.items()), bool(case.scene.gravity), float(case.scene.damping), case.joints
-        if changes not in self.known:
-            self.known[changes] = MujocoDynamics(self.changed(case), case.coordinates, self.bodies)
-        return self.known[changes]
+        dynamics = self.known.pop(changes, None) or MujocoDynamics(self.changed(case), case.coordinates, self.bodies)
+        self.known[changes] = dynamics
+        if len(self.known) > MODELS:
+            del self.known[next(iter(self.known))]
+        return dynamics
 
     def changed(self, case) -> mujoco.MjModel:
         """The model with what the case changes."""
-        if case.locked:
-            model = locked_model(self.source, case.locked)
-        else:
-            model = mujoco.MjModel.__copy__(self.model)
+        model = locked_model(self.source, case.locked) if case.locked else mujoco.MjModel.__copy__(self.model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
         model.dof_damping[:] += case.scene.damping

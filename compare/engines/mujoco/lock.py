@@ -35,8 +35,11 @@ def read(source) -> mujoco.MjSpec:
 def locked_model(source, angles: dict) -> mujoco.MjModel:
     """The compiled model without the joints that are named in `angles`, {name: rad}; every body keeps its number.
 
-    Keyframes and sensors go, and so do the actuators and equalities of a locked joint. ModelError if more refers to it.
+    Keyframes and sensors go, and so do the actuators and equalities of a locked joint. ModelError if more refers to it, or
+    there is no source.
     """
+    if source is None:
+        raise ModelError(f"a model that was changed after it was read cannot have {', '.join(angles)} locked")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the compiler's, of the file as it is

@@ -1,56 +1,95 @@
 """What each thing that is added to the minimal model costs in MuJoCo, and whether it changes the motion."""
 
+import dataclasses
+
 import numpy as np
 
-from . import engine_cost
-from .clock import fastest
-from .scenes import SCENES
+import tmt
 
-TIMED = 128  # steps of a timed run: short enough to pass between the interruptions of a machine that is in use
-INTEGRATORS = ("Euler", "RK4")
-SETTLED = 0.5  # N m s/rad, with which the arm comes to rest on the floor
+from ...case import Case
+from ...engines import Setting
+from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR, contacts, with_additions
+from ...judge.run import step_in_words
+from ...judge.scale import reaches
+from ...judge.timing import fastest
+from ...robots import Robot
+from .times import TIMED_STEPS, TWO_INTEGRATORS
+
+FALL_TIME, FALL_STEPS = 5.0, 1024  # s, long enough to come to rest on the floor; of the run whose bits are compared
+SETTLED = 0.5  # N m s/rad, with which the robot comes to rest
 
 
-def costs(result, engine, rounds) -> None:
-    """A table: time of a step with each thing added, as a ratio to the minimal model, and bits of five seconds."""
-    engines = engine_cost.with_additions(engine)
-    scene = next(scene for scene in SCENES if scene.name == "bent, free")
-    dt, steps = scene.duration / 1024, 1024
-    # all are timed from where the arm rests on the floor that is in reach, so that there the contact stays
-    on_floor = engines[engine_cost.CONTACT].variant(damping=SETTLED)
-    _, *rest = on_floor.trajectory(*scene.start, scene.tau, dt, steps, "Euler")
-    rest = [path[-1] for path in rest]
+def costs(result, setup, rounds: int) -> None:
+    """A table: time of a step with each thing added, as a ratio to the minimal model, and bits of a fall."""
+    case = fall(setup.robot)
+    dt, timed = case.scene.dt, TIMED_STEPS["mujoco"]
+    engines = with_additions(setup.engines["mujoco"], *sizes(setup.robot.tree))
+    models = {name: engine.of(case) for name, engine in engines.items()}
+    # all are timed from where the robot rests on the floor that is in reach, so that there the contact stays
+    damped = engines[ON_FLOOR].of(case.changed(damping=case.scene.damping + SETTLED))
+    settled = damped.run(*case.start, case.tau, dt, FALL_STEPS, "Euler")
+    rest = settled.q[-1], settled.v[-1], case.tau
     runs = {
-        (name, integrator): engine.runner(*rest, scene.tau, dt, TIMED, integrator)[1]
-        for name, engine in engines.items()
-        for integrator in INTEGRATORS
+        (name, integrator): dynamics.prepare(*rest, Setting(dt * timed, timed), integrator)[0]
+        for name, dynamics in models.items()
+        for integrator in TWO_INTEGRATORS
     }
     seconds = fastest(runs, rounds)
-    paths, touching = {}, {}
+    paths, touching, pushed = {}, {}, set()
     for name, integrator in runs:
-        path = engines[name].trajectory(*scene.start, scene.tau, dt, steps, integrator)[1:]
-        paths[name, integrator] = np.concatenate(path, axis=1)
-        touching[name, integrator] = engine_cost.contacts(engines[name], *rest, scene.tau, dt, TIMED, integrator)
+        fallen = *case.start, case.tau, dt, FALL_STEPS, integrator
+        motion = models[name].run(*fallen)
+        paths[name, integrator] = np.concatenate([motion.q, motion.v], axis=1)
+        touching[name, integrator], _ = contacts(models[name], *rest, dt, timed, integrator)
+        if name.startswith(CAPSULES) and contacts(models[name], *fallen)[1]:
+            pushed.add((name, integrator))
     result.tables["cost_in_mujoco"] = table(seconds, paths, touching)
-    judge(result, f"{scene.name}, dt = 5/{steps} s", result.tables["cost_in_mujoco"])
+    check_bits(result, f"{case.name}, {step_in_words(case, FALL_STEPS)}", result.tables["cost_in_mujoco"], pushed)
+    if not pushed:
+        result.notes.append(f"{case.name}: the floor that is in reach pushes no joint, nor does anything else.")
+
+
+def fall(robot: Robot) -> Case:
+    """The whole robot let go under gravity for five seconds.
+
+    As in the scene where errors fall regularly, else in its first scene that lets it go, else from its first posture.
+    """
+    falls = [case for case in robot.cases if case.is_free and case.scene.gravity and not case.locked]
+    regular = [case for case in falls if "regular" in case.scene.tags]
+    case = (regular + falls + [robot.case("let go", posture=next(iter(robot.postures), ()))])[0]
+    return case.changed(duration=FALL_TIME, dt=FALL_TIME / FALL_STEPS, judged=None)
+
+
+def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
+    """Radius of capsules, heights of a floor in reach and of one out of reach of a Tree, m.
+
+    By the largest distance of a centre of mass from the base, to six digits, for the robot may reach twice as far; of the arm
+    0.03, -0.4 and -2.
+    """
+    base = [offset for parent, offset in zip(tree.parent, tree.offset) if parent < 0]
+    offset = [(0.0, 0.0, 0.0) if parent < 0 else offset for parent, offset in zip(tree.parent, tree.offset)]
+    reach = reaches(dataclasses.replace(tree, offset=offset)).max()
+    radius, near, far = (float(f"{part * reach:.6g}") for part in (1 / 15, 8 / 9, 40 / 9))
+    lowest = min(height for *_, height in base)
+    return radius, lowest - near, lowest - far
 
 
 def table(seconds, paths, touching) -> list[dict]:
     """The rows, by integrator, from what is known of each (addition, integrator).
 
-    seconds: of a run of 128 steps; paths: (steps + 1, 2 n), rad and rad/s; touching: contacts in a step.
+    seconds: of a timed run; paths: (steps + 1, 2 n), rad and rad/s; touching: contacts in a step.
     """
     rows = []
-    for name, integrator in sorted(paths, key=lambda key: INTEGRATORS.index(key[1])):
-        path, minimal = paths[name, integrator], paths[engine_cost.NOTHING, integrator]
+    for name, integrator in sorted(paths, key=lambda key: TWO_INTEGRATORS.index(key[1])):
+        path, minimal = paths[name, integrator], paths[MINIMAL, integrator]
         apart = np.abs(path - minimal)[:, : path.shape[1] // 2].max()
         taken = seconds[name, integrator]
         rows.append(
             {
                 "added": name,
                 "integrator": integrator,
-                "ns_per_step": 1e9 * taken / TIMED,
-                "ratio": taken / seconds[engine_cost.NOTHING, integrator],
+                "ns_per_step": 1e9 * taken / TIMED_STEPS["mujoco"],
+                "ratio": taken / seconds[MINIMAL, integrator],
                 "contacts_per_step": touching[name, integrator],
                 "same_bits": np.array_equal(path, minimal),
                 "max_difference_rad": float(apart) if np.isfinite(apart) else None,
@@ -59,14 +98,16 @@ def table(seconds, paths, touching) -> list[dict]:
     return rows
 
 
-def judge(result, where, rows) -> None:
-    """Checks: what exerts no force leaves the bits of the motion, and the floor in reach does not.
+def check_bits(result, where: str, rows, pushed) -> None:
+    """Checks: what exerts no force leaves the bits of the motion, and capsules that something pushes do not.
 
-    The minimal model itself, which is timed twice, is not compared with its own copy.
+    pushed: of which (addition, integrator) that is so. The minimal model itself, which is timed twice, is not compared with its
+    own copy.
     """
     for row in rows:
-        changed, scene = int(not row["same_bits"]), f"{where}, {row['integrator']}"
-        if row["added"] == engine_cost.CONTACT:
-            result.check(scene, f"another motion with {row['added']}", changed, 1, "runs that differ", rule="equal")
-        elif row["added"] not in (engine_cost.NOTHING, engine_cost.AGAIN):
-            result.check(scene, f"the same bits with {row['added']}", changed, 0, "runs that differ", rule="equal")
+        name, integrator, changed = row["added"], row["integrator"], int(not row["same_bits"])
+        scene, unit = f"{where}, {integrator}", "runs that differ"
+        if (name, integrator) in pushed:
+            result.check(scene, f"another motion with {name}", changed, 1, unit, rule="equal")
+        elif name not in (MINIMAL, AGAIN):
+            result.check(scene, f"the same bits with {name}", changed, 0, unit, rule="equal")

@@ -1,122 +1,186 @@
-"""Both engines against motions that are known exactly: the swing of the elbow, small oscillations about hanging."""
+"""Both engines against motions that are known exactly: swings of a single free joint, small oscillations about an equilibrium."""
 
 import numpy as np
 
 import tmt
-from tmt.methods import METHODS
 from tmt.reference import DIGITS, distance
 
-from .agreement import EPS, FACTOR
-from .cost import INTEGRATORS
-from .exact_motion import exact_swing, modes, pendulum, small_oscillation, swing
-from .motion import ORDER_MARGIN, TWINS
-from .scenes import posture
+from ...case import SEED, Case
+from ...engines import LABELS
+from ...judge.run import MOVES, ORDER_MARGIN
+from ...judge.scale import EPS, FACTOR, gravity_scale, mass_scale
+from ...robots import Robot
+from ...truth.linear import held, modes, small_oscillation
+from ...truth.pendulum import exact_swing, pendulum, swing
+from .times import TWO_INTEGRATORS, method_of
 
-SWINGS = (4, 8, 16, 32, 64, 128)  # times the scene's own steps
+SWING_STEPS = (4, 8, 16, 32, 64, 128)  # times the case's own steps
+MOST_SWING_STEPS = 2**20  # finer steps show rounding and no order
+DIGITS_AT = 32  # equal times at which the elliptic function is compared with that of many digits
 ROUNDED = 1e-11  # rad: smaller errors are not those of the method alone
-COMPARED = 16  # of these, those that the table has
+IN_TABLE = 16  # of the SWING_STEPS, those that the table has
 AMPLITUDES = (0.16, 0.08, 0.04, 0.02, 0.01)  # rad, each half of the one before
-DURATION = 5.0  # s
-FINE, LESS_FINE = 8192, 1024  # steps, at which the error of RK4 is far below that of the linear modes
+OSCILLATION, MOST_TURNED = 5.0, 60.0  # s; rad, by which the fastest mode may turn in it at most
+OSCILLATION_STEPS, LESS_FINE = 8192, 1024  # at which the error of RK4 is far below that of the linear modes
 
 
-def swings(result, engine, scenes) -> None:
-    """Each scene in which one hinge is free, a physical pendulum, against its elliptic function."""
-    for scene in scenes:
-        if len(scene.hinges) == 1 and scene.torque == "free" and scene.gravity and not scene.damping:
-            (q,), (qd,) = scene.start
-            if np.isfinite(swing(0.0, q, qd, *pendulum(scene.model))):  # one that turns over is another function
-                of_pendulum(result, scene.engine(engine), scene)
+# a single free joint
 
 
-def of_pendulum(result, engine, scene) -> None:
+def swings(result, setup, cases) -> None:
+    """Each case in which one joint is free, a physical pendulum, against its elliptic function."""
+    for case in cases:
+        if len(case.joints) == 1 and case.is_free and case.scene.gravity and not any(case.tree.damping):
+            t = np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
+            exact = elliptic(case, t)
+            if reason := not_compared(case, exact):
+                result.notes.append(f"{case.name}: not compared with an elliptic function, for {reason}.")
+            else:
+                of_pendulum(result, setup, case, t, exact)
+
+
+def elliptic(case: Case, t: np.ndarray) -> np.ndarray:
+    """The exact angle at times t in s, rad; NaN of one that turns over."""
+    (q,), (v,) = case.start
+    hanging, frequency = pendulum(case.tree)
+    return swing(t, q, v, hanging, frequency) if frequency else np.full_like(t, np.nan)
+
+
+def not_compared(case: Case, exact: np.ndarray) -> str | None:
+    """Why a pendulum shows nothing beside its exact motion, (times,) rad, or None."""
+    if not np.isfinite(exact).all():
+        return "it turns over"
+    if np.ptp(exact) < MOVES:
+        return f"it moves by {np.ptp(exact):.1e} rad only"
+    if SWING_STEPS[-1] * case.steps > MOST_SWING_STEPS:
+        return f"its {case.steps} steps are so fine that rounding hides the order"
+    return None
+
+
+def of_pendulum(result, setup, case: Case, t, exact) -> None:
     """Errors of both engines against the elliptic function, which fall at the method's order; that function's own."""
-    (q,), (qd,) = scene.start
-    hanging, frequency = pendulum(scene.model)
-    t = np.linspace(0.0, scene.duration, SWINGS[0] * scene.steps + 1)
-    exact = swing(t, q, qd, hanging, frequency)
-    off = distance(exact[::8], exact_swing(t[::8], q, qd, hanging, frequency)).max()
+    (q,), (v,) = case.start
+    hanging, frequency = pendulum(case.tree)
+    few = slice(None, None, len(t) // DIGITS_AT)
+    off = distance(exact[few], exact_swing(t[few], q, v, hanging, frequency)).max()
     # rounding of the angle itself, and of the argument times the fastest rate
-    judge_function(result, scene.name, off, np.abs(exact).max() + 2.0 * frequency * scene.duration)
-    errors = {}
-    for integrator in INTEGRATORS:
-        method = TWINS[integrator]
-        for finer in SWINGS:
-            steps = finer * scene.steps
-            arguments = *scene.start, scene.tau, scene.duration / steps, steps
-            paths = {
-                "TMT": tmt.simulate(*arguments, method, scene.model)[1],
-                "MuJoCo": engine.trajectory(*arguments, integrator)[1],
-            }
-            for party, path in paths.items():
-                error = float(np.abs(path[:: finer // SWINGS[0], 0] - exact).max())
-                errors.setdefault((party, integrator), []).append(error)
-                if finer == COMPARED:
-                    result.curves["apart"][scene.name, party, integrator] = error
-    orders = judge_orders(result, scene.name, errors)
-    result.curves["swings"][scene.name] = {
-        "dt": scene.duration / scene.steps / np.array(SWINGS),
-        "errors": errors,
-        "orders": orders,
-    }
-    best = {party: errors[party, "RK4"][-1] for party in ("TMT", "MuJoCo")}
+    check_function(result, case.name, off, np.abs(exact).max() + 2.0 * frequency * case.duration)
+    engines, errors, stated = setup.compared(case), {}, {}
+    for integrator in TWO_INTEGRATORS:
+        stated[integrator] = setup.engines["mujoco"].methods[integrator].order
+        for finer in SWING_STEPS:
+            steps = finer * case.steps
+            for engine, dynamics in engines.items():
+                method = method_of(setup.engines, integrator, engine)
+                path = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method).q
+                error = float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max())
+                errors.setdefault((engine, integrator), []).append(error)
+                if finer == IN_TABLE:
+                    result.curves["apart"][case.name, engine, integrator] = error
+    orders = check_falling(result, case.name, errors, stated)
+    dt = case.duration / case.steps / np.array(SWING_STEPS)
+    result.curves["swings"][case.name] = {"dt": dt, "errors": errors, "orders": orders, "stated": stated}
+    ours, theirs = (errors[engine, "RK4"][-1] for engine in ("tmt", "mujoco"))
     result.notes.append(
-        f"{scene.name}: a physical pendulum, whose small swings have {frequency:.4f} rad/s. With {steps} steps of RK4 TMT "
-        f"is at most {best['TMT']:.2e} rad from the elliptic function, and MuJoCo {best['MuJoCo']:.2e} rad, in "
-        f"{scene.duration:g} s."
+        f"{case.name}: a physical pendulum, whose small swings have {frequency:.4f} rad/s. With {steps} steps of RK4 TMT "
+        f"is at most {ours:.2e} rad from the elliptic function, and MuJoCo {theirs:.2e} rad, in {case.duration:g} s."
     )
 
 
-def judge_function(result, scene, off, scale) -> None:
+def check_function(result, scene: str, off: float, scale: float) -> None:
     """A check: the elliptic function in doubles is that with 50 digits, but for rounding. off, scale: rad."""
     result.check(scene, f"elliptic function, scipy to {DIGITS} digits", off, FACTOR * EPS * scale, "rad", rounding=True)
 
 
-def judge_orders(result, scene, errors) -> dict:
-    """Checks: errors fall at the method's order. errors, orders: {(engine, integrator): ...}, rad, each step half the last.
+def check_falling(result, scene: str, errors, stated) -> dict:
+    """Checks: errors fall at the method's order. errors: {(engine, integrator): rad, each step half the last}; orders found.
 
-    Measured between the last two errors above 1e-11 rad, below which rounding comes in.
+    stated: the order of each integrator. Measured between the last two errors above 1e-11 rad, below which rounding comes in;
+    where there are no two, no order can be measured.
     """
     orders = {}
-    for (party, integrator), values in errors.items():
-        order = METHODS[TWINS[integrator]].order
-        clear = max(2, sum(value > ROUNDED for value in values))
+    for (engine, integrator), values in errors.items():
+        clear = np.argmin([*(not value <= ROUNDED for value in values), False])  # so many, from the first on
+        where, order = f"{scene}, {integrator}, {LABELS[engine]}", stated[integrator]
+        if clear < 2:
+            result.notes.append(f"{where}: no order can be measured, the errors of so fine steps are rounding.")
+            continue
         with np.errstate(divide="ignore", invalid="ignore"):
-            orders[party, integrator] = float(np.log2(np.divide(values[clear - 2], values[clear - 1])))
-        off = abs(orders[party, integrator] - order)
-        where = f"{scene}, {integrator}, {party}"
+            orders[engine, integrator] = float(np.log2(np.divide(values[clear - 2], values[clear - 1])))
+        off = abs(orders[engine, integrator] - order)
         result.check(where, f"order of the error against the elliptic function, from {order}", off, ORDER_MARGIN, "")
     return orders
 
 
-def small_oscillations(result, engine, amplitudes=AMPLITUDES, fine=FINE) -> None:
-    """The whole arm let go near hanging: relative distance from the linear modes falls with the amplitude squared."""
-    q, rest, away = posture("hanging"), np.zeros(3), np.ones(3)
-    off = {"TMT": [], "MuJoCo": []}
+# an equilibrium
+
+
+def small_oscillations(result, setup, amplitudes=AMPLITUDES, steps=OSCILLATION_STEPS) -> None:
+    """The whole robot let go near an equilibrium: relative distance from the linear modes falls with the amplitude squared."""
+    robot, tree = setup.robot, setup.robot.tree
+    posture = equilibrium(robot)
+    if posture is None:
+        why = "its damping" if any(tree.damping) else "no named posture is stable without a torque"
+        result.notes.append(f"Small oscillations of the {robot.name} are not compared with its linear modes: {why}.")
+        return
+    q, rest, away = robot.posture(posture), np.zeros(len(robot.joints)), np.ones(len(robot.joints))
+    frequencies, _ = modes(tree, q)
+    duration = min(OSCILLATION, MOST_TURNED / frequencies[-1])
+    sides, dt = (1.0,) if odd(tree, q) else (1.0, -1.0), duration / steps
+    off = {"tmt": [], "mujoco": []}
     for amplitude in amplitudes:
-        run = q + amplitude * away, rest, rest, DURATION / fine, fine
-        t, ours, _ = tmt.simulate(*run)
-        linear = small_oscillation(t, tmt.ARM, q, amplitude * away)
-        for party, path in (("TMT", ours), ("MuJoCo", engine.trajectory(*run)[1])):
-            off[party].append(float(np.abs(path - linear).max() / amplitude))
-    powers = judge_modes(result, off)
-    frequencies, _ = modes(tmt.ARM, q)
+        linear = small_oscillation(dt * np.arange(steps + 1), tree, q, amplitude * away)
+        for engine, dynamics in setup.compared().items():
+            method = method_of(setup.engines, "RK4", engine)
+            starts = [q + side * amplitude * away for side in sides]
+            paths = [dynamics.run(start, rest, rest, dt, steps, method).q for start in starts]
+            path = paths[0] if len(paths) == 1 else q + (paths[0] - paths[1]) / 2.0
+            off[engine].append(float(np.abs(path - linear).max() / amplitude))
+    powers = check_modes(result, posture, off)
     result.curves["small"] = {
-        "amplitude": np.array(amplitudes), "off": off, "frequencies": frequencies, "powers": powers, "duration": DURATION,
+        "posture": posture, "amplitude": np.array(amplitudes), "off": off, "frequencies": frequencies, "powers": powers,
+        "duration": duration, "sides": len(sides),
     }  # fmt: skip
     result.notes.append(
-        f"About hanging the linear modes have {', '.join(f'{f:.4f}' for f in frequencies)} rad/s. Let go {amplitudes[-1]} rad "
-        f"away in each hinge, TMT's arm is {off['TMT'][-1]:.2e} of that from them at most in {DURATION:g} s, MuJoCo's "
-        f"{off['MuJoCo'][-1]:.2e}."
+        f"About {posture} the linear modes have {', '.join(f'{f:.4f}' for f in frequencies)} rad/s. Let go {amplitudes[-1]} rad "
+        f"away in each hinge, TMT's {robot.name} is {off['tmt'][-1]:.2e} of that from them at most in {duration:.3g} s, MuJoCo's "
+        f"{off['mujoco'][-1]:.2e}."
     )
 
 
-def judge_modes(result, off) -> dict:
+def equilibrium(robot: Robot) -> str | None:
+    """The named posture that needs no torque and is stable, the one of least potential energy; None: there is none.
+
+    None of a robot with damping too, whose modes decay.
+    """
+    tree = robot.tree
+    if any(tree.damping):
+        return None
+    torques = {name: np.abs(tmt.gravity_balance(robot.posture(name), tree)).max() for name in robot.postures}
+    rest = [name for name, torque in torques.items() if torque <= FACTOR * EPS * gravity_scale(tree)]
+    stable = [name for name in rest if held(robot, name).kind == "centre"]
+    return min(stable, key=lambda name: float(tmt.potential_energy(robot.posture(name), tree)), default=None)
+
+
+def odd(tree: tmt.Tree, q: np.ndarray) -> bool:
+    """Whether a motion about q, (n,) rad, that starts on the other side is the mirrored one: its distance from the linear modes
+    goes with the amplitude squared. Else half the difference of the two motions does.
+
+    That is, whether Mbar is the same and the torque of gravity the opposite on the other side, at random places.
+    """
+    away = np.random.default_rng(SEED).uniform(-1.0, 1.0, (3, len(q)))
+    masses, torques = ([f(q + side * away, tree) for side in (1, -1)] for f in (tmt.mass_matrix, tmt.gravity_balance))
+    same = np.abs(masses[0] - masses[1]).max(axis=(1, 2)) <= FACTOR * EPS * mass_scale(tree, q + away)
+    opposite = np.abs(torques[0] + torques[1]).max(axis=1) <= FACTOR * EPS * gravity_scale(tree)
+    return bool(same.all() and opposite.all())
+
+
+def check_modes(result, posture: str, off) -> dict:
     """Checks: halving the amplitude divides the relative distance from the linear modes by 4. off, powers: by engine."""
     powers = {}
-    for party, values in off.items():
+    for engine, values in off.items():
         with np.errstate(divide="ignore", invalid="ignore"):
-            powers[party] = float(np.log2(np.divide(values[-2], values[-1])))
+            powers[engine] = float(np.log2(np.divide(values[-2], values[-1])))
         what = "power of the amplitude with which the distance from the linear modes falls, from 2"
-        result.check(f"hanging, {party}", what, abs(powers[party] - 2.0), ORDER_MARGIN, "")
+        result.check(f"{posture}, {LABELS[engine]}", what, abs(powers[engine] - 2.0), ORDER_MARGIN, "")
     return powers

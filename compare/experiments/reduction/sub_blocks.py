@@ -1,88 +1,97 @@
-"""Every subset of hinges locked: Mbar and the bias of what is left against the sub-blocks of the whole model."""
+"""Every subset of joints locked: Mbar and the bias of what is left against the sub-blocks of the whole model."""
 
-from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
 
-import tmt
-from tmt.kernels import slope_source
+from ...case import SEED, Case
+from ...judge.check import largest
+from ...judge.scale import EPS, FACTOR, bias_scale, mass_scale
+from .times import operations
 
-from .agreement import EPS, FACTOR, SEED, bias_scale, largest, mass_scale
-from .scenes import HINGES
-
-STATES = 20  # of the free hinges, for each choice of the locked angles
-UNITS = {"Mbar": "kg m2", "bias": "N m"}
+STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
+MOST_SUBSETS = 126  # all of seven joints; of more joints so many are chosen at random
+BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 
 
-def compare(result, engine, angles) -> None:
+def compare(result, setup, angles: int) -> None:
     """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
-    rng = np.random.default_rng(SEED)
-    for locked in (names for count in range(1, len(HINGES)) for names in combinations(HINGES, count)):
-        found = {}  # (quantity, parties): differences and scales, a pair of arrays for each choice of angles
+    robot, rng = setup.robot, np.random.default_rng(SEED)
+    for locked in subsets(robot.joints):
+        found = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
-            q, qd = rng.uniform(-np.pi, np.pi, (STATES, 3)), rng.uniform(-10.0, 10.0, (STATES, 3))
-            at = {name: float(q[0, HINGES.index(name)]) for name in locked}
-            for quantity, parties, apart, scale in differences(engine, at, q, qd):
-                found.setdefault((quantity, parties), []).append((apart, scale))
+            q = robot.case().coordinates.random(rng, STATES_OF_SUBSET)
+            v = rng.uniform(-10.0, 10.0, q.shape)
+            case = robot.case(words_of(locked), posture=tuple(np.degrees(q[0])), locked=locked)
+            for quantity, pair, apart, scale in differences(setup, case, q, v):
+                found.setdefault((quantity, pair), []).append((apart, scale))
         counts = {
-            "operations_whole": operations(tmt.ARM),
-            "operations_locked_at_zero": operations(tmt.ARM.lock(dict.fromkeys(locked, 0.0))),
-            "operations_locked_at_angles": operations(tmt.ARM.lock(at)),
+            "operations_whole": operations(robot.tree),
+            "operations_locked_at_zero": operations(robot.tree.lock(dict.fromkeys(locked, 0.0))),
+            "operations_locked_at_angles": operations(case.tree),
         }
-        for (quantity, parties), pairs in found.items():
-            judge(result, locked, quantity, parties, *np.concatenate(pairs, axis=1), counts)
+        for (quantity, pair), arrays in found.items():
+            check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts)
 
 
-def judge(result, locked, quantity, parties, apart, scale, counts) -> None:
+def subsets(joints) -> list[tuple[str, ...]]:
+    """The sets of joints to be locked, the small ones first: all but none and all, or so many of them chosen at random."""
+    if 2 ** len(joints) - 2 <= MOST_SUBSETS:
+        return [names for count in range(1, len(joints)) for names in combinations(joints, count)]
+    rng, chosen = np.random.default_rng(SEED), {}
+    while len(chosen) < MOST_SUBSETS:
+        places = rng.choice(len(joints), rng.integers(1, len(joints)), replace=False)
+        chosen[tuple(joints[i] for i in sorted(places))] = None
+    return sorted(chosen, key=len)
+
+
+def words_of(locked) -> str:
+    return f"{' and '.join(locked)} locked"
+
+
+def check_blocks(result, locked, quantity: str, pair: str, apart, scale, counts) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
-    bar = FACTOR * EPS * scale
-    worst = int(np.argmax(np.where(np.isfinite(apart), apart / bar, np.inf)))
-    where = f"{' and '.join(locked)} locked"
-    check = result.check(where, f"{quantity}, {parties}", apart[worst], bar[worst], UNITS[quantity], rounding=True)
+    tolerance = FACTOR * EPS * scale
+    worst = int(np.argmax(np.where(np.isfinite(apart), apart / tolerance, np.inf)))
+    unit, name = BLOCK_UNITS[quantity], f"{quantity}, {pair}"
+    check = result.check(words_of(locked), name, apart[worst], tolerance[worst], unit, rounding=True)
     result.tables["reduction_subsets"].append(
         {
             "locked": " ".join(locked),
             "quantity": quantity,
-            "parties": parties,
+            "parties": pair,
             "states": len(apart),
             "largest_difference": float(apart.max()) if np.isfinite(apart).all() else None,
-            "unit": UNITS[quantity],
-            "difference_over_bar": check.over_bar,
+            "unit": unit,
+            "difference_over_bar": check.over_tolerance,
         }
         | counts
     )
 
 
-def differences(engine, at, q, qd):
-    """(quantity, parties, difference, scale) of the states q, qd with the hinges in `at`, {name: rad}, locked there."""
-    free = [i for i, name in enumerate(HINGES) if name not in at]
-    q, qd = q.copy(), qd.copy()
-    for name, angle in at.items():
-        q[:, HINGES.index(name)], qd[:, HINGES.index(name)] = angle, 0.0
-    block = np.ix_(range(len(q)), free, free)
-    tree, smaller = tmt.ARM.lock(at), engine.lock(at)
-    state = q[:, free], qd[:, free]
-    whole = {
-        "Mbar": (tmt.mass_matrix(q)[block], engine.mass_matrix(q)[block]),
-        "bias": (tmt.bias(q, qd)[:, free], engine.bias(q, qd)[:, free]),
+def differences(setup, case: Case, q, v):
+    """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it."""
+    joints, tree = setup.robot.joints, setup.robot.tree
+    free = [i for i, name in enumerate(joints) if name in case.joints]
+    q, v = q.copy(), v.copy()
+    for name, angle in case.locked.items():
+        q[:, joints.index(name)], v[:, joints.index(name)] = angle, 0.0
+    block, state = np.ix_(range(len(q)), free, free), (q[:, free], v[:, free])
+    whole, left = setup.compared(), setup.compared(case)
+    of_whole = {
+        "Mbar": [whole[name].mass_matrix(q)[block] for name in ("tmt", "mujoco")],
+        "bias": [whole[name].bias(q, v)[:, free] for name in ("tmt", "mujoco")],
     }
-    left = {
-        "Mbar": (tmt.mass_matrix(state[0], tree), smaller.mass_matrix(state[0])),
-        "bias": (tmt.bias(*state, tree), smaller.bias(*state)),
+    of_left = {
+        "Mbar": [left[name].mass_matrix(state[0]) for name in ("tmt", "mujoco")],
+        "bias": [left[name].bias(*state) for name in ("tmt", "mujoco")],
     }
-    for quantity, scale in (("Mbar", mass_scale(q)), ("bias", bias_scale(q, qd))):
+    for quantity, scale in (("Mbar", mass_scale(tree, q)), ("bias", bias_scale(tree, q, v))):
         pairs = {
-            "TMT, reduced to whole": (left[quantity][0], whole[quantity][0]),
-            "MuJoCo, reduced to whole": (left[quantity][1], whole[quantity][1]),
-            "reduced, TMT to MuJoCo": left[quantity],
+            "TMT, reduced to whole": (of_left[quantity][0], of_whole[quantity][0]),
+            "MuJoCo, reduced to whole": (of_left[quantity][1], of_whole[quantity][1]),
+            "reduced, TMT to MuJoCo": of_left[quantity],
         }
-        for parties, (one, other) in pairs.items():
-            yield quantity, parties, largest(one - other), scale
-
-
-@lru_cache
-def operations(tree, method="rk4") -> int:
-    """Operations of one evaluation of the accelerations in the compiled code of a tree and a method."""
-    return slope_source(tree, method)[1]
+        for pair, (one, other) in pairs.items():
+            yield quantity, pair, largest(one - other), scale

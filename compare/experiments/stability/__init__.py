@@ -1,191 +1,171 @@
-"""Stability: where each method fails, predicted from one step of it and shown in runs, on the full three-hinge arm."""
+"""Stability: where each method fails, predicted from one step of it and shown in runs, with all joints together."""
 
 from functools import partial
 from itertools import product
 
 import numpy as np
 
-from . import beyond, claims, departure, failure, limits, long_runs
-from .agreement import EPS, Result
-from .engine_linear import NUDGE, transition
-from .linear import held, region
-from .motion import SCHEMES, TWINS
-from .parties import FEW, PARTIES, Party
-from .scenes import POSTURES, posture
+from ...engines import same_scheme
+from ...judge.check import Result
+from ...truth.linear import held
+from . import beyond, choice, claims, departure, failure, falling, limits, long_runs
+from .claims_judged import check_claims
+from .equilibria import equilibria, planes
+from .subjects import DAMPINGS, places, subjects
 
 TITLE = "Stability: where methods fail"
-CLAIM = (
-    "Every method fails somewhere, and where can be said beforehand. The equations of motion are linearised about "
-    "each held posture by exact derivatives; what one step of a method does to a small deviation there, its "
-    "amplification, gives its limit of dt, its growth per step and the time at which an unstable posture is left. "
-    "Runs of both engines do as predicted, and the assignment's observations follow from the same numbers."
-)
-BAR = (
-    "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
-    "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
-    "max|J| / 1e-6. Limits: the largest dt at which no mode of the equations of motion grows by more than 0.1 % from the "
-    "second to the last quarter of a run from 1e-6 rad (2000 steps, or more until a quarter holds a swing of the slowest "
-    "mode), found by bisection without the prediction, within 0.1 % of the predicted dt. Growth: 0.1 % over all steps. "
-    "Departure (a hinge 0.1 rad away): within one step or 0.03 s of the first crossing of the method's linear map, whose "
-    "angles are rounded to doubles at each step; where the map stays, the run stays."
-)
-CENTRES, SADDLES, DAMPINGS = ("bent", "hanging"), ("ball catch", "upright"), (0.0, 0.5, 50.0)
-DEPARTURE_STEPS = (5 / 64, 1e-2, 1e-3)  # s
+FINE_DEPARTURES = (1e-2, 1e-3)  # s, beside the coarsest step
 MAP_STEPS = np.geomspace(0.03, 1.0, 100)  # s
-CHECKED_STEPS = {0.0: (1e-2, 5 / 64), 0.5: (1e-2, 5 / 64), 50.0: (5e-4,)}  # damping: dt, of the amplification
-NEAR_METHODS = {"TMT": ("implicit", "semi_implicit_euler"), "MuJoCo": ("implicit", "Euler")}
-LESS = FEW + (Party("TMT", "implicit"), Party("MuJoCo", "implicit"))  # of a small run
-SMALL_NEAR = failure.RESONANCE + np.array([-0.01, -0.005, 0.0, 0.005])
+SMALL_RESONANCE = failure.RESONANCE + np.array([-0.01, -0.005, 0.0, 0.005])  # of a small run
+
+
+def claim(robot) -> str:
+    """What is examined."""
+    return (
+        "Every method fails somewhere, and where can be said beforehand. The equations of motion are linearised about "
+        "each held posture by exact derivatives; what one step of a method does to a small deviation there, its "
+        "amplification, gives its limit of dt, its growth per step and the time at which an unstable posture is left. "
+        "Runs of both engines do as predicted"
+        + (", and the assignment's observations follow from the same numbers." if robot.claims else ".")
+    )
+
+
+def tolerance(robot) -> str:
+    """How far apart what is compared may be."""
+    return (
+        "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
+        "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
+        "max|J| / 1e-6. Limits: the largest dt at which no mode of the equations of motion grows by more than 0.1 % from the "
+        "second to the last quarter of a run from 1e-6 rad (2000 steps, or more until a quarter holds a swing of the slowest "
+        "mode), found by bisection without the prediction, within 0.1 % of the predicted dt. Growth: 0.1 % over all steps. "
+        "Departure (a hinge 0.1 rad away): within one step or 0.03 s of the first crossing of the method's linear map, whose "
+        "angles are rounded to doubles at each step; where the map stays, the run stays."
+    )
+
+
+def methods_of(setup) -> tuple:
+    """The methods that a run of this size takes."""
+    few = choice.of_schemes(setup.engines, choice.FEW_SCHEMES)
+    return setup.of(choice.all_methods(setup.engines), few, few + choice.of_schemes(setup.engines, ("implicit",)))
 
 
 def begin(setup) -> None:
     """Set the runs going side by side. A quick run takes fewer methods and scenes, and no map, minute or fine step."""
-    of = setup.of
-    parties = of(PARTIES, FEW, LESS)
-    centres = [*product(CENTRES, DAMPINGS), *((name, 0.0) for name in SADDLES)]
-    scenes = of(centres, [("bent", 0.0), ("ball catch", 0.0)], [("bent", 0.0), ("bent", 0.5), ("ball catch", 0.0)])
-    mapped = tuple(p for p in PARTIES if p.engine == "TMT" or p.method in SCHEMES)
-    mapped = of(mapped, (), mapped[:3])
-    near = tuple(Party(engine, name) for engine in ("TMT", "MuJoCo") for name in NEAR_METHODS[engine])
-    near = of(near, near[:2], near)
-    long = [party for party in PARTIES if party.engine == "TMT" or party.method in SCHEMES]
-    minute = list(product(of(long, [], [p for p in LESS if p in long]), (failure.COARSE, long_runs.FINE)))
-    edges = of(failure.EDGES, (), failure.EDGES)
-    steps = of(limits.STEPS, limits.STEPS, 1000)
-    engine = [setup.engine]
-    beside = of(engine, [], engine)  # what a quick run leaves out
+    robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects(setup.robot)
+    methods, each, coarse = methods_of(setup), choice.of_schemes(engines), choice.coarsest(robot).scene.dt
+    points = of(
+        places(seen.centres, seen.saddles),
+        places(seen.centres[:1], seen.saddles[:1], DAMPINGS[:1]),
+        places(seen.centres[:1], seen.saddles[:1], DAMPINGS[:2]),
+    )
+    leaving = of(choice.of_schemes(engines, departure.DEPARTURE_SCHEMES), methods, methods)
+    leaving_dts = of((coarse, *FINE_DEPARTURES), (coarse,), (coarse, *FINE_DEPARTURES[:1]))
+    rk4, edges = claims.of_claims(engines), tuple(engines["tmt"].methods[name] for name in failure.EDGE_SCHEMES)
+    near = edges + tuple(same_scheme(engines, method, "mujoco") for method in edges)
+    minutes = list(product(of(each, (), methods), (coarse, long_runs.FINE_STEP)))
+    implicit = choice.implicit_methods(engines)
+    steps = of(limits.GROWTH_STEPS, limits.GROWTH_STEPS, 1000)
+    maps = {
+        "map": {"x": of(MAP_STEPS, MAP_STEPS, MAP_STEPS[::20]), "steps": steps, "allowed": limits.GROWTH_ALLOWED},
+        "edge": {"x": of(failure.EDGE_SWINGS, failure.EDGE_SWINGS, failure.EDGE_SWINGS[::50]), "steps": steps,
+                 "y": of(failure.EDGE_SIZES, failure.EDGE_SIZES, failure.EDGE_SIZES[::5])},
+        "near": {"x": of(failure.RESONANT_SWINGS, failure.RESONANT_SWINGS, SMALL_RESONANCE), "steps": limits.GROWTH_STEPS},
+    }  # fmt: skip
 
     def ask(function, *items, **more):
-        return setup.map(partial(function, mujoco=setup.engine, **more), *items)
+        return setup.map(partial(function, engines=engines, **more), *items)
 
-    maps = {
-        "map": {"x": of(MAP_STEPS, MAP_STEPS, MAP_STEPS[::20]), "steps": steps, "allowed": limits.ALLOWED},
-        "edge": {"x": of(failure.EDGE, failure.EDGE, failure.EDGE[::50]), "steps": steps,
-                 "y": of(failure.EDGE_SIZES, failure.EDGE_SIZES, failure.EDGE_SIZES[::5])},
-        "near": {"x": of(failure.NEAR, failure.NEAR, SMALL_NEAR), "steps": limits.STEPS},
-    }  # fmt: skip
+    def about(subject, items):
+        """These items, if the robot has such a subject."""
+        return items if subject else ()
+
+    def claimed(function, full=True, **more):
+        """What becomes of the claims, if there are any; what is not part of a quick run is left out there."""
+        robots = about(robot.claims and (full or not setup.is_quick), (robot,))
+        return setup.map(partial(function, engines, **more), robots)
+
+    mapped = about(seen.centre, of(each, (), each[:3]))
+    resonant, tongues = about(seen.swinging, of(near, near[:2], near)), about(seen.swinging, of(edges, (), edges))
     setup.background["stability"] = {
-        "limits": ask(limits.examine, scenes, parties=parties, steps=steps),
-        "departure": ask(
-            departure.examine,
-            of(DEPARTURE_STEPS, DEPARTURE_STEPS[:1], DEPARTURE_STEPS[:2]),
-            parties=of(departure.SCHEMES, FEW, LESS),
-        ),
-        "zero": ask(
-            departure.zero_law,
-            [party for party in claims.PAIR if party.engine == "TMT" or not setup.is_quick],
-            sizes=of(departure.ZERO_SIZES, departure.ZERO_SIZES, (1e-2, *departure.ZERO_SIZES[4:6])),
-        ),
-        "torques": setup.map(claims.holding_torques, engine),
-        "finer": setup.map(partial(claims.finer_steps, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))), beside),
-        "printed": setup.map(
-            partial(claims.four_decimals, counts=of(claims.PRINTED_COUNTS, claims.PRINTED_COUNTS, (64, 256))), engine
-        ),
-        "bent": setup.map(partial(beyond.bent, counts=of(beyond.COUNTS, (), beyond.COUNTS[::7])), beside),
-        "reset": setup.map(failure.own_reset, engine),
-        "gain": setup.map(failure.silent_gain, engine),
+        "subjects": seen,
+        "limits": ask(limits.examine, [held(robot, *point) for point in points], methods=methods, steps=steps,
+                      growth_dts=tuple(dict.fromkeys((*FINE_DEPARTURES[::-1], coarse)))),
+        "departure": ask(departure.examine, about(seen.saddle, tuple(dict.fromkeys(leaving_dts))), at=seen.saddle,
+                         methods=leaving),
+        "falls": ask(falling.fall, about(seen.marginal, of(rk4, rk4[:1], rk4)), at=seen.marginal,
+                     sizes=of(falling.FALL_SIZES, falling.FALL_SIZES, (1e-2, *falling.FALL_SIZES[4:6]))),
+        "torques": claimed(claims.holding_torques),
+        "finer": claimed(claims.finer_steps, full=False, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))),
+        "printed": claimed(claims.printed_torque, counts=of(claims.PRINTED_COUNTS, claims.PRINTED_COUNTS, (64, 256))),
+        "kept": claimed(beyond.kept, full=False, counts=of(beyond.COUNTS_WITHIN, (), beyond.COUNTS_WITHIN[::7])),
+        "reset": ask(failure.own_reset, about(seen.free, (seen.free,))),
+        "gain": ask(failure.silent_gain, about(seen.free, (seen.free,))),
         "maps": maps,
-        "map": (mapped, ask(limits.map_of_growth, mapped, dts=maps["map"]["x"], steps=steps)),
-        "near": (near, ask(failure.edge, near, sizes=[failure.SMALL, failure.LARGE], swings=maps["near"]["x"])),
-        "edge": (edges, ask(failure.edge, edges, sizes=maps["edge"]["y"], swings=maps["edge"]["x"], steps=steps)),
-        "minutes": ask(
-            long_runs.long_run, *(zip(*minute) if minute else ((), ())), duration=of(long_runs.LONG, 0.0, 10.0)
-        ),
-        "newton": setup.map(
-            partial(
-                long_runs.newton,
-                dts=of(long_runs.NEWTON, (), (0.1, 1.0, 100.0)),
-                steps=of(limits.STEPS, limits.STEPS, 200),
-            ),
-            of(long_runs.IMPLICIT, (), long_runs.IMPLICIT),
-        ),
-    }
+        "map": (mapped, ask(limits.map_of_growth, mapped, at=seen.centre, dts=maps["map"]["x"], steps=steps)),
+        "near": (resonant, ask(failure.edge, resonant, at=seen.centre, swings=maps["near"]["x"],
+                               sizes=[limits.SMALL_DEVIATION, failure.LARGE_DEVIATION])),
+        "edge": (tongues, ask(failure.edge, tongues, at=seen.centre, sizes=maps["edge"]["y"], swings=maps["edge"]["x"],
+                              steps=steps)),
+        "minutes": ask(long_runs.long_run, *(zip(*about(seen.free, minutes)) if seen.free and minutes else ((), ())),
+                       case=seen.free, duration=of(long_runs.MINUTE, 0.0, 10.0)),
+        "newton": ask(long_runs.newton, about(seen.centre, of(implicit, (), implicit)), at=seen.centre,
+                      dts=of(long_runs.NEWTON_STEPS, (), (0.1, 1.0, 100.0)),
+                      steps=of(limits.GROWTH_STEPS, limits.GROWTH_STEPS, 200)),
+    }  # fmt: skip
 
 
 def rows(setup) -> Result:
-    """Equilibria; step limits and growth per step; departures; the published claims; failures beyond the linear ones."""
-    result = Result("stability")
+    """Equilibria; step limits and growth per step; departures; what is claimed; failures beyond the linear ones."""
+    result, robot = Result("stability"), setup.robot
     if "stability" not in setup.background:
         begin(setup)
     work = setup.background.pop("stability")
+    seen, methods = work["subjects"], methods_of(setup)
+    result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
     equilibria(result, setup)
-    limits.judge(result, list(work["limits"]))
-    falls = [row for part in work["zero"] for row in part]
-    departure.judge(result, [row for part in work["departure"] for row in part] + falls, falls)
-    claims.judge(result, *(next(iter(work[name]), None) for name in ("torques", "finer", "printed")))
-    for found in work["bent"]:
-        beyond.judge(result, found)
+    limits.check_limits(result, robot, list(work["limits"]))
+    falls = [row for part in work["falls"] for row in part]
+    departure.check_departures(result, [row for part in work["departure"] for row in part] + falls)
+    falling.check_falls(result, falls)
+    if robot.claims:
+        check_claims(result, robot, *(next(iter(work[name]), None) for name in ("torques", "finer", "printed")))
+    for found in work["kept"]:
+        beyond.check_kept(result, robot, found)
     for name, axes in work["maps"].items():
         result.curves[name] = {**axes, "grown": dict(zip(*work[name]))}
-    failure.judge_near(result, result.curves["near"])
-    failure.judge_silent(result, *work["reset"], *work["gain"])
-    long_runs.judge_minutes(result, list(work["minutes"]))
-    long_runs.judge_newton(result, list(work["newton"]))
+    if seen.swinging:
+        failure.check_near(result, seen.centre.name, result.curves["near"])
+    for reset, gain in zip(work["reset"], work["gain"]):
+        failure.check_silent(result, reset, gain)
+    long_runs.check_minutes(result, list(work["minutes"]))
+    if seen.centre:
+        long_runs.check_newton(result, seen.centre.name, list(work["newton"]))
     result.tables = {name: table for name, table in result.tables.items() if table}
-    planes(result, tuple(dict.fromkeys(party.scheme for party in setup.of(PARTIES, FEW, LESS))))
+    result.notes += seen.left_out
+    planes(result, robot, seen, tuple(dict.fromkeys(method.scheme for method in methods)))
     return result
 
 
-def planes(result, schemes) -> None:
-    """The stability region of each method in the plane of eigenvalue times dt, and where the postures are in it."""
-    x, y = np.linspace(-7.2, 1.8, 226), np.linspace(-0.6, 6.4, 176)
-    z = x[None, :] + 1j * y[:, None]
-    grown = {name: region(name, z) for name in schemes}
-    alike = {name: next(other for other in grown if np.array_equal(grown[other], grown[name])) for name in schemes}
-    result.curves["regions"] = {  # methods that do the same at rest share one
-        tuple(name for name in schemes if alike[name] == first): (x, y, grown[first])
-        for first in dict.fromkeys(alike.values())
-    }
-    result.curves["points"] = {
-        (name, damping): held(name, posture(name), damping).modes[0]
-        for name, damping in (("bent", 0.0), ("bent", 0.5), ("ball catch", 0.0))
-    }
-
-
-def equilibria(result, setup, names=tuple(POSTURES)) -> None:
-    """What each held posture is, and TMT's amplification of a step against MuJoCo's."""
-    table = []
-    for name in names:
-        at = held(name, posture(name))
-        values = at.modes[0]
-        table += [
-            {"scene": name, "kind": at.kind, "mode": k, "real_per_s": float(v.real), "imaginary_per_s": float(v.imag)}
-            for k, v in enumerate(values)
-        ]
-        swings = [f"{v.imag:.3f} rad/s" for v in values if v.imag > 1e-3]
-        grows = [f"{v.real:.3f} per second" for v in values if v.real > 1e-3]
-        told = [f"grows by {' and '.join(grows)}"] * bool(grows) + [f"swings at {', '.join(swings)}"] * bool(swings)
-        kind = at.kind if at.kind == "marginal" else f"a {at.kind}"
-        result.notes.append(f"{name[0].upper()}{name[1:]}, held, is {kind}: {'; '.join(told)}.")
-        for damping, steps in CHECKED_STEPS.items():
-            engine, at = setup.engine.variant(damping=damping), held(name, posture(name), damping)
-            for integrator, dt in product(SCHEMES, steps):
-                where = f"{name}, {integrator}, dt = {dt:.4g} s, damping {damping:g}"
-                theirs = transition(engine, at.q, at.tau, dt, integrator)
-                amplification(result, where, at.q, at.step(TWINS[integrator], dt), theirs)
-    result.tables["stability_modes"] = table
-
-
-def amplification(result, where, q, ours, theirs) -> None:
-    """The check of one amplification: within what rounding does to a difference quotient."""
-    bar = 64 * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max() / NUDGE
-    quantity = "amplification of one step, TMT to MuJoCo"
-    result.check(where, quantity, np.abs(ours - theirs).max(), bar, "", rounding=True)
-
-
-def figures(result):
+def figures(result, robot):
     """Limits, the map of growth, regions, the nonlinear edge; departures; the claims; silent failure; a minute."""
-    from . import draw_departure, draw_failure, draw_stability  # matplotlib is for the processes that draw
+    # matplotlib is for the process that draws
+    from . import figures_claims, figures_departure, figures_failure, figures_limits
 
-    drawn = [
-        draw_stability.limits,
-        draw_stability.regions,
-        draw_departure.times,
-        draw_departure.torques,
-        draw_failure.silent,
-    ]
-    if result.curves["map"]["grown"]:  # all but a quick run
-        drawn += [draw_stability.growth_map, draw_failure.edge, draw_departure.finer, draw_departure.bent]
-        drawn += [draw_departure.zero, draw_failure.minutes]
-    for figure in drawn:
-        yield partial(figure, result)
+    tables, curves, seen = result.tables, result.curves, subjects(robot)
+    falls = [row for row in tables.get("departure", ()) if seen.marginal and row["scene"] == seen.marginal.name]
+    drawn = {
+        figures_limits.limits: bool(seen.centre),
+        figures_limits.regions: True,
+        figures_departure.times: bool(seen.saddle),
+        figures_claims.torques: "stability_torques" in tables,
+        figures_failure.silent: "silent" in curves,
+        figures_limits.growth_map: curves["map"]["grown"],
+        figures_failure.edge: curves["edge"]["grown"],
+        figures_claims.finer_steps: "stability_finer_steps" in tables,
+        figures_claims.kept: "kept" in curves,
+        figures_departure.falls: len({row["engine"] for row in falls}) > 1,  # all but a quick run
+        figures_failure.minutes: curves["minutes"],
+    }
+    for figure, has_data in drawn.items():
+        if has_data:
+            yield partial(figure, result, robot)

@@ -1,137 +1,156 @@
 """Failures that a linear limit does not foresee, or that an engine does not report."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 import tmt
-from tmt.methods import METHODS
 
-from .engine_linear import left_to_itself
-from .limits import ALLOWED, STEPS, growth, stiffest
-from .linear import held
-from .motion import diverged_at
-from .parties import Party
-from .scenes import SCENES, posture
+from ...case import Case
+from ...engines import LABELS, Engine
+from ...engines.mujoco.linear import left_to_itself
+from ...judge.run import diverged_at, step_in_words
+from .choice import fraction
+from .limits import GROWTH_ALLOWED, GROWTH_STEPS, SMALL_DEVIATION, growth, stiffest
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
-EDGE = np.linspace(1.0, 2.03, 207)  # omega dt, across the linear limit of 2
-NEAR = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
+RESONANT_SWINGS = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
+EDGE_SCHEMES = ("implicit", "semi_implicit_euler")  # whose linear limit is an omega dt of 2
+EDGE_SWINGS = np.linspace(1.0, 2.03, 207)  # omega dt, across the linear limit of 2
 EDGE_SIZES = np.geomspace(1e-4, 3e-2, 16)  # rad
-MOST = 1e300  # stands for the growth of a run that has diverged
-SMALL, LARGE = 1e-6, 1e-3  # rad, of the perturbations that are compared at the resonance
-BENT = next(scene for scene in SCENES if scene.name == "bent, free")
-COARSE = 5 / 64  # s
+LARGE_DEVIATION = 1e-3  # rad, with which a small one is compared at the resonance
+DIVERGED_GROWTH = 1e300  # stands for the growth of a run that has diverged
+SWEEPS = 50  # through all joints, in search of the highest and the lowest potential
 
 
-def edge(party, mujoco, sizes, swings, steps=STEPS) -> np.ndarray:
-    """Growth in so many steps at bent along the stiffest mode, (sizes, swings): size in rad, swing = omega dt."""
-    at = held("bent", posture("bent"))
+def edge(method, at, engines: Mapping[str, Engine], sizes, swings, steps=GROWTH_STEPS) -> np.ndarray:
+    """Growth in so many steps along the stiffest mode of a posture, (sizes, swings): size in rad, swing = omega dt."""
     omega, direction = stiffest(at)
     return np.array([
-        [growth(party, mujoco, at, direction, swing / omega, size, steps) for swing in swings] for size in sizes
+        [growth(method, engines, at, direction, swing / omega, size, steps) for swing in swings] for size in sizes
     ])  # fmt: skip
 
 
-def own_reset(mujoco) -> dict:
-    """Bent, free, by MuJoCo's Euler at 5/64 s with its automatic reset on: what a caller sees, and what gives it away."""
-    steps = round(4 * BENT.duration / COARSE)
-    run = left_to_itself(mujoco, *BENT.start, BENT.tau, COARSE, steps, "Euler")
-    t = COARSE * np.arange(steps + 1)
+def own_reset(case: Case, engines: Mapping[str, Engine]) -> dict:
+    """A free motion by MuJoCo's Euler with its automatic reset on: what a caller sees, and what gives it away."""
+    dt, steps = case.scene.dt, 4 * case.steps
+    dynamics = engines["mujoco"].of(case)
+    run = left_to_itself(dynamics, *case.start, case.tau, dt, steps, "Euler")
+    t = dt * np.arange(steps + 1)
     back = np.diff(run["time"]) <= 0.0
     first = int(np.argmax(back)) + 1 if back.any() else None
-    _, *stopped = mujoco.trajectory(*BENT.start, BENT.tau, COARSE, steps, "Euler")
+    stopped = dynamics.run(*case.start, case.tau, dt, steps, "Euler")
     return {
-        **observed(t, run), "resets": int(back.sum()), "first_reset_s": None if first is None else float(t[first]),
+        **observed(case, t, run), "resets": int(back.sum()), "first_reset_s": None if first is None else float(t[first]),
         "finite": bool(np.isfinite(run["q"]).all()), "after_q": None if first is None else run["q"][first],
-        "caught_at_s": diverged_at(BENT, t, *stopped),
+        "caught_at_s": diverged_at(case, t, stopped.q, stopped.v),
     }  # fmt: skip
 
 
-def observed(t, run) -> dict:
+def observed(case, t, run) -> dict:
     """A run that MuJoCo is left to itself with: its energy, J, since when it is wrong, and when that is noticed, s.
 
     since_s: the first time at which it has gained more energy than the range of the potential, or its clock goes back.
     """
     fine = np.isfinite(np.concatenate([run["q"], run["qd"]], axis=1)).all(axis=1)
     energy = np.full(len(t), np.nan)
-    energy[fine] = tmt.energy(run["q"][fine], run["qd"][fine])
-    reach = float(np.ptp(tmt.potential_energy([posture("upright"), posture("hanging")])))
+    energy[fine] = tmt.energy(run["q"][fine], run["qd"][fine], case.tree)
+    reach = potential_range(case)
     wrong = ~(energy - energy[0] <= reach) | np.append(False, np.diff(run["time"]) <= 0.0)
     return {
-        "t": t, "energy": energy, "clock": run["time"], "warnings": run["warnings"], "range": reach,
+        "case": case, "t": t, "energy": energy, "clock": run["time"], "warnings": run["warnings"], "range": reach,
         "gain": float(np.nanmax(energy) - energy[0]), "since_s": float(t[np.argmax(wrong)]) if wrong.any() else None,
-        "caught_in_it_s": caught(BENT, t, run),
+        "caught_in_it_s": caught(case, t, run),
     }  # fmt: skip
 
 
-def caught(scene, t, run) -> float | None:
+def potential_range(case: Case) -> float:
+    """The highest less the lowest potential, J: from the named postures, joint by joint to where it is highest and lowest.
+
+    V is a + b cos q_i + c sin q_i in each angle, so the derivatives there and a quarter of a turn on say where that is.
+    """
+    robot, ends = case.robot, []
+    for sign in (1.0, -1.0):
+        q = np.array([robot.posture(name) for name in robot.postures])
+        for _ in range(SWEEPS):
+            for i, turn in enumerate(np.pi / 2 * np.eye(q.shape[1])):
+                here, ahead = (sign * tmt.gravity_balance(at, case.tree)[:, i] for at in (q, q + turn))
+                q[:, i] += np.arctan2(here, -ahead)
+        ends.append(sign * float((sign * tmt.potential_energy(q, case.tree)).max()))
+    return ends[0] - ends[1]
+
+
+def caught(case, t, run) -> float | None:
     """The first time at which MuJoCo's clock does not advance or the energy is beyond its physical bound, s."""
     back = np.append(False, np.diff(run["time"]) <= 0.0)
     times = [float(t[np.argmax(back)])] if back.any() else []
-    beyond = diverged_at(scene, t, run["q"], run["qd"])
+    beyond = diverged_at(case, t, run["q"], run["qd"])
     return min(times + ([] if beyond is None else [beyond]), default=None)
 
 
-def silent_gain(mujoco) -> dict:
-    """Bent, free, by MuJoCo's `implicit` at 5/64 s: whether it gains energy, and the matrix it solves with.
+def silent_gain(case: Case, engines: Mapping[str, Engine]) -> dict:
+    """A free motion by MuJoCo's `implicit`: whether it gains energy, and the matrix it solves with.
 
-    definite: the smallest eigenvalue of the symmetric part of Mbar + dt D + dt dh/dqd along the run in kg m2, for
-    64, 128 and 256 steps in 5 s; None where the run is not finite.
+    definite: the smallest eigenvalue of the symmetric part of Mbar + dt D + dt dh/dqd along the run in kg m2, for the
+    coarsest steps, twice and four times as many; None where the run is not finite.
     """
-    definite, kept = {}, {}
-    for count in (64, 128, 256):
-        dt = BENT.duration / count
-        run = left_to_itself(mujoco, *BENT.start, BENT.tau, dt, count, "implicit")
+    definite, coarsest = {}, None
+    for count in (case.steps, 2 * case.steps, 4 * case.steps):
+        dt = case.duration / count
+        run = left_to_itself(engines["mujoco"].of(case), *case.start, case.tau, dt, count, "implicit")
         fine = np.isfinite(np.concatenate([run["q"], run["qd"]], axis=1)).all(axis=1)
-        rows = METHODS["implicit"].matrix(tmt.ARM, list(run["q"][fine].T), list(run["qd"][fine].T), dt)
+        rows = tmt.METHODS["implicit"].matrix(case.tree, list(run["q"][fine].T), list(run["qd"][fine].T), dt)
         A = np.array([[np.broadcast_to(entry, fine.sum()) for entry in row] for row in rows]).transpose(2, 0, 1)
         smallest = np.full(count + 1, np.nan)
         smallest[fine] = np.linalg.eigvalsh(0.5 * (A + A.transpose(0, 2, 1)))[:, 0]
         definite[count] = float(smallest.min()) if fine.all() else None
-        kept = kept or {**observed(dt * np.arange(count + 1), run), "smallest": smallest}
-    return kept | {"definite": definite}
+        coarsest = coarsest or {**observed(case, dt * np.arange(count + 1), run), "smallest": smallest}
+    return coarsest | {"definite": definite}
 
 
-EDGES = (Party("TMT", "implicit"), Party("TMT", "semi_implicit_euler"))
-
-
-def judge_near(result, found) -> None:
-    """The resonance. found: of each party the growth (2, swings) from a small and a large perturbation, in `steps`."""
+def check_near(result, posture: str, found) -> None:
+    """The resonance. found: of each method the growth (2, swings) from a small and a large deviation, in `steps`."""
     steps = found["steps"]
-    worst = {party.label: np.minimum(grown.max(axis=1), MOST) for party, grown in found["grown"].items()}
+    worst = {method.label: np.minimum(grown.max(axis=1), DIVERGED_GROWTH) for method, grown in found["grown"].items()}
     for label, (small, large) in worst.items():
-        where, quantity = f"bent, {label}, omega dt near sqrt 3", f"growth in {steps} steps from"
-        result.check(where, f"{quantity} {SMALL:g} rad", small, ALLOWED, "fold")
-        note = "" if large < MOST else f"diverges, for which {MOST:g} stands"
-        result.check(where, f"{quantity} {LARGE:g} rad", large, ALLOWED, "fold", note, rule="at least")
-    told = "; ".join(f"{label} {fold(small)} and {fold(large)}" for label, (small, large) in worst.items())
+        where, quantity = f"{posture}, {label}, omega dt near sqrt 3", f"growth in {steps} steps from"
+        result.check(where, f"{quantity} {SMALL_DEVIATION:g} rad", small, GROWTH_ALLOWED, "fold")
+        note = "" if large < DIVERGED_GROWTH else f"diverges, for which {DIVERGED_GROWTH:g} stands"
+        result.check(where, f"{quantity} {LARGE_DEVIATION:g} rad", large, GROWTH_ALLOWED, "fold", note, rule="at least")
+    by_method = "; ".join(f"{label} {fold(small)} and {fold(large)}" for label, (small, large) in worst.items())
     result.notes.append(
-        f"The nonlinear edge, at bent: at omega dt = sqrt 3 = {RESONANCE:.4f}, below the linear limit of 2, a swing of the "
-        f"stiffest mode takes three steps, a 1:3 resonance. The largest growth near it in {steps} steps, from {SMALL:g} and "
-        f"from {LARGE:g} rad: {told}."
+        f"The nonlinear edge, at {posture}: at omega dt = sqrt 3 = {RESONANCE:.4f}, below the linear limit of 2, a swing of the "
+        f"stiffest mode takes three steps, a 1:3 resonance. The largest growth near it in {steps} steps, from "
+        f"{SMALL_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {by_method}."
     )
 
 
 def fold(grown) -> str:
     """A growth in words."""
-    if not grown < MOST:
+    if not grown < DIVERGED_GROWTH:
         return "diverges"
     return f"{grown:.2f}-fold" if grown < 1e3 else f"{grown:.1e}-fold"
 
 
-def judge_silent(result, reset, gain) -> None:
+def check_silent(result, reset, gain) -> None:
     """Failures that MuJoCo does not report: where one occurs, it must be caught at once."""
     for where, run in (("Euler, automatic reset on", reset), ("implicit", gain)):
         if run["since_s"] is not None:
-            delay = None if run["caught_in_it_s"] is None else run["caught_in_it_s"] - run["since_s"]
+            case, delay = run["case"], None
+            if run["caught_in_it_s"] is not None:
+                delay = run["caught_in_it_s"] - run["since_s"]
             quantity = "time from a silent failure until it is caught"
-            result.check(f"bent, free, MuJoCo {where}, dt = 5/64 s", quantity, delay, COARSE, "s")
-    result.notes += [tell_reset(reset), tell_gain(gain)]
+            where = f"{case.name}, {LABELS['mujoco']} {where}, {step_in_words(case, case.steps)}"
+            result.check(where, quantity, delay, case.scene.dt, "s")
+    result.notes += [reset_in_words(reset), gain_in_words(gain)]
     result.curves["silent"] = {"reset": reset, "gain": gain}
 
 
-def tell_reset(reset) -> str:
+def reset_in_words(reset) -> str:
     """Whether MuJoCo starts a run again by itself, and what gives that away."""
-    text = f"MuJoCo's default, bent, free, by Euler at 5/64 s with its automatic reset on, {reset['t'][-1]:.0f} s: "
+    case = reset["case"]
+    text = f"MuJoCo's default, {case.name}, by Euler at {fraction(case.duration, case.scene.dt)} s with its automatic reset "
+    text += f"on, {reset['t'][-1]:.0f} s: "
     if not reset["resets"]:
         text += "it never starts again, "
         text += (
@@ -141,8 +160,10 @@ def tell_reset(reset) -> str:
         )
     else:
         angles = ", ".join(f"{angle:.1f}" for angle in np.degrees(reset["after_q"]))
-        text += f"a silent failure. It starts again {times(reset['resets'])}, first at {reset['first_reset_s']:.2f} s, from "
-        text += f"({angles}) deg; {'every number' if reset['finite'] else 'not every number'} is finite"
+        text += (
+            f"a silent failure. It starts again {how_often(reset['resets'])}, first at {reset['first_reset_s']:.2f} s, "
+        )
+        text += f"from ({angles}) deg; {'every number' if reset['finite'] else 'not every number'} is finite"
     text += f"; the counters of its warnings stand at {reset['warnings']}. Energy or clock show it at "
     return text + (
         f"{at_time(reset['caught_in_it_s'])}. With the reset off, as everywhere else in this report, the run "
@@ -150,13 +171,14 @@ def tell_reset(reset) -> str:
     )
 
 
-def tell_gain(gain) -> str:
+def gain_in_words(gain) -> str:
     """Whether `implicit` gains energy that is not there, and whether its matrix is definite."""
-    silent, coarse = gain["since_s"] is not None, gain["definite"][64]
+    case, silent, coarse = gain["case"], gain["since_s"] is not None, gain["definite"][min(gain["definite"])]
     least = ", ".join(f"{'none' if v is None else f'{v:.4f} kg m2'} at {n} steps" for n, v in gain["definite"].items())
     text = (
-        f"MuJoCo's `implicit`, bent, free, at 5/64 s: in 5 s the energy rises by {gain['gain']:.3g} J at most, with "
-        f"{gain['warnings']} warnings; the range of the arm's potential is {gain['range']:.1f} J. "
+        f"MuJoCo's `implicit`, {case.name}, at {fraction(case.duration, case.scene.dt)} s: in {case.duration:g} s the energy "
+        f"rises by {gain['gain']:.3g} J at most, with {gain['warnings']} warnings; the range of the {case.robot.name}'s "
+        f"potential is {gain['range']:.1f} J. "
     )
     text += (
         "A silent failure" if silent and not gain["warnings"] else "A failure with warnings" if silent else "No failure"
@@ -164,13 +186,13 @@ def tell_gain(gain) -> str:
     if coarse is not None:
         text += f": the symmetric part of its matrix Mbar + dt dh/dqd {'loses' if coarse <= 0.0 else 'stays'} "
         text += "definiteness" if coarse <= 0.0 else "definite"
-    return (
-        text
-        + f" (smallest eigenvalue in 5 s: {least}). The energy shows a failure at {at_time(gain['caught_in_it_s'])}."
+    return text + (
+        f" (smallest eigenvalue in {case.duration:g} s: {least}). The energy shows a failure at "
+        f"{at_time(gain['caught_in_it_s'])}."
     )
 
 
-def times(count) -> str:
+def how_often(count) -> str:
     """How often, in words."""
     return "once" if count == 1 else f"{count} times"
 

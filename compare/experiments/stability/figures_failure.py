@@ -4,60 +4,67 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from .draw import BLUE, GREEN, ORANGE, RED, WIDTH
-from .draw_stability import style
-from .failure import COARSE, LARGE, RESONANCE, SMALL, fold, tell_gain, tell_reset
-from .motion import TWINS
+from ...engines import LABELS
+from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH
+from ...truth.linear import of_kind
+from .choice import capital, coarsest, fraction, step_text
+from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
+from .figures_limits import look
+from .limits import SMALL_DEVIATION
 
 
-def edge(result):
+def edge(result, robot):
     """The nonlinear edge: tongues of growth over omega dt and the size of the perturbation; the resonance close up."""
     drawn, close = result.curves["edge"], result.curves["near"]
     maps, near, swings = drawn["grown"], close["grown"], close["x"]
     fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
     above, below = fig.subfigures(2, 1, height_ratios=(1.2, 1))
     axes = above.subplots(1, len(maps), sharey=True, squeeze=False)[0]
-    for ax, (party, grown) in zip(axes, maps.items()):
+    for ax, (method, grown) in zip(axes, maps.items()):
         shown = np.clip(np.where(np.isfinite(grown), grown, 1e6), 1.0, 1e6)
         image = ax.pcolormesh(
             drawn["x"], drawn["y"], shown, norm=LogNorm(1, 1e6), cmap="cividis", shading="nearest", rasterized=True
         )
-        ax.set(yscale="log", xlabel="ω dt of the stiffest mode", title=style(party.method)[2])
+        ax.set(yscale="log", xlabel="ω dt of the stiffest mode", title=look(method.name)[2])
         ax.set_xticks([1.0, 1.25, 1.5, RESONANCE, 2.0], ["1", "1.25", "1.5", "√3", "2"])
         ax.grid(visible=False)
     axes[0].set_ylabel("perturbation, rad")
     above.colorbar(image, ax=axes, label=f"growth in {drawn['steps']} steps", extend="max").ax.minorticks_off()
     ax = below.subplots()
     looks = ((RED, "-", ""), (BLUE, "--", ""), (RED, "", "o"), (BLUE, "", "s"))
-    for (party, grown), (colour, dash, mark) in zip(near.items(), looks):
+    for (method, grown), (colour, dash, mark) in zip(near.items(), looks):
         values = np.clip(np.where(np.isfinite(grown[1]), grown[1], 1e9), 1.0, 1e9)
-        name = party.label.replace("semi_implicit_euler", "semi-implicit Euler")
+        name = method.label.replace("semi_implicit_euler", "semi-implicit Euler")
         ax.semilogy(
             swings, values, linestyle=dash or "none", marker=mark, mfc="none", markersize=5, color=colour, label=name
         )
     ax.semilogy(
-        swings, next(iter(near.values()))[0], ":", color="black", label=f"{next(iter(near)).label}, from {SMALL:g} rad"
+        swings,
+        next(iter(near.values()))[0],
+        ":",
+        color="black",
+        label=f"{next(iter(near)).label}, from {SMALL_DEVIATION:g} rad",
     )
     ax.set(
         xlabel="ω dt",
-        ylabel=f"growth in {close['steps']} steps,\nfrom {LARGE:g} rad",
+        ylabel=f"growth in {close['steps']} steps,\nfrom {LARGE_DEVIATION:g} rad",
         xlim=(swings[0], swings[-1]),
         ylim=(0.5, 5e9),
     )
     ax.set_xticks([1.72, RESONANCE, 1.74, 1.75], ["1.72", "√3", "1.74", "1.75"])
     ax.legend(loc="upper left")
-    told = "; ".join(
-        f"{party.label} {fold(grown[0].max())} and {fold(grown[1].max())}" for party, grown in near.items()
+    worst = "; ".join(
+        f"{method.label} {fold(grown[0].max())} and {fold(grown[1].max())}" for method, grown in near.items()
     )
     caption = (
-        "The nonlinear edge at bent. Above: growth over ω dt and the size of the perturbation; the linear limit is 2. Below: "
-        f"near √3, where a swing takes three steps. The largest growth there in {close['steps']} steps, from {SMALL:g} and "
-        f"from {LARGE:g} rad: {told}. Divergence is drawn at 1e9."
+        f"The nonlinear edge at {of_kind(robot, 'centre')}. Above: growth over ω dt and the size of the perturbation; the linear "
+        "limit is 2. Below: near √3, where a swing takes three steps. The largest growth there in "
+        f"{close['steps']} steps, from {SMALL_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {worst}. Divergence is drawn at 1e9."
     )
     return "stability_edge", fig, caption
 
 
-def silent(result):
+def silent(result, robot):
     """Runs that fail without a word: reset by MuJoCo, and `implicit` gaining energy."""
     reset, gain = (result.curves["silent"][key] for key in ("reset", "gain"))
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
@@ -85,13 +92,17 @@ def silent(result):
         if gain["caught_in_it_s"] is not None:
             ax.axvline(gain["caught_in_it_s"], color=RED, linestyle="--")
     fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    caption = f"Bent, free, by MuJoCo at dt = 5/64 s. Left: {tell_reset(reset)} Right: {tell_gain(gain)}"
+    case = reset["case"]
+    caption = (
+        f"{capital(case.name)}, by MuJoCo at dt = {fraction(case.duration, case.scene.dt)} s. Left: {reset_in_words(reset)} "
+        f"Right: {gain_in_words(gain)}"
+    )
     return "stability_silent", fig, caption
 
 
-def minutes(result):
+def minutes(result, robot):
     """Energy over a minute of free motion, method by method, at a coarse and a fine step."""
-    runs = result.curves["minutes"]
+    runs, coarse = result.curves["minutes"], coarsest(robot)
     steps = sorted({run["row"]["dt_s"] for run in runs}, reverse=True)
     seconds = runs[0]["seconds"]
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
@@ -104,32 +115,29 @@ def minutes(result):
         starts = np.arange(1, len(run["t"]), swing)
         top = np.fmax.reduceat(np.abs(run["off"]), starts)
         at = run["t"][starts]
-        if row["engine"] == "TMT":
-            colour, dash, name = style(row["method"])
+        colour, dash, name = look(run["scheme"])
+        if row["engine"] == "tmt":
             ax.semilogy(at, top, linestyle=dash, color=colour, label=name)
             if row["diverged_at_s"] is not None:
                 ax.plot(row["diverged_at_s"], bound, "x", color=colour)
-        elif row["method"] in ("Euler", "implicit", "RK4"):
-            colour = style(TWINS[row["method"]])[0]
-            label = "MuJoCo, same scheme" if row["method"] == "RK4" else None
+        else:
+            label = f"{LABELS[row['engine']]}, same scheme" if run["scheme"] == "rk4" else None
             ax.semilogy(at[::3], top[::3], "o", mfc="none", markersize=3.5, color=colour, label=label)
     for ax, dt in zip(axes, steps):
-        ax.set(xlabel="time, s", xlim=(0, seconds), title="dt = 5/64 s" if dt == COARSE else f"dt = {dt:g} s")
+        ax.set(xlabel="time, s", xlim=(0, seconds), title=f"dt = {step_text(coarse, dt)} s")
     axes[0].set_ylabel("largest |energy - energy at start|, J")
     fig.legend(*axes[-1].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    verdict = {
-        (row["dt_s"], kind): [style(r["method"])[2] for r in (run["row"] for run in runs)
-                              if r["engine"] == "TMT" and r["dt_s"] == row["dt_s"] and r["energy"] == kind]
-        for row in (run["row"] for run in runs) for kind in ("bounded", "drifts", "diverges")
-    }  # fmt: skip
-    told = ". ".join(
-        f"At dt = {dt:.3g} s "
-        f"" + "; ".join(f"{kind}: {', '.join(verdict[dt, kind])}" for kind in ("bounded", "drifts", "diverges")
-                                          if verdict[dt, kind])
-        for dt in steps
-    )  # fmt: skip
+    ours = [run["row"] for run in runs if run["row"]["engine"] == "tmt"]
+    texts = []
+    for dt in steps:
+        names = {
+            kind: [look(row["method"])[2] for row in ours if (row["dt_s"], row["energy"]) == (dt, kind)]
+            for kind in ("bounded", "drifts", "diverges")
+        }
+        by_kind = "; ".join(f"{kind}: {', '.join(found)}" for kind, found in names.items() if found)
+        texts.append(f"At dt = {dt:.3g} s {by_kind}")
     caption = (
-        f"{seconds:g} s of bent, free: how far the energy is from where it started. {told}. Crosses: the run has diverged, "
-        "its gain beyond its bound."
+        f"{seconds:g} s of {ours[0]['scene']}: how far the energy is from where it started. {'. '.join(texts)}. Crosses: the "
+        "run has diverged, its gain beyond its bound."
     )
     return "stability_energy", fig, caption

@@ -1,45 +1,44 @@
 """Long runs: a minute of energy, and how far Newton's method carries the implicit methods."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 import tmt
-from tmt.methods import METHODS
 
-from .failure import BENT
+from ...case import Case
+from ...engines import Engine, Method
+from ...judge.run import diverged_at, number_or_none
+from ...truth.linear import Held
+from .choice import who
 from .limits import stiffest
-from .linear import held
-from .motion import diverged_at
-from .parties import Party, finite
-from .scenes import posture
 
-FINE = 1e-3  # s
-LONG = 60.0  # s
-KEPT = 600  # points of a curve
-DRIFTS = 3.0  # standard deviations
-NEWTON = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)  # s
+FINE_STEP = 1e-3  # s
+MINUTE = 60.0  # s
+CURVE_POINTS = 600
+DRIFT_DEVIATIONS = 3.0  # standard deviations
+NEWTON_STEPS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)  # s
 NEWTON_SIZES = {"held, 1e-6 rad off": 1e-6, "held, 0.01 rad off": 1e-2, "held, 0.1 rad off": 0.1, "free": None}
 OVERFLOWN = 1e100  # rad/s: the square of a rate that is faster is soon no number
-IMPLICIT = tuple(name for name, stepping in METHODS.items() if hasattr(stepping, "newton"))
 
 
-def long_run(party, dt, mujoco, duration=LONG) -> dict:
-    """A minute of bent, free: the energy over time, and whether it stays bounded, drifts, or the run diverges."""
+def long_run(method: Method, dt: float, case: Case, engines: Mapping[str, Engine], duration: float = MINUTE) -> dict:
+    """A minute of a free motion: the energy over time, and whether it stays bounded, drifts, or the run diverges."""
     steps = round(duration / dt)
     with np.errstate(over="ignore", invalid="ignore"):
-        q, qd = party.run(mujoco, tmt.ARM, *BENT.start, BENT.tau, dt, steps)
-        t = dt * np.arange(steps + 1)
-        ended = diverged_at(BENT, t, q, qd)
+        t, q, qd, *_ = engines[method.engine].of(case).run(*case.start, case.tau, dt, steps, method.name)
+        ended = diverged_at(case, t, q, qd)
         off = np.full(steps + 1, np.nan)
         alive = t < (np.inf if ended is None else ended)
-        off[alive] = tmt.energy(q[alive], qd[alive])
+        off[alive] = tmt.energy(q[alive], qd[alive], case.tree)
     off -= off[0]
-    every = max(1, steps // KEPT)
+    every = max(1, steps // CURVE_POINTS)
     kind, change = ("diverges", None) if ended is not None else behaviour(off)
     row = {
-        "scene": BENT.name, "engine": party.engine, "method": party.method, "dt_s": dt, "energy": kind,
+        "scene": case.name, "engine": method.engine, "method": method.name, "dt_s": dt, "energy": kind,
         "largest_j": None if ended is not None else float(np.abs(off).max()), "change_j": change, "diverged_at_s": ended,
     }  # fmt: skip
-    return {"row": row, "t": t[::every], "off": off[::every], "seconds": duration}
+    return {"row": row, "scheme": method.scheme, "t": t[::every], "off": off[::every], "seconds": duration}
 
 
 def behaviour(off) -> tuple[str, float]:
@@ -50,54 +49,54 @@ def behaviour(off) -> tuple[str, float]:
     fifth = len(off) // 5
     first, last = off[:fifth], off[-fifth:]
     change = float(last.mean() - first.mean())
-    return "drifts" if abs(change) > DRIFTS * max(first.std(), last.std()) else "bounded", change
+    return "drifts" if abs(change) > DRIFT_DEVIATIONS * max(first.std(), last.std()) else "bounded", change
 
 
-def newton(name, dts=NEWTON, steps=2000) -> list:
+def newton(method: Method, at: Held, engines: Mapping[str, Engine], dts=NEWTON_STEPS, steps: int = 2000) -> list[dict]:
     """Steps of an implicit method that Newton's method finds, of so many, against dt, in small and in large motion."""
-    at = held("bent", posture("bent"))
-    direction = stiffest(at)[1]
+    direction, rest, dynamics = stiffest(at)[1], np.zeros_like(at.q), engines[method.engine].of(at.case)
     rows = []
     for motion, size in NEWTON_SIZES.items():
-        start, tau = (at.q, np.zeros(3)) if size is None else (at.q + size * direction, at.tau)
+        start, tau = (at.q, rest) if size is None else (at.q + size * direction, at.tau)
         for dt in dts:
-            _, q, qd = tmt.simulate(start, np.zeros(3), tau, dt, steps, name)
-            found = int(np.isfinite(q).all(axis=1).sum()) - 1
+            run = dynamics.run(start, rest, tau, dt, steps, method.name)
+            found = int(np.isfinite(run.q).all(axis=1).sum()) - 1
             rows.append({
-                "method": name, "motion": motion, "dt_s": dt, "steps_found": found,
-                "last_rad_per_s": finite(np.abs(qd[found]).max()), "steps": steps,
+                "method": method.name, "motion": motion, "dt_s": dt, "steps_found": found,
+                "last_rad_per_s": number_or_none(np.abs(run.v[found]).max()), "steps": steps,
             })  # fmt: skip
     return rows
 
 
-def judge_minutes(result, minutes) -> None:
+def check_minutes(result, minutes) -> None:
     """The energy of a minute: an integrator of MuJoCo does as the same scheme in tmt does."""
     table = [run["row"] for run in minutes]
     result.tables["stability_energy"] = table
     result.curves["minutes"] = minutes
     kinds = {(row["engine"], row["method"], row["dt_s"]): row["energy"] for row in table}
-    for row in (row for row in table if row["engine"] == "MuJoCo"):
-        ours = kinds[("TMT", Party("MuJoCo", row["method"]).scheme, row["dt_s"])]
-        where = f"{row['scene']}, MuJoCo {row['method']}, dt = {row['dt_s']:.4g} s"
+    for row, scheme in ((run["row"], run["scheme"]) for run in minutes if run["row"]["engine"] == "mujoco"):
+        ours = kinds[("tmt", scheme, row["dt_s"])]
+        where = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s"
         note = f"{row['energy']}, in TMT {ours}"
         quantity = "runs whose energy does as that of the same scheme in TMT"
         result.check(where, quantity, int(row["energy"] == ours), 1, "runs", note, rule="equal")
     for dt in sorted({row["dt_s"] for row in table}, reverse=True):
-        mine = [row for row in table if row["dt_s"] == dt and row["engine"] == "TMT"]
+        mine = [row for row in table if row["dt_s"] == dt and row["engine"] == "tmt"]
         of_kind = {
             kind: [f"{row['method']} ({how_far(row)})" for row in mine if row["energy"] == kind]
             for kind in ("bounded", "drifts", "diverges")
         }
-        told = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in of_kind.items() if names)
-        result.notes.append(f"Energy over {minutes[0]['seconds']:g} s of {BENT.name}, at dt = {dt:.4g} s: {told}.")
+        by_kind = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in of_kind.items() if names)
+        scene, seconds = mine[0]["scene"], minutes[0]["seconds"]
+        result.notes.append(f"Energy over {seconds:g} s of {scene}, at dt = {dt:.4g} s: {by_kind}.")
 
 
-def judge_newton(result, found) -> None:
+def check_newton(result, posture, found) -> None:
     """The table of the steps that Newton's method finds, and what it says; nothing where none was taken."""
     table = [row for rows in found for row in rows]
     if table:
         result.tables["stability_newton"] = table
-        result.notes.append(tell_newton(table))
+        result.notes.append(newton_in_words(posture, table))
 
 
 def how_far(row) -> str:
@@ -107,9 +106,9 @@ def how_far(row) -> str:
     return f"within {row['largest_j']:.2g} J" if row["energy"] == "bounded" else f"by {row['change_j']:+.2g} J"
 
 
-def tell_newton(table) -> str:
+def newton_in_words(posture, table) -> str:
     """Up to which step Newton's method finds all stages, method by method and motion by motion, and why it fails."""
-    told = []
+    methods = []
     for name in dict.fromkeys(row["method"] for row in table):
         limits = []
         for motion in dict.fromkeys(row["motion"] for row in table):
@@ -119,9 +118,9 @@ def tell_newton(table) -> str:
             limits.append(
                 f"{motion}: fails from {min(failing):g} s" if failing else f"{motion}: never up to {last:g} s"
             )
-        told.append(f"{name} ({'; '.join(limits)})")
+        methods.append(f"{name} ({'; '.join(limits)})")
     failed = [row for row in table if row["steps_found"] < row["steps"]]
-    text = f"Newton's method in the implicit methods, {table[0]['steps']} steps at bent: {', '.join(told)}. "
+    text = f"Newton's method in the implicit methods, {table[0]['steps']} steps at {posture}: {', '.join(methods)}. "
     if not failed:
         return text + "It finds every stage."
     rates = [row["last_rad_per_s"] for row in failed if row["last_rad_per_s"] is not None]

@@ -1,50 +1,70 @@
 """Energy and momentum along runs: what should be constant drifts with the step at the method's order."""
 
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 
 import tmt
-from tmt.methods import METHODS
 
-from .motion import ORDER_MARGIN, TWINS
-from .scenes import SCENES
+from ...case import Case
+from ...engines import LABELS, Dynamics, Engine, Method, one_of_each_scheme, same_scheme
+from ...judge.check import Result
+from ...judge.run import ORDER_MARGIN
+from ...robots import Robot
 
-DURATION = 1.0  # s: short enough for the order to show, long enough to move
-STEPS = {"Euler": (2048, 4096, 8192), "implicit": (2048, 4096, 8192), "RK4": (256, 512, 1024)}
-FEW_STEPS = STEPS | {"Euler": (512, 1024, 2048), "implicit": (512, 1024, 2048)}
+DRIFT_DURATION = 1.0  # s: short enough for the order to show, long enough to move
+DRIFT_STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method
+FEW_DRIFT_STEPS = DRIFT_STEPS | {1: (512, 1024, 2048)}
 OF_EULER = 1e-3  # of Euler's drift: RK4's is below, with fewer steps
 
 
-def drift(result, engine, steps) -> None:
-    """Energy and, without gravity, alpha-momentum along runs of so many steps, {integrator: three numbers}."""
-    drifts = {}  # (scene, quantity, unit): integrator: engine: a value for each of the steps
-    for scene in (scene for scene in SCENES if scene.torque == "free" and not scene.damping):
-        run_of = {"TMT": tmt_run, "MuJoCo": partial(mujoco_run, scene.engine(engine))}
-        quantities = {("energy", "J"): partial(tmt.energy, model=scene.model)}
-        if not scene.gravity and "alpha" in scene.hinges:
-            quantities["alpha-momentum", "N m s"] = partial(alpha_momentum, scene.model)
-        for integrator, counts in steps.items():
-            for name, run in run_of.items():
-                paths = [run(scene, integrator, DURATION / count, count) for count in counts]
+def drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
+    """Energy and, without gravity, momentum of the first joint along free, undamped runs; steps: so many, by the order."""
+    drifts = {}  # (scene, quantity, unit): method of MuJoCo: engine: a value for each of the steps
+    methods = one_of_each_scheme(engines["mujoco"])
+    # in a scene of a user's own the order need not show in a second
+    cases = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
+    for case in (case for case in cases if not any(case.tree.damping)):
+        dynamics = {name: engines[name].of(case) for name in ("tmt", "mujoco")}
+        quantities = constants(case)
+        for method in methods:
+            for name, of_case in dynamics.items():
+                own = same_scheme(engines, method, name) if name != method.engine else method
+                paths = [run(case, of_case, own, count) for count in steps[method.order]]
                 for quantity, value in quantities.items():
-                    of_scene = drifts.setdefault((scene.name, *quantity), {}).setdefault(integrator, {})
+                    of_scene = drifts.setdefault((case.name, *quantity), {}).setdefault(method, {})
                     of_scene[name] = [largest(value, path) for path in paths]
-    judge(result, drifts)
-    result.curves["drift"] = {"drifts": drifts, "steps": steps}
+    check_drifts(result, drifts)
+    result.curves["drift"] = {"drifts": drifts, "steps": {method: steps[method.order] for method in methods}}
+    if not drifts:
+        result.notes.append(f"No scene of this {robot.name} is free and without damping: there is no drift to measure.")
 
 
-def judge(result, drifts) -> None:
+def constants(case: Case) -> dict[tuple, Callable]:
+    """What stays constant in a free case without damping: (name, unit): a function of q and v along a run."""
+    first, found = case.robot.joints[0], {("energy", "J"): partial(tmt.energy, model=case.tree)}
+    if not any(case.tree.gravity) and first in case.joints:
+        found[f"{first}-momentum", "N m s"] = partial(first_momentum, case.tree)
+    return found
+
+
+def run(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
+    """q and v of a second in so many steps."""
+    return dynamics.run(*case.start, case.tau, DRIFT_DURATION / count, count, method.name)[1:3]
+
+
+def check_drifts(result: Result, drifts: dict) -> None:
     """The drift halves with the step as the order says; RK4's is far below that of Euler, which takes more steps."""
     for (scene, quantity, _), of_scene in drifts.items():
-        for integrator, engines in of_scene.items():
+        euler = next(method for method in of_scene if method.scheme == "semi_implicit_euler")
+        for method, engines in of_scene.items():
             for engine, values in engines.items():
-                where = f"{scene}, {integrator}, {engine}, {DURATION:g} s"
-                order = METHODS[TWINS[integrator]].order
-                off = abs(found_order(values) - order)
-                result.check(where, f"order of the drift of {quantity}, from {order}", off, ORDER_MARGIN, "")
-                if integrator == "RK4":
-                    share = over(values[-1], of_scene["Euler"][engine][-1])
+                where = f"{scene}, {method.name}, {LABELS[engine]}, {DRIFT_DURATION:g} s"
+                off = abs(found_order(values) - method.order)
+                result.check(where, f"order of the drift of {quantity}, from {method.order}", off, ORDER_MARGIN, "")
+                if method.scheme == "rk4":
+                    share = over(values[-1], of_scene[euler][engine][-1])
                     result.check(where, f"drift of {quantity} over that of Euler", share, OF_EULER, "")
 
 
@@ -67,16 +87,6 @@ def over(one, other) -> float:
     return one / other if other > 0.0 else np.nan
 
 
-def tmt_run(scene, integrator, dt, steps) -> list:
-    """q and qd of the same scheme in tmt."""
-    return tmt.simulate(*scene.start, scene.tau, dt, steps, TWINS[integrator], scene.model)[1:]
-
-
-def mujoco_run(engine, scene, integrator, dt, steps) -> list:
-    """q and qd of MuJoCo."""
-    return engine.trajectory(*scene.start, scene.tau, dt, steps, integrator)[1:]
-
-
-def alpha_momentum(model, q, qd) -> np.ndarray:
-    """Angular momentum about the first hinge along a run, N m s."""
-    return np.einsum("sj,sj->s", tmt.mass_matrix(q, model)[:, 0], qd)
+def first_momentum(tree, q, v) -> np.ndarray:
+    """Angular momentum about the first hinge, which hangs on the world, along a run, N m s."""
+    return np.einsum("sj,sj->s", tmt.mass_matrix(q, tree)[:, 0], v)

@@ -1,5 +1,7 @@
 """How far digits reach: the growth of a small difference, and runs of the same scheme with many digits."""
 
+from collections.abc import Iterable, Sequence
+
 import mpmath
 import numpy as np
 
@@ -7,49 +9,63 @@ import tmt
 from tmt.methods import METHODS, one_step
 from tmt.reference import DIGITS, distance
 
-from .band import growth
-from .motion import SCHEMES, TWINS, step
+from ...case import Case
+from ...judge.check import Result
+from ...judge.rounding import growth
+from ...judge.run import step_in_words
 
-EVERY = 16  # steps between two recorded values of a growth
-LONG = (60.0, 6144)  # s and steps of RK4, for the growth of errors
-SHORT = (10.0, 512)
-FEW = 5.0  # s: the other time at which a growth is told
+GROWTH_EVERY = 16  # steps between two recorded values of a growth
+GROWTH_RUN = (60.0, 6144)  # s and steps of RK4, for the growth of errors
+SHORT_GROWTH_RUN = (10.0, 512)  # of a small run
+GROWN_EARLY = 5.0  # s: the other time at which a growth is reported
 CARRIED = {16: "doubles (16 digits)", 30: "30 digits"}
-EXACT_STEPS = 64  # of the runs with many digits
-FAST = 1e4  # rad/s: a run with many digits that is faster has diverged
+MOST_EXACT_STEPS = 64  # of a run with many digits
+TOO_FAST = 1e4  # rad/s: a run with many digits that is faster has diverged
 
 
-def grown(scene, duration, steps) -> np.ndarray:
-    """log10 of the growth of a small difference over so many steps of RK4, every 16 steps."""
+def grown(case: Case, duration: float, steps: int) -> np.ndarray:
+    """log10 of the growth of a small difference over so many steps of RK4, every 16 steps; NaN where the run diverges."""
     dt = duration / steps
-    _, *path = tmt.simulate(*scene.start, scene.tau, dt, steps, "rk4", scene.model)
-    return growth(METHODS["rk4"], scene.model, *path, scene.tau, dt, EVERY)
+    _, *path = tmt.simulate(*case.start, case.tau, dt, steps, "rk4", case.tree)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a run that is about to end
+        return growth(METHODS["rk4"], case.tree, *path, case.tau, dt, GROWTH_EVERY)
 
 
-def growth_of_errors(result, scenes, curves, duration, steps) -> None:
-    """log10 of the growth of a small difference over 5 s and the whole time, scene by scene, told in words."""
-    t = np.linspace(0.0, duration, steps // EVERY + 1)
-    curves = {scene.name: curve for scene, curve in zip(scenes, curves)}
+def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, duration: float, steps: int) -> None:
+    """log10 of the growth of a small difference over 5 s and the whole time, scene by scene, and in words."""
+    t = np.linspace(0.0, duration, steps // GROWTH_EVERY + 1)
+    curves = {case.name: curve for case, curve in zip(cases, curves)}
     result.curves["growth"] = {"t": t, "curves": curves}
-    result.notes += growth_told(t, curves)
+    result.notes += growth_in_words(t, curves)
 
 
-def growth_told(t, curves) -> list[str]:
+def growth_in_words(t, curves) -> list[str]:
     """How much small differences have grown after 5 s and at the end, and which scenes have a horizon."""
-    few = int(np.searchsorted(t, FEW))
-    told = "; ".join(f"{name}: 10^{g[few]:.1f} and 10^{g[-1]:.1f}" for name, g in curves.items())
+    early = int(np.searchsorted(t, GROWN_EARLY))
+    each = "; ".join(f"{name}: {power(g[early], 1)} and {power(g[-1], 1)}" for name, g in curves.items())
     horizons = {name: {digits: reach(t, g, digits) for digits in CARRIED} for name, g in curves.items()}
     found = [
-        f"{name}: {' and '.join(at_of(t, at[digits]) + ' for ' + text for digits, text in CARRIED.items())}"
+        f"{name}: {' and '.join(time_in_words(t, curves[name], at[digits]) + ' for ' + text for digits, text in CARRIED.items())}"
         for name, at in horizons.items()
         if any(time is not None for time in at.values())
     ]
+    least = min(known_until(t, g) for g in curves.values())
     return [
-        f"Growth of a small difference of the state over {t[few]:g} s and {t[-1]:g} s (RK4, exact Jacobians): {told}.",
+        f"Growth of a small difference of the state over {t[early]:g} s and {t[-1]:g} s (RK4, exact Jacobians): {each}.",
         f"These have a horizon, beyond which a run depends on its last digits and on the step: {'; '.join(found)}."
         if found
-        else f"No scene has a horizon within {t[-1]:g} s: nowhere does a difference of the last digit grow to 1 rad.",
+        else f"No scene has a horizon within {least:g} s: nowhere does a difference of the last digit grow to 1 rad.",
     ]
+
+
+def power(exponent, digits) -> str:
+    """A growth in words."""
+    return f"10^{exponent:.{digits}f}" if np.isfinite(exponent) else "no number (the run diverges)"
+
+
+def known_until(t, grown) -> float:
+    """Until when a growth is known, s."""
+    return float(t[np.isfinite(grown)][-1])
 
 
 def reach(t, grown, digits) -> float | None:
@@ -58,53 +74,54 @@ def reach(t, grown, digits) -> float | None:
     return float(t[beyond][0]) if beyond.any() else None
 
 
-def at_of(t, time) -> str:
+def time_in_words(t, grown, time) -> str:
     """A horizon in words."""
-    return f"more than {t[-1]:.0f} s" if time is None else f"about {time:.0f} s"
+    return f"more than {known_until(t, grown):.0f} s" if time is None else f"about {time:.0f} s"
 
 
-def many_digits(result, engine, scenes, runs) -> None:
-    """Both runs against a run of the same scheme with many digits: which engine carries the rounding."""
-    for scene, of_scene in zip(scenes, runs):
-        variant = scene.engine(engine)
-        for integrator, exact in of_scene.items():
-            curve = result.curves["runs"][(scene.name, TWINS[integrator], EXACT_STEPS)]
-            dt = scene.duration / EXACT_STEPS
-            _, theirs, _ = variant.trajectory(*scene.start, scene.tau, dt, EXACT_STEPS, integrator)
+def many_digits(result: Result, cases: Sequence[Case], runs: Iterable[dict]) -> None:
+    """Both runs beside a run of the same scheme with many digits: which engine carries the rounding.
+
+    runs: of each case its paths with many digits, by the scheme.
+    """
+    for case, of_case in zip(cases, runs):
+        for scheme, exact in of_case.items():
+            curve, dt = result.curves["runs"][(case.name, scheme, case.steps)], case.duration / case.steps
             last = min(round(curve["judged_until_s"] / dt), len(exact) - 1)
-            off = {name: distance(path[: last + 1], exact[: last + 1]).max(axis=1)
-                   for name, path in (("TMT", curve["tmt"][0]), ("MuJoCo", theirs))}  # fmt: skip
-            where = f"{scene.name}, {integrator}, {step(scene, EXACT_STEPS)}"
-            judge_digits(result, where, off, curve["band"][: last + 1], dt)
+            off = {
+                name: distance(curve[name][0][: last + 1], exact[: last + 1]).max(axis=1) for name in ("tmt", "mujoco")
+            }
+            where = f"{case.name}, {curve['integrator']}, {step_in_words(case, case.steps)}"
+            check_digits(result, where, off, curve["band"][: last + 1], dt)
 
 
-def judge_digits(result, where, off, band, dt) -> None:
+def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: float) -> None:
     """The state of each engine's run that comes closest to the band of rounding, {engine: distances in rad, (states,)}."""
-    for name, apart in off.items():
+    for label, apart in (("TMT", off["tmt"]), ("MuJoCo", off["mujoco"])):
         ratio = np.divide(apart, band, out=np.zeros_like(apart), where=band > 0)
         k = int(np.argmax(ratio))  # NaN counts as the largest
         at = f"t = {k * dt:.3f} s"
-        result.check(where, f"{name} to many digits of its own scheme", apart[k], band[k], "rad", at, True)
+        result.check(where, f"{label} to many digits of its own scheme", apart[k], band[k], "rad", at, True)
     result.notes.append(
         f"Against {DIGITS} digits of the same scheme ({where}, to {dt * (len(band) - 1):.2f} s): TMT is at most "
-        f"{off['TMT'].max():.1e} rad off, MuJoCo {off['MuJoCo'].max():.1e} rad."
+        f"{off['tmt'].max():.1e} rad off, MuJoCo {off['mujoco'].max():.1e} rad."
     )
 
 
-def exact_runs(scene, steps=EXACT_STEPS) -> dict:
-    """Hinge angles of each scheme on mpmath numbers, by its integrator, over so many of the 64 steps."""
-    return {name: exact_run(scene, TWINS[name], steps, scene.duration / EXACT_STEPS) for name in SCHEMES}
+def exact_runs(case: Case, schemes: Sequence[str], most: int = MOST_EXACT_STEPS) -> dict[str, np.ndarray]:
+    """Joint angles of each scheme on mpmath numbers, over at most so many of the scene's own steps."""
+    dt, steps = case.duration / case.steps, min(most, case.steps)
+    return {scheme: exact_run(case, scheme, steps, dt) for scheme in schemes}
 
 
-def exact_run(scene, twin, steps, dt) -> np.ndarray:
-    """Hinge angles of the same scheme on mpmath numbers, from the same doubles: (steps + 1, 3), fewer if it diverges."""
+def exact_run(case: Case, scheme: str, steps: int, dt: float) -> np.ndarray:
+    """Joint angles of the same scheme on mpmath numbers, from the same doubles: (steps + 1, n), fewer if it diverges."""
     with mpmath.workdps(DIGITS):
-        q, qd = ([mpmath.mpf(float(v)) for v in values] for values in scene.start)
-        tau, dt = [mpmath.mpf(float(v)) for v in scene.tau], mpmath.mpf(dt)
-        path = [q]
+        q, v, tau = ([mpmath.mpf(float(a)) for a in values] for values in (*case.start, case.tau))
+        dt, path = mpmath.mpf(dt), [q]
         for _ in range(steps):
-            q, qd = one_step(METHODS[twin], scene.model, q, qd, tau, dt)
+            q, v = one_step(METHODS[scheme], case.tree, q, v, tau, dt)
             path.append(q)
-            if max(map(abs, qd)) > FAST:  # diverged: its sines would ask for millions of digits of pi
+            if max(map(abs, v)) > TOO_FAST:  # diverged: its sines would ask for millions of digits of pi
                 break
     return np.array(path, dtype=object)

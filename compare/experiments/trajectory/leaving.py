@@ -1,98 +1,100 @@
-"""Why a held arm leaves its posture: the acceleration that the torque leaves, grown by RK4's own linear map."""
+"""Why a held robot leaves its posture: the acceleration that the torque leaves, grown by RK4's own linear map."""
+
+from collections.abc import Mapping
 
 import numpy as np
 
 import tmt
 from tmt.methods import METHODS
 
-from .band import slope_rounding
-from .exact_motion import stiffness
-from .motion import LEFT
+from ...case import Case
+from ...engines import LABELS, Engine
+from ...judge.rounding import slope_rounding
+from ...judge.run import LEFT
+from ...truth.linear import stiffness
 
-SHORT = 1e-6  # s: a step in which the arm does not move
+NO_TIME = 1e-6  # s: a step in which nothing moves
 STEADY = 1e-3  # per second: a slower growth is none in these runs
-NEAR = 2  # steps: so near the time that is predicted from rounding, rounding is the cause
+NEAR_PREDICTION = 2  # steps: so near the time that is predicted from rounding, rounding is the cause
 
 
-def pushes(scene, engine) -> dict[str, np.ndarray]:
+def pushes(case: Case, engines: Mapping[str, Engine]) -> dict[str, np.ndarray]:
     """The acceleration that each engine finds at the start under the torque that is to hold, rad/s2, (n,)."""
-    q, qd = scene.start
+    ours, theirs = (engines[name].of(case) for name in ("tmt", "mujoco"))
     return {
-        "TMT": tmt.simulate(q, qd, scene.tau, SHORT, 1, "rk4", scene.model)[2][1] / SHORT,
-        "MuJoCo": engine.acceleration(q, qd, scene.tau),
+        "tmt": ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
+        "mujoco": theirs.acceleration(*case.start, case.tau),
     }
 
 
-def allowed(scene) -> float:
+def allowed(case: Case) -> float:
     """How large that acceleration may be by rounding alone, rad/s2."""
-    (q, qd), dt = scene.start, scene.duration / scene.steps
-    return float(slope_rounding(METHODS["rk4"], scene.model, q[None], qd[None], scene.tau, dt)[2][0])
+    dt = case.duration / case.steps
+    return float(slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0])
 
 
-def linear_map(scene) -> tuple[np.ndarray, np.ndarray]:
+def linear_map(case: Case) -> tuple[np.ndarray, np.ndarray]:
     """J and G of x+ = J x + G a: one step of RK4 of the linear motion about the start, pushed by a constant a, rad/s2.
 
     x: deviations of angles and rates; J (2n, 2n), G (2n, n). xdd = -Mbar^-1 (K x + D xd) + a.
     """
-    q, n, dt = scene.start[0], len(scene.hinges), scene.duration / scene.steps
-    inverse = np.linalg.inv(tmt.mass_matrix(q, scene.model))
+    n, dt = len(case.joints), case.duration / case.steps
+    inverse = np.linalg.inv(tmt.mass_matrix(case.q, case.tree))
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:] = np.eye(n)
-    A[n:] = -inverse @ np.hstack([stiffness(scene.model, q), np.diag(scene.model.damping)])
+    A[n:] = -inverse @ np.hstack([stiffness(case.tree, case.q), np.diag(case.tree.damping)])
     Z = dt * A
     pushed = dt * (np.eye(2 * n) + Z / 2 + Z @ Z / 6 + Z @ Z @ Z / 24)
     return np.eye(2 * n) + A @ pushed, pushed[:, n:]
 
 
-def predicted(scene, push) -> float | None:
-    """When the linear map has the arm 0.1 rad away under a constant push, rad/s2: s; None: not in this scene."""
-    J, G = linear_map(scene)
+def predicted(case: Case, push: np.ndarray) -> float | None:
+    """When the linear map has the robot 0.1 rad away under a constant push, rad/s2: s; None: not in this scene."""
+    J, G = linear_map(case)
     state = np.zeros(len(J))
-    for k in range(1, scene.steps + 1):
+    for k in range(1, case.steps + 1):
         state = J @ state + G @ push
         if np.abs(state[: len(push)]).max() > LEFT:
-            return k * scene.duration / scene.steps
+            return k * case.duration / case.steps
     return None
 
 
-def told(scene, engine, left) -> list[str]:
-    """A sentence for each engine: what the torque leaves, what becomes of it, when the arm left, and what the cause is."""
-    J, _ = linear_map(scene)
-    rate = np.log(np.abs(np.linalg.eigvals(J)).max()) / (scene.duration / scene.steps)
-    may = allowed(scene)
+def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str, float | None]) -> list[str]:
+    """A sentence for each engine: what the torque leaves, what becomes of it, when the robot left, and what the cause is."""
+    J, _ = linear_map(case)
+    rate = np.log(np.abs(np.linalg.eigvals(J)).max()) / (case.duration / case.steps)
+    may = allowed(case)
     grows = f"small deviations grow by up to e^{rate:.1f} per second" if rate > STEADY else "no small deviation grow"
     sentences = [f"The linear map of RK4 lets {grows}."]
-    for name, push in pushes(scene, engine).items():
+    for name, push in pushes(case, engines).items():
         if not np.isfinite(push).all():
-            sentences.append(f"{name} gives no acceleration there.")
+            sentences.append(f"{LABELS[name]} gives no acceleration there.")
             continue
-        size, at = float(np.abs(push).max()), predicted(scene, push)
+        size, at = float(np.abs(push).max()), predicted(case, push)
         away = (
-            f"be {LEFT} rad away at {at:.2f} s"
-            if at is not None
-            else f"stay within {LEFT} rad for {scene.duration:g} s"
+            f"be {LEFT} rad away at {at:.2f} s" if at is not None else f"stay within {LEFT} rad for {case.duration:g} s"
         )
         sentences.append(
-            f"{name}: the torque leaves an acceleration of {size:.1e} rad/s2 (rounding allows {may:.1e}); by that map alone the "
-            f"arm would {away}; it {words(left[name])}{cause(scene, size, may, at, left[name])}."
+            f"{LABELS[name]}: the torque leaves an acceleration of {size:.1e} rad/s2 (rounding allows {may:.1e}); by that map "
+            f"alone the {case.robot.name} would {away}; it {left_in_words(left[name])}{cause(case, size, may, at, left[name])}."
         )
     return sentences
 
 
-def words(left) -> str:
-    """Whether and when a held arm left, in words."""
+def left_in_words(left: float | None) -> str:
+    """Whether and when a held robot left."""
     return f"stays within {LEFT} rad" if left is None else f"is {LEFT} rad away at {left:.2f} s"
 
 
-def cause(scene, size, may, at, left) -> str:
-    """The cause of leaving, in words; nothing where the arm stays."""
+def cause(case: Case, size: float, may: float, at: float | None, left: float | None) -> str:
+    """The cause of leaving, in words; nothing where the robot stays."""
     if left is None:
         return ""
     if size > may:
         return ": that is no rounding"
-    steps = np.inf if at is None else abs(left - at) * scene.steps / scene.duration
+    steps = np.inf if at is None else abs(left - at) * case.steps / case.duration
     return (
         ": the cause is rounding of the torque"
-        if steps < NEAR + 0.5
+        if steps < NEAR_PREDICTION + 0.5
         else ": rounding of the torque alone does not explain it"
     )

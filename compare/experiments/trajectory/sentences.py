@@ -1,105 +1,132 @@
-"""What a trajectory's runs say, in words: the assignment's claims, errors against agreement, the methods of order 1."""
+"""What a trajectory's runs say: claims about held postures, errors beside agreement, the methods of order 1."""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from . import leaving
-from .engine import INTEGRATORS
-from .motion import worst
-from .scenes import SCENES
+from tmt.methods import METHODS
 
-FAR = 100  # times the difference of the engines: an error beyond which their agreement says nothing
+from ...case import Case
+from ...engines import LABELS, Engine
+from ...judge.check import Result
+from ...judge.run import deviation, number_or_none
+from ...robots import Robot
+from .leaving import causes_in_words, left_in_words
+from .runs import STEPS_AT_MOST, counts
+
+SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
 
 
-def notes(result, engine) -> list[str]:
-    """All of it; `engine` is the one that the scenes were run with."""
-    runs, scenes = result.curves["runs"], {scene.name: scene for scene in SCENES}
+def notes(result: Result, robot: Robot, engines: Mapping[str, Engine], finer: Sequence[int]) -> list[str]:
+    """All of them, of the runs that these engines have given."""
+    runs, cases = result.curves["runs"], {case.name: case for case in robot.cases}
+    held = [case for case in robot.cases if case.is_held and (case.name, "rk4", case.steps) in runs]
     return [
-        *(
-            claim(scenes[name], engine, runs[name, "rk4", scenes[name].steps])
-            for name in ("ball catch, held", "bent, held")
-        ),
-        *errors(runs, result.curves["errors"], scenes),
-        *first_order(runs, scenes),
-        f"MuJoCo's integrators here: {', '.join(INTEGRATORS)}.",
+        *(of_held(case, engines, runs[case.name, "rk4", case.steps]) for case in held),
+        *of_errors(runs, result.curves["errors"], cases),
+        *of_first_order(runs, cases),
+        f"MuJoCo's integrators here: {', '.join(engines['mujoco'].methods)}.",
+        *of_left_out([cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], finer),
     ]
 
 
-def claim(scene, engine, curve) -> str:
-    """What a run of a held posture says of the assignment's claim about its figure."""
-    claims = {
-        "ball catch, held": "held at ball catch with dt = 5/64 s, the arm leaves after about 4.5 s, by rounding in an "
-        "unstable posture",
-        "bent, held": "held at bent, the arm does not move",
-    }
-    moved = [worst(path - path[0]) for path in (curve["tmt"][0], curve["mujoco"][0])]
-    by = " and ".join(f"{name}'s {rad(value)}" for name, value in zip(("TMT", "MuJoCo"), moved))
+def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
+    """What a run of a held posture says, of what is claimed of it if it is."""
+    claims = case.robot.claims.of_scenes if case.robot.claims else {}
+    about = f"Claim: {claims[case.name]}. Here" if case.name in claims else f"{case.name[0].upper()}{case.name[1:]}"
+    moved = {name: number_or_none(deviation(curve[name][0], curve[name][0][0])) for name in ("tmt", "mujoco")}
+    by = " and ".join(f"{LABELS[name]}'s {rad(value)}" for name, value in moved.items())
     return (
-        f"Claim: {claims[scene.name]}. Here, under TMT's torque, in {scene.duration:g} s TMT's arm "
-        f"{leaving.words(curve['left']['TMT'])}, MuJoCo's {leaving.words(curve['left']['MuJoCo'])}; the farthest is {by}. "
-        + " ".join(leaving.told(scene, scene.engine(engine), curve["left"]))
+        f"{about}, under TMT's torque, in {case.duration:g} s TMT's {case.robot.name} "
+        f"{left_in_words(curve['left']['tmt'])}, MuJoCo's {left_in_words(curve['left']['mujoco'])}; the farthest is {by}. "
+        + " ".join(causes_in_words(case, engines, curve["left"]))
     )
 
 
-def rad(value) -> str:
+def rad(value: float | None) -> str:
     """An angle in words; None: the run has diverged."""
     return "no number (it diverged)" if value is None else f"{value:.1e} rad"
 
 
-def errors(runs, found, scenes) -> list[str]:
-    """How far 64 RK4 steps are from the true motion, beside how far the engines are apart; {scene: (TMT, MuJoCo)}."""
+def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
+    """How far the coarsest steps of RK4 are from the true motion, beside how far the engines are apart.
+
+    found: {scene: (TMT, MuJoCo)}.
+    """
     if not found:
         return []
     lines, says_nothing = [], []
     for name, (ours, theirs) in found.items():
-        curve = runs[name, "rk4", scenes[name].steps]
+        curve = runs[name, "rk4", cases[name].steps]
         apart = agreement(curve)
-        true = "rest" if scenes[name].torque == "hold" else "more than 20 digits"
+        true = "rest" if cases[name].is_held else "more than 20 digits"
         lines.append(
             f"{name} (true: {true}): TMT {rad(ours)}, MuJoCo {rad(theirs)}, apart {apart:.1e} rad in the "
             f"{curve['judged_until_s']:.2f} s that are judged"
         )
-        if None not in (ours, theirs) and max(ours, theirs) > FAR * apart:
+        if None not in (ours, theirs) and max(ours, theirs) > SAYS_NOTHING * apart:
             says_nothing.append(name)
+    steps = the_same(cases[name].steps for name in found)
     return [
-        f"Agreement is not truth. Largest error of {next(iter(scenes.values())).steps} steps of RK4 over the whole scene: "
+        f"Agreement is not truth. Largest error of {steps or 'the coarsest'} steps of RK4 over the whole scene: "
         f"{'; '.join(lines)}.",
-        f"The error is more than {FAR} times the difference of the engines in these scenes: {'; '.join(says_nothing)}. There "
-        "their agreement, as long as it is judged, says nothing of the error."
+        f"The error is more than {SAYS_NOTHING} times the difference of the engines in these scenes: "
+        f"{'; '.join(says_nothing)}. There their agreement, as long as it is judged, says nothing of the error."
         if says_nothing
-        else f"In none of these scenes is the error more than {FAR} times the difference of the engines.",
+        else f"In none of these scenes is the error more than {SAYS_NOTHING} times the difference of the engines.",
     ]
 
 
-def agreement(curve) -> float:
+def agreement(curve: dict) -> float:
     """How far the engines are apart while they are judged, rad."""
     last = int(np.searchsorted(curve["t"], curve["judged_until_s"] * (1 + 1e-9), side="right"))
     return float(np.abs(curve["tmt"][0][:last] - curve["mujoco"][0][:last])[:: curve["every"]].max())
 
 
-def first_order(runs, scenes) -> list[str]:
+def of_first_order(runs: dict, cases: Mapping[str, Case]) -> list[str]:
     """For how long the methods of order 1 are judged at the coarsest step in the scenes that are let go, and how they end."""
-    lines, shortest = [], None
-    for name, scene in scenes.items():
-        for twin in ("semi_implicit_euler", "implicit"):
-            curve = runs.get((name, twin, scene.steps))
-            if curve is None or scene.torque != "free":
-                continue
-            until, ended = curve["judged_until_s"], curve["ended"]
-            if shortest is None or until < shortest[0]:
-                shortest = until, f"{name}, {curve['integrator']}", scene.dt
-            if until < scene.duration:
-                how = ", ".join(
-                    f"{engine} {'never' if at is None else f'at {at:.2f} s'}" for engine, at in ended.items()
-                )
-                diverges = "nothing diverges" if not any(ended.values()) else f"diverges: {how}"
-                lines.append(f"{name}, {curve['integrator']}: judged for {until:.2f} s, {diverges}")
-    if shortest is None:
+    schemes = dict.fromkeys(scheme for _, scheme, _ in runs if METHODS[scheme].order == 1)
+    free = [case for case in cases.values() if case.is_free]
+    found = [(case, curve) for case in free for s in schemes if (curve := runs.get((case.name, s, case.steps)))]
+    if not found:
         return []
+    case, curve = min(found, key=lambda pair: pair[1]["judged_until_s"])
+    shortest, until = f"{case.name}, {curve['integrator']}", curve["judged_until_s"]
+    lines = [
+        f"{case.name}, {curve['integrator']}: judged for {curve['judged_until_s']:.2f} s, {ends_in_words(curve['ended'])}"
+        for case, curve in found
+        if curve["judged_until_s"] < case.duration
+    ]
     if not lines:
         return [
-            f"At the coarsest step the methods of order 1 are judged all along in every free scene ({shortest[1]} too)."
+            f"At the coarsest step the methods of order 1 are judged all along in every free scene ({shortest} too)."
         ]
+    dt = the_same(case.scene.dt for case, _ in found)
     return [
-        f"Order 1 at dt = {shortest[2]:.4g} s. The shortest time that can be judged, before rounding grows beyond the tolerance "
-        f"or a run diverges, is {shortest[0]:.2f} s ({shortest[1]}). {'; '.join(lines)}."
+        f"Order 1 at {f'dt = {dt:.4g} s' if dt else 'the coarsest step'}. The shortest time that can be judged, before rounding "
+        f"grows beyond the tolerance or a run diverges, is {until:.2f} s ({shortest}). {'; '.join(lines)}."
     ]
+
+
+def ends_in_words(ended) -> str:
+    """When the runs of both engines diverge."""
+    if not any(ended.values()):
+        return "nothing diverges"
+    at = (f"{LABELS[name]} {'never' if time is None else f'at {time:.2f} s'}" for name, time in ended.items())
+    return f"diverges: {', '.join(at)}"
+
+
+def of_left_out(cases: Sequence[Case], finer: Sequence[int]) -> list[str]:
+    """Which scenes are followed with fewer step sizes than others."""
+    names = [case.name for case in cases if len(counts(case, finer)) < len(finer)]
+    return (
+        [f"Runs of more than {STEPS_AT_MOST} steps, finer than a scene's own, are left out: {', '.join(names)}."]
+        if names
+        else []
+    )
+
+
+def the_same(values):
+    """The value that all are, or None."""
+    values = set(values)
+    return values.pop() if len(values) == 1 else None

@@ -1,0 +1,68 @@
+"""How long a step takes, of the whole model and of the smallest one that has the motion of a case."""
+
+from functools import lru_cache
+
+import tmt
+from tmt.kernels import slope_source
+
+from ...engines import Setting, same_scheme
+from ...judge.timing import fastest
+
+TWO_INTEGRATORS = ("Euler", "RK4")  # of MuJoCo, a cheap and an accurate one, with the same schemes in tmt
+TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a timed run: it passes between the interruptions of a busy machine
+FINER_RUNS = 16  # steps of a run for each of the case's own
+
+
+def method_of(engines, integrator: str, name: str) -> str:
+    """What the engine of that name calls the scheme of an integrator of MuJoCo."""
+    return same_scheme(engines, engines["mujoco"].methods[integrator], name).name
+
+
+def scheme_of(engines, integrator: str) -> str:
+    """The method of tmt that is the same scheme as an integrator of MuJoCo."""
+    return engines["mujoco"].methods[integrator].scheme
+
+
+def time_models(result, models, setup, rounds) -> None:
+    """The rows: all models of all cases, timed in turn, against the whole model of the same case."""
+    calls = {}
+    for name, case in models:
+        for integrator in TWO_INTEGRATORS if case else ():
+            for engine, dynamics in setup.compared(case).items():
+                steps = TIMED_STEPS[engine]
+                setting = Setting(case.duration / case.steps / FINER_RUNS * steps, steps)
+                method = method_of(setup.engines, integrator, engine)
+                call, _ = dynamics.prepare(*case.start, case.tau, setting, method)
+                calls[name, case.joints, engine, integrator] = call
+    result.rows += table(models, setup, fastest(calls, rounds), result.curves["apart"])
+
+
+def table(models, setup, seconds, apart) -> list[dict]:
+    """The rows: models as (a case's name, Case or None), seconds of a timed run by (name, joints, engine, integrator)."""
+    rows, every = [], setup.robot.joints
+    for name, case in models:
+        joints = case.joints if case else ()
+        for engine, steps in TIMED_STEPS.items():
+            for integrator in TWO_INTEGRATORS:
+                taken = seconds.get((name, joints, engine, integrator))
+                count = operations(case.tree, scheme_of(setup.engines, integrator)) if case else 0
+                rows.append(
+                    {
+                        "scene": name,
+                        "hinges": " ".join(joints) or "none",
+                        "engine": engine,
+                        "nv": len(joints),
+                        "operations": count if engine == "tmt" else None,
+                        "ns_per_step": 1e9 * taken / steps if taken else None,
+                        "speedup": seconds[name, every, engine, integrator] / taken if taken else None,
+                        "max_difference_rad": None if joints == every else apart.get((name, engine, integrator)),
+                        "integrator": integrator,
+                    }
+                )
+    return rows
+
+
+@lru_cache
+def operations(tree: tmt.Tree, method: str = "rk4") -> int:
+    """Operations of one evaluation of the accelerations in the compiled code of a tree and a method."""
+    return slope_source(tree, method)[1]

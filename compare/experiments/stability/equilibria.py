@@ -1,0 +1,72 @@
+"""What each held posture is, what one step of each method does there, and where that is in the method's stability region."""
+
+from itertools import product
+
+import numpy as np
+
+from ...engines import one_of_each_scheme
+from ...engines.mujoco.linear import NUDGE, transition
+from ...judge.scale import EPS, FACTOR
+from ...truth.linear import held, region
+from .choice import capital, coarsest
+from .subjects import DAMPINGS, places
+
+FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
+    1e-2,
+    5e-4,
+)  # s, of steps whose amplification is compared; the second with much damping
+
+
+def equilibria(result, setup) -> None:
+    """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
+    robot, mujoco, table = setup.robot, setup.engines["mujoco"], []
+    least, some, much = DAMPINGS
+    usual = (FINE_AMPLIFICATION, coarsest(robot).scene.dt)
+    for name in robot.postures:
+        at = held(robot, name)
+        values = at.modes[0]
+        table += [
+            {"scene": name, "kind": at.kind, "mode": k, "real_per_s": float(v.real), "imaginary_per_s": float(v.imag)}
+            for k, v in enumerate(values)
+        ]
+        result.notes.append(kind_in_words(at))
+        for damping, steps in ((least, usual), (some, usual), (much, (DAMPED_AMPLIFICATION,))):
+            at = held(robot, name, damping)
+            for method, dt in product(one_of_each_scheme(mujoco), steps):
+                where = f"{name}, {method.name}, dt = {dt:.4g} s, damping {damping:g}"
+                theirs = transition(mujoco.of(at.case), at.q, at.tau, dt, method.name)
+                check_amplification(result, where, at.q, at.step(method.scheme, dt), theirs)
+    result.tables["stability_modes"] = table
+
+
+def kind_in_words(at) -> str:
+    """What a held posture is, and its modes."""
+    values = at.modes[0]
+    swings = [f"{v.imag:.3f} rad/s" for v in values if v.imag > 1e-3]
+    grows = [f"{v.real:.3f} per second" for v in values if v.real > 1e-3]
+    texts = [f"grows by {' and '.join(grows)}"] * bool(grows) + [f"swings at {', '.join(swings)}"] * bool(swings)
+    kind = at.kind if at.kind == "marginal" else f"a {at.kind}"
+    return f"{capital(at.name)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
+
+
+def check_amplification(result, where, q, ours, theirs) -> None:
+    """The check of one amplification: within what rounding does to a difference quotient."""
+    allowed = FACTOR * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max() / NUDGE
+    quantity = "amplification of one step, TMT to MuJoCo"
+    result.check(where, quantity, np.abs(ours - theirs).max(), allowed, "", rounding=True)
+
+
+def planes(result, robot, subjects, schemes) -> None:
+    """The stability region of each method in the plane of eigenvalue times dt, and where the postures are in it."""
+    x, y = np.linspace(-7.2, 1.8, 226), np.linspace(-0.6, 6.4, 176)
+    z = x[None, :] + 1j * y[:, None]
+    grown = {name: region(name, z) for name in schemes}
+    alike = {name: next(other for other in grown if np.array_equal(grown[other], grown[name])) for name in schemes}
+    result.curves["regions"] = {  # methods that do the same at rest share one
+        tuple(name for name in schemes if alike[name] == first): (x, y, grown[first])
+        for first in dict.fromkeys(alike.values())
+    }
+    result.curves["points"] = {
+        (name, damping): held(robot, name, damping).modes[0]
+        for name, damping in places(subjects.centres[:1], subjects.saddles[:1], DAMPINGS[:2])
+    }

@@ -1,0 +1,41 @@
+"""How far the runs with the coarsest step of RK4 are from the true motion, where that is known."""
+
+from collections.abc import Iterator
+
+from ...case import Case
+from ...judge.check import Result
+from ...judge.run import deviation, number_or_none
+from ...robots import Robot
+from ...truth import reference
+
+
+def held(result: Result, robot: Robot) -> dict[str, tuple]:
+    """Of each held scene, whose true motion is rest: {scene: (TMT, MuJoCo)}, rad.
+
+    The largest angle over the run; None of a run that has diverged.
+    """
+    return {
+        case.name: tuple(number_or_none(deviation(curve[name][0], curve[name][0][0])) for name in ("tmt", "mujoco"))
+        for case, curve in coarsest(result, robot)
+        if case.is_held
+    }
+
+
+def free(result: Result, robot: Robot) -> dict[str, tuple]:
+    """The same of the other scenes whose true motion stands in the table of runs with more than 20 digits."""
+    errors = {}
+    for case, curve in coarsest(result, robot):
+        true = reference.committed(case) if case.steps == reference.RECORDS and not case.is_held else None
+        if true:
+            joints = range(len(case.joints))
+            of_run = (true.error(curve[name][0], joints).max() for name in ("tmt", "mujoco"))
+            errors[case.name] = tuple(map(number_or_none, of_run))
+    return errors
+
+
+def coarsest(result: Result, robot: Robot) -> Iterator[tuple[Case, dict]]:
+    """Each case that was run, with the curve of its coarsest step of RK4."""
+    runs = result.curves["runs"]
+    for case in robot.cases:
+        if curve := runs.get((case.name, "rk4", case.steps)):
+            yield case, curve

@@ -1,0 +1,74 @@
+"""The rules of a run: until when it is judged, how close the engines must be, how they end."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...judge.check import Result
+from ...judge.rounding import NARROW
+from ...judge.run import MOVES
+
+
+def ends_first(ends: Mapping[str, float | None]) -> float:
+    """When the first of the runs has diverged, s; inf: none has."""
+    return min((end for end in ends.values() if end is not None), default=np.inf)
+
+
+def judged(times: np.ndarray, width: np.ndarray, ends: Mapping[str, float | None]) -> int:
+    """How many of the recorded states are judged: all before the band is wide or a run has diverged; the start always is."""
+    alive = times < ends_first(ends)
+    return max(1, int(np.argmin(np.append((width < NARROW) & alive, False))))
+
+
+def check_divergence(
+    result: Result, where: str, ends: Mapping[str, float | None], dt: float, steps: int, width: np.ndarray
+) -> None:
+    """Both diverge at the same step, if one does while the band (recorded,) is narrow: then rounding decides nothing."""
+    end = ends_first(ends)
+    if end == np.inf:
+        return
+    every = steps // (len(width) - 1)
+    if width[int(round(end / dt) / every)] < NARROW:
+        ours, theirs = (steps + 1 if ends[name] is None else round(ends[name] / dt) for name in ("tmt", "mujoco"))
+        note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
+        result.check(where, "step of divergence, MuJoCo's, is TMT's", theirs, ours, "", note, rule="equal")
+
+
+def check_movement(result: Result, where: str, moved: float) -> None:
+    """A free run moves: one that stays shows nothing."""
+    result.check(where, "movement", moved, MOVES, "rad", rule="at least")
+
+
+def check_same_bits(result: Result, where: str, integrator: str, first: list, other: list) -> None:
+    """Integrators that are one scheme here give the same bits: q and v of both."""
+    differ = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(first, other))
+    result.check(where, f"the same bits as {integrator}", differ, 0.0, "arrays that differ", rule="equal")
+
+
+def check_level(result: Result, where: str, about: dict, joints, difference, tolerance, times, ending: dict) -> None:
+    """A row and a check: the component and state of the recorded ones that come closest to their tolerance.
+
+    about, ending: the first and the last columns of the row; difference: (states, n) rad/s2, or (states, 2n) rad and rad/s;
+    tolerance: the same, or of a shape that stands for it; times: of the states, s.
+    """
+    level, n = about["level"], len(joints)
+    difference = np.abs(difference)
+    tolerance = np.broadcast_to(tolerance, difference.shape)
+    ratio = np.divide(difference, tolerance, out=np.where(difference == 0.0, 0.0, np.inf), where=tolerance > 0)
+    k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
+    unit, largest_unit = ("rad/s2",) * 2 if level == "derivative" else (("rad", "rad/s")[i // n], "rad")
+    place = f"{joints[i % n]} at t = {times[k]:.3f} s"
+    check = result.check(where, f"{level}, TMT to MuJoCo", difference[k, i], tolerance[k, i], unit, place, True)
+    result.rows.append(
+        about
+        | {
+            "largest_difference": None if check.value is None else difference[:, :n].max(),
+            "unit": largest_unit,
+            "worst_difference": check.value,
+            "band": check.tolerance,
+            "worst_unit": unit,
+            "difference_over_band": check.over_tolerance,
+            "worst_place": place,
+        }
+        | ending
+    )

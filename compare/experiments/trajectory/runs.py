@@ -1,0 +1,141 @@
+"""One scene by every scheme and step: a method of tmt, and the integrators of MuJoCo that do the same."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tmt.methods import METHODS
+
+from ...case import Case
+from ...engines import Dynamics, Engine, Method
+from ...judge.check import Result
+from ...judge.rounding import band, slope_rounding, step_rounding
+from ...judge.run import departure, deviation_alive, diverged_at, step_in_words
+from ...truth.smallest import reduced
+from .rules import check_divergence, check_level, check_movement, check_same_bits, ends_first, judged
+
+STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
+
+
+class TmtSide(NamedTuple):
+    """What TMT gives of one case with one scheme and step; states are recorded at the scene's own steps."""
+
+    t: np.ndarray  # (steps + 1,) s
+    q: np.ndarray  # (steps + 1, n) rad
+    v: np.ndarray
+    width: np.ndarray  # (recorded, 2n): the band of rounding
+    ended: float | None  # s: when it diverged
+    states: list  # the recorded q and v before that
+    derivative: np.ndarray  # (states, n) rad/s2
+    derivative_tolerance: np.ndarray  # (states,)
+    stepped: np.ndarray  # (states, 2n): one step from each
+    step_tolerance: np.ndarray
+    ulp: np.ndarray  # (steps + 1, n): angles of the run that starts one ulp away
+
+
+def counts(case: Case, finer: Sequence[int]) -> list[int]:
+    """The numbers of steps of a case's runs: multiples of its own; at most 8192, its own excepted."""
+    return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= STEPS_AT_MOST]
+
+
+def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], known: dict | None = None) -> Result:
+    """One case with every scheme and step size, and once by RK4 without the joints that it does not need.
+
+    finer: steps as multiples of the scene's own. known: a dict in which TMT's side is kept, for whoever compares it with
+    several engines.
+    """
+    result, known = Result("trajectory"), {} if known is None else known
+    if case not in known:
+        known[case] = reduced(case)
+    schemes = {}
+    for method in engines["mujoco"].methods.values():
+        schemes.setdefault(method.scheme, []).append(method)
+    runs = [(case, steps, *item) for steps in counts(case, finer) for item in schemes.items()]
+    if smaller := known[case]:
+        runs.append((smaller, smaller.steps, "rk4", schemes["rk4"]))
+    dynamics = {each: {name: engines[name].of(each) for name in ("tmt", "mujoco")} for each in {run[0] for run in runs}}
+    with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
+        for each, steps, scheme, methods in runs:
+            if (each, steps, scheme) not in known:
+                known[each, steps, scheme] = tmt_side(each, dynamics[each]["tmt"], steps, scheme)
+            compare(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
+    return result
+
+
+def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide:
+    """TMT's side of a case: the run, its band, and the two other levels at its recorded states."""
+    stepping, tree, tau = METHODS[scheme], case.tree, case.tau
+    dt, every = case.duration / steps, steps // case.steps
+    t, q, v, *_ = dynamics.run(*case.start, tau, dt, steps, scheme)
+    ended = diverged_at(case, t, q, v)
+    alive = t[::every] < (np.inf if ended is None else ended)
+    states = [path[::every][alive] for path in (q, v)]
+    one_ulp_away = (np.nextafter(start, np.inf) for start in case.start)
+    return TmtSide(
+        t, q, v,
+        band(stepping, tree, q, v, tau, dt, every),
+        ended,
+        states,
+        dynamics.acceleration(*states, tau),
+        slope_rounding(METHODS["rk4"], tree, *states, tau, dt)[2],
+        one_step(dynamics, states, tau, dt, scheme),
+        step_rounding(stepping, tree, *states, tau, dt),
+        dynamics.run(*one_ulp_away, tau, dt, steps, scheme).q,
+    )  # fmt: skip
+
+
+def compare(
+    result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
+) -> None:
+    """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step."""
+    tau, dt, every, n = case.tau, case.duration / steps, steps // case.steps, len(case.joints)
+    t, times, first = mine.t, mine.t[::every], None
+    angle_band = mine.width[:, :n].max(axis=1)
+    accelerations = dynamics.acceleration(*mine.states, tau)
+    for method in methods:
+        _, *theirs = dynamics.run(*case.start, tau, dt, steps, method.name)[:3]
+        ends = {"tmt": mine.ended, "mujoco": diverged_at(case, t, *theirs)}
+        count = judged(times, angle_band, ends)
+        where = f"{case.name}, {method.name}, {step_in_words(case, steps)}"
+        until, required = float(times[count - 1]), case.required(method.scheme, dt)
+        about = {"scene": case.name, "engine_integrator": method.name, "twin": method.scheme, "dt_s": dt}
+        ending = {
+            "judged_until_s": until, "required_s": required, "diverged_at_s": ends["mujoco"],
+            "twin_diverged_at_s": ends["tmt"],
+        }  # fmt: skip
+        one = one_step(dynamics, mine.states, tau, dt, method.name)
+        apart = beside(*(a[::every][:count] - b[::every][:count] for a, b in zip((mine.q, mine.v), theirs)))
+        alive = times[: len(mine.states[0])]
+        for level, difference, tolerance, at in (
+            ("derivative", mine.derivative - accelerations, mine.derivative_tolerance[:, None], alive),
+            ("one step", mine.stepped - one, mine.step_tolerance, alive),
+            ("open loop", apart, mine.width[:count], times[:count]),
+        ):
+            check_level(result, where, about | {"level": level}, case.joints, difference, tolerance, at, ending)
+        if required:  # a scene may leave it open
+            result.check(where, "time judged", until, required, "s", rule="at least")
+        check_divergence(result, where, ends, dt, steps, angle_band)
+        if case.is_free and "own" not in case.scene.tags:
+            before = t < ends_first(ends)
+            check_movement(result, where, min(deviation_alive(path[before], case.q) for path in (mine.q, theirs[0])))
+        if first is None:
+            first = method, theirs
+            result.curves[(case.name, method.scheme, steps)] = {
+                "integrator": method.name, "t": t, "every": every, "tmt": [mine.q, mine.v], "mujoco": theirs,
+                "band": angle_band, "ulp": mine.ulp, "judged_until_s": until, "ended": ends,
+                "left": {"tmt": departure(t, mine.q), "mujoco": departure(t, theirs[0])},
+            }  # fmt: skip
+        else:
+            check_same_bits(result, where, first[0].name, first[1], theirs)
+
+
+def one_step(dynamics: Dynamics, states, tau, dt: float, method: str) -> np.ndarray:
+    """Angles and rates one step after each of the states, (states, 2n)."""
+    motion = dynamics.run(*states, tau, dt, 1, method)
+    return beside(motion.q[:, 1], motion.v[:, 1])
+
+
+def beside(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Angles and rates side by side, (..., 2n)."""
+    return np.concatenate([q, v], axis=-1)

@@ -1,0 +1,64 @@
+"""A second robot, of four hinges: nothing in compare knows it."""
+
+from pathlib import Path
+
+import tmt
+from compare.case import Scene
+from compare.robots import Robot
+
+XML = """
+<mujoco model="crane">
+  <compiler angle="radian"/>
+  <option gravity="0 0 -9.81"><flag contact="disable" constraint="disable" autoreset="disable"/></option>
+  <worldbody>
+    <body name="boom">
+      <joint name="swing" axis="1 0 0"/>
+      <joint name="lift" axis="0 1 0"/>
+      <inertial pos="0.02 0 -0.2" mass="2.0" diaginertia="0.03 0.028 0.004"/>
+      <body name="jib" pos="0 0 -0.4">
+        <joint name="bend" axis="0 1 0"/>
+        <inertial pos="0 0.01 -0.15" mass="1.2" diaginertia="0.012 0.011 0.002"/>
+        <body name="tool" pos="0 0 -0.3">
+          <joint name="twist" axis="0.6 0 0.8"/>
+          <inertial pos="0 0.05 -0.08" mass="0.5" diaginertia="0.002 0.0018 0.0009"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def diagonal(x, y, z):
+    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
+
+
+TREE = tmt.Tree(
+    hinge_names=("swing", "lift", "bend", "twist"),
+    parent=(-1, 0, 1, 2),
+    offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.4), (0.0, 0.0, -0.3)),
+    axis=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8)),
+    damping=(0.0,) * 4,
+    body_names=("boom", "jib", "tool"),
+    body_hinge=(1, 2, 3),
+    mass=(2.0, 1.2, 0.5),
+    com=((0.02, 0.0, -0.2), (0.0, 0.01, -0.15), (0.0, 0.05, -0.08)),
+    inertia=(diagonal(0.03, 0.028, 0.004), diagonal(0.012, 0.011, 0.002), diagonal(0.002, 0.0018, 0.0009)),
+    gravity=(0.0, 0.0, -9.81),
+)
+SHORT = {"duration": 0.25, "dt": 0.25 / 64}
+SCENES = (
+    Scene("let go", "reaching", tags=("speed", "regular", "digits"), **SHORT),
+    Scene("held up", "raised", "hold", **SHORT),
+    Scene("let go, damped", "reaching", damping=0.1, **SHORT),
+    Scene("thrown, weightless", "down", speed=(200.0, 100.0, 0.0, -100.0), gravity=False, **SHORT),
+    Scene("jib alone", "reaching", locked=("swing", "lift", "twist"), tags=("fewer joints",), **SHORT),
+)
+
+
+def crane(folder: Path) -> Robot:
+    """The robot; its file is written into a folder."""
+    path = folder / "crane.xml"
+    path.write_text(XML, encoding="utf-8")
+    postures = {"down": (0, 0, 0, 0), "raised": (150, 20, 10, 0), "reaching": (20, -60, -30, 15)}
+    return Robot("crane", path, TREE, postures, SCENES)

@@ -1,0 +1,94 @@
+"""From a file to MuJoCo: what is read, what is refused in one line, whose names and frames count."""
+
+import numpy as np
+import pytest
+
+from compare.engines.mujoco import ModelError, load, parse
+from compare.engines.mujoco.parameters import parameters
+from compare.robots.arm import ARM
+
+XML = ARM.mjcf.read_text(encoding="utf-8")
+
+
+def edited(old, new):
+    assert XML.count(old) == 1
+    return XML.replace(old, new)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(ModelError, match=r"cannot read .*no\.xml: No such file"):
+        load(tmp_path / "no.xml", ARM.tree)
+
+
+@pytest.mark.parametrize(
+    "content, says",
+    [
+        (b"not xml", "is not MJCF"),
+        (b"<robot/>", "has the joints none"),
+        (b"\xff\xfe\x00", "is not MJCF"),
+        (b"<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo cannot compile"),
+        (b"<mujoco/>", "has the joints none; hinges alpha, beta, gamma and no others are expected"),
+    ],
+)
+def test_a_file_that_is_not_the_arm(tmp_path, content, says):
+    path = tmp_path / "model.xml"
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match=says) as error:
+        load(path, ARM.tree)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "old, new, says",
+    [
+        ('name="gamma"', 'name="elbow"', r"elbow \(hinge\)"),
+        ('name="gamma"', "", r"unnamed \(hinge\)"),
+        ('name="gamma" type="hinge"', 'name="gamma" type="slide"', r"gamma \(slide\)"),
+        (
+            '<body name="upper_arm" pos="0 0 0">',
+            '<body name="upper_arm"><freejoint name="loose"/>',
+            "cannot compile|loose",
+        ),
+    ],
+)
+def test_other_hinges(tmp_path, old, new, says):
+    path = tmp_path / "model.xml"
+    path.write_text(edited(old, new))
+    with pytest.raises(ModelError, match=says):
+        load(path, ARM.tree)
+
+
+def test_body_axes_are_those_of_the_world_at_zero(rng):
+    """A forearm frame that lies turned in the file describes the same arm."""
+    turned = edited(
+        '<body name="forearm" pos="0 0 -0.3">', '<body name="forearm" pos="0 0 -0.3" euler="0 0 1.5707963267948966">'
+    )
+    turned = turned.replace('name="gamma" type="hinge" axis="0 1 0"', 'name="gamma" type="hinge" axis="1 0 0"')
+    turned = turned.replace('pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"',
+                            'pos="0 -0.15 0" mass="1.5" diaginertia="0.019 0.001 0.019"')  # fmt: skip
+    engine, arm = (parse(text, ARM.tree).of(ARM.case()) for text in (turned, XML))
+    q, qd = rng.uniform(-3, 3, (2, 50, 3))
+    assert np.allclose(engine.angular_velocities(q, qd), arm.angular_velocities(q, qd), atol=1e-12)
+    assert np.allclose(engine.jacobians(q)[1], arm.jacobians(q)[1], atol=1e-12)
+    assert np.allclose(parameters(engine)["inertia"], parameters(arm)["inertia"], atol=1e-15)
+    assert np.allclose(parameters(engine)["com"], parameters(arm)["com"], atol=1e-15)
+
+
+def test_a_comment_in_another_encoding_is_no_obstacle(tmp_path):
+    path = tmp_path / "model.xml"
+    path.write_bytes(XML.encode().replace(b"<!--", b"<!-- \xe9 ", 1))
+    assert load(path, ARM.tree).of(ARM.case()).mass_matrix(np.zeros(3))[0, 0] == pytest.approx(0.2445)
+
+
+def test_joints_are_those_of_the_tree_in_its_order(rng):
+    """What a file calls beta is beta, though it stands before alpha."""
+    lines = [f'<joint name="{name}" type="hinge" axis="{axis}"/>' for name, axis in (("alpha", "0 1 0"), ("beta", "1 0 0"))]
+    text = XML.replace(lines[0], "first").replace(lines[1], lines[0].replace("0 1 0", "1 0 0"))
+    text = text.replace("first", lines[1].replace("1 0 0", "0 1 0"))  # beta first, about y; then alpha, about x
+    q, v = rng.uniform(-3, 3, (2, 20, 3))
+    other, arm = (parse(text, ARM.tree).of(ARM.case()) for text in (text, XML))
+    swapped = [1, 0, 2]
+    assert np.allclose(other.bias(q, v), arm.bias(q[:, swapped], v[:, swapped])[:, swapped], atol=1e-12)
+    engine = parse(XML, ARM.tree)
+    assert engine.joints == ARM.joints and engine.carriers == ["beta", "gamma"] and engine.source == XML
+    assert load(ARM.mjcf, ARM.tree).source == ARM.mjcf

@@ -1,0 +1,120 @@
+"""The whole experiment: a small run, one without timings, wrong models, and other robots."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from trees import mjcf
+
+import tmt
+from compare import experiment
+from compare.case import Scene
+from compare.engines.mujoco import parse
+from compare.experiments import reduction
+from compare.robots import Robot
+from compare.robots.arm import ARM
+
+XML = ARM.mjcf.read_text(encoding="utf-8")
+
+
+def setup_of(text) -> experiment.Setup:
+    return experiment.Setup.small(ARM, experiment.engines(parse(text, ARM.tree)))
+
+
+def test_a_small_run_takes_every_path(small):
+    result = small("reduction")
+    rows = {(r["scene"], r["hinges"], r["engine"], r["integrator"]): r for r in result.rows}
+    assert {scene for scene, *_ in rows} == {scene.name for scene in ARM.scenes}
+    planar, whole = (rows["zero, free", hinges, "tmt", "RK4"] for hinges in ("alpha gamma", "alpha beta gamma"))
+    assert planar["nv"] == 2 and whole["nv"] == 3 and 0 < planar["operations"] < whole["operations"]
+    assert planar["ns_per_step"] > 0
+    assert planar["max_difference_rad"] is not None and whole["max_difference_rad"] is None
+    stays = rows["bent, held", "none", "mujoco", "RK4"]
+    assert stays["nv"] == 0 and stays["ns_per_step"] is None and 0.0 < stays["max_difference_rad"] < 1e-12
+
+
+def test_a_run_without_timings_has_the_checks_only(engines):
+    result = reduction.rows(experiment.Setup.small(ARM, engines), timed=False)
+    assert len(result.checks) > 30 and all(check.passed for check in result.checks)
+    assert result.rows == [] and [figure()[0] for figure in reduction.figures(result, ARM)] == [
+        "reduction_elbow_swing", "reduction_modes"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "old, new, fails",
+    [
+        ("0 0 -9.81", "0 0 -1.62", "order of the error against the elliptic function, from 4"),
+        ("-9.81", '-9.81" density="50" viscosity="1', "order of the error against the elliptic function, from 4"),
+        ('axis="1 0 0"', 'axis="1 0 0" damping="0.1"', "power of the amplitude with which"),
+        ('axis="1 0 0"', 'axis="1 0 0" armature="0.01"', "Mbar, reduced, TMT to MuJoCo"),
+    ],
+    ids=["moon", "air", "damping", "armature"],
+)
+def test_a_wrong_model_fails(old, new, fails):
+    assert old in XML
+    checks = reduction.rows(setup_of(XML.replace(old, new)), timed=False).checks
+    assert any(check.quantity.startswith(fails) for check in checks if not check.passed)
+
+
+def test_a_model_whose_joint_cannot_be_locked_is_a_failed_check():
+    tendon = '<tendon><fixed><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
+    result = reduction.rows(setup_of(XML.replace("</mujoco>", tendon)))
+    failed = [check for check in result.checks if not check.passed]
+    assert [check.quantity for check in failed] == ["models whose hinges can be locked"]
+    assert "gamma locked" in failed[0].note and list(reduction.figures(result, ARM)) == []
+
+
+# another robot
+
+
+LEG = tmt.Tree(
+    hinge_names=("yaw", "hip", "roll", "knee"),
+    parent=(-1, 0, 1, 2),
+    offset=((0.1, 0, 0.5), (0, 0, -0.05), (0, 0, -0.25), (0, 0, -0.2)),
+    axis=((0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 0)),
+    damping=(0, 0, 0, 0),
+    body_names=("base", "thigh", "shank"),
+    body_hinge=(0, 1, 3),
+    mass=(2.0, 1.5, 0.8),
+    com=((0.02, 0, 0), (0, 0, -0.12), (0, 0, -0.1)),
+    inertia=(np.diag([0.01, 0.01, 0.008]), np.diag([0.012, 0.012, 0.002]), np.diag([0.004, 0.004, 0.001])),
+    gravity=(0, 0, -9.81),
+)
+SHORT = {"duration": 0.25, "dt": 1 / 64}
+SCENES = (
+    Scene("drop", "folded", **SHORT),
+    Scene("rest", "sideways", "hold", **SHORT),
+    Scene("knee swing", (0, 0, 0, 60), locked=("yaw", "hip", "roll"), **SHORT),
+    Scene("plane", (0, 50, 0, 20), tags=("fewer joints",), **SHORT),
+    Scene("own", (10, 20, 0, 40), (0.5, 0, 0, 0.1), (0, 10, 0, 0), damping=0.2, locked=("roll",), judged=0.0, tags=("own",), **SHORT),
+)
+
+
+def test_a_robot_of_four_hinges_goes_through_with_figures(tmp_path):
+    postures = {"straight": (0, 0, 0, 0), "folded": (20, 40, -10, 80), "sideways": (90, 0, 30, 20)}
+    leg = Robot("leg", Path("leg.xml"), LEG, postures, SCENES)
+    setup = experiment.Setup.small(leg, experiment.engines(parse(mjcf(LEG), LEG)))
+    result = reduction.rows(setup)
+    assert all(check.passed for check in result.checks), [str(check) for check in result.checks if not check.passed]
+    assert len(result.tables["reduction_subsets"]) == (2**4 - 2) * 6
+    assert {row["scene"]: row["hinges"] for row in result.rows} == {
+        "drop": "yaw hip roll knee", "rest": "none", "knee swing": "knee", "plane": "hip knee", "own": "yaw hip knee"}  # fmt: skip
+    drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, leg))}
+    assert list(drawn) == ["reduction_needs", "reduction_knee_swing", "reduction_cost_in_mujoco"]  # yaw never swings
+    assert drawn["reduction_needs"].startswith("What each scene of the stated leg needs. Nothing for rest:")
+    said = " ".join([*result.notes, *drawn.values(), reduction.claim(leg), reduction.tolerance(leg)])
+    assert "Small oscillations of the leg are not compared with its linear modes: no named posture" in said
+    assert not any(f" {word} " in said for word in ("arm", "alpha", "beta", "gamma", "bent", "nan"))
+
+
+TWO = dataclasses.replace(tmt.ARM.lock({"alpha": 0.3}), hinge_names=("a", "b"))
+ONE = tmt.Tree(("a",), (-1,), ((0, 0, 1),), ((0, 1, 0),), (0.1,), ("rod",), (0,), (1,), ((0, 0, -0.3),), (np.eye(3) / 100,), (0, 0, -9))
+
+
+@pytest.mark.parametrize("tree", [TWO, ONE], ids=["two hinges", "one"])
+def test_a_robot_of_few_hinges_without_postures_and_scenes_goes_through(tree):
+    bare = Robot("bare", Path("bare.xml"), tree, {}, ())
+    result = reduction.rows(experiment.Setup.small(bare, experiment.engines(parse(mjcf(tree), tree))))
+    assert all(check.passed for check in result.checks), [str(check) for check in result.checks if not check.passed]
+    assert [figure()[0] for figure in reduction.figures(result, bare)] == ["reduction_cost_in_mujoco"]

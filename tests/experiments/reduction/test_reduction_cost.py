@@ -1,0 +1,65 @@
+"""What is added to the model in MuJoCo is there, in the size of the robot, and only what touches something changes the motion."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import tmt
+from compare.case import Scene
+from compare.engines.mujoco import ModelError, additions
+from compare.experiments.reduction import cost
+from compare.robots.arm import ARM
+
+
+def test_additions_are_there_and_only_a_touched_floor_changes_the_motion(mujoco):
+    engines = additions.with_additions(mujoco, *cost.sizes(ARM.tree))
+    case = ARM.case("falls", posture="bent")
+    models = {name: engine.of(case) for name, engine in engines.items()}
+    sizes = {name: (d.model.ngeom, d.model.nsensor, d.model.nu) for name, d in models.items()}
+    assert sizes[additions.MINIMAL] == (0, 0, 0) and sizes["two capsules"] == (2, 0, 0)
+    assert sizes["6 sensors"] == (0, 6, 0) and sizes["a motor"] == (0, 0, 1) and sizes[additions.ON_FLOOR] == (3, 0, 0)
+    assert not models[additions.MINIMAL].enabled("contact") and models["contact stage"].enabled("contact")
+    start = *case.start, case.tau, 5 / 1024, 400
+    paths = {name: dynamics.run(*start, "RK4").q for name, dynamics in models.items()}
+    changed = {name for name, path in paths.items() if not np.array_equal(path, paths[additions.MINIMAL])}
+    assert changed == {additions.ON_FLOOR}
+    many, pushed = additions.contacts(models[additions.ON_FLOOR], *start, "Euler")
+    assert many > 0.1 and pushed
+    assert additions.contacts(models[additions.CAPSULES], *start, "Euler") == (0.0, False)
+
+
+def test_a_model_with_additions_takes_a_scenes_changes_but_no_locked_joint(mujoco):
+    engine = additions.with_additions(mujoco, *cost.sizes(ARM.tree))[additions.ON_FLOOR]
+    damped = engine.of(ARM.case("damped", damping=0.5, gravity=False)).model
+    assert damped.dof_damping.tolist() == [0.5] * 3 and damped.ngeom == 3 and not damped.opt.gravity.any()
+    with pytest.raises(ModelError, match="cannot have beta locked"):
+        engine.of(ARM.case("locked", locked=("beta",)))
+
+
+def test_sizes_follow_the_robot_and_its_base():
+    assert cost.sizes(ARM.tree) == (0.03, -0.4, -2.0)
+    big = dataclasses.replace(
+        ARM.tree, offset=2.0 * np.array(ARM.tree.offset) + [[0, 0, 1.5], [0, 0, 0], [0, 0, 0]], com=2.0 * np.array(ARM.tree.com)
+    )
+    assert cost.sizes(big) == (0.06, 1.5 - 0.8, 1.5 - 4.0)
+
+
+def test_the_fall_is_the_regular_scene_else_a_free_one_else_a_posture():
+    assert cost.fall(ARM).name == "bent, free"
+    scenes = Scene("weightless", gravity=False), Scene("held", torque="hold"), Scene("locked", locked=("beta",)), Scene("free")
+    assert cost.fall(dataclasses.replace(ARM, scenes=scenes)).name == "free"
+    let_go = cost.fall(dataclasses.replace(ARM, scenes=scenes[:-1]))
+    assert let_go.scene.posture == "zero" and let_go.is_free
+    short = Scene("short", "bent", duration=0.25, dt=0.25 / 64, judged=0.1)
+    assert cost.fall(dataclasses.replace(ARM, scenes=(short,))).duration == 5.0  # time enough to come to rest
+    assert cost.fall(dataclasses.replace(ARM, scenes=(), postures={})).posture.tolist() == [0.0] * 3
+
+
+def test_a_body_whose_centre_of_mass_is_at_its_joint_gets_a_ball(mujoco):
+    from compare.engines.mujoco import parse
+
+    text = ARM.mjcf.read_text(encoding="utf-8").replace('pos="0.15 0 0" mass', 'pos="0 0 0" mass')
+    tree = dataclasses.replace(tmt.ARM, com=((0, 0, -0.15), (0, 0, 0)))
+    engine = additions.with_additions(parse(text, tree), *cost.sizes(tree))["two capsules"]
+    assert engine.model.ngeom == 2

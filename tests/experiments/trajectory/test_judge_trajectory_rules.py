@@ -1,0 +1,87 @@
+"""The rules of a run: for each a row just inside and one just outside."""
+
+import numpy as np
+import pytest
+from judged import verdicts
+from trajectory_curves import FREE, HELD
+
+from compare.experiments.trajectory import rules
+from compare.judge.check import Result
+
+
+def test_a_run_is_judged_while_its_band_is_below_a_thousandth_of_a_radian_and_nothing_has_diverged():
+    times, never = np.arange(5.0), {"tmt": None, "mujoco": None}
+    narrow, wide = np.full(5, 0.999e-3), np.array([0.0, 0.999e-3, 1.001e-3, 0.0, 0.0])
+    assert rules.judged(times, narrow, never) == 5
+    assert rules.judged(times, wide, never) == 2
+    assert rules.judged(times, narrow, {"tmt": None, "mujoco": 3.0}) == 3
+    assert rules.judged(times, narrow, {"tmt": 2.5, "mujoco": 4.0}) == 3
+    assert rules.judged(times, wide + 1.0, never) == 1
+
+
+def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance():
+    bar, times = np.full((3, 4), 1.0), np.array([0.0, 0.5, 1.0])
+    for off, passes in ((0.999, True), (1.001, False), (np.nan, False), (np.inf, False)):
+        difference, result = np.zeros((3, 4)), Result("trajectory")
+        difference[1, 3] = off
+        rules.check_level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, bar, times, {})
+        (check,), (row,) = result.checks, result.rows
+        assert (check.passed, check.unit, check.note) == (passes, "rad/s", "beta at t = 0.500 s")
+        assert row["worst_difference"] == check.value and (row["largest_difference"] is None) == (check.value is None)
+    difference = np.array([[0.2, 0.7, 3.0, 0.0], [0.1, 0.4, 0.0, 0.0], [0.0, 0.5, 0.0, 0.9]])
+    result = Result("trajectory")
+    rules.check_level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, bar, times, {})
+    assert (result.rows[0]["largest_difference"], result.rows[0]["worst_difference"]) == (0.7, 3.0)
+    for off, passes in (
+        (0.0, True),
+        (1e-300, False),
+        (np.nan, False),
+    ):  # where rounding has nothing to add, nothing may differ
+        result, difference = Result("trajectory"), np.array([[0.0, 0.0, off, 0.0]])
+        rules.check_level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, 0.0 * bar[:1], times, {})
+        assert result.checks[0].passed is passes
+
+
+def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
+    assert FREE.required("rk4", 5 / 64) == 5.0 and HELD.required("rk4", 5 / 64) == 2.5
+    for scheme in ("semi_implicit_euler", "implicit"):
+        assert (FREE.required(scheme, 0.0099), FREE.required(scheme, 0.0101)) == (5.0, 0.3)
+    assert FREE.changed(judged=0.2).required("implicit", 5 / 64) == 0.2
+
+
+@pytest.mark.parametrize(
+    "ours, theirs, width, found",
+    [
+        (None, None, 0.0, {}),
+        (0.5, 0.5, 0.0, True),
+        (0.5, 0.51, 0.0, False),
+        (0.51, 0.5, 0.0, False),
+        (None, 0.5, 0.0, False),
+        (0.5, None, 0.0, False),
+        (0.5, None, 0.999e-3, False),
+        (0.5, None, 1.001e-3, {}),
+    ],
+)
+def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, width, found):
+    result = Result("trajectory")
+    rules.check_divergence(result, "x", {"tmt": ours, "mujoco": theirs}, 0.01, 100, np.full(11, width))
+    assert verdicts(result) == ({} if found == {} else {"step of divergence, MuJoCo's, is TMT's": found})
+    assert all(check.rule == "equal" for check in result.checks)
+
+
+def test_a_free_run_moves_by_a_tenth_of_a_radian():
+    for moved, passes in ((0.1001, True), (0.0999, False)):
+        result = Result("trajectory")
+        rules.check_movement(result, "x", moved)
+        assert verdicts(result) == {"movement": passes}
+
+
+def test_integrators_that_are_one_scheme_give_the_same_bits():
+    one = [np.array([1.0, np.nan]), np.array([2.0, 3.0])]
+    for other, passes in (
+        (one, True), ([one[0].copy(), one[1] + 0.0], True), ([one[0], np.nextafter(one[1], 9.0)], False),
+        ([one[0] + 1, one[1]], False),
+    ):  # fmt: skip
+        result = Result("trajectory")
+        rules.check_same_bits(result, "x", "Euler", one, other)
+        assert verdicts(result) == {"the same bits as Euler": passes}

@@ -1,0 +1,79 @@
+"""Models that are not the stated arm: nothing raises, and every sentence and caption follows that model's numbers."""
+
+import re
+
+import pytest
+from trajectory_curves import CASES
+
+import tmt
+from compare.engines.mujoco import parse
+from compare.experiments import trajectory
+from compare.experiments.trajectory import drift, errors, horizon, sentences
+from compare.judge.check import Result
+from compare.robots.arm import ARM
+
+XML = ARM.mjcf.read_text()
+MODELS = {
+    "the arm": ("", ""),
+    "on the moon": ("0 0 -9.81", "0 0 -1.62"),
+    "gravity off by its flag": ("<flag ", '<flag gravity="disable" '),
+    "ten times the gravity": ("-9.81", "-98.1"),
+    "damped by 5": ('axis="1 0 0"/>', 'axis="1 0 0" damping="5"/>'),
+    "with a spring": ('axis="1 0 0"/>', 'axis="1 0 0" stiffness="30"/>'),
+    "a muscle's activation": ("</mujoco>", '<actuator><position joint="beta" kp="3" timeconst="0.1"/></actuator></mujoco>'),
+    "a feather": (
+        'pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"', 'pos="1e-5 0 0" mass="1.5" diaginertia="1e-9 1e-9 1e-9"',
+    ),
+}  # fmt: skip
+STEPS = {1: (16, 32, 64), 4: (16, 32, 64)}
+FREE = CASES["bent, free"]
+
+
+@pytest.fixture(scope="module")
+def known():
+    """TMT's side, and the runs with many digits, which are the same for all models."""
+    return {}, [horizon.exact_runs(FREE, ("semi_implicit_euler", "implicit", "rk4"), 3)]
+
+
+@pytest.fixture(params=MODELS, scope="module")
+def other(request, known, engines):
+    """A model's name and all that a report says of its runs."""
+    text = XML.replace(*MODELS[request.param]) if request.param != "the arm" else XML
+    engines = engines | {"mujoco": parse(text, tmt.ARM)}
+    result = Result("trajectory", curves={"runs": {}})
+    for case in ARM.cases:
+        part = trajectory.follow(case, engines, (1,), known[0])
+        result.rows += part.rows
+        result.curves["runs"] |= part.curves
+    drift.drift(result, ARM, engines, STEPS)
+    horizon.many_digits(result, [FREE], known[1])
+    result.curves["errors"] = errors.held(result, ARM) | errors.free(result, ARM)
+    result.notes = sentences.notes(result, ARM, engines, (1,)) + result.notes
+    return request.param, result
+
+
+def test_the_sentences_of_a_trajectory_follow_the_model(other):
+    name, result = other
+    catch, bent, of_errors, agreement, order = result.notes[:5]
+    right = name == "the arm"
+    assert (re.search(r"MuJoCo's is 0.1 rad away at 4\.\d+ s", catch) is not None) == right
+    assert ("the cause is rounding of the torque" in catch) == right
+    at = re.search(r"MuJoCo's (stays within 0.1 rad|is 0.1 rad away at ([\d.]+) s)", bent)
+    for note, scene in ((catch, "ball catch, held"), (bent, "bent, held")):
+        left = result.curves["runs"][scene, "rk4", 64]["left"]["mujoco"]
+        assert ("that is no rounding" in note) == (not right and left is not None and "damped" not in name)
+    assert (at.group(2) is None) == (result.curves["runs"]["bent, held", "rk4", 64]["left"]["mujoco"] is None)
+    assert ("; bent, free; " in agreement) == right or "damped" in name
+    held = result.curves["errors"]["ball catch, held"]
+    assert f"ball catch, held (true: rest): TMT {sentences.rad(held[0])}, MuJoCo {sentences.rad(held[1])}" in of_errors
+    ended = result.curves["runs"]["ball catch, free", "semi_implicit_euler", 64]["ended"]["mujoco"]
+    says = "MuJoCo never" if ended is None else f"MuJoCo at {ended:.2f} s"
+    assert re.search(rf"ball catch, free, Euler: judged for [\d.]+ s, diverges: TMT at 0.39 s, {says}", order)
+
+
+def test_every_caption_of_a_trajectory_can_be_said_of_the_model(other):
+    for figure in trajectory.figures(result := other[1], ARM):
+        if figure.args[-1] in (result, *ARM.cases[4:]):  # some of the scenes: each is drawn in the same way
+            continue
+        name, _, caption = figure()
+        assert caption.endswith(".") and "nan" not in caption and name

@@ -1,0 +1,108 @@
+"""The width of the band of rounding, and the growth of a small difference."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import tmt
+from compare.judge.rounding import band, growth, step_rounding
+from compare.robots.arm import ARM
+from tmt.methods import METHODS, amplification
+
+EPS = 2.0**-52
+TURN = tmt.Tree(  # one hinge without gravity: a linear system, and nothing but a sum of roundings
+    hinge_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,),
+    body_names=("disc",), body_hinge=(0,), mass=(1.0,),
+    com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),),
+    gravity=(0.0, 0.0, 0.0),
+)  # fmt: skip
+
+
+def turning(steps, dt, torque=3.0, rate=5.0):
+    """States of the disc under a constant torque, and the rounding of each step as the report states it."""
+    t, a = dt * np.arange(steps + 1), torque / 2.0
+    q, qd = 1.0 + rate * t + a * t**2 / 2, rate + a * t
+    rounding = (64 * EPS * 2.0 * a + 64 * EPS * torque) / 2.0
+    rates = dt * rounding + 8 * EPS * (qd + dt * a)
+    return q[:, None], qd[:, None], 8 * EPS * (q + dt * qd) + dt * rates, rates
+
+
+@pytest.mark.parametrize("method", ["semi_implicit_euler", "rk4"])
+def test_the_rounding_of_a_step_is_64_eps_of_the_solve_and_8_eps_of_the_sums(method):
+    q, qd, angles, rates = turning(8, 0.1)
+    found = step_rounding(METHODS[method], TURN, q, qd, np.array([3.0]), 0.1)
+    # the stages of RK4 lie ahead of the state, where nothing of the disc's sums is larger
+    assert found == pytest.approx(np.stack([angles, rates], axis=1), rel=1e-9)
+
+
+def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
+    """Elbow alone, damped: gravity of both links, the centripetal term, torque and damping."""
+    tree = ARM.case("elbow", posture=(0.0, 0.0, 30.0), locked=("alpha", "beta"), damping=0.5).tree
+    q, qd, tau, dt, M = 0.3, -4.0, 2.0, 0.01, 0.05275
+    (h,) = tmt.bias(np.array([q]), np.array([qd]), tree)
+    a = (tau - 0.5 * qd - h) / M
+    S = 9.81 * (1.9 * 0.15 + 1.5 * 0.45) + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2 + tau + 0.5 * 4.0
+    rates = dt * (64 * EPS * M * abs(a) + 64 * EPS * S) / M + 8 * EPS * (4.0 + dt * abs(a))
+    expected = [8 * EPS * (q + dt * 4.0) + dt * rates, rates]
+    damped = dataclasses.replace(METHODS["semi_implicit_euler"])
+    found = step_rounding(METHODS["explicit_euler"], tree, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt)
+    assert found[0] == pytest.approx(expected, rel=1e-9)
+    implicit = step_rounding(damped, tree, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt)
+    assert 0.85 < implicit[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
+
+
+@pytest.mark.parametrize("every", [1, 4, 64])
+def test_the_band_is_the_sum_of_what_each_step_adds_carried_to_the_present(every):
+    """J of the disc is ((1, dt), (0, 1)): an error of rate becomes m dt times as much of angle after m steps."""
+    steps, dt = 128, 0.05
+    q, qd, angles, rates = turning(steps, dt)
+    found = band(METHODS["semi_implicit_euler"], TURN, q, qd, np.array([3.0]), dt, every)
+    assert found.shape == (steps // every + 1, 2) and not found[0].any()
+    for row, n in zip(found[1:], range(every, steps + 1, every)):
+        k = np.arange(n)
+        # an error of rate reaches the angle in its own step through the sum, in each later one through dt
+        expected = [(angles[:n] + (n - 1 - k) * dt * rates[:n]).sum(), rates[:n].sum()]
+        assert row == pytest.approx(expected, rel=1e-9 if every == 1 else 0.04)
+
+
+@pytest.mark.parametrize("share, inside", [(0.999, True), (1.001, False)])
+def test_errors_of_every_step_within_its_bound_stay_in_the_band_and_larger_ones_leave_it(share, inside):
+    """Each step is off by a share of its bound, all to one side; a million times as large, so that nothing else is seen."""
+    steps, dt, tau, large = 64, 0.05, np.array([3.0]), 1e6
+    q, qd, *delta = turning(steps, dt)
+    path = tmt.simulate(q[0], qd[0], tau, dt, steps, "semi_implicit_euler", TURN)[1:]
+    width = band(METHODS["semi_implicit_euler"], TURN, *path, tau, dt)
+    state = [q[0], qd[0]]
+    for k in range(steps):
+        state = [x[1] for x in tmt.simulate(*state, tau, dt, 1, "semi_implicit_euler", TURN)[1:]]
+        state = [x + large * share * d[k] for x, d in zip(state, delta)]
+        off = np.concatenate([x - p[k + 1] for x, p in zip(state, path)])
+        assert (np.abs(off) <= large * width[k + 1]).all() == inside
+
+
+def test_the_band_of_a_run_that_diverges_is_infinite_from_there():
+    q, qd, *_ = turning(8, 0.1)
+    q[5:] = np.nan
+    width = band(METHODS["rk4"], TURN, q, qd, np.array([3.0]), 0.1)
+    assert np.isfinite(width[:5]).all() and np.isinf(width[5:]).all()
+    q[0] = np.nan
+    assert np.isinf(band(METHODS["rk4"], TURN, q, qd, np.array([3.0]), 0.1)[1:]).all()
+
+
+def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():
+    """Upright, held: every step has the same Jacobian, so a small difference grows as the norm of its powers."""
+    q, steps, dt = np.radians([180.0, 0.0, 90.0]), 64, 0.01
+    path = np.tile(q, (steps + 1, 1))
+    tau = tmt.gravity_balance(q)
+    (J,) = amplification(METHODS["rk4"], tmt.ARM, q[None], np.zeros((1, 3)), tau, dt)
+    grown = growth(METHODS["rk4"], tmt.ARM, path, 0.0 * path, tau, dt, every=16)
+    expected = [np.log10(np.linalg.norm(np.linalg.matrix_power(J, k), 2)) for k in range(0, steps + 1, 16)]
+    assert grown == pytest.approx(expected, abs=1e-6) and grown[-1] > 2.0
+
+
+def test_the_growth_of_a_run_that_diverges_is_no_number_from_there():
+    q, qd, *_ = turning(8, 0.1)
+    q[5:] = np.nan
+    grown = growth(METHODS["rk4"], TURN, q, qd, np.array([3.0]), 0.1, every=2)
+    assert np.isfinite(grown[:3]).all() and np.isnan(grown[3:]).all() and len(grown) == 5

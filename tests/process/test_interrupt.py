@@ -1,0 +1,127 @@
+"""Ctrl-C, SIGTERM and SIGHUP end a run within a second, with one line and status 2, whatever it is doing."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from runs import ENVIRONMENT, SECOND, command, ended, started
+from small_report import OLD, files, old_report
+
+from compare.__main__ import main
+
+LINE = "interrupted; a report that was there is unchanged"
+ROLLOUT = """
+from compare.process import interrupt
+
+interrupt.answer()
+import numpy as np
+from compare.engines.mujoco import load
+from compare.robots.arm import ARM
+
+dynamics = load(ARM.mjcf, ARM.tree).of(ARM.case())
+_, run = dynamics.runner(np.zeros(3), np.zeros(3), np.zeros(3), 1e-4, 500_000, "RK4")
+print("now", flush=True)
+run()  # some seconds in C
+"""
+COMPILATION = """
+from compare.process import interrupt
+
+interrupt.answer()
+import numba
+
+text = "\\n".join(["def f(x):", *(f"    x = np.sin(x) + np.array([x, {k}.0])[0] * x" for k in range(150)), "    return x"])
+scope = {"np": __import__("numpy")}
+exec(text, scope)
+print("now", flush=True)
+numba.njit(scope["f"])(1.0)
+"""
+
+
+def seconds_after(seconds):
+    return lambda run, cache: time.sleep(seconds)
+
+
+def first_line(run, cache):
+    run.stdout.readline()
+
+
+def compiling(run, cache):
+    """Generated code is written down, then compiled."""
+    for _ in range(6000):
+        if list(cache.glob("kernel_*.py")):
+            break
+        time.sleep(0.01)
+    time.sleep(0.5)
+
+
+def within(run, cache):
+    assert run.stdout.readline() == "now\n"
+    time.sleep(0.5)
+
+
+RUNS = {
+    "imports": (command("all", "--quick", "--out", "report"), signal.SIGINT, seconds_after(0.3)),
+    "workers start": (command("all", "--quick", "--out", "report"), signal.SIGTERM, seconds_after(0.8)),
+    "a line": (command("all", "--quick", "--out", "report"), signal.SIGHUP, first_line),
+    "its own compilation": (command("speed", "--quick", "--out", "report"), signal.SIGINT, compiling),
+    "a compilation": ([sys.executable, "-c", COMPILATION], signal.SIGINT, within),
+    "a rollout": ([sys.executable, "-c", ROLLOUT], signal.SIGINT, within),
+}
+
+
+@pytest.mark.parametrize("what, number, moment", RUNS.values(), ids=RUNS)
+def test_an_interrupt_is_answered_within_a_second(tmp_path, what, number, moment):
+    for attempt in range(2):  # the machine may be busy
+        out, cache = tmp_path / f"{attempt}" / "report", tmp_path / f"cache {attempt}"
+        old_report(out)
+        run = started(*what, cwd=out.parent, env={"TMT_CACHE": str(cache)})
+        moment(run, cache)
+        assert run.poll() is None
+        end = ended(run, number)
+        assert (end.status, end.lines) == (2, [LINE])
+        assert files(out) == OLD and {p.name for p in out.iterdir()} == {"tables", "results.json"}
+        if end.seconds < SECOND:
+            return
+    raise AssertionError(f"answered after {end.seconds:.2f} s")
+
+
+def test_what_kill_9_leaves_is_cleared_by_the_next_run(tmp_path):
+    out = tmp_path / "report"
+    old_report(out)
+    run = started(*command("all", "--quick", "--out", "report"), cwd=tmp_path)
+    while not list(out.glob(".new-*")):
+        time.sleep(0.01)
+    time.sleep(0.5)  # its workers are there
+    assert ended(run, signal.SIGKILL).status == -signal.SIGKILL
+    assert list(out.glob(".new-*"))
+    old_report(out)
+    assert {p.name for p in out.iterdir()} == {"tables", "results.json"}
+
+
+def test_a_signal_that_is_ignored_stays_ignored():
+    text = (
+        "import os, signal; from compare.process import interrupt; interrupt.answer(); "
+        "os.kill(os.getpid(), signal.SIGINT); os.kill(os.getpid(), signal.SIGHUP); print('well')"
+    )
+    line = ["bash", "-c", "trap '' INT HUP; exec \"$@\"", "-", sys.executable, "-c", text]
+    run = subprocess.run(line, env=ENVIRONMENT, capture_output=True, text=True)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "well\n", "")
+
+
+def test_called_from_python_the_command_line_leaves_signals_alone(tmp_path, capsys):
+    def handler(*_):
+        raise AssertionError
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        assert main(["mass", "--out", os.devnull]) == 2
+        assert [signal.getsignal(number) for number in numbers] == [handler] * 3
+    finally:
+        for number in numbers:
+            signal.signal(number, before[number])
+    assert signal.set_wakeup_fd(-1) == -1
+    assert "it is a file" in capsys.readouterr().err

@@ -1,0 +1,221 @@
+"""A report takes the old one's place when it is complete, and nothing else is touched."""
+
+import resource
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from types import SimpleNamespace
+
+import pytest
+from matplotlib.figure import Figure
+from runs import ENVIRONMENT
+from small_report import OLD, files, fill, old_report
+
+from compare.experiment import draw
+from compare.report.folder import FolderError, new_report, save
+
+
+def test_a_new_report_replaces_the_old_one_and_keeps_other_files(tmp_path):
+    out = tmp_path / "deep" / "report"
+    with new_report(out) as work:
+        fill(work, "old")
+        (work / "report.md").write_text("only in the old one")
+    (out / "my notes.txt").write_text("mine")
+    with new_report(out) as work:
+        fill(work, "new")
+    assert files(out) == {"tables/mass.csv": "new", "results.json": "new", "my notes.txt": "mine"}
+    assert sorted(p.name for p in out.iterdir()) == ["my notes.txt", "results.json", "tables"]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_an_interrupted_report_leaves_the_old_one_whole(tmp_path, error):
+    with new_report(tmp_path) as work:
+        fill(work, "old")
+    with pytest.raises(error), new_report(tmp_path) as work:
+        fill(work, "half")
+        raise error
+    assert files(tmp_path) == {"tables/mass.csv": "old", "results.json": "old"}
+
+
+def test_an_interrupted_first_report_leaves_no_folder(tmp_path):
+    with pytest.raises(RuntimeError), new_report(tmp_path / "new"):
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
+    with new_report(tmp_path) as work:
+        fill(work, "old")
+    rename = type(tmp_path).rename
+
+    def stubborn(source, target):
+        if source.parent.name == "moving" and source.name == "tables":
+            raise PermissionError(13, "Permission denied")
+        return rename(source, target)
+
+    with pytest.raises(FolderError, match="the old one is unchanged"), new_report(tmp_path) as work:
+        fill(work, "new")
+        monkeypatch.setattr(type(tmp_path), "rename", stubborn)
+    monkeypatch.undo()
+    assert files(tmp_path) == {"tables/mass.csv": "old", "results.json": "old"}
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.json", "tables"]
+
+
+# a run that is killed, or asked to end, at each moment of the exchange
+
+RUN = """
+import json, os, sys
+from compare.process import interrupt
+from compare.report.folder import new_report
+
+out, number, at = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+renamed = 0
+
+
+def hook(event, _):
+    global renamed
+    if event == "os.rename":
+        if renamed == at:
+            os.kill(os.getpid(), number)
+        renamed += 1
+
+
+interrupt.answer()
+with new_report(out) as work:
+    (work / "tables").mkdir()
+    (work / "tables" / "mass.csv").write_text("new")
+    (work / "report.md").write_text("new")
+    listed = ["report.md", "results.json", "tables/mass.csv"]
+    (work / "results.json").write_text(json.dumps({"provenance": {"files": listed}, "text": "new"}))
+    sys.addaudithook(hook)
+print(renamed)
+"""
+NEW = {"tables/mass.csv": "new", "results.json": "new", "report.md": "new"}
+
+
+def run(out, number=0, at=-1):
+    command = [sys.executable, "-c", RUN, str(out), str(int(number)), str(at)]
+    return subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("before", [{}, OLD])
+def test_after_kill_9_in_the_exchange_the_next_run_finds_the_old_report_whole(tmp_path, before):
+    for at in range(20):
+        out = tmp_path / str(at)
+        if before:
+            old_report(out)
+        if run(out, signal.SIGKILL, at).returncode == 0:  # after its last rename
+            assert files(out) == NEW
+            break
+        with pytest.raises(RuntimeError), new_report(out):
+            raise RuntimeError  # a run that does not end well: what changes is what the killed one has left
+        assert files(out) == before
+        assert {p.name for p in out.iterdir()} == {name.split("/")[0] for name in before}
+        with new_report(out) as work:
+            fill(work, "third")
+        assert files(out) == {"tables/mass.csv": "third", "results.json": "third"}
+    assert at == 5 + len(before)  # three moved in, two names of a folder changed, and what was moved away
+
+
+def test_an_exchange_that_has_begun_is_finished_and_the_run_ends_well(tmp_path):
+    numbers = [signal.SIGTERM] * 7 + [signal.SIGINT, signal.SIGHUP]
+    for at, number in enumerate(numbers):
+        out = tmp_path / str(at)
+        old_report(out)
+        asked = run(out, number, at % 7)
+        assert (asked.returncode, asked.stdout, asked.stderr) == (0, "7\n", "")
+        assert files(out) == NEW
+        assert sorted(p.name for p in out.iterdir()) == ["report.md", "results.json", "tables"]
+
+
+def test_two_runs_at_once_both_end_well(tmp_path):
+    with new_report(tmp_path / "out") as first:
+        fill(first, "first")
+        with new_report(tmp_path / "out") as second:
+            fill(second, "second")
+            assert first.exists()  # the folder of a run that is alive stays
+        assert files(tmp_path / "out")["results.json"] == "second"
+        assert first.exists()
+    assert files(tmp_path / "out") == {"tables/mass.csv": "first", "results.json": "first"}
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["results.json", "tables"]
+
+
+def test_only_what_a_run_has_left_is_cleared(tmp_path):
+    left = tmp_path / ".new-a1b2c3_d"
+    (left / "new" / "tables").mkdir(parents=True)
+    kept = [tmp_path / ".new-a1b2c3_e" / "mine.txt", tmp_path / ".new-ideas" / "report.md", tmp_path / ".news"]
+    for path in kept:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("mine")
+    with new_report(tmp_path) as work:
+        fill(work, "new")
+    assert not left.exists() and all(path.exists() for path in kept)
+
+
+@pytest.mark.parametrize("report", [False, True])
+def test_files_of_somebody_elses_are_not_replaced(tmp_path, report):
+    if report:
+        with new_report(tmp_path) as work:
+            fill(work, "old")
+    (tmp_path / "tables").mkdir(exist_ok=True)
+    (tmp_path / "tables" / "precious.csv").write_text("1")
+    before = files(tmp_path)
+    with (
+        pytest.raises(FolderError, match=r"has tables/precious\.csv, which is not of an earlier report"),
+        new_report(tmp_path),
+    ):
+        pass
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"provenance": {"files": null}}'])
+def test_some_other_results_json_is_not_replaced(tmp_path, text):
+    (tmp_path / "results.json").write_text(text)
+    with pytest.raises(FolderError, match=r"has results\.json, which is not"), new_report(tmp_path):
+        pass
+    assert (tmp_path / "results.json").read_text() == text
+
+
+def test_what_stands_in_a_folders_place_is_said(tmp_path):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "link").symlink_to("nowhere")
+    expected = "; a folder that can be written is expected"
+    for path, says in (
+        (tmp_path / "file", "it is a file"),
+        (tmp_path / "file" / "below", f"{tmp_path / 'file'} is a file"),
+        (tmp_path / "link", "it is a symbolic link to nowhere, which does not exist"),
+        (tmp_path / "link" / "below", f"{tmp_path / 'link'} is a symbolic link to nowhere, which does not exist"),
+        (tmp_path / ("long" * 100), "File name too long"),
+    ):
+        with pytest.raises(FolderError) as error, new_report(path):
+            pass
+        assert str(error.value) == f"cannot write to {path}: {says}{expected}"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "link"]
+
+
+@contextmanager
+def little_space():
+    """No file may be longer than 1000 bytes in this block, what the tests print included: as on a disk that is full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path):
+    with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
+        save(work / "results.json", "x" * 5000)
+    expected = f"cannot write {tmp_path / 'out' / 'results.json'}: File too large; a report that was there is unchanged"
+    assert str(error.value) == expected
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_while_a_figure_is_drawn_is_no_failed_check(tmp_path, monkeypatch):
+    module = SimpleNamespace(figures=lambda result, robot: iter([lambda: ("plot", Figure(), "")]))
+    monkeypatch.setitem(sys.modules, "compare.experiments.plain", module)
+    with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
+        draw("plain", None, None, work)
+    assert f"cannot write {tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value)

@@ -1,0 +1,54 @@
+"""The answers to the assignment's questions: which number is whose, what broke off, what is far from the truth."""
+
+from sections import section
+
+from compare.report.questions import answers
+from compare.report.verdict import Section
+from compare.robots.arm import ARM
+
+
+def answer_of(sections) -> dict:
+    """The answers by their part."""
+    return {part: answer for part, _, _, answer in answers(sections, ARM)}
+
+
+def test_answers_give_each_number_to_its_engine():
+    row = {"item": "c", "published": 1.0, "tmt": 2.0, "mujoco": 3.0, "unit": "N m"}
+    items = [row | {"item": item} for item in ("c", "f1", "f2", "f3", "f4", "g", "h")]
+    found = answer_of([section("published", rows=items)])
+    assert found["c"] == "c: printed (1), TMT (2), MuJoCo (3) N m"
+    apart = [
+        {"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": 1e-16},
+        {"quantity": "Mbar", "scene": "bent", "unit": "kg m2", "largest_difference": 4e-16},
+        {"quantity": "other", "scene": "bent", "unit": "kg m2", "largest_difference": 9e-16},
+    ]
+    found = answer_of([section("mass", rows=apart)])
+    assert found["e"].startswith("Mbar: at most 4.0e-16 kg m2 apart (bent); not run")
+
+
+def test_a_row_without_a_number_is_a_run_that_diverged():
+    rows = [{"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": d} for d in (1e-16, None)]
+    found = answer_of([section("mass", rows=rows)])
+    assert found["e"] == "diverged; not run"
+
+
+def test_the_answer_on_motion_names_the_true_errors_of_held_and_of_free_scenes(small):
+    answer = answer_of([Section("trajectory", "", "", "", small("trajectory"))])["i"]
+    for scene in ("ball catch, held: ", "bent, held: ", "zero, free: 1.6 and 1.6", "bent, free: 0.27 and 0.27"):
+        assert scene in answer
+
+
+def test_what_to_use_gives_each_engine_its_own_time():
+    line = {
+        "scene": "bent",
+        "target_rad": 1e-6,
+        "mujoco": "RK4, 9 steps",
+        "mujoco_ms": 7.0,
+        "tmt": "rk4",
+        "tmt_ms": 2.0,
+    }
+    lines = [line | {"target_rad": 1e-3, "mujoco_ms": 5.0}, line | {"tmt": None}, line]
+    found = [answer for *_, answer in answers([section("speed", what_should_i_use=lines)], ARM)]
+    assert found[-1].startswith(
+        "What should I use? For 1e-06 rad over five seconds (bent): RK4, 9 steps (7 ms), or rk4 (2 ms)"
+    )

@@ -1,0 +1,80 @@
+"""The verdict from plain checks: what fails, what broke off, what is named first, what the answers say of which engine."""
+
+import pytest
+from sections import BAD, GOOD, section
+
+from compare.experiment import outcome
+from compare.report import verdict
+
+
+@pytest.mark.parametrize("place", [0, 59, 60, 199])
+def test_one_failing_check_among_many_fails_the_verdict(place):
+    checks = [GOOD] * 200
+    assert verdict.passed([section("mass", *checks)])
+    checks[place] = BAD
+    for sections in ([section("mass", *checks)], [section("gravity", GOOD), section("mass", *checks)]):
+        assert not verdict.passed(sections)
+        assert verdict.verdict(sections, len(sections)).startswith("The two models do not agree: 1 of 20")
+    assert verdict.outcome(section("mass", *checks)) == "It does not hold: 1 of 200 checks fail."
+
+
+def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
+    sections = [
+        section("mass", ("Mbar", 0.25, 1.0, "at most", True), ("printed", 0.9, 1.0, "at most", False)),
+        section("gravity", ("torque", 0.5, 1.0, "at most", True)),
+    ]
+    text = verdict.verdict(sections, 10)
+    assert text.startswith("The two models agree in mass, gravity (2 of 10 experiments): all 3 checks pass.")
+    assert "is 0.5 kg m2, 50 % of it (gravity: torque, zero)" in text
+
+
+class Lines(list):
+    """A terminal that keeps what is said."""
+
+    def say(self, text, style=""):
+        self.append(text)
+
+
+def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
+    said = Lines()
+    outcome(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
+    assert said == ["mass          ok           2 checks  uses 0.5 of a tolerance      1.2 s"]
+    said.clear()
+    outcome(
+        said,
+        section("mass", *[BAD] * 7, ("b", 0.5, 1.0, "at most", True)),
+        1.0,
+        [{"text": "mass of forearm: stated 1"}],
+    )
+    assert said[0].split() == ["mass", "7", "FAILED", "8", "checks", "1.0", "s"]
+    assert said[1] == "  CAUSE mass of forearm: stated 1" and said[-1] == "  and 3 more: in the report"
+    assert said[2:-1] == ["  FAIL mass: Mbar, zero: 2 kg m2, must be at most 1 kg m2"] * 4
+
+
+def test_what_broke_off_fails_and_is_no_disagreement():
+    broken = section("speed")
+    broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no (speed.py:1)", rule="equal")
+    assert not verdict.passed([section("mass", GOOD), broken])
+    text = verdict.verdict([section("mass", GOOD), broken], 2)
+    assert text == (
+        "Not everything could be compared; the other 1 checks pass. Broken off: speed, ValueError: no (speed.py:1)."
+    )
+    both = verdict.verdict([section("mass", GOOD, BAD), broken], 2)
+    assert both.startswith("The two models do not agree: 1 of 3 checks fail.") and "Broken off: speed" in both
+    assert verdict.outcome(broken) == "It is not decided: runs to its end does not hold (ValueError: no (speed.py:1))."
+
+
+def test_the_verdict_names_the_first_cause_and_counts_the_others():
+    causes = [{"text": f"number {k}"} for k in range(3)]
+    wrong = [section("parameters", BAD), section("mass", GOOD, BAD, BAD)]
+    assert verdict.verdict(wrong, 2, causes) == (
+        "The two models do not agree: 3 of 4 checks fail. Cause: number 0, and 2 more. "
+        "2 further checks fail as a consequence."
+    )
+
+
+def test_a_run_that_diverged_is_a_disagreement_and_what_cannot_be_locked_is_none():
+    diverged = section("trajectory", ("open loop", None, 1.0, "at most", True))
+    assert verdict.verdict([diverged], 1).startswith("The two models do not agree: 1 of 1 checks fail.")
+    tied = section("reduction", (verdict.LOCKABLE, 0.0, 1.0, "equal", False))
+    assert verdict.verdict([tied], 1).startswith("Not everything could be compared")

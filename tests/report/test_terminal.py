@@ -1,0 +1,138 @@
+"""What a user sees on a terminal, wide or narrow, clever or dumb, and with any name and any place for the output."""
+
+import json
+import os
+import re
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import pytest
+from runs import ROOT, SECOND, compare, in_shell, on_terminal, readable_lines, screen, words
+
+from compare.engines.mujoco import load
+from compare.robots.arm import ARM
+
+LINE = "interrupted; a report that was there is unchanged"
+HEAVY = ARM.mjcf.read_text().replace('mass="1.5"', 'mass="1.6"')
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Runs that wait for nothing of each other: of the arm and of a heavy one, on terminals and in a shell."""
+    plain, umlauts = tmp_path_factory.mktemp("plain"), tmp_path_factory.mktemp("Zoë") / "Über"
+    umlauts.mkdir()
+    for name in (umlauts / "Käfer.xml", umlauts / os.fsdecode(b"\xff.xml")):
+        name.write_bytes(ARM.mjcf.read_bytes())
+    (plain / "heavy.xml").write_text(HEAVY)
+    arm, heavy = ("mass", "--quick", "--out"), ("mass", "--quick", "--mjcf", "heavy.xml", "--out")
+    old = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"
+    calls = {("arm", *at): partial(on_terminal, [*arm, f"arm{at}"], *at, plain) for at in [(40, "xterm"), (80, "dumb")]}
+    calls |= {
+        ("heavy", *at): partial(on_terminal, [*heavy, f"heavy{at}"], *at, plain) for at in [(80, "xterm"), (40, "dumb")]
+    }
+    calls |= {
+        "ascii, head": partial(in_shell, "PYTHONIOENCODING=ascii compare mass --quick --mjcf Käfer.xml --out Öl | head -1;"
+                               "exit ${PIPESTATUS[0]}", umlauts),
+        "C": partial(in_shell, f"{old} compare mass --quick --mjcf Käfer.xml --out 'Öl im C'", umlauts),
+        "bytes, full": partial(in_shell, f"{old} compare mass --quick --mjcf $'\\xff.xml' --out $'\\xfe'"
+                               " >/dev/full 2>&1", umlauts),
+        "closed": partial(in_shell, "compare mass --quick --mjcf heavy.xml --out closed <&- >&- 2>&-", plain),
+    }  # fmt: skip
+    with ThreadPoolExecutor(2) as pool:
+        under_way = {name: pool.submit(call) for name, call in calls.items()}
+    return {name: run.result() for name, run in under_way.items()} | {"plain": plain, "umlauts": umlauts}
+
+
+@pytest.mark.parametrize("columns, term", [(40, "xterm"), (80, "dumb")])
+def test_mass(runs, columns, term):
+    run = runs["arm", columns, term]
+    assert run.status == 0, run.output
+    text = words(readable_lines(run))
+    assert re.match(
+        r"mass ok \d+ checks uses .* of a tolerance .* s The two models agree in mass \(1 of 10 experiments\)", text
+    )
+    assert f"Report: arm({columns}, '{term}')/index.html (" in text and text.endswith(" s)")
+    assert ("\x1b" in run.output) == (term == "xterm")
+
+
+@pytest.mark.parametrize("columns, term", [(80, "xterm"), (40, "dumb")])
+def test_a_model_that_fails(runs, columns, term):
+    run = runs["heavy", columns, term]
+    assert run.status == 1, run.output
+    lines = readable_lines(run)
+    results = json.loads((runs["plain"] / f"heavy{columns, term}" / "results.json").read_text())
+    failed = [check for check in results["checks"] if not check["passed"]]
+    shown = [line for line in lines if line.startswith(("  CAUSE mass of forearm: stated 1.5 kg", "  FAIL mass: "))]
+    assert len(shown) == 5 and shown[0].startswith("  CAUSE")
+    assert f"  and {len(failed) - 4} more: in the report" in lines
+    assert "The two models do not agree in mass" in words(lines)
+    assert "Checks that fail" in (runs["plain"] / f"heavy{columns, term}" / "report.md").read_text(encoding="utf-8")
+    assert ("\x1b" in run.output) == (term == "xterm")
+
+
+@pytest.mark.parametrize("columns, term, at", [(40, "xterm", b"mass: the"), (80, "dumb", b"mass ")])
+def test_ctrl_c(tmp_path, columns, term, at):
+    arguments = ["all", "--quick"] if term == "dumb" else ["mass"]
+    for _ in range(2):  # the machine may be busy
+        run = on_terminal(arguments, columns, term, tmp_path, interrupt_at=at)
+        assert run.status == 2
+        lines, visible = screen(run.output, columns)
+        assert words(lines).endswith(LINE) and visible
+        if term == "xterm":
+            assert words(lines) == LINE  # and what was in progress is gone
+        else:
+            assert "\x1b" not in run.output
+        assert list(tmp_path.iterdir()) == []
+        if run.seconds < SECOND:
+            return
+    raise AssertionError(f"answered after {run.seconds:.2f} s")
+
+
+# where the output goes, and how it is spelt, does not change what is found
+
+
+@pytest.mark.parametrize("name, model, out, heard", [
+    ("ascii, head", "Käfer.xml", "Öl", 1), ("C", "Käfer.xml", "Öl im C", 4), ("bytes, full", "\\xff.xml", b"\xfe", 0),
+])  # fmt: skip
+def test_any_name_of_a_file_in_any_locale_and_any_reader(runs, name, model, out, heard):
+    run, report = runs[name], runs["umlauts"] / os.fsdecode(out)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert len(run.stdout.splitlines()) == heard
+    results = json.loads((report / "results.json").read_text(encoding="utf-8"))
+    assert results["passed"] and results["provenance"]["model"] == model
+    assert model.split(".")[0] in results["provenance"]["command"]
+    for file in ("report.md", "index.html"):
+        assert model in (report / file).read_text(encoding="utf-8")
+
+
+def test_a_check_that_failed_is_status_1_though_nobody_hears_of_it(runs):
+    assert runs["closed"].returncode == 1
+    assert json.loads((runs["plain"] / "closed/results.json").read_text())["passed"] is False
+
+
+def test_a_model_of_any_name_can_be_locked(tmp_path):
+    path = tmp_path / os.fsdecode(b"\xff\xc3\xa4.xml")
+    path.write_bytes(ARM.mjcf.read_bytes())
+    locked = ARM.case("locked", locked=("beta",), posture="bent")
+    assert load(path, ARM.tree).of(locked).coordinates.names == ("alpha", "gamma")
+
+
+@pytest.mark.parametrize("line, status", [
+    ("compare --help >/dev/full", 0), ("compare --help >&-", 0), ("compare --help | head -1; exit ${PIPESTATUS[0]}", 0),
+    ("compare mass --fast >&- 2>&-", 2), ("compare nothing 2>/dev/full", 2),
+    ("compare mass --mjcf none.xml 2>&-", 2), ("compare mass --mjcf none.xml >&- 2>/dev/full", 2),
+])  # fmt: skip
+def test_nor_does_it_for_what_is_answered_at_once(tmp_path, line, status):
+    run = in_shell(line, tmp_path)
+    assert run.returncode == status
+    assert "Traceback" not in run.stderr
+
+
+def test_what_nobody_foresaw_is_one_line(tmp_path):
+    (tmp_path / "rich.py").write_text("raise RuntimeError('two\\nlines')")  # found first: the current folder
+    run = compare("mass", cwd=tmp_path)
+    assert run.returncode == 2
+    assert run.stderr.splitlines() == [
+        "python -m compare: cannot go on: RuntimeError: two lines (compare/report/terminal.py:9)"
+    ]
+    assert ROOT.as_posix() not in run.stderr

@@ -1,0 +1,77 @@
+"""Two runs of the same program compared: which checks each makes, and their values, through a map of names that were changed.
+
+`python tests/results_compared.py BEFORE.json AFTER.json` prints every check without a partner and every value that differs
+by more than rounding; both files are a report's results.json. The map is for reports that are older than compare's folders.
+"""
+
+import json
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+
+FIELDS = ("experiment", "scene", "quantity", "rule")
+RENAMED = []  # (field, regular expression, replacement): a name of before, and what it is now
+WITHOUT = {}  # regular expression for the checks of before, or "after: " and one for those of after, without partner: the reason
+CLOSE = 1e-6  # relative: values differ by less where only rounding differs
+
+
+def name_of(check: dict, renamed=()) -> tuple:
+    """What a check is called, after the changes."""
+    named = {field: check[field] for field in FIELDS}
+    for field, old, new in renamed:
+        named[field] = re.sub(old, new, named[field])
+    return tuple(named.values())
+
+
+def compared(before: list[dict], after: list[dict], renamed=RENAMED) -> dict[str, list]:
+    """Checks by what became of them: lost, new, with another outcome, with another value or tolerance than rounding explains."""
+    old, new = Counter(name_of(check, renamed) for check in before), Counter(name_of(check) for check in after)
+    found = {"lost": sorted((old - new).elements()), "new": sorted((new - old).elements()), "passed": [], "values": []}
+    by_name = {name_of(check): check for check in after}
+    for check in before:
+        partner = by_name.get(name_of(check, renamed))
+        if partner is None:
+            continue
+        if partner["passed"] != check["passed"]:
+            found["passed"].append(name_of(partner))
+        for field in ("value", "tolerance"):
+            if not alike(check[field], partner[field], check):
+                found["values"].append((*name_of(partner), field, check[field], partner[field]))
+    return found
+
+
+def alike(one, other, check) -> bool:
+    """Whether two numbers are the same but for rounding; of a check of rounding a share of the tolerance is rounding."""
+    if None in (one, other):
+        return one is other
+    allowed = check["tolerance"] if check["rule"] == "at most" and check["tolerance"] else 0.0
+    return abs(one - other) <= max(CLOSE * max(abs(one), abs(other)), 0.01 * abs(allowed))
+
+
+def reason(name: tuple, side: str) -> str | None:
+    """Why a check has no partner, as far as that is known."""
+    text = " | ".join(name)
+    return next((why for pattern, why in WITHOUT.items() if re.search(pattern, f"{side}: {text}")), None)
+
+
+def main(before: str, after: str) -> int:
+    """Print what differs; 0 if each check has its partner with the same value, or a reason."""
+    of_files = [json.loads(Path(path).read_text(encoding="utf-8"))["checks"] for path in (before, after)]
+    found = compared(*of_files)
+    print(f"{len(of_files[0])} checks before, {len(of_files[1])} after")
+    unexplained = len(found["passed"]) + len(found["values"])
+    for side in ("lost", "new"):
+        for name in found[side]:
+            why = reason(name, side)
+            unexplained += why is None
+            print(f"{side}: {' | '.join(name)}: {why or 'no reason'}")
+    for kind in ("passed", "values"):
+        for what in found[kind]:
+            print(f"{kind}:", *what)
+    print(f"{unexplained} without a reason")
+    return int(unexplained > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,15 @@
+"""Sections of plain checks, for tests of what is said of them."""
+
+from compare.judge.check import Result
+from compare.report.verdict import Section
+
+
+def section(name="mass", *checks, rows=(), **tables):
+    """A section of plain checks (quantity, value, tolerance, rule, rounding)."""
+    result = Result(name, rows=list(rows), tables=tables)
+    for quantity, value, tolerance, rule, rounding in checks:
+        result.check("zero", quantity, value, tolerance, "kg m2", rounding=rounding, rule=rule)
+    return Section(name, name.capitalize(), "They agree.", "64 eps.", result)
+
+
+GOOD, BAD = ("Mbar", 0.5, 1.0, "at most", True), ("Mbar", 2.0, 1.0, "at most", True)

@@ -1,0 +1,69 @@
+"""Which joints a case needs: those that its motion moves, decided on expressions and with 50 digits."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import tmt
+from compare.robots.arm import ARM
+from compare.truth.smallest import needed, reduced
+
+
+def test_from_zero_beta_is_not_needed_and_a_held_posture_needs_nothing():
+    stays = {case.name: needed(case).stays for case in ARM.cases}
+    assert stays.pop("zero, free") == ("beta",)
+    held = {name for name, joints in stays.items() if joints == ARM.joints}
+    assert held == {"ball catch, held", "bent, held"}
+    assert all(joints == () for name, joints in stays.items() if name not in held)
+
+
+@pytest.mark.parametrize(
+    "name, scene, stays",
+    [
+        ("in its plane", {"posture": (20, 0, 40), "speed": (30, 0, -50)}, ("beta",)),
+        ("out of it by 1e-6 deg", {"posture": (20, 1e-6, 40)}, ()),
+        ("beta has a speed", {"posture": (20, 0, 40), "speed": (0, 1e-9, 0)}, ()),
+        ("beta is pushed", {"posture": (20, 0, 40), "torque": (0, 1e-30, 0)}, ()),
+        ("sin of the double nearest to pi is not 0", {"posture": (20, 180, 40)}, ()),
+        ("plane of a locked alpha", {"posture": (30, 0, 0), "locked": ("alpha",)}, ("beta",)),
+        ("at rest without gravity", {"posture": "bent", "gravity": False}, ARM.joints),
+        ("the rounded torque does not hold", {"posture": "zero", "torque": (-2.20725, 0, -2.20725)}, ("beta",)),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_needed(name, scene, stays):
+    assert needed(ARM.case(name, **scene)).stays == stays
+
+
+def test_what_does_not_fold_is_kept_and_named():
+    """A round top on crossed hinges: alpha and gamma never move, but c (I s) - s (I c) does not fold to 0."""
+    top = dataclasses.replace(
+        tmt.ARM,
+        parent=(-1, 0, 1),
+        offset=np.zeros((3, 3)),
+        axis=np.eye(3)[[1, 0, 2]],
+        body_names=("top",),
+        body_hinge=(2,),
+        mass=(1.0,),
+        com=((0.0, 0.0, -0.2),),
+        inertia=(np.diag([0.01, 0.01, 0.002]),),
+    )
+    robot = dataclasses.replace(ARM, name="top", tree=top)
+    found = needed(robot.case("top", posture=(0, 30, 40)))
+    assert found.stays == () and set(found.moves) == {"beta"} and found.undecided == ("alpha", "gamma")
+
+
+def test_a_small_acceleration_is_one():
+    """A torque of a thousandth moves the hanging arm by 1e-2 rad/s2: every hinge is needed, and of none it is undecided."""
+    need = needed(ARM.case("a light push", posture="hanging", torque=(1e-3, 1e-3, 1e-3)))
+    assert set(need.moves) == set(ARM.joints) and need.stays == need.undecided == ()
+
+
+def test_the_smaller_case_is_the_same_with_more_joints_locked():
+    case = ARM.case("plane", posture=(20, 0, 40), speed=(30, 0, -50), damping=0.2, torque=(0.5, 0, 0.25))
+    smaller = reduced(case)
+    assert smaller.name == "plane, beta locked" and smaller.joints == ("alpha", "gamma")
+    assert smaller.tau.tolist() == [0.5, 0.25] and smaller.v.tolist() == case.v[[0, 2]].tolist()
+    assert smaller.tree.damping == (0.2, 0.2) and smaller.scene.duration == case.duration
+    assert reduced(ARM.case("all", posture="bent")) is None and reduced(ARM.case("none", torque="hold")) is None
