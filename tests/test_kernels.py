@@ -59,3 +59,29 @@ def test_compiled_loop_is_the_step_in_python(rng, name):
     for k in range(1, 6):
         state = one_step(METHODS[name], model, *state, tau.tolist(), 0.01)
         assert np.allclose(state, [path_q[k], path_qd[k]], rtol=0, atol=1e-12)
+
+
+def test_a_tree_of_one_hinge_compiles_in_every_form(rng):
+    tree = tmt.ARM.lock({"alpha": 0.1, "beta": 0.2})
+    q, qd, tau = states = rng.uniform(-2, 2, (3, 40, 1))  # more than the lanes, and a rest
+    columns = [np.ascontiguousarray(a.T) for a in states]
+    expected = {
+        "forward_dynamics": tmt.acceleration(q, qd, tau, tree),
+        "mass_matrix_and_bias": np.hstack([tmt.mass_matrix(q, tree)[:, 0], tmt.bias(q, qd, tree)]),
+    }
+    for quantity, values in expected.items():
+        compiled, rows = kernels.evaluator(tree, quantity), np.empty(values.shape)
+        compiled.each(*states, rows)
+        assert np.allclose(rows, values, rtol=1e-12, atol=1e-12)
+        in_lanes = np.empty(values.T.shape)
+        compiled.lanes(*columns, in_lanes)
+        assert np.array_equal(in_lanes.T, rows)
+        assert np.isfinite(compiled.chain(q[0], qd[0], tau[0], 3))
+    rate = kernels.evaluator(tree, "forward_dynamics").rate
+    assert np.allclose(rate(np.append(q[0], qd[0]), tau[0]), [qd[0, 0], expected["forward_dynamics"][0, 0]], rtol=1e-12)
+    for name in (name for name, stepping in METHODS.items() if stepping.lanes):
+        one, side_by_side = paths = np.zeros((2, 2, kernels.LANES, 4, 1))
+        paths[:, :, :, 0] = [s[: kernels.LANES] for s in (q, qd)]
+        kernels.stepper(tree, name)(*one, tau[: kernels.LANES], 0.01)
+        kernels.lane_stepper(tree, name)(*side_by_side, tau[: kernels.LANES], 0.01)
+        assert np.array_equal(one, side_by_side) and np.isfinite(one).all(), name

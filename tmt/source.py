@@ -121,7 +121,7 @@ def lanes_source(tree, stepping) -> str:
         "stages": "".join(stages).rstrip(),
     }
     arguments = ", ".join([_lane("x", i) for i in range(3 * n)] + ["dt"])
-    slopes = SLOPES.format(W=LANES, arguments=arguments, results=", ".join(_lane("k", i, "o + ") for i in range(n)))
+    slopes = SLOPES.format(W=LANES, arguments=arguments, results=_sequence(lambda i: _lane("k", i, "o + "), n))
     inline = '@njit(forceinline=True, error_model="numpy")\n'
     return "\n\n".join([HEADER + inline + functions[0], *(inline + text for text in functions[1:]), slopes,
                         RUN_LANES.format(**words)])  # fmt: skip
@@ -148,15 +148,12 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     inputs = [(name, i) for name in ("q", "qd", "tau") for i in range(n)]
     places = ", ".join(f"{name}[i, {k}]" for name, k in inputs)
 
-    def sequence(pattern, count):
-        return ", ".join(pattern(i) for i in range(count))
-
     words = {
         "W": LANES,
         "size_x": 3 * n * LANES,
         "size_y": m * LANES,
         "row_in": places,
-        "row_out": sequence(lambda k: f"out[i, {k}]", m),
+        "row_out": _sequence(lambda k: f"out[i, {k}]", m),
         "n": n,
         "m": m,
         "sound_row": " + ".join(f"abs(out[i, {k}])" for k in range(m)) + " < np.inf",
@@ -165,14 +162,14 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
         "chained": ", ".join(f"{name}[{k}] + 1e-300 * last" for name, k in inputs),
         "last": " + ".join(f"results[{k}]" for k in range(m)),
         "gather": "; ".join(f"{_lane('x', r)} = flat_{a}[b{k} + l]" for r, (a, k) in enumerate(inputs)),
-        "results": sequence(lambda k: _lane("y", k), m),
-        "arguments": sequence(lambda k: _lane("x", k), 3 * n),
+        "results": _sequence(lambda k: _lane("y", k), m),
+        "arguments": _sequence(lambda k: _lane("x", k), 3 * n),
         "scatter": "; ".join(f"flat_out[b{k} + l] = {_lane('y', k)}" for k in range(m)),
         "lane_in": ", ".join(f"{name}[{k}, b + l]" for name, k in inputs),
-        "lane_out": sequence(lambda k: f"out[{k}, b + l]", m),
+        "lane_out": _sequence(lambda k: f"out[{k}, b + l]", m),
         "begins": "; ".join(f"b{k} = np.uint64({k} * count + b)" for k in range(max(m, n))),
         "column_in": ", ".join(f"{name}[{k}, i]" for name, k in inputs),
-        "column_out": sequence(lambda k: f"out[{k}, i]", m),
+        "column_out": _sequence(lambda k: f"out[{k}, i]", m),
     }
     fast = '@njit(forceinline=True, error_model="numpy")\n' + text.replace("sincos(", f"{sine}(")
     sure = '@njit(error_model="numpy")\n' + text.replace("def quantity(", "def by_library(").replace(
@@ -181,8 +178,8 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     text = "\n\n".join([HEADER + fast, sure, EVALUATE.format(**words)])
     if quantity != "forward_dynamics":
         return text
-    given = sequence(lambda k: f"y[{k}]", 2 * n) + ", " + sequence(lambda k: f"tau[{k}]", n)
-    rates = sequence(lambda k: f"result[{n + k}]", n)
+    given = _sequence(lambda k: f"y[{k}]", 2 * n) + ", " + _sequence(lambda k: f"tau[{k}]", n)
+    rates = _sequence(lambda k: f"result[{n + k}]", n)
     sound = " + ".join(f"abs(result[{n + k}])" for k in range(n)) + " < np.inf"
     return text + RATE.format(n=n, twice=2 * n, rates=rates, given=given, sound_rates=sound)
 
@@ -209,6 +206,11 @@ def _words(n) -> dict:
         "why": _why(n),
         "check": CHECK.format(n=n),
     }
+
+
+def _sequence(pattern, count) -> str:
+    """What stands on the left of an assignment of so many results, or in a call: a single one is a tuple too."""
+    return ", ".join(pattern(i) for i in range(count)) + "," * (count == 1)
 
 
 def _sum(name, n) -> str:

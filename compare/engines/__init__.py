@@ -37,6 +37,13 @@ class Setting(NamedTuple):
     steps: int | None = None
     tolerance: float | None = None
 
+    @property
+    def every(self) -> int:
+        """How many of its steps lie between two of the times at which the run is read; ValueError if that is no whole number."""
+        if not self.steps or self.steps % GRID:
+            raise ValueError(f"steps is {self.steps}; a multiple of {GRID} is expected")
+        return self.steps // GRID
+
 
 class Motion(NamedTuple):
     """One run, or a batch of them. A run that ends early is NaN from there on."""
@@ -45,7 +52,7 @@ class Motion(NamedTuple):
     q: np.ndarray  # (..., times, nq) rad
     v: np.ndarray  # (..., times, nv) rad/s
     evaluations: int | None = None  # of the dynamics in all; None where a method has no such thing
-    ended: str | np.ndarray | None = None  # why a run ended early, or None; of a batch an array of its shape
+    ended: str | np.ndarray | None = None  # when and why a run ended early, or None; of a batch an array of its shape
     steps: int | None = None  # that the method took; None: not known
 
 

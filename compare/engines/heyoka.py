@@ -10,10 +10,10 @@ from tmt.method import acceleration
 from tmt.space import cos, sin
 
 from . import GRID, Method, Motion, Setting
-from .scipy import each
+from .scipy import as_far_as_it_goes, each
 from .tmt import TmtDynamics
 
-TOLERANCE = 1e-15
+FULL = 1e-15  # tolerance: all digits of a double
 
 
 class Heyoka:
@@ -34,8 +34,25 @@ class Heyoka:
 class HeyokaDynamics(TmtDynamics):
     """The equations of a case as heyoka's expressions."""
 
+    def mass_matrix(self, q) -> np.ndarray:
+        n = self.coordinates.nv
+        return self.evaluated(q)[..., : n * n].reshape(*np.shape(q)[:-1], n, n)
+
+    def bias(self, q, v) -> np.ndarray:
+        n = self.coordinates.nv
+        return self.evaluated(q, v)[..., n * n : n * n + n]
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        return self.evaluated(q, v, tau)[..., -self.coordinates.nv :]
+
+    def evaluated(self, q, v=0.0, tau=0.0) -> np.ndarray:
+        """Mbar by rows, h and the acceleration at each state, (..., n (n + 2))."""
+        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
+        states = np.array([np.broadcast_to(a, shape).reshape(-1, shape[-1]).T for a in (q, v, tau)])
+        return dynamics(self.tree)(states.reshape(-1, states.shape[-1])).T.reshape(*shape[:-1], -1)
+
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), tolerance or TOLERANCE)
+        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), tolerance or FULL)
 
     def solved(self, q, v, tau, t, tolerance) -> Motion:
         run, read = self.prepared(q, v, tau, t, tolerance)
@@ -53,10 +70,9 @@ class HeyokaDynamics(TmtDynamics):
             return stepper.propagate_grid(t)
 
         def read(outcome):
-            path = np.full((len(t), start.size), np.nan)
-            path[: len(outcome[-1])] = outcome[-1]
-            ended = None if np.isfinite(path).all() else f"heyoka stops: {outcome[0]}"
-            return Motion(t, *np.split(path, 2, axis=1), None, ended, int(outcome[3]))
+            why, *_, steps, _, path = outcome
+            q, v, ended = as_far_as_it_goes(t, path, start, f"heyoka stops: {why}")
+            return Motion(t, q, v, None, ended, int(steps))
 
         return run, read
 
@@ -66,9 +82,29 @@ def integrator(tree, tau, tolerance):
     """heyoka's integrator of a Tree: the composite form traced on its expressions, compiled for this tolerance."""
     import heyoka
 
+    q, qd = variables(tree, "q", "qd")
+    qdd = acceleration(tree, q, qd, list(tau), composite.mass_matrix_and_bias)
+    return heyoka.taylor_adaptive([*zip(q, qd), *zip(qd, qdd)], [0.0] * (2 * len(q)), tol=tolerance)
+
+
+@lru_cache(maxsize=32)
+def dynamics(tree):
+    """Mbar by rows, h and the acceleration as one function that heyoka compiles, of q, qd and tau one after the other."""
+    import heyoka
+
+    q, qd, tau = variables(tree, "q", "qd", "tau")
+    M, h = composite.mass_matrix_and_bias(tree, q, qd)
+    n = len(q)
+    rows = [M[min(i, j)][max(i, j)] for i in range(n) for j in range(n)]
+    qdd = acceleration(tree, q, qd, tau, composite.mass_matrix_and_bias)
+    values = [heyoka.expression(value) if isinstance(value, float) else value for value in (*rows, *h, *qdd)]
+    return heyoka.cfunc(values, vars=[*q, *qd, *tau])
+
+
+def variables(tree, *names) -> list:
+    """heyoka's variables for each hinge: one list for each name."""
+    import heyoka
+
     sin.register(heyoka.expression, heyoka.sin)
     cos.register(heyoka.expression, heyoka.cos)
-    n = len(tree.parent)
-    q, qd = (heyoka.make_vars(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd"))
-    qdd = acceleration(tree, q, qd, list(tau), composite.mass_matrix_and_bias)
-    return heyoka.taylor_adaptive([*zip(q, qd), *zip(qd, qdd)], [0.0] * (2 * n), tol=tolerance)
+    return [[heyoka.make_vars(f"{name}{i}") for i in range(len(tree.parent))] for name in names]

@@ -1,5 +1,7 @@
 """SciPy's solve_ivp with tmt's compiled equations."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tmt import kernels
@@ -7,7 +9,7 @@ from tmt import kernels
 from . import GRID, Method, Motion, Setting
 from .tmt import TmtDynamics
 
-TOLERANCE = 1e-9
+DEFAULT = 1e-9  # tolerance
 LEAST_RELATIVE = 2.3e-14  # that solve_ivp takes
 
 
@@ -27,15 +29,35 @@ class Scipy:
 class ScipyDynamics(TmtDynamics):
     """The compiled equations of a case: what SciPy integrates."""
 
+    def mass_matrix(self, q) -> np.ndarray:
+        n = self.coordinates.nv
+        rows, columns = np.triu_indices(n)
+        upper = self.evaluated("mass_matrix_and_bias", rows.size + n, q)[..., : rows.size]
+        M = np.empty((*np.shape(q)[:-1], n, n))
+        M[..., rows, columns] = M[..., columns, rows] = upper
+        return M
+
+    def bias(self, q, v) -> np.ndarray:
+        n = self.coordinates.nv
+        return self.evaluated("mass_matrix_and_bias", n * (n + 3) // 2, q, v)[..., -n:]
+
     def acceleration(self, q, v, tau) -> np.ndarray:
+        return self.evaluated("forward_dynamics", self.coordinates.nv, q, v, tau)
+
+    def rate(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """rate(y, tau): dy/dt of y = (q, v), (2n,)."""
+        return kernels.evaluator(self.tree, "forward_dynamics").rate
+
+    def evaluated(self, quantity, size, q, v=0.0, tau=0.0) -> np.ndarray:
+        """A compiled quantity of so many numbers at each state, (..., size)."""
         shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
-        states = [np.array(np.broadcast_to(a, shape), float).reshape(-1, shape[-1]) for a in (q, v, tau)]
-        result = np.empty_like(states[0])
-        kernels.evaluator(self.tree, "forward_dynamics").each(*states, result)
-        return result.reshape(shape)
+        states = [np.array(np.broadcast_to(a, shape), float, order="C").reshape(-1, shape[-1]) for a in (q, v, tau)]
+        result = np.empty((len(states[0]), size))
+        kernels.evaluator(self.tree, quantity).each(*states, result)
+        return result.reshape(*shape[:-1], size)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), method, tolerance or TOLERANCE)
+        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), method, tolerance or DEFAULT)
 
     def solved(self, q, v, tau, t, method, tolerance) -> Motion:
         run, read = self.prepared(q, v, tau, t, method, tolerance)
@@ -47,19 +69,52 @@ class ScipyDynamics(TmtDynamics):
     def prepared(self, q, v, tau, t, method, tolerance):
         from scipy.integrate import solve_ivp
 
-        rate = kernels.evaluator(self.tree, "forward_dynamics").rate
-        start, torque = np.concatenate([q, v]), np.ascontiguousarray(tau, float)
-        options = {"t_eval": t, "rtol": max(tolerance, LEAST_RELATIVE), "atol": tolerance}
+        rate = self.rate()
+        start, torque, nothing = np.concatenate([q, v]), np.array(tau, float), np.zeros(2 * len(q))
+        options = {"rtol": max(tolerance, LEAST_RELATIVE), "atol": tolerance}
 
-        def run():
-            return solve_ivp(lambda t, y: rate(y, torque), (0.0, t[-1]), start, method, **options)
+        def slope(time, y):
+            result = rate(y, torque)
+            if result @ nothing != 0.0:  # solve_ivp would try ever smaller steps without end
+                raise NotFinite(time)
+            return result
+
+        def run(times=t):
+            try:
+                return solve_ivp(slope, (0.0, times[-1]), start, method, t_eval=times, **options)
+            except NotFinite as error:
+                return error
 
         def read(solution):
-            path = np.full((len(t), start.size), np.nan)
-            path[: solution.y.shape[1]] = solution.y.T
-            return Motion(t, *np.split(path, 2, axis=1), int(solution.nfev), None if solution.success else solution.message)
+            times = t
+            while isinstance(solution, NotFinite) and len(times) > 2:  # once more, as far as it goes
+                times = t[: max(2, min(len(times) - 1, np.searchsorted(t, solution.args[0]) + 1))]
+                solution = run(times)
+            found, evaluations, why = start[None], 1, "its slope is not finite"
+            if not isinstance(solution, NotFinite):
+                found, evaluations = solution.y.T, int(solution.nfev)
+                why = why if solution.success else solution.message
+            q, v, ended = as_far_as_it_goes(t, found, start, why)
+            return Motion(t, q, v, evaluations, ended)
 
         return run, read
+
+
+class NotFinite(ArithmeticError):
+    """A slope at a time, s, that is not finite."""
+
+
+def as_far_as_it_goes(t, found, start, why) -> tuple[np.ndarray, np.ndarray, str | None]:
+    """q and v at the times t, NaN from where a run has no finite state any more, and why and when that is, or None.
+
+    found: (times reached, 2n), the states of a run that may have ended early; start: (2n,), its first.
+    """
+    path = np.full((len(t), start.size), np.nan)
+    path[: len(found)], path[0] = found, start
+    finite = np.isfinite(path).all(axis=1)
+    path[np.cumsum(~finite) > 0] = np.nan
+    ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"
+    return *np.split(path, 2, axis=1), ended
 
 
 def each(solved, q, v, tau, *more) -> Motion:

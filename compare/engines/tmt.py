@@ -6,6 +6,8 @@ import numpy as np
 
 import tmt
 from tmt import kernels
+from tmt.methods import method_named
+from tmt.simulation import reasons
 
 from . import GRID, Method, Motion, Setting
 
@@ -67,22 +69,24 @@ class TmtDynamics:
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
-        return Motion(*motion, motion.evaluations, motion.ended, None if tmt.METHODS[method].adaptive else steps)
+        return Motion(*motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps)
 
     def prepare(self, q, v, tau, setting: Setting, method):
-        stepping = tmt.METHODS[method]
-        steps = setting.steps or GRID
-        paths = np.full((2, 1, steps + 1, len(q)), np.nan)
+        stepping = method_named(method)
+        if setting.tolerance is not None and not stepping.adaptive:
+            raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
+        if stepping.adaptive and not setting.steps:
+            setting = setting._replace(steps=GRID)  # between which it takes its own
+        every, dt = setting.every, setting.duration / setting.steps
+        paths, codes = np.full((2, 1, setting.steps + 1, len(q)), np.nan), np.zeros(1, np.int8)
         paths[:, 0, 0] = q, v
-        arguments = [*paths, np.array(tau)[None], setting.duration / steps]
-        if setting.tolerance is not None:
-            arguments.append(setting.tolerance)
-        run = partial(kernels.stepper(self.tree, method), *arguments)
+        tolerance = () if setting.tolerance is None else (setting.tolerance,)
+        run = partial(kernels.stepper(self.tree, method), *paths, np.array(tau, float)[None], dt, *tolerance, codes)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(evaluations):
-            taken = steps if setting.steps else evaluations // stepping.stages
-            every = slice(None, None, steps // GRID)
-            return Motion(t, *(path[0, every].copy() for path in paths), evaluations, None, taken)
+            (ended,) = reasons(self.tree, *paths, codes, dt, setting.tolerance or 0.0)
+            taken = evaluations // stepping.stages if stepping.adaptive else setting.steps
+            return Motion(t, *(path[0, ::every].copy() for path in paths), evaluations, ended, taken)
 
         return run, read

@@ -23,9 +23,14 @@ from ..case import Case
 
 TABLE = Path(__file__).with_name("reference.csv")
 RECORDS = 64  # of a run, and its start
-COARSEST, FINEST = 256, 2048  # steps of a run of 5 s: the halving begins and ends there
-ENOUGH = 2e-22  # rad, rad/s: a difference from the run with half the steps that need not be smaller
-UNUSABLE = (OSError, RuntimeError, ValueError, csv.Error)  # of a cache folder: none, not the user's own; or of what is in it
+FIRST_STEPS, MOST_STEPS_IN_5_S = 256, 2048  # of a run of 5 s: the halving begins and ends there
+SMALL_ENOUGH = 2e-22  # rad, rad/s: a difference from the run with half the steps that need not be smaller
+UNUSABLE = (
+    OSError,
+    RuntimeError,
+    ValueError,
+    csv.Error,
+)  # of a cache folder: none, not the user's own; or of what is in it
 ABOUT = ["scene", "key", "steps", "halving_difference", "t_s"]
 
 
@@ -107,19 +112,29 @@ def remade(cases: Sequence[Case], map: Callable, tell: Callable) -> list[list[di
 
 def next_counts(case, runs) -> list[int]:
     """The numbers of steps with which the case is to be run next: two at first; none where the digits are enough."""
-    scale = max(1, round(case.duration / 5.0 * COARSEST / RECORDS)) * RECORDS / COARSEST
+    first = max(1, round(case.duration / 5.0 * FIRST_STEPS / RECORDS)) * RECORDS
     if not runs:
-        return [round(scale * COARSEST), round(2 * scale * COARSEST)]
-    (_, coarse), (count, fine) = runs[-2:]
-    enough = abs(fine - coarse).max() <= ENOUGH or 2 * count > scale * FINEST
+        return [first, 2 * first]
+    count, _ = runs[-1]
+    enough = halving(runs) <= SMALL_ENOUGH or 2 * count > first * MOST_STEPS_IN_5_S / FIRST_STEPS
     return [] if enough else [2 * count]
 
 
+def halving(runs) -> float:
+    """The largest difference of the two finest runs, rad or rad/s; infinite if one of them did not reach its end."""
+    (_, coarse), (_, fine) = runs[-2:]
+    return np.inf if coarse is None or fine is None else float(abs(fine - coarse).max())
+
+
 def case_rows(case, runs) -> list[dict]:
-    """The rows of a case from its two finest runs."""
-    (_, coarse), (count, fine) = runs[-2:]
-    difference = f"{float(abs(fine - coarse).max()):.2e}"
-    about = {"scene": case.name, "key": key(case), "steps": count, "halving_difference": difference}
+    """The rows of a case from its two finest runs; ValueError if they did not reach its end."""
+    count, fine = runs[-1]
+    if not np.isfinite(halving(runs)):
+        raise ValueError(
+            f"scene {case.name!r}: runs with many digits and up to {count} steps do not reach its end; a slower start or a "
+            "shorter scene is expected"
+        )
+    about = {"scene": case.name, "key": key(case), "steps": count, "halving_difference": f"{halving(runs):.2e}"}
     times = np.linspace(0.0, case.duration, RECORDS + 1)
     return [
         about | {"t_s": t} | dict(zip(columns(case), (f"{v:.32g}" if v else "0" for v in row)))
@@ -127,10 +142,13 @@ def case_rows(case, runs) -> list[dict]:
     ]
 
 
-def run(job) -> np.ndarray:
-    """One run with many digits; a job is a case, the number of records and that of steps."""
+def run(job) -> np.ndarray | None:
+    """One run with many digits, None if its numbers overflow; a job is a case, the number of records and that of steps."""
     case, records, steps = job
-    return trajectory(case.tree, *case.start, case.tau, case.duration, records, steps)
+    try:
+        return trajectory(case.tree, *case.start, case.tau, case.duration, records, steps)
+    except ArithmeticError:
+        return None
 
 
 def reference(rows: list[dict]) -> Reference:

@@ -11,7 +11,9 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from .engine import FLAGS, INTEGRATORS, Engine
+from .dynamics import FLAGS, INTEGRATORS, MujocoDynamics
+
+TINY_STEP = 1e-9  # s: a loop of steps stays where it starts
 
 
 def library() -> ctypes.CDLL | None:
@@ -22,40 +24,123 @@ def library() -> ctypes.CDLL | None:
     return None
 
 
+class MinimalCalls:
+    """Dynamics by only those of MuJoCo's functions that a tree of hinges with damping needs, called by their addresses.
+
+    Contact and constraint stages are off; springs, tendons and actuators have no part in it.
+    """
+
+    def __init__(self, dynamics: MujocoDynamics):
+        self.coordinates, self.qpos, self.dofs = dynamics.coordinates, dynamics.qpos, dynamics.dofs
+        self.model = mujoco.MjModel.__copy__(dynamics.model)
+        self.data = mujoco.MjData(self.model)
+        self.model.opt.integrator, self.model.opt.timestep = INTEGRATORS["RK4"], TINY_STEP
+        self.model.opt.disableflags |= int(FLAGS["contact"]) | int(FLAGS["constraint"])
+        self.force, self.solution = np.zeros((2, self.model.nv))
+        self.functions = functions(library())
+
+    @staticmethod
+    def unavailable() -> str | None:
+        """Why it cannot take part here, or None."""
+        return None if library() else "MuJoCo's library was not found beside its package"
+
+    def mass_matrix(self, q) -> np.ndarray:
+        """M, kg m2, (..., n, n): mj_makeM (or mj_crb), laid out by mj_fullM."""
+        full = np.zeros((self.model.nv, self.model.nv))
+
+        def dense():
+            mujoco.mj_fullM(self.model, self.data, full)
+            return full[np.ix_(self.dofs, self.dofs)]
+
+        return self.each(dense, q, 0.0, 0.0)
+
+    def bias(self, q, v) -> np.ndarray:
+        """h, N m, (..., n): mj_rne."""
+        return self.each(lambda: self.force[self.dofs], q, v, 0.0)
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        """rad/s2, (..., n): mj_solveM of tau - D v - h."""
+
+        def solved():
+            d = self.data
+            self.force[:] = d.qfrc_applied - self.model.dof_damping * d.qvel - self.force
+            self.functions["mj_factorM"](*self.addresses)
+            self.functions["mj_solveM"](*self.addresses, self.solution.ctypes.data, self.force.ctypes.data, 1)
+            return self.solution[self.dofs]
+
+        return self.each(solved, q, v, tau)
+
+    def loops(self, q, v, tau) -> dict[str, tuple[str, Callable]]:
+        """For each way: (quantity, run(count)), where run does the same at one state count times.
+
+        q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work is only what
+        forward dynamics needs. Its solution is -M^-1 h, as no torque is added up.
+        """
+        self.place(q, v, tau)
+        mujoco.mj_forward(self.model, self.data)
+        call = self.functions
+        force, solution = self.force.ctypes.data, self.solution.ctypes.data
+
+        def run(loop, *arguments):
+            # what the addresses point to must live as long as the call
+            return lambda count, _=self: loop(*arguments, count)
+
+        terms, dynamics = equal_work(call)
+        return {
+            "MuJoCo, mj_forward": ("forward_dynamics", run(repeated, call["mj_forward"], *self.addresses)),
+            "MuJoCo, equal work": ("forward_dynamics", run(dynamics, *self.addresses, force, solution)),
+            "MuJoCo, equal work, no solve": ("mass_matrix_and_bias", run(terms, *self.addresses, force)),
+            "MuJoCo, mj_step": ("rk4_step", run(repeated, call["mj_step"], *self.addresses)),
+        }
+
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """Of the model and of its data."""
+        return self.model._address, self.data._address
+
+    def place(self, q, v, tau) -> None:
+        """Set the state."""
+        d = self.data
+        d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
+
+    def each(self, read, q, v, tau) -> np.ndarray:
+        """read() after the calls that give M and h, at each state, stacked to the batch shape of the states."""
+        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
+        states = (np.broadcast_to(a, shape).reshape(-1, shape[-1]) for a in (q, v, tau))
+        values = []
+        for state in zip(*states):
+            self.place(*state)
+            for name in TERMS:
+                self.functions[name](*self.addresses)
+            self.functions["mj_rne"](*self.addresses, 0, self.force.ctypes.data)
+            values.append(np.array(read()))
+        return np.array(values).reshape(*shape[:-1], *values[0].shape)
+
+
+TERMS = ("mj_kinematics", "mj_comPos", "mass matrix", "mj_comVel")  # before mj_rne, in this order
+
+
+def functions(lib) -> dict[str, Callable]:
+    """MuJoCo's functions of model and data by their names."""
+    more = {"mj_rne": (ctypes.c_int, ctypes.c_void_p), "mj_solveM": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)}
+    mass_matrix = "mj_makeM" if hasattr(lib, "mj_makeM") else "mj_crb"
+    names = ("mj_forward", "mj_step", "mj_kinematics", "mj_comPos", "mj_comVel", "mj_factorM", "mj_rne", "mj_solveM")
+    found = {name: getattr(lib, name) for name in names} | {"mass matrix": getattr(lib, mass_matrix)}
+    for name, function in found.items():
+        function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p, *more.get(name, ())], None
+    return found
+
+
 @njit
 def repeated(function, model, data, count):
     for _ in range(count):
         function(model, data)
 
 
-def loops(engine: Engine, q, qd, tau) -> dict[str, tuple[str, Callable]]:
-    """For each way: (quantity, run(count)), where run does the same at one state count times. {} without the library.
-
-    q, qd, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration, with contact and constraint
-    stages off; the equal work is only what forward dynamics of this arm needs.
-    """
-    lib = library()
-    if lib is None:
-        return {}
-    model, data = mujoco.MjModel.__copy__(engine.model), mujoco.MjData(engine.model)
-    model.opt.integrator, model.opt.timestep = INTEGRATORS["RK4"], 1e-9
-    model.opt.disableflags |= int(FLAGS["contact"]) | int(FLAGS["constraint"])
-    data.qpos[engine.qpos], data.qvel[engine.dofs], data.qfrc_applied[engine.dofs] = q, qd, tau
-    mujoco.mj_forward(model, data)
-    m, d = model._address, data._address
-
-    def named(name, *more):
-        function = getattr(lib, name)
-        function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p, *more], None
-        return function
-
-    forward, step = named("mj_forward"), named("mj_step")
-    kinematics, com, velocities = named("mj_kinematics"), named("mj_comPos"), named("mj_comVel")
-    inertia = named("mj_makeM" if hasattr(lib, "mj_makeM") else "mj_crb")
-    factor, rne = named("mj_factorM"), named("mj_rne", ctypes.c_int, ctypes.c_void_p)
-    solve = named("mj_solveM", ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
-    bias, acceleration = np.zeros((2, model.nv))
-    to_bias, to_acceleration = bias.ctypes.data, acceleration.ctypes.data
+def equal_work(call) -> tuple[Callable, Callable]:
+    """Compiled loops: mass matrix and bias; and the acceleration from them."""
+    kinematics, com, inertia, velocities = (call[name] for name in TERMS)
+    factor, rne, solve = call["mj_factorM"], call["mj_rne"], call["mj_solveM"]
 
     @njit
     def terms(m, d, bias, count):
@@ -77,14 +162,4 @@ def loops(engine: Engine, q, qd, tau) -> dict[str, tuple[str, Callable]]:
             rne(m, d, 0, bias)
             solve(m, d, acceleration, bias, 1)
 
-    owners = model, data, bias, acceleration  # what the addresses point to must live as long as the calls
-
-    def call(loop, *arguments):
-        return lambda count, _=owners: loop(*arguments, count)
-
-    return {
-        "MuJoCo, mj_forward": ("forward_dynamics", call(repeated, forward, m, d)),
-        "MuJoCo, equal work": ("forward_dynamics", call(dynamics, m, d, to_bias, to_acceleration)),
-        "MuJoCo, equal work, no solve": ("mass_matrix_and_bias", call(terms, m, d, to_bias)),
-        "MuJoCo, mj_step": ("rk4_step", call(repeated, step, m, d)),
-    }
+    return terms, dynamics

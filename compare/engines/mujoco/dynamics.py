@@ -159,7 +159,8 @@ class MujocoDynamics:
         return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
 
     def prepare(self, q, v, tau, setting: Setting, method):
-        dt, every = setting.duration / setting.steps, setting.steps // GRID
+        refuse_tolerance(setting.tolerance, method)
+        every, dt = setting.every, setting.duration / setting.steps
         starts, run = self.runner(q, v, tau, dt, setting.steps, method)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 

@@ -2,33 +2,31 @@
 
 import numpy as np
 
-from .agreement import FACTOR
-from .competitors import GRID
-from .motion import TWINS
+from ...judge.scale import FACTOR
 
-NEAR = 30  # times the error of rounding: an error below has come to it
-NEAR_ENOUGH = 0.1  # rad: an error below is a small deviation, which rounding changes no more than the growth says
-FAR = 0.1  # rad: a run that is farther off is another motion
+NEAR_ROUNDING = 30  # times the error of rounding: an error below has come to it
+SMALL_DEVIATION = 0.1  # rad: rounding changes an error below no more than the growth of a small difference says
+ANOTHER_MOTION = 0.1  # rad: a run that is farther off is another motion
 ALIKE = 0.01  # of an error: two that differ by less are the same in a sentence
 
 
-def same_schemes(result, floors) -> None:
+def check_same_schemes(result, floors, schemes) -> None:
     """MuJoCo's integrators and the same schemes in tmt make the same error, but for rounding.
 
     Judged where either error is below 0.1 rad: one that is not, or a run that has diverged, beside one that is, fails.
-    floors: {scene: rad}, what rounding leaves in each.
+    floors: {scene: rad}, what rounding leaves in each; schemes: {integrator of MuJoCo: the method of tmt}.
     """
     by_place = {(row["scene"], row["engine"], row["method"], row["dt_s"]): row for row in result.rows}
     for (scene, engine, method, dt), row in by_place.items():
-        ours = by_place.get((scene, "tmt", TWINS.get(method), dt)) if engine == "mujoco" and scene in floors else None
-        if ours and min(error(row), error(ours)) < NEAR_ENOUGH:
+        ours = by_place.get((scene, "tmt", schemes.get(method), dt)) if engine == "mujoco" and scene in floors else None
+        if ours and min(error(row), error(ours)) < SMALL_DEVIATION:
             difference = abs(error(row) - error(ours))
             where = f"{scene}, {method}, dt = {dt:.3g} s"
             quantity = f"the same error as tmt's {ours['method']}"
             result.check(where, quantity, difference, FACTOR * floors[scene], "rad", rounding=True)
 
 
-def smallest_errors(result, floors) -> None:
+def check_smallest_errors(result, floors) -> None:
     """MuJoCo's RK4 comes as near to the reference as tmt's; and where errors stop falling, they are of the size of rounding."""
     for scene, left in floors.items():
         least = {}
@@ -38,13 +36,13 @@ def smallest_errors(result, floors) -> None:
             if stopped(errors):
                 quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
                 result.check(scene, quantity, least[method], FACTOR * left, "rad", rounding=True)
-        bar = FACTOR * left + (2.0 * least["rk4"] if np.isfinite(least["rk4"]) else 0.0)
-        result.check(scene, "smallest error of MuJoCo's RK4, beside that of tmt's rk4", least["RK4"], bar, "rad")
+        tolerance = FACTOR * left + (2.0 * least["rk4"] if np.isfinite(least["rk4"]) else 0.0)
+        result.check(scene, "smallest error of MuJoCo's RK4, beside that of tmt's rk4", least["RK4"], tolerance, "rad")
 
 
 def gained_nothing(found, work, best, last, left) -> bool:
     """Whether a run that cost more than the last one came no nearer, though the best error was near that of rounding."""
-    return best < NEAR * left and work > 1.2 * last and not found < 0.7 * best
+    return best < NEAR_ROUNDING * left and work > 1.2 * last and not found < 0.7 * best
 
 
 def error(row) -> float:
@@ -62,76 +60,96 @@ def stopped(errors) -> bool:
     return bool(errors) and np.isfinite(min(errors)) and errors.index(min(errors)) < len(errors) - 1
 
 
-def true_error(rows) -> dict[str, tuple[float | None, float | None]]:
-    """{scene: (TMT's, MuJoCo's)}: the worst error of RK4 at the assignment's step, 64 in 5 s, rad; None: diverged, not run."""
+def true_error(rows, steps) -> dict[str, tuple[float | None, float | None]]:
+    """{scene: (TMT's, MuJoCo's)}: the worst error of RK4 with the coarsest steps, rad; None: diverged, not run.
+
+    steps: {scene: how many}.
+    """
     found = {}
     for row in rows:
-        if row["steps"] == GRID and (row["engine"], row["method"]) in (("tmt", "rk4"), ("mujoco", "RK4")):
+        of_rk4 = (row["engine"], row["method"]) in (("tmt", "rk4"), ("mujoco", "RK4"))
+        if of_rk4 and row["steps"] == steps.get(row["scene"]):
             found.setdefault(row["scene"], {})[row["engine"]] = row["worst_error_rad"]
     return {scene: (pair.get("tmt"), pair.get("mujoco")) for scene, pair in found.items()}
 
 
-def true_errors_told(rows) -> list[str]:
-    """How far from the true motion the runs are at the assignment's step, in words."""
-    errors = true_error(rows)
-    if not errors:
-        return []
-    pairs = "; ".join(f"{scene}: TMT {in_rad(a)}, MuJoCo {in_rad(b)}" for scene, (a, b) in errors.items())
-    text = f"At the assignment's step, {GRID} steps of RK4, the worst errors against the true motion are: {pairs}."
-    far = {s: pair for s, pair in errors.items() if any(value is None or value > FAR for value in pair)}
-    alike = [s for s, pair in far.items() if None not in pair and abs(pair[0] - pair[1]) < ALIKE * pair[0]]
-    other = [s for s in far if s not in alike]
-    if alike:
-        text += f" {'; '.join(alike)}: both engines make this error. That they agree says nothing of the arm's motion there."
-    if other:
-        text += f" {'; '.join(other)}: the errors are not the same."
-    return [text]
+def true_errors_in_words(rows, steps, robot) -> list[str]:
+    """How far from the true motion the runs with the coarsest steps are, in words, for each number of them."""
+    sentences = []
+    for count in dict.fromkeys(steps.values()):
+        errors = true_error(rows, {scene: own for scene, own in steps.items() if own == count})
+        if not errors:
+            continue
+        pairs = "; ".join(f"{scene}: TMT {in_rad(a)}, MuJoCo {in_rad(b)}" for scene, (a, b) in errors.items())
+        dt = {row["dt_s"] for row in rows if row["scene"] in errors and row["steps"] == count}
+        whose = "the assignment's" if robot.claims and dt == {robot.claims.dt} else "the coarsest"
+        text = f"At {whose} step, {count} steps of RK4, the worst errors against the true motion are: {pairs}."
+        far = {s: pair for s, pair in errors.items() if any(v is None or v > ANOTHER_MOTION for v in pair)}
+        alike = [s for s, pair in far.items() if None not in pair and abs(pair[0] - pair[1]) < ALIKE * pair[0]]
+        other = [s for s in far if s not in alike]
+        if alike:
+            text += f" {'; '.join(alike)}: both engines make this error. That they agree says nothing of the {robot.name}'s "
+            text += "motion there."
+        if other:
+            text += f" {'; '.join(other)}: the errors are not the same."
+        sentences.append(text)
+    return sentences
 
 
 def in_rad(value) -> str:
     return "no number" if value is None else f"{value:.2g} rad"
 
 
-def floors_told(rows, floors) -> list[str]:
+def floors_in_words(rows, floors) -> list[str]:
     """How large the error of rounding is, and how many methods come to it and stop there, in words."""
     sizes = "; ".join(f"{scene}: {left:.1e} rad" for scene, left in floors.items())
     came, stay, below = 0, 0, 0
     for scene, left in floors.items():
         for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in rows if row["scene"] == scene):
             errors = errors_of(rows, scene, engine, method)
-            if min(errors) < NEAR * left:
+            if min(errors) < NEAR_ROUNDING * left:
                 came, stay, below = came + 1, stay + stopped(errors), below + (min(errors) < left)
     return [
         f"The size of what rounding leaves, eps times the growth of a small difference on the way: {sizes}. Of the curves of "
-        f"all methods {came} come to within {NEAR} times of it; in {stay} of these the last setting is not the most exact, and "
-        f"{below} get below it."
+        f"all methods {came} come to within {NEAR_ROUNDING} times of it; in {stay} of these the last setting is not the most "
+        f"exact, and {below} get below it."
     ]
 
 
-def first_order(rows, scenes) -> list[str]:
+def references_in_words(known, floors) -> list[str]:
+    """Of which scenes the reference is known to fewer digits than doubles have, in words."""
+    coarse = [f"{scene}: {known[scene].halving:.0e}" for scene, left in floors.items() if known[scene].halving >= left]
+    if not coarse:
+        return []
+    return [
+        f"The runs with many digits are known to no more than so many rad or rad/s, in place of rounding: {'; '.join(coarse)}."
+    ]
+
+
+def first_order_in_words(rows, scenes) -> list[str]:
     """How far MuJoCo's integrators of order 1 come, in words."""
-    told = []
+    found = []
     for scene in scenes:
         runs = [row for row in rows if (row["scene"], row["engine"]) == (scene, "mujoco") and not row["diverged"]]
         first = [row for row in runs if row["method"] != "RK4"]
         if first:
             best = min(first, key=lambda row: row["worst_error_rad"])
             taken = "" if best["seconds"] is None else f" in {1e3 * best['seconds']:.3g} ms"
-            told.append(f"{scene}: {best['worst_error_rad']:.1e} rad{taken} ({best['method']}, {best['steps']} steps)")
-    return [f"The least errors of MuJoCo's integrators of order 1: {'; '.join(told)}."] if told else []
+            found.append(f"{scene}: {best['worst_error_rad']:.1e} rad{taken} ({best['method']}, {best['steps']} steps)")
+    return [f"The least errors of MuJoCo's integrators of order 1: {'; '.join(found)}."] if found else []
 
 
-def smaller_models(rows) -> list[str]:
+def smaller_models_in_words(rows) -> list[str]:
     """What the smaller model of a scene saves, in words."""
-    told = []
+    sentences = []
     for row in rows:
         name = row["scene"].rsplit(", ", 1)[0]
         for whole in rows:
             same = all(whole[key] == row[key] for key in ("engine", "method", "dt_s", "tolerance"))
             if whole["scene"] == name and same and whole["seconds"] and row["seconds"] and row["worst_error_rad"]:
                 gain = whole["seconds"] / row["seconds"]
-                told.append(
+                sentences.append(
                     f"{row['scene']} ({row['engine']} {row['method']}, {row['steps']} steps): the whole model takes {gain:.2f} "
                     f"times as long; {row['worst_error_rad']:.2e} rad off where that is {error(whole):.2e}."
                 )
-    return told
+    return sentences

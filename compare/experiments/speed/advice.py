@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from .accuracy import NEAR
+from ...judge.run import ORDER_MARGIN
+from .accuracy import NEAR_ROUNDING
 
 TARGETS = (1e-2, 1e-3, 1e-6, 1e-9, 1e-12)  # rad, worst on the way
 EARLY = 1.0  # s: up to here chaos has not yet grown, and errors fall regularly
 REGULAR, CLEAR = 3e-2, 2e-12  # rad, in that time: an error in between falls with its order, and rounding is far below
-MARGIN = 0.15  # of the measured order
-LEAST = {8: 7.0}  # of order 8 only the least, as rounding comes before it has settled
+LEAST_ORDER = {8: 7.0}  # of order 8 only the least, as rounding comes before it has settled
 
 
 def advice(rows, scenes, floors) -> list[dict]:
@@ -42,12 +42,12 @@ def advice(rows, scenes, floors) -> list[dict]:
                 "kernel_part": part(rk4, twin),
                 "method_part": part(twin, ours),
             }
-            for party, row in (("mujoco", theirs), ("tmt", ours), ("of_all", best)):
+            for who, row in (("mujoco", theirs), ("tmt", ours), ("of_all", best)):
                 line |= {
-                    party: named(row) if row else None,
-                    f"{party}_dt_s": row and row["dt_s"],
-                    f"{party}_ms": row and 1e3 * row["seconds"],
-                    f"{party}_evaluations": row and row["evaluations"],
+                    who: named(row) if row else None,
+                    f"{who}_dt_s": row and row["dt_s"],
+                    f"{who}_ms": row and 1e3 * row["seconds"],
+                    f"{who}_evaluations": row and row["evaluations"],
                 }
             line["why_not"] = why_not(of_scene, theirs, ours, floors[scene])
             table.append(line)
@@ -70,7 +70,7 @@ def why_not(rows, theirs, ours, floor) -> str | None:
             last = [run for run in runs if run["method"] == best["method"]][-1]
             if best is last:
                 cause = "its steps end before"
-            elif best["worst_error_rad"] < NEAR * floor:
+            elif best["worst_error_rad"] < NEAR_ROUNDING * floor:
                 cause = f"there rounding, of the size of {floor:.0e} rad, takes over"
             else:
                 cause = f"finer steps come no nearer, though rounding is of the size of {floor:.0e} rad only"
@@ -80,38 +80,50 @@ def why_not(rows, theirs, ours, floor) -> str | None:
     return "; ".join(reasons) or None
 
 
-def orders(result, scenes, known, complete=True) -> list[dict]:
+def orders(result, scenes, methods, complete=True) -> list[dict]:
     """Rows and checks: each method of fixed step, its order and the one measured where the error falls regularly.
 
-    complete: every method must show its order in one scene at least, which the coarse steps of a quick run do not allow.
+    complete: every method must show its order in one scene at least, which the coarse steps of a quick run do not allow; but
+    for one that is near rounding with its coarsest steps already, wherever it runs.
     """
     table = []
     for scene in scenes:
-        for engine, method, order in known:
-            runs = [
-                row for row in result.rows
-                if (row["scene"], row["engine"], row["method"]) == (scene, engine, method) and CLEAR < row["early"] < REGULAR
-            ]  # fmt: skip
-            if len(runs) < 2:
+        for method in methods:
+            regular = [row for row in early_runs(result, scene, method) if CLEAR < row["early"] < REGULAR]
+            if len(regular) < 2:
                 continue
-            coarse, fine = runs[-2:]  # the finest are those to which the theory applies best
+            coarse, fine = regular[-2:]  # the finest are those to which the theory applies best
             measured = float(np.log(coarse["early"] / fine["early"]) / np.log(coarse["dt_s"] / fine["dt_s"]))
             table.append(
-                {"scene": scene, "engine": engine, "method": method, "order": order, "measured_order": measured,
-                 "from_dt_s": coarse["dt_s"], "to_dt_s": fine["dt_s"]}
+                {"scene": scene, "engine": method.engine, "method": method.name, "order": method.order,
+                 "measured_order": measured, "from_dt_s": coarse["dt_s"], "to_dt_s": fine["dt_s"]}
             )  # fmt: skip
-            judge_order(result, f"{scene}, {engine} {method}", order, measured)
-    for engine, method, _ in known if complete else ():
-        shown = sum((row["engine"], row["method"]) == (engine, method) for row in table)
-        result.check(f"{engine} {method}", "scenes that show its order", shown, 1, "scenes", rule="at least")
+            check_order(result, f"{scene}, {method.engine} {method.name}", method.order, measured)
+    for method in methods if complete else ():
+        shown = sum((row["engine"], row["method"]) == (method.engine, method.name) for row in table)
+        if shown or not near_rounding(result, scenes, method):
+            where = f"{method.engine} {method.name}"
+            result.check(where, "scenes that show its order", shown, 1, "scenes", rule="at least")
     return table
 
 
-def judge_order(result, where, order, measured) -> None:
+def near_rounding(result, scenes, method) -> bool:
+    """Whether errors of a method are so small with its coarsest steps that half of these would show rounding."""
+    firsts = [runs[0]["early"] for scene in scenes if (runs := early_runs(result, scene, method))]
+    return bool(firsts) and all(first < CLEAR * 2.0**method.order for first in firsts)
+
+
+def early_runs(result, scene, method) -> list[dict]:
+    """The rows of a method in a scene, from coarse to fine."""
+    place = (scene, method.engine, method.name)
+    return [row for row in result.rows if (row["scene"], row["engine"], row["method"]) == place]
+
+
+def check_order(result, where, order, measured) -> None:
     """A check: the measured order is the method's; of order 8 it is at least 7."""
-    least = LEAST.get(order)
+    least = LEAST_ORDER.get(order)
     if least is None:
         off = abs(measured - order)
-        result.check(where, f"distance of the measured order from {order}", off, MARGIN, "", f"{measured:.2f}")
+        result.check(where, f"distance of the measured order from {order}", off, ORDER_MARGIN, "", f"{measured:.2f}")
     else:
         result.check(where, f"measured order, of {order}", measured, least, "", rule="at least")

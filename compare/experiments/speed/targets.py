@@ -1,21 +1,19 @@
 """What was aimed at for speed, and what is reached: ratios of one run. They make no checks."""
 
-from .evaluations import EACH, EQUAL, FORWARD, LANES, MJ_STEP, STEP, WAITING, WHOLE
+from .evaluations import EACH, EQUAL, FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WAITING, WHOLE
 
-AIMS = {  # (scene, rad): MuJoCo's cheapest setting over tmt's
-    ("zero, free", 1e-6): 50, ("zero, free", 1e-9): 200, ("zero, free", 1e-12): 500,
-    ("bent, free", 1e-6): 50, ("bent, free", 1e-9): 200, ("bent, free", 1e-12): 500,
-    ("ball catch, free", 1e-6): 50, ("ball catch, free", 1e-9): 200,
-}  # fmt: skip
 LANES_AIM = {"AVX-512": 300}  # over lanes, by the width of the vectors; 120 for AVX2
 
 
-def targets(result, floors, vectors) -> list[dict]:
-    """A row for each aim: what is compared, the ratio that was aimed at, the ratio that is reached."""
+def targets(result, floors, vectors, aims) -> list[dict]:
+    """A row for each aim: what is compared, the ratio that was aimed at, the ratio that is reached.
+
+    aims: of the robot, {(scene, rad): MuJoCo's cheapest setting over tmt's}.
+    """
     ns = {(row["quantity"], row["implementation"], row["states"], row["threads"]): row["ns_per_state"]
           for row in result.tables["evaluations"]}  # fmt: skip
     lanes = {states: value for (quantity, name, states, threads), value in ns.items()
-             if (quantity, name, threads) == (FORWARD, LANES, 1) and states > 1}  # fmt: skip
+             if (quantity, name, threads) == (FORWARD, IN_LANES, 1) and states > 1}  # fmt: skip
     best = min(lanes, key=lanes.get, default=None)  # as many states as fit into the caches
     wide = next((aim for name, aim in LANES_AIM.items() if name in vectors), 120)
     rows = []
@@ -33,9 +31,9 @@ def targets(result, floors, vectors) -> list[dict]:
         add(f"forward dynamics, {how}: equal work over the kernel", 12, of(FORWARD, EQUAL), fast)
     of_states = f" of {best:,} states" if best else ""
     add(f"forward dynamics: mj_forward over lanes{of_states}", wide, of(FORWARD, WHOLE), lanes.get(best))
-    add("RK4 step: mj_step over the kernel", 20, of(STEP, MJ_STEP), of(STEP, EACH))
+    add("RK4 step: mj_step over the kernel", 20, of(RK4_STEP, MJ_STEP), of(RK4_STEP, EACH))
     for line in result.tables["what_should_i_use"]:
-        aim = AIMS.get((line["scene"], line["target_rad"]))
+        aim = aims.get((line["scene"], line["target_rad"]))
         if aim:
             what = f"{line['scene']}, {line['target_rad']:.0e} rad: MuJoCo's cheapest over tmt's"
             add(what, aim, line["ratio"], 1.0)
@@ -50,7 +48,7 @@ def targets(result, floors, vectors) -> list[dict]:
     return rows
 
 
-def told(rows) -> list[str]:
+def aims_in_words(rows) -> list[str]:
     """How many aims are met and which are missed, in words."""
     measured = [row for row in rows if row["met"] is not None]
     missed = [f"{row['what']}: {row['reached']:.3g} of {row['aim']:g}" for row in measured if not row["met"]]

@@ -4,24 +4,41 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from .draw import BLUE, GREEN, GREY, ORANGE, WIDTH
+from ...engines import LABELS
+from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name
 from .evaluations import WHOLE
 
-PURPLE = "#CC79A7"
-ENGINES = {"mujoco": ("MuJoCo", ORANGE), "tmt": ("tmt", BLUE), "scipy": ("SciPy", GREEN), "heyoka": ("heyoka", PURPLE)}
+COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
 SAME_BITS = ("implicitfast", "discrete")  # as Euler's
 MARKS = "osD^v<>PXph*"
-LEFT, RIGHT = 3.0, 3e-16  # rad: the axis of errors runs from coarse to fine
-WRONG = 1.0  # rad: a run that is farther off is no result
-LOST = 30.0  # where what has diverged is drawn
+COARSE_END, FINE_END = 3.0, 3e-16  # rad: the axis of errors runs from coarse to fine
+NO_RESULT = 1.0  # rad: a run that is farther off is none
+OF_DIVERGED = 30.0  # rad: where what has diverged is drawn
+
+
+def written(engine) -> str:
+    """An engine's name in the figures: tmt's is that of its package here."""
+    return "tmt" if engine == "tmt" else LABELS.get(engine, engine)
+
+
+def colour_of(engine) -> str:
+    return COLOURS.get(engine, GREY)
+
+
+def runs(result) -> list[dict]:
+    """The rows that are runs, not those of an engine that is not there."""
+    return [row for row in result.rows if row["why_not"] is None]
+
+
+def runs_of(result, scene) -> list[dict]:
+    return [row for row in runs(result) if row["scene"] == scene]
 
 
 def curves(result, scene) -> dict:
     """The rows of a scene by (engine, method), in the order of their settings."""
     by_method = {}
-    for row in result.rows:
-        if row["scene"] == scene:
-            by_method.setdefault((row["engine"], row["method"]), []).append(row)
+    for row in runs_of(result, scene):
+        by_method.setdefault((row["engine"], row["method"]), []).append(row)
     return by_method
 
 
@@ -44,7 +61,7 @@ def marker(method) -> str:
 def pareto(rows, of) -> list[dict]:
     """The rows that nothing beats in both error and cost, from the cheapest to the most exact."""
     front, least = [], np.inf
-    good = (r for r in rows if not r["diverged"] and r["worst_error_rad"] < WRONG)
+    good = (r for r in rows if not r["diverged"] and r["worst_error_rad"] < NO_RESULT)
     for row in sorted(good, key=lambda r: (r[of], r["worst_error_rad"])):
         if row["worst_error_rad"] < least:
             front.append(row)
@@ -59,7 +76,7 @@ def times(result, scene):
     by_method = curves(result, scene)
     ends = []
     for (engine, method), rows in by_method.items():
-        _, colour = ENGINES[engine]
+        colour = colour_of(engine)
         good = [r for r in rows if not r["diverged"]]
         errors, spent = visible(good), [1e3 * r["seconds"] for r in good]
         ax.plot(errors, spent, marker=marker(method), markersize=3.5, linewidth=1, color=colour)
@@ -73,33 +90,35 @@ def times(result, scene):
         visible(front), [1e3 * r["seconds"] for r in front], "o", markersize=9, markerfacecolor="none",
         markeredgecolor="black", label="nothing is both faster and more exact",
     )  # fmt: skip
-    for key, (name, colour) in ENGINES.items():
-        if any(engine == key for engine, _ in by_method):
-            ax.plot([], [], color=colour, linewidth=3, label=name)
+    for engine in dict.fromkeys(engine for engine, _ in by_method):
+        ax.plot([], [], color=colour_of(engine), linewidth=3, label=written(engine))
     ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label="rounding: eps × growth")
-    ax.set(xscale="log", yscale="log", xlim=(LOST * 3, RIGHT / 30))
-    ax.set(xlabel="worst error on the way, rad (finer to the right)", ylabel=f"time for {motion(result)} of motion, ms")
+    ax.set(xscale="log", yscale="log", xlim=(OF_DIVERGED * 3, FINE_END / 30))
+    ax.set(
+        xlabel="worst error on the way, rad (finer to the right)",
+        ylabel=f"time for {motion(runs_of(result, scene))} of motion, ms",
+    )
     labelled(ax, ends)
     lost = [r for rows in by_method.values() for r in rows if r["diverged"]]
     for row in lost:
-        ax.plot(LOST, 1e3 * row["seconds"], "x", color=ENGINES[row["engine"]][1], markersize=6)
+        ax.plot(OF_DIVERGED, 1e3 * row["seconds"], "x", color=colour_of(row["engine"]), markersize=6)
     if lost:
         ax.plot([], [], "x", color="black", label="diverged (no error)")
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
     caption = f"{scene[0].upper()}{scene[1:]}: {spoken(result, scene)}"
     if lost:
         caption += f" {len(lost)} {'settings diverge' if len(lost) > 1 else 'setting diverges'} (crosses at the left)."
-    return "speed_" + scene.replace(", ", "_").replace(" ", "_"), fig, caption
+    return file_name("speed", scene), fig, caption
 
 
 def visible(rows) -> np.ndarray:
     """The worst errors of rows, as far as the axis goes, rad."""
-    return np.clip([r["worst_error_rad"] for r in rows], RIGHT, LEFT)
+    return np.clip([r["worst_error_rad"] for r in rows], FINE_END, COARSE_END)
 
 
-def motion(result) -> str:
+def motion(rows) -> str:
     """How long the motion is that was timed."""
-    times = {round(r["dt_s"] * r["steps"], 9) for r in result.rows if r["dt_s"]}
+    times = {round(r["dt_s"] * r["steps"], 9) for r in rows if r["dt_s"]}
     return " or ".join(f"{t:g} s" for t in sorted(times)) or "the scene"
 
 
@@ -122,10 +141,10 @@ def labelled(ax, ends) -> None:
 def spoken(result, scene) -> str:
     """The message of a scene: how many times faster at the errors asked for."""
     lines = [line for line in result.tables["what_should_i_use"] if line["scene"] == scene and line["ratio"]]
-    told = ", ".join(f"{line['ratio']:.0f} times as long for {line['target_rad']:.0e} rad" for line in lines)
+    ratios = ", ".join(f"{line['ratio']:.0f} times as long for {line['target_rad']:.0e} rad" for line in lines)
     return (
-        f"MuJoCo's cheapest setting takes {told} as tmt's."
-        if told
+        f"MuJoCo's cheapest setting takes {ratios} as tmt's."
+        if ratios
         else "no error asked for is reached by both MuJoCo and tmt."
     )
 
@@ -137,15 +156,15 @@ def evaluations(result):
         for (engine, method), rows in curves(result, scene).items():
             good = [r for r in rows if not r["diverged"] and r["evaluations"]]
             if good and not (engine == "mujoco" and method in SAME_BITS):
-                errors = np.clip([r["worst_error_rad"] for r in good], RIGHT, LEFT)
+                errors = np.clip([r["worst_error_rad"] for r in good], FINE_END, COARSE_END)
                 line(ax, engine, method, errors, [r["evaluations"] for r in good])
-        ax.set(xlim=(LEFT * 2, 2e-16), ylim=(40, 2e6))
+        ax.set(xlim=(COARSE_END * 2, 2e-16), ylim=(40, 2e6))
     fig.supylabel("evaluations of the right-hand side", fontsize=9)
     finish(fig, axes, "worst error on the way, rad")
     caption = (
         "The same errors against evaluations of the equations of motion, which do not depend on the machine. "
-        f"{agreeing(result.checks)}{fewest(result, 'bent, free', 1e-9)}Of an implicit method an evaluation with its derivatives "
-        "counts once; a method without evaluations, as heyoka's Taylor, is not drawn."
+        f"{agreeing(result.checks)}{fewest(result, result.curves.get('regular'), 1e-9)}Of an implicit method an evaluation with "
+        "its derivatives counts once; a method without evaluations, as heyoka's Taylor, is not drawn."
     )
     return "speed_evaluations", fig, caption
 
@@ -183,15 +202,15 @@ def energy(result):
                 errors = np.clip([r["energy_error_J"] for r in good], 1e-15, 10)
                 line(ax, engine, method, errors, [1e3 * r["seconds"] for r in good])
         ax.set(xlim=(20, 3e-16))
-    fig.supylabel(f"time for {motion(result)} of motion, ms", fontsize=9)
+    fig.supylabel(f"time for {motion(runs(result))} of motion, ms", fontsize=9)
     finish(fig, axes, "largest energy error on the grid, J")
-    told = []
+    least = []
     for engine, method in (("tmt", "semi_implicit_euler"), ("tmt", "rk4"), ("mujoco", "Euler"), ("mujoco", "RK4")):
         rows = [r for s in scenes(result) for r in curves(result, s).get((engine, method), []) if not r["diverged"]]
         if rows:
-            told.append(f"{ENGINES[engine][0]} {method} {min(r['energy_error_J'] for r in rows):.1e} J")
+            least.append(f"{written(engine)} {method} {min(r['energy_error_J'] for r in rows):.1e} J")
     caption = "Largest error of the energy against time."
-    caption += f" The least in any scene: {'; '.join(told)}." if told else ""
+    caption += f" The least in any scene: {'; '.join(least)}." if least else ""
     return "speed_energy", fig, caption
 
 
@@ -208,7 +227,7 @@ def panels(result):
 
 
 def line(ax, engine, method, errors, costs) -> None:
-    name, colour = ENGINES[engine]
+    name, colour = written(engine), colour_of(engine)
     dash = "-" if engine in ("mujoco", "tmt") else "--"
     wide = 2.5 if engine == "mujoco" else 0.9  # seen where the same scheme of tmt lies on it
     label = f"{name}: {'Euler, implicitfast, discrete' if engine == 'mujoco' and method == 'Euler' else method}"
@@ -221,8 +240,8 @@ def finish(fig, axes, label) -> None:
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7)
 
 
-def cost_of_one(result):
-    """What one evaluation costs, way by way."""
+def cost_of_one(result, name):
+    """What one evaluation costs, way by way; name: of the robot."""
     rows = [row for row in result.tables["evaluations"] if row["quantity"] == "forward_dynamics"]
     fig = Figure(figsize=(WIDTH, 0.9 + 0.24 * len(rows)), layout="constrained")
     ax = fig.subplots()
@@ -236,12 +255,12 @@ def cost_of_one(result):
     ax.set_yticks(range(len(rows)), names, fontsize=8)
     ax.set(xscale="log", xlabel="ns per state")
     ax.grid(axis="y", visible=False)
-    caption = "Forward dynamics of the arm for one state."
+    caption = f"Forward dynamics of the {name} for one state."
     if rows:
         ax.set_xlim(min(values) / 2, max(values) * 5)
         slow, fast = (names[values.index(pick(values))] for pick in (max, min))
         caption = (
-            f"Forward dynamics of the arm for one state: from {spelled(max(values))} ns ({slow}) to {spelled(min(values))} ns "
+            f"Forward dynamics of the {name} for one state: from {spelled(max(values))} ns ({slow}) to {spelled(min(values))} ns "
             f"({fast})."
         )
     whole = next((r["ns_per_state"] for r in rows if r["implementation"] == WHOLE), None)

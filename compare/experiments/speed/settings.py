@@ -1,0 +1,93 @@
+"""Who takes part: the scenes that are followed, the methods of the engines that are there, and their steps and tolerances."""
+
+from collections.abc import Mapping
+
+from tmt.methods import method_named
+
+from ...case import Case
+from ...engines import GRID, Engine, Method, Setting, one_of_each_scheme
+
+COMPARED = ("mujoco", "tmt")  # engines of a quick run
+FINEST = {"mujoco": 2**16, "tmt": 2**18}  # steps beyond which a run would take too long to be timed again and again
+FINEST_RK4, FINEST_IMPLICIT = 2**17, 2**15  # of MuJoCo's RK4; of methods that solve their stages, and of other engines
+EXPONENTS = {  # of the coarsest and of the finest tolerance, 10^-k
+    "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 6), "LSODA": (2, 12), "Taylor": (4, 16),
+}  # fmt: skip
+OTHER_EXPONENTS = (2, 12)
+FEW, FEW_OTHERS = {"quick": 5, "small": 7}, 2  # settings of a run that is not full: the coarsest; of further engines
+NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
+
+
+def scenes_of(robot) -> list[Case]:
+    """The scenes that every method follows: those with the tag, and a user's own."""
+    return [case for case in robot.cases if "speed" in case.scene.tags or is_own(case)]
+
+
+def is_own(case: Case) -> bool:
+    """Whether a scene is a user's own."""
+    return case.scene.tags == ("own",)
+
+
+def regular_of(robot) -> Case:
+    """Of these scenes the one in which errors fall regularly from coarse steps on; the first, if none is said to."""
+    cases = scenes_of(robot)
+    return next((case for case in cases if "regular" in case.scene.tags), cases[0])
+
+
+def followed(robot, size: str) -> list[Case]:
+    """The scenes of a run of this size: all; of a quick one the regular one and a user's own; of a small one two."""
+    cases, regular = scenes_of(robot), regular_of(robot).name
+    if size == "quick":
+        return [case for case in cases if case.name == regular or is_own(case)]
+    return [case for k, case in enumerate(cases) if size == "full" or k == 0 or case.name == regular]
+
+
+def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
+    """The engines of a run of this size, unavailable ones too."""
+    return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
+
+
+def methods(engines: Mapping[str, Engine], size: str, which: str = "all") -> list[Method]:
+    """The methods of all engines that are there; "same schemes": one of MuJoCo for each scheme, and the same in tmt."""
+    if which == "same schemes":
+        theirs = one_of_each_scheme(engines["mujoco"])
+        schemes = {method.scheme for method in theirs}
+        return [*theirs, *(method for method in engines["tmt"].methods.values() if method.scheme in schemes)]
+    present = [engine for engine in taking_part(engines, size).values() if engine.unavailable() is None]
+    return [method for engine in present for method in engine.methods.values()]
+
+
+def settings(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
+    """With what a method follows a case, from coarse to fine."""
+    found = tolerances(method, case) if method.adaptive else halvings(method, case)
+    if which == "same schemes":
+        return found[NEARER] or found[-1:]
+    few = FEW if method.engine in COMPARED else dict.fromkeys(FEW, FEW_OTHERS)
+    return found[: few.get(size)]
+
+
+def halvings(method: Method, case: Case) -> tuple[Setting, ...]:
+    """Steps that are halved and halved again: first the scene's own, or a little finer, as the times of reading ask for."""
+    count, finest = coarsest(case), finest_steps(method)
+    doublings = max(1, (finest // count).bit_length())
+    return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
+
+
+def coarsest(case: Case) -> int:
+    """The least multiple of 64 that is no less than the scene's own number of steps."""
+    return -(-case.steps // GRID) * GRID
+
+
+def finest_steps(method: Method) -> int:
+    """The number of the finest steps of a method."""
+    if (method.engine, method.name) == ("mujoco", "RK4"):
+        return FINEST_RK4
+    if method.engine == "tmt" and method_named(method.name).solves_stages:
+        return FINEST_IMPLICIT
+    return FINEST.get(method.engine, FINEST_IMPLICIT)
+
+
+def tolerances(method: Method, case: Case) -> tuple[Setting, ...]:
+    """Tolerances that are divided by ten again and again."""
+    first, last = EXPONENTS.get(method.name, OTHER_EXPONENTS)
+    return tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))

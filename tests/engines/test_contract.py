@@ -1,0 +1,236 @@
+"""What every engine promises: another one is one more parameter."""
+
+import numpy as np
+import pytest
+
+from compare.engines import GRID, Setting
+from compare.engines.heyoka import Heyoka
+from compare.engines.mujoco import Mujoco
+from compare.engines.mujoco.calls import MinimalCalls
+from compare.engines.scipy import Scipy
+from compare.engines.tmt import Tmt
+from compare.judge.scale import EPS, FACTOR, acceleration_scale, bias_scale, mass_scale
+from compare.robots.arm import ARM
+from tmt.reference import distance, exact
+
+ENGINES = (Tmt, Mujoco, Scipy, Heyoka)
+METHODS = [method for engine in (Tmt(), Mujoco, Scipy, Heyoka) for method in engine.methods.values()]
+CASES = {
+    "as it is": ARM.case(),
+    "damped, weightless": ARM.case("floating", damping=0.4, gravity=False),
+    "one joint locked": ARM.case("stiff", posture="bent", locked=("beta",), damping=0.1),
+    "one joint free": ARM.case("swing", posture="bent", locked=("alpha", "beta")),
+}
+DURATION = 0.5  # s
+# every method follows the case as it is; of the others, which take time to compile, two of each engine do
+FOLLOWED = [
+    (method, name)
+    for method in METHODS
+    for name in CASES
+    if name == "as it is"
+    or method in [m for m in METHODS if m.engine == method.engine][:1]
+    or method.scheme == "semi_implicit_euler"
+]
+
+
+@pytest.fixture(params=CASES)
+def case(request):
+    return CASES[request.param]
+
+
+def available(engines, name):
+    """The engine of that name; the test is left out where it cannot take part."""
+    if reason := engines[name].unavailable():
+        pytest.skip(reason)
+    return engines[name]
+
+
+@pytest.fixture(params=[engine.name for engine in ENGINES])
+def engine(request, engines):
+    return available(engines, request.param)
+
+
+@pytest.fixture(params=[*(engine.name for engine in ENGINES), "MuJoCo's minimal calls"])
+def dynamics(request, engines, case):
+    """The dynamics of a case in each engine, and by MuJoCo's minimal calls."""
+    if request.param in engines:
+        return available(engines, request.param).of(case)
+    if reason := MinimalCalls.unavailable():
+        pytest.skip(reason)
+    return MinimalCalls(engines["mujoco"].of(case))
+
+
+@pytest.fixture(params=FOLLOWED, ids=lambda pair: f"{pair[0].label}, {pair[1]}")
+def followed(request, engines):
+    """A method, a case, and the case in the method's engine."""
+    method, name = request.param
+    return method, CASES[name], available(engines, method.engine).of(CASES[name])
+
+
+@pytest.fixture(params=METHODS, ids=lambda method: method.label)
+def arm(request, engines):
+    """A method, and the arm as it is in the method's engine."""
+    return request.param, available(engines, request.param.engine).of(CASES["as it is"])
+
+
+def test_its_methods_are_its_own_by_their_names(engine):
+    for name, method in engine.methods.items():
+        assert (method.engine, method.name) == (engine.name, name) and method.scheme
+        assert (method.order is None) == method.adaptive
+
+
+def test_coordinates_are_those_of_the_case(dynamics, case, rng):
+    coordinates, n = dynamics.coordinates, len(case.joints)
+    assert coordinates.names == case.joints and coordinates.nq == coordinates.nv == n
+    assert coordinates.units == ("rad",) * n
+    q = coordinates.random(rng, 4)
+    assert q.shape == (4, n) and np.abs(q).max() <= np.pi
+    step = rng.uniform(-1.0, 1.0, (4, n))
+    assert np.allclose(coordinates.difference(coordinates.move(q, step), q), step)
+
+
+@pytest.mark.parametrize("batch", [(), (5,), (2, 5)])
+def test_quantities_have_the_shape_of_the_states(dynamics, case, rng, batch):
+    n = len(case.joints)
+    q, v, tau = rng.uniform(-2.0, 2.0, (3, *batch, n))
+    assert dynamics.mass_matrix(q).shape == (*batch, n, n)
+    assert dynamics.bias(q, v).shape == dynamics.acceleration(q, v, tau).shape == (*batch, n)
+    for index in np.ndindex(batch):
+        one = q[index], v[index], tau[index]
+        assert np.array_equal(dynamics.mass_matrix(q)[index], dynamics.mass_matrix(one[0]))
+        assert np.array_equal(dynamics.bias(q, v)[index], dynamics.bias(*one[:2]))
+        assert np.array_equal(dynamics.acceleration(q, v, tau)[index], dynamics.acceleration(*one))
+
+
+def test_one_state_goes_with_many_others(dynamics, case, rng):
+    n = len(case.joints)
+    q, v, tau = rng.uniform(-2.0, 2.0, (5, n)), rng.uniform(-2.0, 2.0, n), rng.uniform(-2.0, 2.0, (2, 1, n))
+    each = (np.broadcast_to(a, (2, 5, n)) for a in (q, v, tau))
+    assert np.array_equal(dynamics.acceleration(q, v, tau), dynamics.acceleration(*each))
+    assert np.array_equal(dynamics.bias(q, v), dynamics.bias(q, np.broadcast_to(v, (5, n))))
+
+
+def test_quantities_are_those_of_50_digits(dynamics, case, rng):
+    n, tree = len(case.joints), case.tree
+    q, v, tau = rng.uniform(-3.0, 3.0, (3, 5, n))
+    truth = [exact(tree, *state) for state in zip(q, v, tau)]
+    force = bias_scale(tree, q, v)
+    with_torque = force + np.abs(tau).max(axis=1) + max(tree.damping) * np.abs(v).max(axis=1)
+    scales = {
+        "mass_matrix": (dynamics.mass_matrix(q), mass_scale(tree, q)),
+        "bias": (dynamics.bias(q, v), force),
+        "acceleration": (dynamics.acceleration(q, v, tau), acceleration_scale(tree, q, with_torque)),
+    }
+    for name, (values, scale) in scales.items():
+        off = distance(values, np.array([getattr(t, name) for t in truth]))
+        assert (off.reshape(5, -1).max(axis=1) <= FACTOR * EPS * scale).all(), name
+
+
+def start(case, rng, *batch):
+    return rng.uniform(-1.0, 1.0, (3, *batch, len(case.joints)))
+
+
+def test_a_batch_of_runs_is_each_run(followed, rng):
+    (method, case, dynamics), dt = followed, 0.01
+    q, v, tau = start(case, rng, 2, 3)
+    motion = dynamics.run(q, v, tau, dt, 5, method.name)
+    assert motion.q.shape == motion.v.shape == (2, 3, 6, len(case.joints)) and motion.ended.shape == (2, 3)
+    assert np.allclose(motion.t, dt * np.arange(6)) and np.isfinite([motion.q, motion.v]).all()
+    assert np.array_equal(motion.q[..., 0, :], q) and np.array_equal(motion.v[..., 0, :], v)
+    evaluations = 0
+    for index in np.ndindex(2, 3):
+        single = dynamics.run(q[index], v[index], tau[index], dt, 5, method.name)
+        assert np.array_equal(single.q, motion.q[index]) and np.array_equal(single.v, motion.v[index])
+        assert single.ended is None is motion.ended[index]
+        evaluations += single.evaluations or 0
+    assert evaluations == (motion.evaluations or 0)
+
+
+def test_one_start_goes_with_many_torques(arm, rng):
+    method, dynamics = arm
+    q, v, _ = start(CASES["as it is"], rng)
+    tau = rng.uniform(-3.0, 3.0, (2, 3))
+    motion = dynamics.run(q, v, tau, 0.01, 4, method.name)
+    for k in range(2):
+        assert np.array_equal(motion.q[k], dynamics.run(q, v, tau[k], 0.01, 4, method.name).q)
+    assert np.abs(motion.q[0, -1] - motion.q[1, -1]).max() > 1e-5
+
+
+def test_a_run_starts_with_its_acceleration(followed, rng):
+    """Two short runs from one state, a torque apart: what they gain is the acceleration under that torque."""
+    (method, case, dynamics), dt = followed, 1e-3
+    q, v, tau = start(case, rng)
+    motion = dynamics.run(q, v, np.stack([tau, 0.0 * tau]), dt, 1, method.name)
+    gained = (motion.v[0, 1] - motion.v[1, 1]) / dt
+    expected = dynamics.acceleration(q, v, tau) - dynamics.acceleration(q, v, 0.0 * tau)
+    assert np.allclose(gained, expected, rtol=0.02, atol=0.02 * np.abs(expected).max())
+
+
+def test_a_prepared_run_is_the_run(followed, rng):
+    method, case, dynamics = followed
+    q, v, tau = start(case, rng)
+    steps, tolerance = (None, 1e-6) if method.adaptive else (2 * GRID, None)
+    run, read = dynamics.prepare(q, v, tau, Setting(DURATION, steps, tolerance), method.name)
+    count = steps or GRID
+    motion = dynamics.run(q, v, tau, DURATION / count, count, method.name, tolerance)
+    for _ in range(2):  # again and again
+        found = read(run())
+        every = count // GRID
+        assert np.array_equal(found.t, motion.t[::every]) and len(found.t) == GRID + 1
+        assert np.array_equal(found.q, motion.q[::every]) and np.array_equal(found.v, motion.v[::every])
+        assert found.ended is None is motion.ended and found.evaluations == motion.evaluations
+        assert found.steps == steps if steps else found.steps is None or found.steps > 0
+
+
+def test_evaluations_are_counted(arm):
+    (method, dynamics), case = arm, CASES["as it is"]
+    setting = Setting(DURATION, None, 1e-6) if method.adaptive else Setting(DURATION, GRID)
+    run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
+    evaluations = read(run()).evaluations
+    if method.engine == "heyoka":  # its Taylor series have none
+        assert evaluations is None
+    elif method.adaptive:
+        assert evaluations > 10
+    else:
+        stages = {"rk4": 4, "dopri8": 12}.get(method.scheme, 1)
+        assert evaluations == stages * GRID or (method.order > 1 and evaluations > stages * GRID)  # Newton's iterations
+
+
+def test_a_tolerance_is_taken_only_by_what_chooses_its_own_steps(arm):
+    (method, dynamics), case = arm, CASES["as it is"]
+    if method.adaptive:
+        coarse, fine = (
+            dynamics.run(*case.start, case.tau, 0.5, 4, method.name, tolerance).q[-1] for tolerance in (1e-3, 1e-10)
+        )
+        assert 1e-12 < np.abs(coarse - fine).max() < 0.1
+        return
+    with pytest.raises(ValueError, match="fixed step and takes no tolerance"):
+        dynamics.run(*case.start, case.tau, 0.01, 4, method.name, 1e-6)
+    with pytest.raises(ValueError, match="fixed step and takes no tolerance"):
+        dynamics.prepare(*case.start, case.tau, Setting(DURATION, GRID, 1e-6), method.name)
+    for steps in (GRID + 1, 0, None):
+        with pytest.raises(ValueError, match=f"steps is {steps}; a multiple of 64 is expected"):
+            dynamics.prepare(*case.start, case.tau, Setting(DURATION, steps), method.name)
+
+
+def ended_as_it_says(t, q, v, ended):
+    """Whether a run is NaN from where it ended, and says why and when that was."""
+    finite = np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1)
+    last = int(np.argmin(finite)) - 1
+    assert finite[: last + 1].all() and last >= 0 and np.isnan(q[last + 1 :]).all() and np.isnan(v[last + 1 :]).all()
+    assert ended.startswith(f"at t = {t[last]:g} s: ") and len(ended) > 20 and "\n" not in ended
+
+
+def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    (method, case, dynamics), n = followed, len(followed[1].joints)
+    q, tau, fast = np.zeros(n), np.zeros(n), np.full(n, 1e200)
+    motion = dynamics.run(q, np.stack([0.0 * fast, fast]), tau, 0.01, 10, method.name)
+    assert motion.ended[0] is None and np.isfinite(motion.q[0]).all()
+    ended_as_it_says(motion.t, motion.q[1], motion.v[1], motion.ended[1])
+    setting = Setting(DURATION, None, 1e-6) if method.adaptive else Setting(DURATION, GRID)
+    run, read = dynamics.prepare(q, fast, tau, setting, method.name)
+    for _ in range(2):
+        found = read(run())
+        ended_as_it_says(found.t, found.q, found.v, found.ended)
+    assert list(tmp_path.iterdir()) == [] and capfd.readouterr() == ("", "")
