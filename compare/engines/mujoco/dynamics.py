@@ -149,8 +149,7 @@ class MujocoDynamics:
 
         From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
         """
-        if tolerance is not None:
-            raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
+        refuse_tolerance(tolerance, method)
         shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
         starts, follow = self.runner(q, v, tau, dt, steps, method)
         *paths, ended = self.path(starts, follow(), dt)
@@ -243,3 +242,8 @@ class MujocoDynamics:
         """(translation, rotation) rows of Jacobians: joints in our order, rotation in body axes."""
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
+
+
+def refuse_tolerance(tolerance, method) -> None:
+    if tolerance is not None:
+        raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
