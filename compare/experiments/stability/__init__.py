@@ -103,7 +103,7 @@ def begin(setup) -> None:
         "maps": maps,
         "map": (mapped, ask(limits.map_of_growth, mapped, at=seen.centre, dts=maps["map"]["x"], steps=steps)),
         "near": (resonant, ask(failure.edge, resonant, at=seen.centre, swings=maps["near"]["x"],
-                               sizes=[limits.SMALL_DEVIATION, failure.LARGE_DEVIATION])),
+                               sizes=[limits.LINEAR_DEVIATION, failure.LARGE_DEVIATION])),
         "edge": (tongues, ask(failure.edge, tongues, at=seen.centre, sizes=maps["edge"]["y"], swings=maps["edge"]["x"],
                               steps=steps)),
         "minutes": ask(long_runs.long_run, *([pair[k] for pair in minutes] for k in (0, 1)), case=seen.free,

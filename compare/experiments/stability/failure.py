@@ -12,7 +12,7 @@ from ...engines.mujoco.linear import left_to_itself
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
 from .choice import fraction
-from .limits import GROWTH_ALLOWED, GROWTH_STEPS, SMALL_DEVIATION, growth, stiffest
+from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth, stiffest
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
 RESONANT_SWINGS = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
@@ -121,7 +121,7 @@ def check_near(result, robot, posture: str, found) -> None:
     worst = {method.label: np.minimum(grown.max(axis=1), DIVERGED_GROWTH) for method, grown in found["grown"].items()}
     for label, (small, large) in worst.items():
         where, quantity = f"{posture}, {label}, omega dt near sqrt 3", f"growth in {steps} steps from"
-        result.check(where, f"{quantity} {SMALL_DEVIATION:g} rad", small, GROWTH_ALLOWED, "fold")
+        result.check(where, f"{quantity} {LINEAR_DEVIATION:g} rad", small, GROWTH_ALLOWED, "fold")
         if robot.kinds.get("resonant") == posture:
             note = "" if large < DIVERGED_GROWTH else f"diverges, for which {DIVERGED_GROWTH:g} stands"
             result.check(
@@ -131,7 +131,7 @@ def check_near(result, robot, posture: str, found) -> None:
     result.notes.append(
         f"The nonlinear edge, at {posture}: at omega dt = sqrt 3 = {RESONANCE:.4f}, below the linear limit of 2, a swing of the "
         f"stiffest mode takes three steps, a 1:3 resonance. The largest growth near it in {steps} steps, from "
-        f"{SMALL_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {by_method}."
+        f"{LINEAR_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {by_method}."
     )
 
 

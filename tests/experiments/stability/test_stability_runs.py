@@ -112,7 +112,7 @@ def test_own_bias_holds_for_ever(engines, method):
 
 
 def test_resonance_needs_a_large_perturbation(engines, method):
-    sizes = [limits.SMALL_DEVIATION, failure.LARGE_DEVIATION]
+    sizes = [limits.LINEAR_DEVIATION, failure.LARGE_DEVIATION]
     near = failure.edge(method("tmt", "implicit"), BENT, engines, sizes, failure.RESONANT_SWINGS)
     assert near[0].max() < 3.0 and near[1].max() > limits.GROWTH_ALLOWED
 

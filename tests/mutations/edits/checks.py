@@ -48,7 +48,7 @@ CHECKS = (
     ("claims_judged", "check_torques", '"movement under the engine\'s own bias"'),
     ("claims_judged", "check_finer_steps", "quantity"),
     ("beyond", "check_kept", 'f"time within {_1:g} rad, below the limit"'),
-    ("failure", "check_near", 'f"{_1} {SMALL_DEVIATION:g} rad"'),
+    ("failure", "check_near", 'f"{_1} {LINEAR_DEVIATION:g} rad"'),
     ("failure", "check_near", 'f"{_1} {LARGE_DEVIATION:g} rad"'),
     ("failure", "check_silent", "quantity"),
     ("long_runs", "check_minutes", "quantity"),
