@@ -21,7 +21,7 @@ STYLE = {
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.grid": True,
-    "grid.color": (0.69, 0.69, 0.69, 0.3),
+    "grid.alpha": 0.3,
     "axes.axisbelow": True,
     "legend.frameon": False,
     "savefig.dpi": 150,
