@@ -43,7 +43,7 @@ def follow(setup) -> Result:
 
 def linearise(setup) -> Result:
     result = Result("stability")
-    stability.equilibria(result, setup)
+    stability.check_equilibria(result, setup)
     return result
 
 

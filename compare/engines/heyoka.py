@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 from importlib.util import find_spec
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,7 +21,7 @@ class Heyoka:
     """The engine of heyoka's Taylor method, which chooses its own steps."""
 
     name = "heyoka"
-    methods = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
+    methods: ClassVar[dict[str, Method]] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
     def unavailable(self) -> str | None:
         if find_spec("heyoka") is None:

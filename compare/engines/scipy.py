@@ -1,6 +1,7 @@
 """SciPy's solve_ivp with tmt's compiled equations."""
 
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,7 +18,9 @@ class Scipy:
     """The engine of SciPy's methods, all of which choose their own steps."""
 
     name = "scipy"
-    methods = {name: Method("scipy", name, None, name, adaptive=True) for name in ("RK45", "DOP853", "Radau", "LSODA")}
+    methods: ClassVar[dict[str, Method]] = {
+        name: Method("scipy", name, None, name, adaptive=True) for name in ("RK45", "DOP853", "Radau", "LSODA")
+    }
 
     def unavailable(self) -> str | None:
         return None

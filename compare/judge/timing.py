@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-ENOUGH = 0.02  # s: what has taken so long in all is timed no more than twice
+TIMED_ENOUGH = 0.02  # s: what has taken so long in all is timed no more than twice
 ONCE = 0.1  # s: what takes so long is timed once, without a call to warm up: both weigh little beside it
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
@@ -15,7 +15,7 @@ def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
     times = [[] for _ in runs]
     for k in range(rounds + 1):
         for run, taken in zip(runs, times):
-            if not taken or (len(taken) < 2 and taken[0] < ONCE) or sum(taken) < ENOUGH:
+            if not taken or (len(taken) < 2 and taken[0] < ONCE) or sum(taken) < TIMED_ENOUGH:
                 begin = time.perf_counter()
                 run()
                 taken.append(time.perf_counter() - begin)

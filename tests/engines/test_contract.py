@@ -223,9 +223,10 @@ def ended_as_it_says(t, q, v, ended):
 
 def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    (method, case, dynamics), n = followed, len(followed[1].joints)
-    q, tau, fast = np.zeros(n), np.zeros(n), np.full(n, 1e200)
-    motion = dynamics.run(q, np.stack([0.0 * fast, fast]), tau, 0.01, 10, method.name)
+    method, case, dynamics = followed
+    q, tau, fast = np.zeros((3, len(case.joints)))
+    fast += 1e200
+    motion = dynamics.run(q, np.stack([q, fast]), tau, 0.01, 10, method.name)
     assert motion.ended[0] is None and np.isfinite(motion.q[0]).all()
     ended_as_it_says(motion.t, motion.q[1], motion.v[1], motion.ended[1])
     setting = Setting(DURATION, None, 1e-6) if method.adaptive else Setting(DURATION, GRID)

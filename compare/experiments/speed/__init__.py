@@ -17,7 +17,7 @@ from ...judge.scale import EPS, FACTOR
 from ...truth.reference import Reference, committed, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets
-from .settings import coarsest, followed, methods, regular_of, scenes_of, settings, taking_part
+from .settings import coarsest, followed, methods, regular_of, scenes_of, settings_of, taking_part
 
 TITLE = "Speed against accuracy"
 PARTS = (
@@ -32,15 +32,17 @@ COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluatio
 
 
 def claim(robot) -> str:
+    """What is claimed of any robot."""
     return (
         "Every integrator of MuJoCo and every method of tmt, SciPy and (where it is installed) heyoka comes to the same motion "
-        "as its step falls, at its own order and down to rounding; so errors can be set against time, and the cheapest setting for "
-        "so many digits be named. What is compared is code made for this one model (tmt, SciPy, heyoka) against an engine made "
-        "for any model (MuJoCo): the ratios say what that costs, not that one is better. Timings make no checks."
+        "as its step falls, at its own order and down to rounding; so errors can be set against time, and the cheapest setting "
+        "for so many digits be named. What is compared is code made for this one model (tmt, SciPy, heyoka) against an engine "
+        "made for any model (MuJoCo): the ratios say what that costs, not that one is better. Timings make no checks."
     )
 
 
 def tolerance(robot) -> str:
+    """What errors are, and how they are judged."""
     ours = all(committed(case) for case in scenes_of(robot))
     made = "a table, made again in part by the tests" if ours else "made for what no table has, and kept"
     return (
@@ -55,7 +57,7 @@ def tolerance(robot) -> str:
 
 def skipped(robot) -> str | None:
     """Why it cannot serve a robot, or None."""
-    return None if scenes_of(robot) else "it has no scene that every method follows"
+    return None if scenes_of(robot) else f"the {robot.name} has no scene that every method follows"
 
 
 def begin(setup) -> None:
@@ -146,7 +148,7 @@ def errors(case, engines, known, size, which) -> tuple[list[dict], float]:
     taking = methods(engines, size, which)
     for method in taking:
         best, last = np.inf, 0
-        for setting in settings(method, case, size, which):
+        for setting in settings_of(method, case, size, which):
             found.append(follow(case, case, engines, method, setting, reference))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
             if accuracy.gained_nothing(now, work, best, last, left):
@@ -179,6 +181,7 @@ def follow(case: Case, whole: Case, engines, method: Method, setting: Setting, r
         "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
         "energy_error_J": None if ended else float(off), "diverged": ended,
         "early": float(error[reference.t <= advice.EARLY].max()), "run": (case, method, setting),
+        "whole": None if case is whole else whole.name,
     }  # fmt: skip
 
 

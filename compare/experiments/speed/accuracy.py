@@ -140,13 +140,12 @@ def first_order_in_words(rows, scenes) -> list[str]:
 
 
 def smaller_models_in_words(rows) -> list[str]:
-    """What the smaller model of a scene saves, in words."""
+    """What the smaller model of a scene saves, in words; such a row says in `whole` of which scene it is."""
     sentences = []
-    for row in rows:
-        name = row["scene"].rsplit(", ", 1)[0]
-        for whole in rows:
+    for row in (row for row in rows if row["whole"]):
+        for whole in (other for other in rows if other["scene"] == row["whole"]):
             same = all(whole[key] == row[key] for key in ("engine", "method", "dt_s", "tolerance"))
-            if whole["scene"] == name and same and whole["seconds"] and row["seconds"] and row["worst_error_rad"]:
+            if same and whole["seconds"] and row["seconds"] and row["worst_error_rad"]:
                 gain = whole["seconds"] / row["seconds"]
                 sentences.append(
                     f"{row['scene']} ({row['engine']} {row['method']}, {row['steps']} steps): the whole model takes {gain:.2f} "

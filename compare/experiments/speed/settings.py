@@ -57,7 +57,7 @@ def methods(engines: Mapping[str, Engine], size: str, which: str = "all") -> lis
     return [method for engine in present for method in engine.methods.values()]
 
 
-def settings(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
+def settings_of(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
     """With what a method follows a case, from coarse to fine."""
     found = tolerances(method, case) if method.adaptive else halvings(method, case)
     if which == "same schemes":

@@ -45,7 +45,7 @@ EDITS = (
     Edit("draw_motion", "drift_caption", "theirs / ours if ours else np.nan", "ours / theirs if ours else np.nan",
          "the ratio of the drifts is inverted"),
     Edit("draw_motion", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
-    Edit("draw_speed", "fewest", "min(good, default=None)", "max(good, default=None)", "the most evaluations are told as fewest"),
+    Edit("figures_times", "fewest", "min(good, default=None)", "max(good, default=None)", "the most evaluations are told as fewest"),
     Edit("figures_needs", "gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
          "the least gain is told as the best"),
 )  # fmt: skip

@@ -1,0 +1,40 @@
+"""Rows of speed whose conclusions are known, for its tests."""
+
+from compare.engines import Method
+from compare.experiments.speed.evaluations import EACH, EQUAL, FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WAITING, WHOLE
+
+RK4 = Method("tmt", "rk4", 4, "rk4")
+SCHEMES = {"Euler": "semi_implicit_euler", "implicit": "implicit", "RK4": "rk4"}  # of MuJoCo's integrators
+NS = {
+    (FORWARD, WHOLE, 1, 1): 1000.0, (FORWARD, EQUAL, 1, 1): 500.0, (RK4_STEP, MJ_STEP, 1, 1): 4000.0,
+    (FORWARD, WAITING, 1, 1): 50.0, (FORWARD, EACH, 1000, 1): 25.0, (FORWARD, IN_LANES, 1000, 1): 10.0,
+    (RK4_STEP, EACH, 1, 1): 200.0, (RK4_STEP, IN_LANES, 1000, 1): 40.0,
+}  # fmt: skip
+
+
+def row(engine, method, error, steps=64, seconds=1e-3, **more):
+    """A row of speed: diverged where the error is None."""
+    return {
+        "scene": "bent, free", "engine": engine, "method": method, "dt_s": 5.0 / steps, "tolerance": None, "steps": steps,
+        "evaluations": 4 * steps, "seconds": seconds, "error_rad": error, "worst_error_rad": error, "energy_error_J": error,
+        "diverged": error is None, "why_not": None, "early": error, "whole": None,
+    } | more  # fmt: skip
+
+
+def known_rows():
+    """MuJoCo's RK4 20 times slower than tmt's; of its integrators Euler is never as near; dopri8 needs fewest steps."""
+    rows = []
+    for k in range(5):
+        steps, error = 64 << k, 2e-2 / 16**k
+        rows += [row("mujoco", "RK4", error, steps, 20e-3 * 2**k), row("tmt", "rk4", error, steps, 1e-3 * 2**k)]
+        rows += [
+            row("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k),
+            row("tmt", "dopri8", error**2, steps, 2e-3 * 2**k),
+        ]
+    return [*rows, row("scipy", "DOP853", 1e-9, 500, 1e-4), row("mujoco", "implicit", None, 64, 1e-9)]
+
+
+def absent(scene="bent, free"):
+    """A row of an engine that cannot take part."""
+    named = {"scene": scene, "engine": "own", "method": "RK4, Heun", "why_not": "own is not here"}
+    return dict.fromkeys(row("own", "RK4", 1.0)) | named

@@ -1,0 +1,149 @@
+"""Speed against accuracy, from runs to the table: every method, smaller models, wrong models, engines that are not there."""
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+from edited import XML, setup_of
+
+from compare import experiment
+from compare.engines import Method, Setting
+from compare.experiments import speed
+from compare.experiments.speed import accuracy, settings
+from compare.robots.arm import ARM
+from tmt.methods import METHODS
+
+
+def test_every_method_follows_the_scene(engines, bent, known_reference):
+    """Each method's finest useful setting is near the reference, and costs evaluations."""
+    for method in settings.methods(engines, "full"):
+        steps = None if method.adaptive else 2**14 if method.order == 1 else 1024
+        setting = Setting(5.0, steps, 1e-7 if method.adaptive else None)
+        row = speed.follow(bent, bent, engines, method, setting, known_reference)
+        tolerance = {1: 0.3, 2: 0.03}.get(method.order, 1e-4)
+        assert 0.0 < row["worst_error_rad"] < tolerance, method
+        assert row["error_rad"] <= row["worst_error_rad"] and not row["diverged"]
+        assert row["energy_error_J"] > 0.0 and row["dt_s"] == (5.0 / steps if steps else None)
+        if method.engine == "tmt" and method.order:
+            stages = len(getattr(METHODS[method.name], "b", "1"))
+            assert row["evaluations"] % stages == 0 and row["evaluations"] >= stages * steps
+        assert (row["evaluations"] is None) == (method.engine == "heyoka")
+
+
+def test_a_run_that_diverges_has_no_error(engines, bent, known_reference):
+    row = speed.follow(bent, bent, engines, engines["tmt"].methods["explicit_euler"], Setting(5.0, 64), known_reference)
+    assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
+
+
+def test_the_smaller_model_has_the_error_of_the_whole_one(engines, known_reference):
+    zero = next(case for case in ARM.cases if case.name == "zero, free")
+    known = speed.references([zero])["zero, free"]
+    smaller = speed.reduced(zero)
+    assert smaller.locked == {"beta": 0.0}
+    method, setting = engines["tmt"].methods["rk4"], Setting(5.0, 1024)
+    whole, small = (speed.follow(case, zero, engines, method, setting, known) for case in (zero, smaller))
+    assert small["worst_error_rad"] == pytest.approx(whole["worst_error_rad"], rel=1e-3)
+    assert small["energy_error_J"] == pytest.approx(whole["energy_error_J"], rel=1e-3)
+    assert (whole["whole"], small["whole"], small["scene"]) == (None, "zero, free", "zero, free, beta locked")
+
+
+def test_rounding_leaves_eps_times_the_growth(bent):
+    slow = bent.changed(posture=(), gravity=False, duration=1.0, dt=1 / 64)
+    assert 1.0 <= speed.floor(slow) / np.finfo(float).eps < 3.0  # nothing grows, at rest
+    assert speed.floor(bent) > 10 * speed.floor(slow)
+    fast = bent.changed(speed=(1e7, 1e7, 1e7))
+    with pytest.raises(ValueError, match="scene 'bent, free': RK4 with 16384 steps does not reach its end"):
+        speed.floor(fast)
+
+
+def test_where_the_reference_is_not_known_nothing_is_judged(engines, bent, known_reference):
+    for halving, left in ((1e-30, speed.floor(bent)), (1e-6, 1e-6)):
+        known = {"bent, free": known_reference._replace(halving=halving)}
+        assert speed.errors(bent, engines, known, "small", "same schemes")[1] == left
+
+
+def test_a_small_run_takes_every_path(engines, small):
+    result = small("speed")
+    table = pd.DataFrame(result.rows)
+    assert list(table.columns) == speed.COLUMNS and speed.COLUMNS[-1] == "why_not"
+    everyone = {(m.engine, m.name) for m in settings.methods(engines, "full")}
+    runs = table[table.why_not.isna()]
+    assert {(row.engine, row.method) for row in runs.itertuples()} == everyone and runs.diverged.any()
+    diverged = runs[runs.diverged.astype(bool)]
+    assert diverged[["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(axis=None)
+    assert (runs.seconds > 0.0).all() and set(runs.scene) == {"zero, free", "zero, free, beta locked", "bent, free"}
+    assert any("zero, free, beta locked (tmt rk4, 1024 steps): the whole model takes" in note for note in result.notes)
+    evaluations = pd.DataFrame(result.tables["evaluations"])
+    assert list(evaluations.columns) == ["quantity", "implementation", "states", "threads", "ns_per_state"]
+    assert set(evaluations.quantity) == {"mass_matrix_and_bias", "forward_dynamics", "rk4_step"}
+    errors = accuracy.true_error(result.rows, dict.fromkeys(("zero, free", "bent, free"), 64))
+    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1) and errors["bent, free"][0] == pytest.approx(
+        0.27, abs=0.01
+    )
+
+
+def test_a_run_without_timings_has_the_checks_only(engines):
+    result = speed.rows(experiment.Setup.small(ARM, engines), timed=False)
+    assert len(result.checks) > 10 and all(check.passed for check in result.checks)
+    assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result, ARM)) == []
+
+
+@pytest.mark.parametrize(
+    "old, new", [("0 0 -9.81", "0 0 -1.62"), ('mass="1.5"', 'mass="1.50001"')], ids=["moon", "mass"]
+)
+def test_a_wrong_model_is_far_from_the_reference(old, new):
+    assert XML.count(old) == 1
+    checks = speed.rows(setup_of(XML.replace(old, new)), timed=False).checks
+    failed = {check.quantity for check in checks if not check.passed}
+    assert {"smallest error of MuJoCo's RK4, beside that of tmt's rk4", "the same error as tmt's rk4"} <= failed
+
+
+class Elsewhere:
+    """An engine that cannot take part."""
+
+    name = "own"
+    methods = {name: Method("own", name, 4, "rk4") for name in ("RK4", "Heun")}  # noqa: RUF012
+
+    def unavailable(self):
+        return "own.py is not there"
+
+    def of(self, case):
+        raise AssertionError("nothing is asked of it")
+
+
+def test_an_engine_that_cannot_take_part_says_why_in_its_cells_and_is_nowhere_else(engines, bent):
+    robot = dataclasses.replace(ARM, scenes=(bent.scene,))
+    with_it, without = (
+        speed.rows(experiment.Setup.small(robot, some)) for some in (engines | {"own": Elsewhere()}, engines)
+    )
+    rows = [row for row in with_it.rows if row["why_not"] is not None]
+    assert rows == [
+        dict.fromkeys(speed.COLUMNS)
+        | {"scene": "bent, free", "engine": "own", "method": "RK4, Heun", "why_not": "own.py is not there"}
+    ]
+    assert with_it.rows[-1] is rows[0] and len(with_it.rows) == len(without.rows) + 1
+    assert [(c.scene, c.quantity, c.value) for c in with_it.checks] == [
+        (c.scene, c.quantity, c.value) for c in without.checks
+    ]
+    for name, table in with_it.tables.items():
+        assert "own" not in {row.get("engine") for row in table} and len(table) == len(without.tables[name])
+    assert not any("own.py" in note or " own " in note for note in with_it.notes)
+    assert len(list(speed.figures(with_it, robot))) == len(list(speed.figures(without, robot)))
+
+
+def test_a_quick_run_takes_mujoco_and_tmt_alone(engines):
+    setup = experiment.Setup.quick(ARM, engines | {"own": Elsewhere()})
+    assert speed.unavailable(setup, ["bent, free"]) == []
+
+
+def test_a_robot_without_such_scenes_is_left_out_with_the_reason():
+    assert speed.skipped(ARM) is None
+    bare = dataclasses.replace(ARM, scenes=(), name="bare")
+    assert speed.skipped(bare) == "the bare has no scene that every method follows"
+
+
+def test_only_what_a_table_has_is_called_a_table():
+    assert "(a table, made again in part by the tests)" in speed.tolerance(ARM)
+    other = dataclasses.replace(ARM, scenes=(ARM.scenes[0], dataclasses.replace(ARM.scenes[0], name="b", damping=0.1)))
+    assert "(made for what no table has, and kept)" in speed.tolerance(other)
