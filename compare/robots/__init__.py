@@ -82,7 +82,9 @@ class Robot:
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     conditioning: Conditioning | None = None
-    aims: Mapping[tuple[str, float], float] = field(default_factory=dict)  # (scene, rad): MuJoCo's time over tmt's, aimed at
+    aims: Mapping[tuple[str, float], float] = field(
+        default_factory=dict
+    )  # (scene, rad): MuJoCo's time over tmt's, aimed at
     questions: tuple[Question, ...] = ()
     remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
 
