@@ -87,7 +87,7 @@ def test_what_cannot_be_is_one_line_with_file_and_entry(tmp_path, text, says):
 def test_a_file_that_cannot_be_read(tmp_path):
     with pytest.raises(SceneError, match=r"cannot read .*no\.toml: No such file"):
         read(tmp_path / "no.toml", ARM)
-    with pytest.raises(SceneError, match="cannot read .*: Is a directory"):
+    with pytest.raises(SceneError, match=r"cannot read .*: Is a directory"):
         read(tmp_path, ARM)
     (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(SceneError, match="is not TOML"):

@@ -23,7 +23,8 @@ EDITS = (
     # files
     Edit("report.files", "write", "passed(sections)", "True", "results.json says passed whatever fails"),
     Edit("report.files", "write", "_1.to_csv(*_2)", "_1.to_csv(*_2, float_format='%.4g')", "digits of the tables are rounded"),
-    Edit("report.files", "write", "pd.DataFrame(rows, dtype=object)", "pd.DataFrame(rows[:1], dtype=object)", "tables have one row"),
+    Edit("report.files", "write", "pd.DataFrame(rows, dtype=object)", "pd.DataFrame(rows[:1], dtype=object)",
+         "tables have one row"),
     Edit("report.files", "write", "[check.record() for section in sections for check in section.result.checks]",
          "[check.record() for section in sections for check in section.result.checks if check.passed]",
          "results.json has the checks that pass"),
@@ -45,7 +46,8 @@ EDITS = (
     Edit("figures_runs", "drift_caption", "theirs / ours if ours else np.nan", "ours / theirs if ours else np.nan",
          "the ratio of the drifts is inverted"),
     Edit("figures_runs", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
-    Edit("figures_times", "fewest", "min(good, default=None)", "max(good, default=None)", "the most evaluations are told as fewest"),
+    Edit("figures_times", "fewest", "min(good, default=None)", "max(good, default=None)",
+         "the most evaluations are told as fewest"),
     Edit("figures_needs", "gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
          "the least gain is told as the best"),
 )  # fmt: skip
