@@ -99,12 +99,12 @@ class Result:
             known = sample.truth(truth)
             for engine, values in (("TMT", tmt_values), ("MuJoCo", mujoco_values)):
                 apart[f"{engine} to exact"] = largest(distance(values[: len(known)], known))
-        in_eps = {name: d / (EPS * scale[: len(d)]) for name, d in apart.items()}
+        in_eps = {name: over(d, EPS * scale[: len(d)]) for name, d in apart.items()}
         difference = apart["TMT to MuJoCo"]
 
         def closest(quantity, difference):
             """A check of the state that comes closest to its tolerance, and which one that is."""
-            share = np.where(np.isfinite(difference), difference / tolerance[: len(difference)], np.inf)
+            share = np.where(np.isfinite(difference), over(difference, tolerance[: len(difference)]), np.inf)
             k = int(np.argmax(share))
             return self.check(sample.name, quantity, difference[k], tolerance[k], unit, sample.describe(k), True), k
 
@@ -136,6 +136,11 @@ class Result:
         curves = {name: np.sort(values) for name, values in in_eps.items()}
         self.curves.setdefault(sample.name, {})[quantity] = curves
         self.shown = AGREEMENT
+
+
+def over(difference, scale) -> np.ndarray:
+    """A difference over its scale, (states,); nothing over nothing is 0."""
+    return np.divide(difference, scale, out=np.where(difference == 0.0, 0.0, np.inf), where=scale > 0.0)
 
 
 def numbers(values) -> str:
