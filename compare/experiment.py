@@ -170,6 +170,8 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
             name, path = called(call), None
             try:
                 name, figure, caption = call()
+                while name.casefold() in {other.casefold() for other, _ in drawn}:
+                    name += "_"  # names that differ in signs alone may give one file
                 path = folder / f"{name}.png"
                 with writing(path):
                     figure.savefig(path)

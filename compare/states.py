@@ -47,11 +47,11 @@ class Sample:
 
 
 def named(robot: Robot) -> Sample:
-    """The named postures, with random rates and torques where those are asked for."""
-    rng = np.random.default_rng([SEED, 1])
-    rates, torques = rng.uniform(-10.0, 10.0, (2, len(robot.postures), len(robot.joints)))
-    q = np.array([robot.posture(name) for name in robot.postures])
-    return Sample(robot.tree, "named postures", q, rates, torques, len(q), tuple(robot.postures))
+    """The named postures, or all joints at zero if there are none; with random rates and torques where those are asked for."""
+    rng, q = np.random.default_rng([SEED, 1]), np.array(list(robot.poses.values()))
+    rates, torques = rng.uniform(-10.0, 10.0, (2, *q.shape))
+    name = "named postures" if robot.postures else "a posture"
+    return Sample(robot.tree, name, q, rates, torques, len(q), tuple(robot.poses))
 
 
 def random(robot: Robot, states: int, exact_states: int) -> Sample:

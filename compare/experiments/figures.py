@@ -13,7 +13,7 @@ from tmt import method
 from ..engines import LABELS
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, gravity_scale
-from ..report.style import BLUE, GREY, ORANGE, RED, WIDTH, joint_lines
+from ..report.style import BLUE, GREY, ORANGE, RED, WIDTH, file_name, joint_lines
 from ..robots import Robot
 
 ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
@@ -26,7 +26,7 @@ UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E
 
 def sketch(robot: Robot) -> tuple[str, Figure, str]:
     """The robot with its hinge axes in two postures, from the method's own frames."""
-    poses = {name: robot.posture(name) for name in robot.sketched or tuple(robot.postures)[:2]}
+    poses = {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
     parts = {name: (chains(robot, q), tmt.com_positions(q, robot.tree)) for name, q in poses.items()}
     size = max(np.ptp(np.concatenate([*lines, coms]), axis=0).max() for lines, coms in parts.values()) or 1.0  # m
     arrows = {name: axes(robot, q, 0.57 * size) for name, q in poses.items()}
@@ -65,7 +65,7 @@ def sketch(robot: Robot) -> tuple[str, Figure, str]:
         f"The {robot.name} and its hinges, drawn from the method's own kinematics: {', then '.join(hinges(robot))}. Dots: "
         f"centres of mass of {of}."
     )
-    return robot.name.replace(" ", "_"), fig, caption
+    return file_name(robot.name), fig, caption
 
 
 def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:

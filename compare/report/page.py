@@ -26,9 +26,9 @@ def title(robot) -> str:
 def introduction(robot) -> str:
     """What is compared, and how its tables are read."""
     tree, named = robot.tree, robot.described or robot.name
-    bodies, hinges = (in_words(count) for count in (len(tree.body_names), len(tree.hinge_names)))
+    bodies = counted(len(tree.body_names), "rigid body", "rigid bodies")
     return (
-        f"{named[:1].upper()}{named[1:]}, {bodies} rigid bodies on {hinges} hinges, modelled twice: as MJCF, run by MuJoCo, and "
+        f"{named[:1].upper()}{named[1:]}, {bodies} on {counted(len(tree.hinge_names), 'hinge', 'hinges')}, modelled twice: as MJCF, run by MuJoCo, and "
         "by the TMT method in a program that shares nothing with it. Each difference stands beside a tolerance that was "
         "fixed beforehand (column bar); 'exact' is the method in 50-digit arithmetic, and distances from it are in eps = "
         "2.2e-16 of the quantity's scale. Of the states in a row, the largest difference is the largest of all; the worst is "
@@ -36,10 +36,10 @@ def introduction(robot) -> str:
     )
 
 
-def in_words(count: int) -> str:
-    """A small number in words."""
+def counted(count: int, one: str, many: str) -> str:
+    """So many of something, a small number in words."""
     words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-    return words[count] if count < len(words) else str(count)
+    return f"{words[count] if count < len(words) else count} {one if count == 1 else many}"
 
 
 def shown(table, columns=None) -> pd.DataFrame:

@@ -35,9 +35,9 @@ def joint_lines(robot) -> dict[str, tuple]:
     return {name: LINES[k % len(LINES)] for k, name in enumerate(robot.joints)}
 
 
-def file_name(start: str, scene: str) -> str:
-    """The name of a scene's figure: letters, digits, minus signs and underscores."""
-    return start + "_" + re.sub(r"[^\w-]+", "_", scene)
+def file_name(*parts: str) -> str:
+    """The name of a figure: letters, digits, minus signs and underscores, no more than a file's name may have."""
+    return "_".join(re.sub(r"[^\w-]+", "_", part) for part in parts)[:60]
 
 
 def plain(text: str) -> str:

@@ -97,6 +97,11 @@ class Robot:
         angles = self.postures[posture] if isinstance(posture, str) else posture
         return np.radians(np.array(angles or (0.0,) * len(self.joints), dtype=float))
 
+    @property
+    def poses(self) -> dict[str, np.ndarray]:
+        """The named postures, rad, (n,) each; all joints at zero if there are none."""
+        return {name: self.posture(name) for name in self.postures} or {"all joints at zero": self.posture()}
+
     def case(self, name: str = "as it is", **changes) -> Case:
         """The robot with changes, the fields of a Scene."""
         return Case(self, Scene(name, **changes))

@@ -3,13 +3,23 @@
 import numpy as np
 import pytest
 
+import tmt
 from compare.engines import GRID, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import Mujoco
 from compare.engines.mujoco.calls import MinimalCalls
 from compare.engines.scipy import Scipy
 from compare.engines.tmt import Tmt
-from compare.judge.scale import EPS, FACTOR, acceleration_scale, bias_scale, mass_scale
+from compare.judge.scale import (
+    EPS,
+    FACTOR,
+    acceleration_scale,
+    bias_scale,
+    condition,
+    gravity_scale,
+    mass_scale,
+    reaches,
+)
 from compare.robots.arm import ARM
 from tmt.reference import distance, exact
 
@@ -111,19 +121,38 @@ def test_one_state_goes_with_many_others(dynamics, case, rng):
 
 
 def test_quantities_are_those_of_50_digits(dynamics, case, rng):
+    """Those that every engine has, and of the others what this one has."""
     n, tree = len(case.joints), case.tree
     q, v, tau = rng.uniform(-3.0, 3.0, (3, 5, n))
     truth = [exact(tree, *state) for state in zip(q, v, tau)]
-    force = bias_scale(tree, q, v)
+    force, weight, reach = bias_scale(tree, q, v), gravity_scale(tree), reaches(tree).max()
+    speed = np.abs(v).sum(axis=1)
     with_torque = force + np.abs(tau).max(axis=1) + max(tree.damping) * np.abs(v).max(axis=1)
-    scales = {
-        "mass_matrix": (dynamics.mass_matrix(q), mass_scale(tree, q)),
-        "bias": (dynamics.bias(q, v), force),
-        "acceleration": (dynamics.acceleration(q, v, tau), acceleration_scale(tree, q, with_torque)),
+    kinetic = mass_scale(tree, q) * speed**2
+    scales = {  # by the method: its arguments, and the scale of each field of the truth that it gives
+        "mass_matrix": ((q,), {"mass_matrix": mass_scale(tree, q)}),
+        "bias": ((q, v), {"bias": force}),
+        "acceleration": ((q, v, tau), {"acceleration": acceleration_scale(tree, q, with_torque)}),
+        "com_positions": ((q,), {"com_positions": reach}),
+        "angular_velocities": ((q, v), {"angular_velocities": speed}),
+        "jacobians": ((q,), {"T": reach, "B": 1.0}),
+        "convective_terms": ((q, v), {"v_conv": reach * speed**2, "w_conv": speed**2}),
+        "gravity_balance": ((q,), {"gravity_balance": weight}),
+        "potential_energy": ((q,), {"potential_energy": weight}),
+        "energy": ((q, v), {"energy": weight + kinetic}),
     }
-    for name, (values, scale) in scales.items():
-        off = distance(values, np.array([getattr(t, name) for t in truth]))
-        assert (off.reshape(5, -1).max(axis=1) <= FACTOR * EPS * scale).all(), name
+    known = [name for name in scales if hasattr(dynamics, name)]
+    assert len(known) == len(scales) or isinstance(dynamics, MinimalCalls)
+    for name in known:
+        arguments, fields = scales[name]
+        found = getattr(dynamics, name)(*arguments)
+        for field, values in zip(fields, (found,) if len(fields) == 1 else found):
+            off = distance(values, np.array([getattr(t, field) for t in truth]))
+            assert (off.reshape(5, -1).max(axis=1) <= FACTOR * EPS * fields[field]).all(), field
+    if hasattr(dynamics, "inverse"):
+        back = dynamics.inverse(q, v, dynamics.acceleration(q, v, tau))
+        assert (np.abs(back - tau).max(axis=1) <= FACTOR * EPS * condition(tree, q) * with_torque).all()
+        assert not any(np.abs(force).max() for force in dynamics.other_forces(q, v).values())
 
 
 def start(case, rng, *batch):
@@ -166,6 +195,45 @@ def test_a_run_starts_with_its_acceleration(followed, rng):
     assert np.allclose(gained, expected, rtol=0.02, atol=0.02 * np.abs(expected).max())
 
 
+@pytest.fixture(scope="module")
+def true_end():
+    """Where the arm is a second after it is let go at bent, q and v, by 512 steps of order 8: with 13 digits."""
+    case = ARM.case(posture="bent")
+    _, q, v = tmt.simulate(*case.start, case.tau, 1 / 512, 512, "dopri8", case.tree)
+    return np.concatenate([q[-1], v[-1]])
+
+
+def test_each_method_comes_to_the_same_motion_at_its_own_order_or_tolerance(arm, true_end):
+    (method, dynamics), case = arm, ARM.case(posture="bent")
+    coarse = {1: 8 * GRID, 8: GRID // 2}.get(method.order, 2 * GRID)
+
+    def error(steps, tolerance=None):
+        motion = dynamics.run(*case.start, case.tau, 1 / steps, steps, method.name, tolerance)
+        return np.abs(np.concatenate([motion.q[-1], motion.v[-1]]) - true_end).max()
+
+    if method.adaptive:
+        assert error(2, 1e-7) < min(1e-4, error(2, 1e-3)) and error(2, 1e-3) < 0.5
+        assert error(2) < {"heyoka": 1e-12}.get(method.engine, 1e-6)  # of itself it is exact
+        return
+    measured = np.log2(error(coarse) / error(2 * coarse))
+    assert abs(measured - method.order) < 0.3 or 7.0 < measured < 9.0 < method.order + 1.1  # order 8 has hardly settled
+
+
+def test_methods_of_one_scheme_do_the_same_and_others_do_not(engines):
+    """Ten steps of each method: apart by rounding, or by more."""
+    case, ends = ARM.case("thrown", posture="bent", speed=(90.0, -60.0, 120.0)), {}
+    for method in METHODS:
+        if engines[method.engine].unavailable() is None:
+            motion = engines[method.engine].of(case).run(*case.start, case.tau, 0.01, 10, method.name)
+            ends[method] = motion.q[-1]
+    for one in ends:
+        for other in ends:
+            apart = np.abs(ends[one] - ends[other]).max()
+            assert apart < 1e-13 if one.scheme == other.scheme else apart > 0.0, (one.label, other.label)
+            if one.order == other.order == 1 and one.scheme != other.scheme:
+                assert apart > 1e-6, (one.label, other.label)
+
+
 def test_a_prepared_run_is_the_run(followed, rng):
     method, case, dynamics = followed
     q, v, tau = start(case, rng)
@@ -179,7 +247,11 @@ def test_a_prepared_run_is_the_run(followed, rng):
         assert np.array_equal(found.t, motion.t[::every]) and len(found.t) == GRID + 1
         assert np.array_equal(found.q, motion.q[::every]) and np.array_equal(found.v, motion.v[::every])
         assert found.ended is None is motion.ended and found.evaluations == motion.evaluations
-        assert found.steps == steps if steps else found.steps is None or found.steps > 0
+        assert motion.steps == steps  # None: it is not known
+        if steps or method.engine == "scipy":
+            assert found.steps == steps
+        else:
+            assert found.steps > 5 and (method.engine == "heyoka" or found.evaluations / found.steps in (11, 12))
 
 
 def test_evaluations_are_counted(arm):
@@ -193,7 +265,8 @@ def test_evaluations_are_counted(arm):
         assert evaluations > 10
     else:
         stages = {"rk4": 4, "dopri8": 12}.get(method.scheme, 1)
-        assert evaluations == stages * GRID or (method.order > 1 and evaluations > stages * GRID)  # Newton's iterations
+        newton = method.engine == "tmt" and tmt.METHODS[method.name].solves_stages
+        assert evaluations == stages * GRID or (newton and evaluations > stages * GRID)
 
 
 def test_a_tolerance_is_taken_only_by_what_chooses_its_own_steps(arm):
@@ -203,6 +276,12 @@ def test_a_tolerance_is_taken_only_by_what_chooses_its_own_steps(arm):
             dynamics.run(*case.start, case.tau, 0.5, 4, method.name, tolerance).q[-1] for tolerance in (1e-3, 1e-10)
         )
         assert 1e-12 < np.abs(coarse - fine).max() < 0.1
+        lasts = 32.0 if method.engine == "tmt" else 2.0  # its steps are no longer than what is recorded
+        prepared = (
+            dynamics.prepare(*case.start, case.tau, Setting(lasts, None, 10.0**-k), method.name) for k in (3, 5)
+        )
+        coarse, fine = (read(run()) for run, read in prepared)
+        assert np.abs(coarse.q[-1] - fine.q[-1]).max() > 1e-9
         return
     with pytest.raises(ValueError, match="fixed step and takes no tolerance"):
         dynamics.run(*case.start, case.tau, 0.01, 4, method.name, 1e-6)
@@ -231,7 +310,9 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed
     ended_as_it_says(motion.t, motion.q[1], motion.v[1], motion.ended[1])
     setting = Setting(DURATION, None, 1e-6) if method.adaptive else Setting(DURATION, GRID)
     run, read = dynamics.prepare(q, fast, tau, setting, method.name)
+    alone = dynamics.run(q, fast, tau, DURATION / GRID, GRID, method.name, setting.tolerance)
     for _ in range(2):
         found = read(run())
         ended_as_it_says(found.t, found.q, found.v, found.ended)
+        assert found.ended == alone.ended and found.evaluations == alone.evaluations
     assert list(tmp_path.iterdir()) == [] and capfd.readouterr() == ("", "")

@@ -7,23 +7,64 @@ from compare.engines.mujoco import calls
 from compare.engines.mujoco.calls import MinimalCalls
 from compare.robots.arm import ARM
 
+STATE = np.array([0.5, 0.3, 1.0]), np.array([1.0, -2.0, 3.0]), np.zeros(3)
 
-def test_the_loops_do_the_work(mujoco):
+
+@pytest.fixture(scope="module")
+def minimal(mujoco):
+    """The arm by its minimal calls, and its loops, made at a state."""
     if reason := MinimalCalls.unavailable():
         pytest.skip(reason)
-    state = np.array([0.5, 0.3, 1.0]), np.array([1.0, -2.0, 3.0]), np.zeros(3)
+    found = MinimalCalls(mujoco.of(ARM.case()))
+    return found, found.loops(*STATE)
+
+
+def test_the_loops_do_the_work(mujoco, minimal):
+    minimal, ways = minimal
     dynamics = mujoco.of(ARM.case())
-    minimal = MinimalCalls(dynamics)
-    ways = minimal.loops(*state)
     assert {quantity for quantity, _ in ways.values()} == {"forward_dynamics", "mass_matrix_and_bias", "rk4_step"}
     for name, (_, loop) in ways.items():
+        minimal.place(*STATE)
         minimal.force[:] = minimal.solution[:] = np.nan
         loop(3)
         if "equal work" in name:
-            assert np.array_equal(minimal.force, dynamics.bias(*state[:2])[dynamics.dofs])
+            assert np.array_equal(minimal.force, dynamics.bias(*STATE[:2])[dynamics.dofs])
         if name == "MuJoCo, equal work":
-            assert np.allclose(minimal.solution, -dynamics.acceleration(*state), rtol=1e-12)
+            assert np.allclose(minimal.solution, -dynamics.acceleration(*STATE), rtol=1e-12)
     assert dynamics.model.opt.timestep == mujoco.model.opt.timestep  # nothing of the engine has changed
+
+
+@pytest.mark.parametrize("name", ["MuJoCo, equal work, no solve", "MuJoCo, equal work"])
+def test_the_loops_do_all_of_it_at_the_state_that_is_there(mujoco, minimal, rng, name):
+    """Nothing is left of what was found at the state before."""
+    (minimal, ways), dynamics = minimal, mujoco.of(ARM.case())
+    q, v, nothing = *rng.uniform(-2.0, 2.0, (2, 3)), np.zeros(3)
+    minimal.place(q, v, nothing)
+    minimal.force[:] = np.nan
+    ways[name][1](0)
+    assert np.isnan(minimal.force).all()  # it does as often as it is told
+    ways[name][1](1)
+    M, full = dynamics.mass_matrix(q), np.zeros((3, 3))
+    calls.mujoco.mj_fullM(minimal.model, minimal.data, full)
+    assert np.array_equal(full, M) and np.array_equal(minimal.force, dynamics.bias(q, v))
+    assert name.endswith("no solve") or np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
+    assert np.array_equal(minimal.bias(q, v), minimal.force)  # whatever acceleration mj_forward has left
+
+
+def test_a_loop_repeats_a_step_of_rk4_and_all_of_mj_forward(mujoco, minimal):
+    (minimal, ways), dynamics = minimal, mujoco.of(ARM.case())
+    minimal.data.time = 0.0
+    ways["MuJoCo, mj_step"][1](7)
+    assert minimal.data.time == pytest.approx(7 * calls.TINY_STEP, rel=1e-12)
+    minimal.place(*STATE)
+    minimal.model.opt.timestep = 0.01
+    ways["MuJoCo, mj_step"][1](1)
+    minimal.model.opt.timestep = calls.TINY_STEP
+    run = dynamics.run(*STATE, 0.01, 1, "RK4")
+    assert np.array_equal(minimal.data.qpos, run.q[1]) and np.array_equal(minimal.data.qvel, run.v[1])
+    minimal.data.qacc[:] = np.nan
+    ways["MuJoCo, mj_forward"][1](1)
+    assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], STATE[2]), rtol=1e-12)
 
 
 def test_without_the_library_it_says_so(monkeypatch, tmp_path):

@@ -1,7 +1,8 @@
-"""SciPy's solvers where the slope is not finite: they would try ever smaller steps without end."""
+"""SciPy's solvers: they are solve_ivp's; and where the slope is not finite, they would try ever smaller steps without end."""
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from compare.engines import Setting
 from compare.engines.scipy import Scipy, ScipyDynamics
@@ -27,3 +28,13 @@ def test_a_run_goes_as_far_as_its_slope_is_finite(method):
         assert 2 <= reached <= 21 and np.isnan(motion.q[reached:]).all() and np.isnan(motion.v[reached:]).all()
         assert np.allclose(motion.q[:reached, 0], motion.t[:reached])
         assert motion.ended == f"at t = {motion.t[reached - 1]:g} s: its slope is not finite" and motion.evaluations > 1
+
+
+@pytest.mark.parametrize("method, tolerance", [*((method, 1e-3) for method in Scipy.methods), ("DOP853", 1e-15)])
+def test_a_run_is_that_of_solve_ivp_by_this_method_with_this_tolerance(method, tolerance):
+    dynamics, case = ScipyDynamics(ARM.case()), ARM.case(posture="bent")
+    rate, t, few = dynamics.rate(), np.linspace(0.0, 0.05, 3), {"rtol": max(tolerance, 2.3e-14), "atol": tolerance}
+    known = solve_ivp(lambda t, y: rate(y, np.ones(3)), (0.0, 0.05), [*case.q, *case.v], method, t, **few)
+    motion = dynamics.run(*case.start, np.ones(3), 0.025, 2, method, tolerance)
+    assert np.array_equal(motion.q, known.y[:3].T) and np.array_equal(motion.v, known.y[3:].T)
+    assert motion.evaluations == known.nfev

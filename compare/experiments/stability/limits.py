@@ -50,7 +50,8 @@ def examine(
         rows.append({
             "scene": at.name, "engine": method.engine, "method": method.name, "damping": at.case.scene.damping,
             "mode_per_s": np.abs(at.modes[0]).max() if kind == "never_fails" else at.rate(shape),
-            "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION, "seen": seen, "allowed": tolerance,
+            "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION, "seen": seen,
+            "allowed": tolerance,
         })  # fmt: skip
     return {"rows": rows, "growths": growths}
 

@@ -18,6 +18,7 @@ DRIFT_DURATION = 1.0  # s: short enough for the order to show, long enough to mo
 DRIFT_STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method
 FEW_DRIFT_STEPS = DRIFT_STEPS | {1: (512, 1024, 2048)}
 OF_EULER = 1e-3  # of Euler's drift: RK4's is below, with fewer steps
+ROUNDED = 10 * FACTOR * EPS  # of the terms of a quantity: a drift below is not that of the method alone
 
 
 def drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
@@ -52,9 +53,9 @@ def constants(case: Case) -> dict[tuple, Callable]:
 
 
 def roundings(case: Case) -> tuple[float, float]:
-    """What rounding alone may do to the energy, J, and to the momentum of the first joint, N m s: 64 eps of their terms."""
+    """Up to where a drift of the energy, J, and of the momentum of the first joint, N m s, may be rounding."""
     momenta = np.abs(tmt.mass_matrix(case.q, case.tree)) @ np.abs(case.v)
-    return FACTOR * EPS * (gravity_scale(case.tree) + momenta @ np.abs(case.v) / 2), FACTOR * EPS * momenta[0]
+    return ROUNDED * (gravity_scale(case.tree) + momenta @ np.abs(case.v) / 2), ROUNDED * momenta[0]
 
 
 def run(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
@@ -65,8 +66,8 @@ def run(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
 def check_drifts(result: Result, drifts: dict, rounding: Mapping[tuple, float]) -> None:
     """The drift halves with the step as the order says; RK4's is far below that of Euler, which takes more steps.
 
-    rounding: what rounding alone may do to each quantity. Nothing is asked where both engines drift by no more, and no order
-    where it falls faster in both: in small swings that of RK4 is of order 5.
+    rounding: up to where a drift of each quantity may be rounding. Nothing is asked where both engines drift by no more, and no
+    order where it falls faster in both: in small swings that of RK4 is of order 5.
     """
     for (scene, quantity, unit), of_scene in drifts.items():
         euler = next(method for method in of_scene if method.scheme == "semi_implicit_euler")
@@ -75,7 +76,9 @@ def check_drifts(result: Result, drifts: dict, rounding: Mapping[tuple, float]) 
             found = {engine: found_order(values) for engine, values in engines.items()}
             why = no_order(method, engines, found, allowed)
             if why:
-                result.notes.append(f"{scene}, {method.name}: no order is asked of the drift of {quantity}, which {why}.")
+                result.notes.append(
+                    f"{scene}, {method.name}: no order is asked of the drift of {quantity}, which {why}."
+                )
             for engine, values in engines.items():
                 where = f"{scene}, {method.name}, {LABELS[engine]}, {DRIFT_DURATION:g} s"
                 if not why:
@@ -89,7 +92,7 @@ def check_drifts(result: Result, drifts: dict, rounding: Mapping[tuple, float]) 
 def no_order(method: Method, engines: dict, found: dict, allowed: float | None) -> str | None:
     """Why no order can be measured in the drifts of both engines, {engine: values}, or None; found: the orders."""
     if is_rounding(engines, allowed):
-        return "is rounding alone"
+        return "may be rounding alone"
     if all(ORDER_MARGIN < order - method.order <= 1.0 + ORDER_MARGIN for order in found.values()):
         measured = " and ".join(f"{LABELS[engine]}'s by {order:.2f}" for engine, order in found.items())
         return f"falls faster than by the order {method.order}, {measured}"
@@ -97,7 +100,7 @@ def no_order(method: Method, engines: dict, found: dict, allowed: float | None) 
 
 
 def is_rounding(engines: dict, allowed: float | None) -> bool:
-    """Whether the drift of both engines with the finest steps is no more than rounding may make it; None: that is not known."""
+    """Whether the drift of both engines with the finest steps may be rounding; allowed: up to where, None: not known."""
     return allowed is not None and all(values[-1] <= allowed for values in engines.values())
 
 

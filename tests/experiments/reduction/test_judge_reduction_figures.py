@@ -143,6 +143,7 @@ def test_any_name_of_a_scene_is_drawn_as_it_is_and_gives_a_plain_file_name(tmp_p
     errors = {(engine, i): [1e-3] * 6 for engine in ("tmt", "mujoco") for i in ("RK4", "Euler")}
     swing = {"dt": 0.02 / 2.0 ** np.arange(6), "errors": errors, "orders": {}, "stated": {"RK4": 4, "Euler": 1}}
     name, fig, _ = figures_motion.swing(Result("reduction", curves={"swings": {scene: swing}}), scene)
+    assert len(figures_motion.swing(Result("reduction", curves={"swings": {300 * "x": swing}}), 300 * "x")[0]) == 60
     assert name == "reduction_to_5_and_6_x_" and not fig.axes[0].texts  # no order is measured
 
 
