@@ -81,7 +81,7 @@ def true_errors_in_words(rows, steps, robot) -> list[str]:
         if not errors:
             continue
         pairs = "; ".join(f"{scene}: TMT {in_rad(a)}, MuJoCo {in_rad(b)}" for scene, (a, b) in errors.items())
-        dt = {row["dt_s"] for row in rows if row["scene"] in errors and row["steps"] == count}
+        dt = {row["dt_s"] for row in rows if row["scene"] in errors and row["steps"] == count and row["dt_s"]}
         whose = "the assignment's" if robot.claims and dt == {robot.claims.dt} else "the coarsest"
         text = f"At {whose} step, {count} steps of RK4, the worst errors against the true motion are: {pairs}."
         far = {s: pair for s, pair in errors.items() if any(v is None or v > ANOTHER_MOTION for v in pair)}

@@ -115,6 +115,7 @@ def test_the_true_error_in_words(ours, theirs, says):
 def test_only_the_arms_own_step_is_the_assignments():
     rows = [row("tmt", "rk4", 1e-3), row("mujoco", "RK4", 1e-3)]
     rows += [row("tmt", "rk4", 1e-6, 128, scene="mine"), row("mujoco", "RK4", 1e-6, 128, scene="mine")]
+    rows += [row("heyoka", "Taylor", 1e-6, 64, dt_s=None)]  # it chose as many steps by itself
     own, mine = accuracy.true_errors_in_words(rows, BENT | {"mine": 128}, ARM)
     assert own.startswith("At the assignment's step, 64 steps of RK4, ") and "mine" not in own
     assert mine.startswith("At the coarsest step, 128 steps of RK4, ") and "bent" not in mine
