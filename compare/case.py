@@ -63,7 +63,7 @@ class Scene:
     locked: tuple = ()  # names of the joints that stay at the start
     duration: float = 5.0  # s
     dt: float = 5.0 / 64  # s, the coarsest step; runs with finer ones divide it
-    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along; 0: any
+    judged: float | None = None  # s, for how long a run must be judged, its band of rounding narrow; None: all along
     tags: tuple = ()  # what it serves for, see robots
 
     def __post_init__(self):

@@ -60,7 +60,8 @@ def test_every_field_takes_a_value_or_says_in_one_line_what_it_accepts(field):
         ({"locked": None}, "scene 'mine': locked is None; a tuple of names is expected"),
         ({"locked": ("wrist",)}, "scene 'mine': locked is ('wrist',); a tuple of at most 2 of alpha, beta, gamma is expected"),
         ({"speed": None}, "scene 'mine': speed is None; a speed in deg/s for each joint is expected"),
-        ({"speed": (1, 2)}, "scene 'mine': speed is (1.0, 2.0); 3 numbers, one per joint (alpha, beta, gamma), in deg/s is expected"),
+        ({"speed": (1, 2)}, "scene 'mine': speed is (1.0, 2.0); 3 numbers, one per joint (alpha, beta, gamma), in deg/s is "
+         "expected"),
         ({"duration": "5"}, "scene 'mine': duration is '5'; a time in s above 0 is expected"),
         ({"dt": 1e-300}, "scene 'mine': dt is 1e-300; a step that divides 5 s into at most 10,000,000 is expected"),
         ({"damping": True}, "scene 'mine': damping is True; at least 0 N m s/rad is expected"),
@@ -105,7 +106,9 @@ def test_any_fields_are_a_scene_or_one_line(fields):
 
 
 def test_numbers_are_kept_as_floats_and_tuples_of_floats():
-    scene = Scene("mine", np.array([1, 2, 3]), speed=[0, 1, 0], locked=["gamma", "gamma"], damping=1, judged=np.array(2))
+    scene = Scene(
+        "mine", np.array([1, 2, 3]), speed=[0, 1, 0], locked=["gamma", "gamma"], damping=1, judged=np.array(2)
+    )
     assert (scene.posture, scene.speed, scene.locked) == ((1.0, 2.0, 3.0), (0.0, 1.0, 0.0), ("gamma",))
     assert all(type(value) is float for value in (scene.damping, scene.duration, scene.dt, scene.judged))
     assert shorten("a" * 60) == "a" * 60 and len(shorten("a" * 61)) == 60
@@ -134,7 +137,9 @@ def test_how_long_a_run_must_be_judged():
 def robot(**fields) -> Robot:
     """A robot of two hinges."""
     tree = tmt.ARM.lock({"alpha": 0.0})
-    return Robot(**{"name": "two", "mjcf": Path("none.xml"), "tree": tree, "postures": {"low": (0, 90)}, "scenes": ()} | fields)
+    return Robot(
+        **{"name": "two", "mjcf": Path("none.xml"), "tree": tree, "postures": {"low": (0, 90)}, "scenes": ()} | fields
+    )
 
 
 @pytest.mark.parametrize(

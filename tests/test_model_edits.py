@@ -6,8 +6,10 @@ Every experiment in its smallest setting, in one process.
 from functools import partial
 
 import pytest
+from edited import XML, setup_of
 
-from compare import (
+from compare.experiment import Setup
+from compare.experiments import (
     acceleration,
     gravity,
     kinematics,
@@ -19,14 +21,13 @@ from compare import (
     stability,
     trajectory,
 )
-from compare.agreement import Result, Setup
-from compare.engine_file import ARM_XML, parse
-from compare.scenes import SCENES
+from compare.judge.check import Result
+from compare.robots.arm import ARM
 
-XML = ARM_XML.read_text(encoding="utf-8")
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge" axis="' for name in ("alpha", "beta", "gamma"))
 KNOWN = {}  # what TMT gives, the same for every edit
-FOLLOWED = tuple(scene for scene in SCENES if scene.name in ("bent, free", "bent, damped"))
+FOLLOWED = tuple(case for case in ARM.cases if case.name in ("bent, free", "bent, damped"))
+SMALLEST = {"states": 20, "exact_states": 1, "finer": (1,), "size": "small"}
 
 
 def with_more(line, more):
@@ -35,14 +36,14 @@ def with_more(line, more):
 
 def follow(setup) -> Result:
     result = Result("trajectory")
-    for scene in FOLLOWED:
-        result.checks += trajectory.follow(scene, setup.engine, (64,), KNOWN).checks
+    for case in FOLLOWED:
+        result.checks += trajectory.follow(case, setup.engines, setup.finer, KNOWN).checks
     return result
 
 
 def linearise(setup) -> Result:
     result = Result("stability")
-    stability.equilibria(result, setup, ["bent", "ball catch"])
+    stability.check_equilibria(result, setup)
     return result
 
 
@@ -111,15 +112,10 @@ def failing(old, new) -> set:
     """The experiments in which a check fails for the edited model."""
     assert XML.count(old) == 1
     try:
-        engine = parse(XML.replace(old, new))
+        setup = setup_of(XML.replace(old, new), Setup, **SMALLEST)
     except ValueError:
         pytest.skip("this MuJoCo does not know what the edit asks for")
-    found = set()
-    for name, rows in EXPERIMENTS.items():
-        setup = Setup(engine, states=20, exact_states=1, steps=(64,), size="small")
-        if not all(check.passed for check in rows(setup).checks):
-            found.add(name)
-    return found
+    return {name for name, rows in EXPERIMENTS.items() if not all(check.passed for check in rows(setup).checks)}
 
 
 def test_the_stated_arm_fails_nowhere():

@@ -75,8 +75,11 @@ def choice(results) -> list[tuple]:
     line = next((line for line in lines if line["target_rad"] == 1e-6 and line["mujoco"] and line["tmt"]), None)
     if line is None:
         return []
+    of_scene = (
+        row["dt_s"] * row["steps"] for row in results["speed"].rows if row["scene"] == line["scene"] and row["dt_s"]
+    )
     text = (
-        f"What should I use? For {line['target_rad']:.0e} rad over five seconds ({line['scene']}): {line['mujoco']} "
+        f"What should I use? For {line['target_rad']:.0e} rad over {next(of_scene):.4g} s ({line['scene']}): {line['mujoco']} "
         f"({line['mujoco_ms']:.2g} ms), or {line['tmt']} ({line['tmt_ms']:.2g} ms); more in the table of that name."
     )
     return [("", "which integrator and which step", "speed", text)]

@@ -3,6 +3,8 @@
 A function that draws returns (file name, figure, caption), and computes nothing but positions on paper.
 """
 
+import re
+
 import matplotlib
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
@@ -34,5 +36,10 @@ def joint_lines(robot) -> dict[str, tuple]:
 
 
 def file_name(start: str, scene: str) -> str:
-    """The name of a scene's figure."""
-    return f"{start}_{scene.replace(', ', '_').replace(' ', '_')}"
+    """The name of a scene's figure: letters, digits, minus signs and underscores."""
+    return start + "_" + re.sub(r"[^\w-]+", "_", scene)
+
+
+def plain(text: str) -> str:
+    """A name as it is drawn: a dollar sign begins no formula."""
+    return text.replace("$", r"\$")

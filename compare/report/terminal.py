@@ -12,7 +12,7 @@ from rich.text import Text
 from ..process import interrupt
 from ..process.streams import Stream, readable
 
-CLEAR, CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
+EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
 
 class Terminal:
@@ -77,4 +77,4 @@ def clear() -> None:
     """Take what is in progress from the terminal, at an early end."""
     Stream.silent = True
     with suppress(OSError):
-        os.write(2, (CLEAR + CURSOR).encode())
+        os.write(2, (EMPTY_LINE + SHOW_CURSOR).encode())

@@ -74,14 +74,17 @@ class Robot:
     scenes: tuple[Scene, ...]
     described: str = ""  # in a sentence: "a human arm"
     symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
-    kinds: Mapping[str, str] = field(default_factory=dict)  # centre, saddle, marginal: the posture that stands for it
+    # centre, saddle, marginal: the posture that stands for it; resonant: a centre at which a swing of three steps grows
+    kinds: Mapping[str, str] = field(default_factory=dict)
     landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins
     sketched: tuple[str, ...] = ()  # the postures of the sketch; none: the first two
     axes: tuple[str, str, str] = ("x", "y", "z")  # of the inertial frame, as they are written there
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     conditioning: Conditioning | None = None
-    aims: Mapping[tuple[str, float], float] = field(default_factory=dict)  # (scene, rad): MuJoCo's time over tmt's, aimed at
+    aims: Mapping[tuple[str, float], float] = field(
+        default_factory=dict
+    )  # (scene, rad): MuJoCo's time over tmt's, aimed at
     questions: tuple[Question, ...] = ()
     remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
 

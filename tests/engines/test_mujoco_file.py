@@ -82,7 +82,9 @@ def test_a_comment_in_another_encoding_is_no_obstacle(tmp_path):
 
 def test_joints_are_those_of_the_tree_in_its_order(rng):
     """What a file calls beta is beta, though it stands before alpha."""
-    lines = [f'<joint name="{name}" type="hinge" axis="{axis}"/>' for name, axis in (("alpha", "0 1 0"), ("beta", "1 0 0"))]
+    lines = [
+        f'<joint name="{name}" type="hinge" axis="{axis}"/>' for name, axis in (("alpha", "0 1 0"), ("beta", "1 0 0"))
+    ]
     text = XML.replace(lines[0], "first").replace(lines[1], lines[0].replace("0 1 0", "1 0 0"))
     text = text.replace("first", lines[1].replace("1 0 0", "0 1 0"))  # beta first, about y; then alpha, about x
     q, v = rng.uniform(-3, 3, (2, 20, 3))

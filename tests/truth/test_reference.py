@@ -123,7 +123,10 @@ def test_a_scene_with_locked_joints_has_columns_of_its_own(tmp_path, monkeypatch
     first, again = (reference.references([swing], tell=lambda text: None)["swing"] for _ in range(2))
     assert first.high.shape == (5, 2) and np.array_equal(first.low, again.low)
     (kept,) = tmp_path.glob("reference_*.csv")
-    assert kept.read_text(encoding="utf-8").splitlines()[0] == "scene,key,steps,halving_difference,t_s,gamma_rad,gamma_rad_per_s"
+    assert (
+        kept.read_text(encoding="utf-8").splitlines()[0]
+        == "scene,key,steps,halving_difference,t_s,gamma_rad,gamma_rad_per_s"
+    )
 
 
 # how many steps
@@ -157,7 +160,9 @@ def test_the_committed_runs_have_the_steps_of_this_rule():
 def test_a_run_that_does_not_reach_its_end_is_none_and_says_so_in_one_line():
     fast = SHORT.changed(name="fast", speed=(1e8, -1e8, 1e8))
     assert reference.run((fast, 64, 64)) is None
-    with pytest.raises(ValueError, match=r"scene 'fast': runs with many digits and up to 512 steps do not reach") as error:
+    with pytest.raises(
+        ValueError, match=r"scene 'fast': runs with many digits and up to 512 steps do not reach"
+    ) as error:
         reference.references([fast], tell=lambda text: None)
     assert "\n" not in str(error.value)
     assert reference.halving([(64, None), (128, np.zeros(1))]) == np.inf  # a coarse one may fail: finer ones are tried

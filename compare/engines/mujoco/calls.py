@@ -110,14 +110,14 @@ class MinimalCalls:
         values = []
         for state in zip(*states):
             self.place(*state)
-            for name in TERMS:
+            for name in BEFORE_RNE:
                 self.functions[name](*self.addresses)
             self.functions["mj_rne"](*self.addresses, 0, self.force.ctypes.data)
             values.append(np.array(read()))
         return np.array(values).reshape(*shape[:-1], *values[0].shape)
 
 
-TERMS = ("mj_kinematics", "mj_comPos", "mass matrix", "mj_comVel")  # before mj_rne, in this order
+BEFORE_RNE = ("mj_kinematics", "mj_comPos", "mass matrix", "mj_comVel")  # before mj_rne, in this order
 
 
 def functions(lib) -> dict[str, Callable]:
@@ -139,7 +139,7 @@ def repeated(function, model, data, count):
 
 def equal_work(call) -> tuple[Callable, Callable]:
     """Compiled loops: mass matrix and bias; and the acceleration from them."""
-    kinematics, com, inertia, velocities = (call[name] for name in TERMS)
+    kinematics, com, inertia, velocities = (call[name] for name in BEFORE_RNE)
     factor, rne, solve = call["mj_factorM"], call["mj_rne"], call["mj_solveM"]
 
     @njit

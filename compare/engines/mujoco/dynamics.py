@@ -27,7 +27,7 @@ INTEGRATORS = {
     for name, member in NAMES.items()
     if hasattr(mujoco.mjtIntegrator, f"mjINT_{member}")
 }
-STAGES = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # evaluations of the dynamics in a step
+EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 FLAGS = {
     "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
     "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
@@ -154,7 +154,7 @@ class MujocoDynamics:
         starts, follow = self.runner(q, v, tau, dt, steps, method)
         *paths, ended = self.path(starts, follow(), dt)
         q, v = (path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
-        evaluations, ended = len(starts) * steps * STAGES[method], ended.reshape(shape[:-1])[()]
+        evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(shape[:-1])[()]
         return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
 
     def prepare(self, q, v, tau, setting: Setting, method):
@@ -165,7 +165,7 @@ class MujocoDynamics:
 
         def read(states):
             q, v, ended = self.path(starts, states, dt)
-            return Motion(t, q[0, ::every], v[0, ::every], setting.steps * STAGES[method], ended[0], setting.steps)
+            return Motion(t, q[0, ::every], v[0, ::every], setting.steps * EVALUATIONS[method], ended[0], setting.steps)
 
         return run, read
 

@@ -17,8 +17,9 @@ def swing(result, scene: str):
         values = errors["tmt", integrator]
         ax.loglog(dt, values, dash, color=colour, label=f"{integrator}, TMT")
         ax.loglog(dt, errors["mujoco", integrator], "o", mfc="none", color=colour, label=f"{integrator}, MuJoCo")
-        place = {"xy": (dt[3], values[3]), "xytext": (0, 8), "textcoords": "offset points", "ha": "right"}
-        ax.annotate(f"order {stated[integrator]}", **place, color=colour)
+        if ("tmt", integrator) in orders:
+            place = {"xy": (dt[3], values[3]), "xytext": (0, 8), "textcoords": "offset points", "ha": "right"}
+            ax.annotate(f"order {stated[integrator]}", **place, color=colour)
     ax.set(xlabel="dt, s", ylabel="largest error of the angle, rad")
     fig.legend(loc="outside upper center", ncols=4)
 

@@ -7,7 +7,7 @@ from matplotlib.patches import Patch
 
 from ...engines import LABELS
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR
-from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH
+from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, plain
 
 KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
@@ -26,8 +26,8 @@ def needs(result, robot):
         for x, joint in enumerate(joints):
             left.plot(x, y, markersize=9, linestyle="none", **KINDS_OF_JOINT[kind_of_joint(joint, found)])
     left.set(xlim=(-0.6, len(joints) - 0.4), ylim=(max(1, len(scenes)) - 0.5, -0.5))
-    left.set_xticks(range(len(joints)), [robot.symbol(joint) for joint in joints])
-    left.set_yticks(range(len(scenes)), scenes)
+    left.set_xticks(range(len(joints)), [plain(robot.symbol(joint)) for joint in joints])
+    left.set_yticks(range(len(scenes)), [plain(name) for name in scenes])
     left.tick_params(length=0)
     for y, name in enumerate(scenes):
         draw_times(right, result, name, y)
@@ -105,17 +105,8 @@ def costs(result):
         rows = {row["added"]: row for row in table if row["integrator"] == integrator}
         for y, name in enumerate(names):
             row = rows[name]
-            hatch = None if row["same_bits"] else "////"
-            ax.barh(
-                y + offset,
-                row["ratio"] - 1.0,
-                left=1.0,
-                height=0.36,
-                color=colour,
-                alpha=0.8,
-                hatch=hatch,
-                edgecolor="white",
-            )
+            look = {"facecolor": (colour, 0.8), "edgecolor": "white", "hatch": None if row["same_bits"] else "////"}
+            ax.barh(y + offset, row["ratio"] - 1.0, left=1.0, height=0.36, **look)
             ax.text(max(row["ratio"], 1.0) + 0.01 * most, y + offset, f"{row['ratio']:.2f}", va="center", fontsize=7)
     ax.set_yticks(range(len(names)), names)
     ax.axvline(1.0, color="black", linewidth=0.8)
@@ -125,7 +116,7 @@ def costs(result):
         xlim=(0.9, 1.08 * most),
     )
     ax.grid(axis="y", visible=False)
-    handles = [Patch(color=colour, alpha=0.8, label=name) for name, colour in (("Euler", BLUE), ("RK4", GREEN))]
+    handles = [Patch(color=(colour, 0.8), label=name) for name, colour in (("Euler", BLUE), ("RK4", GREEN))]
     handles.append(Patch(facecolor=GREY, hatch="////", edgecolor="white", label="changes the motion"))
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
     ratio = {(row["added"], row["integrator"]): row["ratio"] for row in table}

@@ -47,11 +47,13 @@ def need_in_words(case: Case, need: Needed) -> str:
         count = "the one hinge that is free" if len(names) == 1 else f"all {len(names)} hinges"
         return f"{case.name}: {count}{declared}. {why}."
     left, stays = (" and ".join(some) for some in ([name for name in names if name not in need.stays], need.stays))
-    never = "never moves: at its start and at rest its acceleration folds to 0 for all values of the others, and is"
+    never, vanish = "never moves: at its start and at rest its acceleration folds", "and is"
     if len(need.stays) > 1:
-        never = "never move: at their start and at rest their accelerations fold to 0 for all values of the others, and are"
-    stays = stays[:1].upper() + stays[1:]
-    return f"{case.name}: {left}{declared}. {stays} {never} 0 with {DIGITS} digits at random ones. {why}."
+        never, vanish = "never move: at their start and at rest their accelerations fold", "and are"
+    return (
+        f"{case.name}: {left}{declared}. {stays[:1].upper()}{stays[1:]} {never} to 0 for all values of the others, {vanish} 0 "
+        f"with {DIGITS} digits at random ones. {why}."
+    )
 
 
 def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> None:

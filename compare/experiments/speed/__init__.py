@@ -229,7 +229,8 @@ def spread_in_words(spread) -> list[str]:
 
 def figures(result, robot):
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
-    from . import figures_times as draw  # matplotlib is for the process that draws
+    from . import figures_evaluations  # matplotlib is for the process that draws
+    from . import figures_times as draw
 
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
@@ -237,4 +238,4 @@ def figures(result, robot):
         yield partial(draw.times, result, scene)
     yield partial(draw.evaluations, result)
     yield partial(draw.energy, result)
-    yield partial(draw.cost_of_one, result, robot.name)
+    yield partial(figures_evaluations.cost_of_one, result, robot.name)

@@ -6,7 +6,6 @@ from matplotlib.patheffects import withStroke
 
 from ...engines import LABELS
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name
-from .evaluations import WHOLE
 
 COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
 SAME_BITS = ("implicitfast", "discrete")  # as Euler's
@@ -238,36 +237,3 @@ def line(ax, engine, method, errors, costs) -> None:
 def finish(fig, axes, label) -> None:
     fig.supxlabel(f"{label} (finer to the right)", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7)
-
-
-def cost_of_one(result, name):
-    """What one evaluation costs, way by way; name: of the robot."""
-    rows = [row for row in result.tables["evaluations"] if row["quantity"] == "forward_dynamics"]
-    fig = Figure(figsize=(WIDTH, 0.9 + 0.24 * len(rows)), layout="constrained")
-    ax = fig.subplots()
-    names = [f"{r['implementation']}, {r['states']:,} state{'s' * (r['states'] > 1)}"
-             + (f", {r['threads']} threads" if r["threads"] > 1 else "") for r in rows]  # fmt: skip
-    values = [r["ns_per_state"] for r in rows]
-    colours = [ORANGE if r["implementation"].startswith("MuJoCo") else BLUE for r in rows]
-    ax.barh(range(len(rows)), values, color=colours, height=0.7)
-    for k, value in enumerate(values):
-        ax.text(value * 1.1, k, spelled(value), va="center", fontsize=8)
-    ax.set_yticks(range(len(rows)), names, fontsize=8)
-    ax.set(xscale="log", xlabel="ns per state")
-    ax.grid(axis="y", visible=False)
-    caption = f"Forward dynamics of the {name} for one state."
-    if rows:
-        ax.set_xlim(min(values) / 2, max(values) * 5)
-        slow, fast = (names[values.index(pick(values))] for pick in (max, min))
-        caption = (
-            f"Forward dynamics of the {name} for one state: from {spelled(max(values))} ns ({slow}) to {spelled(min(values))} ns "
-            f"({fast})."
-        )
-    whole = next((r["ns_per_state"] for r in rows if r["implementation"] == WHOLE), None)
-    caption += f" MuJoCo's mj_forward takes {spelled(whole)} ns." if whole else ""
-    return "speed_evaluation_cost", fig, caption
-
-
-def spelled(value) -> str:
-    """Nanoseconds in three digits or so."""
-    return f"{value:,.0f}" if value >= 100 else f"{value:.1f}"

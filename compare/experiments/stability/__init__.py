@@ -10,8 +10,8 @@ from ...judge.check import Result
 from ...truth.linear import held
 from . import beyond, choice, claims, departure, failure, falling, limits, long_runs
 from .claims_judged import check_claims
-from .equilibria import equilibria, planes
-from .subjects import DAMPINGS, places, subjects
+from .equilibria import check_equilibria, planes
+from .subjects import DAMPINGS, places, subjects_of
 
 TITLE = "Stability: where methods fail"
 FINE_DEPARTURES = (1e-2, 1e-3)  # s, beside the coarsest step
@@ -51,7 +51,7 @@ def methods_of(setup) -> tuple:
 
 def begin(setup) -> None:
     """Set the runs going side by side. A quick run takes fewer methods and scenes, and no map, minute or fine step."""
-    robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects(setup.robot)
+    robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects_of(setup.robot)
     methods, each, coarse = methods_of(setup), choice.of_schemes(engines), choice.coarsest(robot).scene.dt
     points = of(
         places(seen.centres, seen.saddles),
@@ -62,7 +62,6 @@ def begin(setup) -> None:
     leaving_dts = of((coarse, *FINE_DEPARTURES), (coarse,), (coarse, *FINE_DEPARTURES[:1]))
     rk4, edges = claims.of_claims(engines), tuple(engines["tmt"].methods[name] for name in failure.EDGE_SCHEMES)
     near = edges + tuple(same_scheme(engines, method, "mujoco") for method in edges)
-    minutes = list(product(of(each, (), methods), (coarse, long_runs.FINE_STEP)))
     implicit = choice.implicit_methods(engines)
     steps = of(limits.GROWTH_STEPS, limits.GROWTH_STEPS, 1000)
     maps = {
@@ -85,6 +84,7 @@ def begin(setup) -> None:
         return setup.map(partial(function, engines, **more), robots)
 
     mapped = about(seen.centre, of(each, (), each[:3]))
+    minutes = list(product(about(seen.free, of(each, (), methods)), (coarse, long_runs.FINE_STEP)))
     resonant, tongues = about(seen.swinging, of(near, near[:2], near)), about(seen.swinging, of(edges, (), edges))
     setup.background["stability"] = {
         "subjects": seen,
@@ -103,11 +103,11 @@ def begin(setup) -> None:
         "maps": maps,
         "map": (mapped, ask(limits.map_of_growth, mapped, at=seen.centre, dts=maps["map"]["x"], steps=steps)),
         "near": (resonant, ask(failure.edge, resonant, at=seen.centre, swings=maps["near"]["x"],
-                               sizes=[limits.SMALL_DEVIATION, failure.LARGE_DEVIATION])),
+                               sizes=[limits.LINEAR_DEVIATION, failure.LARGE_DEVIATION])),
         "edge": (tongues, ask(failure.edge, tongues, at=seen.centre, sizes=maps["edge"]["y"], swings=maps["edge"]["x"],
                               steps=steps)),
-        "minutes": ask(long_runs.long_run, *(zip(*about(seen.free, minutes)) if seen.free and minutes else ((), ())),
-                       case=seen.free, duration=of(long_runs.MINUTE, 0.0, 10.0)),
+        "minutes": ask(long_runs.long_run, *([pair[k] for pair in minutes] for k in (0, 1)), case=seen.free,
+                       duration=of(long_runs.MINUTE, long_runs.MINUTE, 10.0)),
         "newton": ask(long_runs.newton, about(seen.centre, of(implicit, (), implicit)), at=seen.centre,
                       dts=of(long_runs.NEWTON_STEPS, (), (0.1, 1.0, 100.0)),
                       steps=of(limits.GROWTH_STEPS, limits.GROWTH_STEPS, 200)),
@@ -122,7 +122,7 @@ def rows(setup) -> Result:
     work = setup.background.pop("stability")
     seen, methods = work["subjects"], methods_of(setup)
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
-    equilibria(result, setup)
+    check_equilibria(result, setup)
     limits.check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
     departure.check_departures(result, [row for part in work["departure"] for row in part] + falls)
@@ -134,7 +134,7 @@ def rows(setup) -> Result:
     for name, axes in work["maps"].items():
         result.curves[name] = {**axes, "grown": dict(zip(*work[name]))}
     if seen.swinging:
-        failure.check_near(result, seen.centre.name, result.curves["near"])
+        failure.check_near(result, robot, seen.centre.name, result.curves["near"])
     for reset, gain in zip(work["reset"], work["gain"]):
         failure.check_silent(result, reset, gain)
     long_runs.check_minutes(result, list(work["minutes"]))
@@ -151,7 +151,7 @@ def figures(result, robot):
     # matplotlib is for the process that draws
     from . import figures_claims, figures_departure, figures_failure, figures_limits
 
-    tables, curves, seen = result.tables, result.curves, subjects(robot)
+    tables, curves, seen = result.tables, result.curves, subjects_of(robot)
     falls = [row for row in tables.get("departure", ()) if seen.marginal and row["scene"] == seen.marginal.name]
     drawn = {
         figures_limits.limits: bool(seen.centre),

@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 import tmt
 
 from ...case import Case
 from ...engines import LABELS, Engine, Method, one_of_each_scheme
-from ...truth.linear import of_kind
+from ...judge.scale import gravity_scale
+from ...truth.linear import NEGLIGIBLE, all_of_kind, held
 
 FEW_SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit_midpoint")  # of a quick run, by tmt's names
 
@@ -30,10 +33,12 @@ def implicit_methods(engines: Mapping[str, Engine]) -> tuple[Method, ...]:
 
 
 def free_motion(robot) -> Case | None:
-    """The robot let go at rest at the centre, undamped, under its gravity: a scene of its own if it has one; None: no centre."""
-    centre = of_kind(robot, "centre")
-    if centre is None:
+    """The robot let go at a centre, the first at which it moves: a scene of its own if it has one; None: no centre."""
+    centres = all_of_kind(robot, "centre")
+    if not centres:
         return None
+    least = NEGLIGIBLE * gravity_scale(robot.tree)
+    centre = next((name for name in centres if np.abs(held(robot, name).tau).max() > least), centres[0])
     known = (case for case in robot.cases if case.scene.posture == centre and is_let_go(case))
     return next(known, robot.case(f"{centre}, free", posture=centre))
 

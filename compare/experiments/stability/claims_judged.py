@@ -10,7 +10,7 @@ from .choice import fraction, who
 from .claims import CLEAR_TORQUES, CLEAR_ULPS, NEAREST, VARIANT, ulps_of, watched
 from .departure import check_row, span
 
-ABOUT = 1.0  # s: how near a time is, for "about"
+ABOUT_SO_LATE = 1.0  # s: how near a time is, for "about"
 
 
 def sides(joint: str) -> dict:
@@ -43,7 +43,7 @@ def check_torques(result, robot, torques) -> None:
         if engine == "mujoco":  # of TMT no double need be the bias: compiled code rounds its last sum only once
             result.check(where, "movement under the engine's own bias", own["moved_rad"], 0.0, "rad")
         gone = [row for row in rows if row["observed_s"] is not None]
-        near_claim = sum(abs(row["observed_s"] - claims.left_after) <= ABOUT for row in gone)
+        near_claim = sum(abs(row["observed_s"] - claims.left_after) <= ABOUT_SO_LATE for row in gone)
         off = max((number_or_nan(row["residual_ulps"]) for row in rows), default=np.nan)
         findings += [2 * near_claim > len(rows), bool(off < CLEAR_ULPS)]
         texts.append(torques_in_words(robot, engine, rows, own, near_claim, off))
@@ -52,7 +52,7 @@ def check_torques(result, robot, torques) -> None:
     result.notes.append(
         f"Claim 1, {word}: held at {claims.left} by RK4 at {fraction(claims.duration, claims.dt)} s under each of the "
         f"{len(rows)} torques within one unit in the last place of TMT's. {'. '.join(texts)}. (Reproduced: in both engines "
-        f"more than half leave within {ABOUT:g} s of {claims.left_after:g} s, the residual of the torque is below "
+        f"more than half leave within {ABOUT_SO_LATE:g} s of {claims.left_after:g} s, the residual of the torque is below "
         f"{CLEAR_ULPS} ulps, which is rounding, and the checks of the claim pass: under {CLEAR_ULPS} ulps the residual decides "
         "side and time, under MuJoCo's own bias nothing moves.)"
     )
@@ -67,7 +67,7 @@ def torques_in_words(robot, engine, rows, own, near_claim, off) -> str:
     text = f"{LABELS[engine]}: {len(gone)} leave"
     if gone:
         text += (
-            f", after {span(row['observed_s'] for row in gone)} ({near_claim} within {ABOUT:g} s of "
+            f", after {span(row['observed_s'] for row in gone)} ({near_claim} within {ABOUT_SO_LATE:g} s of "
             f"{robot.claims.left_after:g} s), {' and '.join(by_side)}; {len(gone) - len(against)} of them to the side to which "
             f"the residual of the torque, at most {off:.3g} ulps, pushes the unstable mode"
         )

@@ -9,7 +9,7 @@ import tmt
 
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
-from ...truth.linear import Held
+from ...truth.linear import NEGLIGIBLE, Held
 from .choice import who
 
 LONGEST_DEPARTURE = 12.0  # s
@@ -66,9 +66,13 @@ def variants(tau: np.ndarray, reach: int = 1) -> np.ndarray:
 
 
 def offset(at, off) -> np.ndarray:
-    """How far the posture is from the equilibrium of the held torque plus a small torque, rad and N m (k, n)."""
+    """How far the posture is from the equilibrium of the held torque plus a small torque, rad and N m (k, n).
+
+    A torque along a mode without stiffness has no equilibrium, and is too small to matter.
+    """
     n = len(at.q)
-    return np.linalg.solve(at.matrix[n:, :n], np.linalg.solve(tmt.mass_matrix(at.q, at.tree), np.transpose(off))).T
+    accelerations = np.linalg.solve(tmt.mass_matrix(at.q, at.tree), np.transpose(off))
+    return (np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2) @ accelerations).T
 
 
 def predicted(at, scheme, dt, moved, off, longest=LONGEST_DEPARTURE, rounded=True) -> list[float | None]:

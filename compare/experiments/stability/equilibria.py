@@ -17,7 +17,7 @@ FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
 )  # s, of steps whose amplification is compared; the second with much damping
 
 
-def equilibria(result, setup) -> None:
+def check_equilibria(result, setup) -> None:
     """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
     robot, mujoco, table = setup.robot, setup.engines["mujoco"], []
     least, some, much = DAMPINGS

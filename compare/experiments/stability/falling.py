@@ -23,7 +23,7 @@ LONGEST_FALL = 1000.0  # s: a cubic coefficient that lets the smallest start sta
 def without_law(at: Held) -> str | None:
     """Why a marginal posture is not left by the law of a cubic potential, or None."""
     frequencies = np.abs(at.modes[0])
-    soft = int((frequencies < NEGLIGIBLE * frequencies.max()).sum()) // 2
+    soft = int((frequencies <= NEGLIGIBLE * frequencies.max()).sum()) // 2
     if soft != 1:
         return f"{soft} of its modes have no stiffness"
     slope = cubic(at)[1]

@@ -42,7 +42,7 @@ def times(result, robot):
                 )
             else:
                 ax.plot(p, observed, next(marks), color="black", label=f"{LABELS[engine]} {method}")
-        ax.axvspan(1e-15, 3e-13, color=GREY, alpha=0.15)
+        ax.axvspan(1e-15, 3e-13, color=(GREY, 0.15))
         ax.set(xscale="log", xlim=(1e-15, 3e-2), ylim=(0, None), title=f"dt = {step_text(coarse, dt)} s")
         ax.set_xticks([1e-14, 1e-11, 1e-8, 1e-5])
     axes[0].set_ylabel(f"time until a hinge is {LEFT:g} rad away, s")

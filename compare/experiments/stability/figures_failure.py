@@ -10,7 +10,7 @@ from ...truth.linear import of_kind
 from .choice import capital, coarsest, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
 from .figures_limits import look
-from .limits import SMALL_DEVIATION
+from .limits import LINEAR_DEVIATION
 
 
 def edge(result, robot):
@@ -43,7 +43,7 @@ def edge(result, robot):
         next(iter(near.values()))[0],
         ":",
         color="black",
-        label=f"{next(iter(near)).label}, from {SMALL_DEVIATION:g} rad",
+        label=f"{next(iter(near)).label}, from {LINEAR_DEVIATION:g} rad",
     )
     ax.set(
         xlabel="ω dt",
@@ -58,8 +58,8 @@ def edge(result, robot):
     )
     caption = (
         f"The nonlinear edge at {of_kind(robot, 'centre')}. Above: growth over ω dt and the size of the perturbation; the linear "
-        "limit is 2. Below: near √3, where a swing takes three steps. The largest growth there in "
-        f"{close['steps']} steps, from {SMALL_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {worst}. Divergence is drawn at 1e9."
+        f"limit is 2. Below: near √3, where a swing takes three steps. The largest growth there in {close['steps']} steps, "
+        f"from {LINEAR_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {worst}. Divergence is drawn at 1e9."
     )
     return "stability_edge", fig, caption
 

@@ -9,7 +9,7 @@ from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...truth.linear import all_of_kind, of_kind
 from .choice import coarsest, damped, fraction
 from .departure import span
-from .limits import SMALL_DEVIATION, apart
+from .limits import LINEAR_DEVIATION, apart
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),
@@ -81,7 +81,7 @@ def limits(result, robot):
     expected = [row for row in rows if row["limit"] == "finite"]
     off = [apart(row) for row in expected if apart(row) is not None]
     caption = (
-        f"The largest dt at which no mode of the equations of motion grows in a run from {SMALL_DEVIATION:g} rad, found by "
+        f"The largest dt at which no mode of the equations of motion grows in a run from {LINEAR_DEVIATION:g} rad, found by "
         "bisection, beside the limit predicted from the amplification of one step. "
         f"{len(off)} of {len(expected)} predicted limits are observed"
         + (
@@ -181,7 +181,7 @@ def growth_map(result, robot):
     bar.ax.minorticks_off()
     fig.legend(loc="outside upper center")
     caption = (
-        f"How much a perturbation of {SMALL_DEVIATION:g} rad grows at {centre}, {damped(robot, 0.0)}, in {steps} steps, at "
+        f"How much a perturbation of {LINEAR_DEVIATION:g} rad grows at {centre}, {damped(robot, 0.0)}, in {steps} steps, at "
         f"{len(dts)} values of dt, {100 * (dts[1] / dts[0] - 1):.1f} % apart. {map_in_words(by_method, dts, allowed, limit)}"
     )
     return "stability_map", fig, caption

@@ -9,7 +9,7 @@ from ...judge.run import deviation, number_or_none
 from ...truth.linear import Held
 from .choice import damped, who
 
-SMALL_DEVIATION = 1e-6  # rad, at the start
+LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
 GROWTH_MARGIN = 1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
@@ -52,7 +52,7 @@ def examine(
     return {"rows": rows, "growths": growths}
 
 
-def growth(method, engines, at, direction, dt, size=SMALL_DEVIATION, steps=GROWTH_STEPS) -> float:
+def growth(method, engines, at, direction, dt, size=LINEAR_DEVIATION, steps=GROWTH_STEPS) -> float:
     """The largest deviation of a run over that at its start, which is size x direction, rad; inf if it diverged."""
     dynamics, start = engines[method.engine].of(at.case), at.q + size * direction
     with np.errstate(over="ignore", invalid="ignore"):
@@ -92,7 +92,7 @@ def shares(method, engines, at, dt, steps) -> tuple[np.ndarray, np.ndarray]:
     vectors = vectors / vectors[np.argmax(np.abs(vectors[:n]), axis=0), np.arange(2 * n)]
     swings = values.imag[values.imag > 1e-3]
     quarter = max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))) if len(swings) else 0)
-    start = SMALL_DEVIATION * vectors.sum(axis=1).real / (2 * n)
+    start = LINEAR_DEVIATION * vectors.sum(axis=1).real / (2 * n)
     weight = np.hanning(quarter + 2)[1:-1]
     weight /= weight.sum()
     dynamics = engines[method.engine].of(at.case)
@@ -157,8 +157,7 @@ def check_limits(result, robot, parts) -> None:
     growths = [row for part in parts for row in part["growths"]]
     for row in growths:
         where, off = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s", row.pop("total_off")
-        quantity = f"growth in {row['steps']} steps, observed / predicted - 1"
-        result.check(where, quantity, off, GROWTH_TOLERANCE, "")
+        result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
     result.tables["stability_growth"] = growths
     result.notes[:0] = limits_in_words(robot, result.rows)
     result.notes += growth_in_words(growths)

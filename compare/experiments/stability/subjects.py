@@ -25,7 +25,7 @@ class Subjects(NamedTuple):
     left_out: tuple[str, ...]  # what is left out, and why, in sentences
 
 
-def subjects(robot) -> Subjects:
+def subjects_of(robot) -> Subjects:
     """What is looked at of a robot."""
     centres, saddles = all_of_kind(robot, "centre"), all_of_kind(robot, "saddle")
     centre, saddle = (held(robot, names[0]) if names else None for names in (centres, saddles))

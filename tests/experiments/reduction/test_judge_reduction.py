@@ -86,7 +86,9 @@ def order_passes(*values):
 def test_the_order_is_that_of_the_finest_steps_above_rounding():
     assert order_passes(1.0, 0.9, 2.0**4 * 1e-9, 1e-9, 9e-12) == [True]
     assert order_passes(1.0, 2.0**-4, 0.9e-9, 0.8e-9, 9e-12) == [False]
-    assert order_passes(2.0**4 * 1e-9, 1e-9, 9e-12, 1.1e-11, 2e-11) == [True]  # rounding that grows is no error of the method
+    assert order_passes(2.0**4 * 1e-9, 1e-9, 9e-12, 1.1e-11, 2e-11) == [
+        True
+    ]  # rounding that grows is no error of the method
 
 
 def test_an_order_that_rounding_hides_is_not_measured_and_a_run_without_an_end_fails():
@@ -104,9 +106,7 @@ def test_what_exerts_no_force_leaves_the_bits_and_what_is_pushed_does_not():
     names = {"minimal": additions.MINIMAL, "again": additions.AGAIN, "motor": "a motor", "floor": FLOOR}
 
     def judged(pushed=(FLOOR,), **same):
-        rows = [
-            {"added": name, "integrator": "RK4", "same_bits": same.get(key, True)} for key, name in names.items()
-        ]
+        rows = [{"added": name, "integrator": "RK4", "same_bits": same.get(key, True)} for key, name in names.items()]
         return verdicts(cost.check_bits, "bent, free", rows, {(name, "RK4") for name in pushed})
 
     motor, floor = "the same bits with a motor", f"another motion with {FLOOR}"

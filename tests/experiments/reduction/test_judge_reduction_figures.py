@@ -133,6 +133,19 @@ def test_the_figures_of_known_motions_say_what_was_measured():
     assert "half the difference" in figures_motion.small_oscillations(result, ARM)[2]
 
 
+def test_any_name_of_a_scene_is_drawn_as_it_is_and_gives_a_plain_file_name(tmp_path):
+    scene = "to / $5 and $6_x^"
+    _, fig, caption = figures_needs.needs(
+        Result("reduction", curves={"needs": {scene: {"locked": (), "stays": JOINTS[:1]}}}), ARM
+    )
+    fig.savefig(tmp_path / "needs.png")
+    assert f"proved, for {scene}." in caption
+    errors = {(engine, i): [1e-3] * 6 for engine in ("tmt", "mujoco") for i in ("RK4", "Euler")}
+    swing = {"dt": 0.02 / 2.0 ** np.arange(6), "errors": errors, "orders": {}, "stated": {"RK4": 4, "Euler": 1}}
+    name, fig, _ = figures_motion.swing(Result("reduction", curves={"swings": {scene: swing}}), scene)
+    assert name == "reduction_to_5_and_6_x_" and not fig.axes[0].texts  # no order is measured
+
+
 def test_an_empty_section_has_no_figures_and_none_raises():
     empty = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}}, tables={"cost_in_mujoco": []})
     assert len(list(reduction.figures(Result("reduction", curves={"swings": {}}), ARM))) == 0

@@ -40,14 +40,21 @@ def test_a_model_with_additions_takes_a_scenes_changes_but_no_locked_joint(mujoc
 def test_sizes_follow_the_robot_and_its_base():
     assert cost.sizes(ARM.tree) == (0.03, -0.4, -2.0)
     big = dataclasses.replace(
-        ARM.tree, offset=2.0 * np.array(ARM.tree.offset) + [[0, 0, 1.5], [0, 0, 0], [0, 0, 0]], com=2.0 * np.array(ARM.tree.com)
+        ARM.tree,
+        offset=2.0 * np.array(ARM.tree.offset) + [[0, 0, 1.5], [0, 0, 0], [0, 0, 0]],
+        com=2.0 * np.array(ARM.tree.com),
     )
     assert cost.sizes(big) == (0.06, 1.5 - 0.8, 1.5 - 4.0)
 
 
 def test_the_fall_is_the_regular_scene_else_a_free_one_else_a_posture():
     assert cost.fall(ARM).name == "bent, free"
-    scenes = Scene("weightless", gravity=False), Scene("held", torque="hold"), Scene("locked", locked=("beta",)), Scene("free")
+    scenes = (
+        Scene("weightless", gravity=False),
+        Scene("held", torque="hold"),
+        Scene("locked", locked=("beta",)),
+        Scene("free"),
+    )
     assert cost.fall(dataclasses.replace(ARM, scenes=scenes)).name == "free"
     let_go = cost.fall(dataclasses.replace(ARM, scenes=scenes[:-1]))
     assert let_go.scene.posture == "zero" and let_go.is_free

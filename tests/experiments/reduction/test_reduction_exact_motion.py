@@ -81,15 +81,25 @@ def test_the_equilibrium_is_the_lowest_that_is_stable():
     down, up = (0, 0, 0), (180, 0, 0)
     assert exact_motion.equilibrium(another(CHAIN, up=up, bent=(0, 20, 0), down=down)) == "down"
     assert exact_motion.equilibrium(another(CHAIN, up=up, bent=(0, 20, 0))) is None
+    cross = dataclasses.replace(
+        CHAIN, body_hinge=(0, 2)
+    )  # with the first body up the others may hang too, stable but higher
+    assert exact_motion.equilibrium(another(cross, flipped=(180, 180, 0), down=down)) == "down"
+    assert exact_motion.equilibrium(another(cross, flipped=(180, 180, 0), up=up)) == "flipped"
     assert exact_motion.equilibrium(another(dataclasses.replace(CHAIN, damping=(0, 0.1, 0)), down=down)) is None
     assert exact_motion.equilibrium(another(dataclasses.replace(CHAIN, gravity=(0, 0, 0)), down=down)) is None
 
 
 def test_a_robot_without_one_says_why():
-    for tree, says in ((CHAIN, "no named posture is stable"), (dataclasses.replace(CHAIN, damping=(0, 0.1, 0)), "damping")):
+    for tree, says in (
+        (CHAIN, "no named posture is stable"),
+        (dataclasses.replace(CHAIN, damping=(0, 0.1, 0)), "damping"),
+    ):
         result = oscillations(another(tree, up=(180, 0, 0)))
         assert result.checks == [] and "small" not in result.curves
-        assert result.notes[0].startswith("Small oscillations of the double are not compared") and says in result.notes[0]
+        assert (
+            result.notes[0].startswith("Small oscillations of the double are not compared") and says in result.notes[0]
+        )
 
 
 def test_a_motion_is_mirrored_or_half_the_difference_of_two_is_taken():
@@ -99,7 +109,9 @@ def test_a_motion_is_mirrored_or_half_the_difference_of_two_is_taken():
         result = oscillations(another(tree, down=(0, 0, 0)))
         assert [check.passed for check in result.checks] == [True, True], result.checks
         assert {check.scene for check in result.checks} == {"down, TMT", "down, MuJoCo"}
-        assert result.curves["small"]["sides"] == sides and result.notes[0].startswith("About down the linear modes have")
+        assert result.curves["small"]["sides"] == sides and result.notes[0].startswith(
+            "About down the linear modes have"
+        )
         assert result.curves["small"]["duration"] <= 5.0
 
 

@@ -126,8 +126,7 @@ def test_only_the_arms_own_step_is_the_assignments():
 def test_sentences_of_first_order_and_smaller_models():
     rows = known_rows()
     assert (
-        "bent, free: 3.1e-02 rad in 64 ms (Euler, 1024 steps)"
-        in accuracy.first_order_in_words(rows, ["bent, free"])[0]
+        "bent, free: 3.1e-02 rad in 64 ms (Euler, 1024 steps)" in accuracy.first_order_in_words(rows, ["bent, free"])[0]
     )
     assert accuracy.first_order_in_words([], ["bent, free"]) == []
     smaller = row("tmt", "rk4", 1e-3, 64, 0.5e-3, scene="bent, free, beta locked", whole="bent, free")

@@ -5,7 +5,7 @@ from matplotlib.colors import to_hex
 from speed_rows import NS, absent, known_rows
 
 from compare.experiments import speed
-from compare.experiments.speed import advice, evaluations
+from compare.experiments.speed import advice, evaluations, figures_evaluations
 from compare.experiments.speed import figures_times as draw
 from compare.judge.check import Result
 from compare.robots.arm import ARM
@@ -60,7 +60,7 @@ def test_an_engine_that_is_not_there_is_not_drawn():
 
 
 def test_the_bars_are_nanoseconds_of_each_way():
-    _, fig, caption = draw.cost_of_one(drawn_result(), "arm")
+    _, fig, caption = figures_evaluations.cost_of_one(drawn_result(), "arm")
     ax = fig.axes[0]
     names = [label.get_text() for label in ax.get_yticklabels()]
     bars = {name: (bar.get_width(), to_hex(bar.get_facecolor())) for name, bar in zip(names, ax.patches)}
@@ -72,5 +72,5 @@ def test_the_bars_are_nanoseconds_of_each_way():
 def test_an_empty_section_has_no_figures_and_none_raises():
     empty = Result("speed", tables={"evaluations": []})
     assert list(speed.figures(empty, ARM)) == []
-    for draws in (draw.evaluations, draw.energy, lambda result: draw.cost_of_one(result, "arm")):
+    for draws in (draw.evaluations, draw.energy, lambda result: figures_evaluations.cost_of_one(result, "arm")):
         assert len(draws(empty)) == 3

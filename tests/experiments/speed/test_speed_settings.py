@@ -21,7 +21,11 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
     assert settings.regular_of(MINE).name == "bent, free"
     alone = dataclasses.replace(ARM, scenes=(OWN,))
     assert settings.regular_of(alone).name == "my swing"
-    for size, expected in (("full", names), ("quick", ["bent, free", "my swing"]), ("small", ["zero, free", "bent, free"])):
+    for size, expected in (
+        ("full", names),
+        ("quick", ["bent, free", "my swing"]),
+        ("small", ["zero, free", "bent, free"]),
+    ):
         assert [case.name for case in settings.followed(MINE, size)] == expected
         assert [case.name for case in settings.followed(alone, size)] == ["my swing"]
 

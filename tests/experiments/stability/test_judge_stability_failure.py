@@ -1,0 +1,195 @@
+"""The checks of failures beyond the linear limits and of long runs, just inside and just outside of each rule; no runs."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import tmt
+from compare.engines.mujoco.engine import METHODS as INTEGRATORS
+from compare.engines.tmt import Tmt
+from compare.experiments.stability import choice, failure, figures_failure, long_runs
+from compare.judge.check import Result
+from compare.judge.scale import gravity_scale
+from compare.robots.arm import ARM
+
+INSIDE, OUTSIDE = 0.999, 1.001  # of a tolerance
+BOTH = pytest.mark.parametrize("share, passes", [(INSIDE, True), (OUTSIDE, False)])
+IMPLICIT = Tmt().methods["implicit"]
+FREE = choice.free_motion(ARM)
+
+
+@pytest.fixture
+def result():
+    return Result("stability")
+
+
+def only(result) -> bool:
+    """Whether the one check of a result passes."""
+    (check,) = result.checks
+    return check.passed
+
+
+@pytest.mark.parametrize(
+    "small, large, passes",
+    [
+        (99.0, 101.0, (True, True)),
+        (101.0, 99.0, (False, False)),
+        (2.0, np.inf, (True, True)),
+        (np.inf, 1e7, (False, True)),
+    ],
+)
+def test_growth_at_the_resonance(result, small, large, passes):
+    grown = np.array([[1.0, small], [1.0, large]])
+    failure.check_near(result, ARM, "bent", {"steps": 2000, "grown": {INTEGRATORS["implicit"]: grown}})
+    assert tuple(check.passed for check in result.checks) == passes
+
+
+def test_where_a_robot_is_not_known_to_resonate_only_small_deviations_are_judged(result):
+    grown = np.array([[1.0, 101.0], [1.0, 1.0]])
+    failure.check_near(result, ARM, "hanging", {"steps": 2000, "grown": {INTEGRATORS["implicit"]: grown}})
+    assert not only(result)
+
+
+def silent_run(since=1.0, caught=1.0, warnings=0, resets=0, definite=-0.5):
+    return {
+        "t": np.array([0.0, 1.0, 2.0]), "energy": np.zeros(3), "clock": np.arange(3.0), "warnings": warnings, "range": 18.8,
+        "gain": 30.0, "since_s": since, "caught_in_it_s": caught, "resets": resets, "caught_at_s": caught, "finite": True,
+        "first_reset_s": 1.5 if resets else None, "after_q": np.zeros(3), "smallest": np.zeros(3),
+        "definite": {64: definite, 128: 0.1}, "case": FREE,
+    }  # fmt: skip
+
+
+@BOTH
+def test_a_silent_failure_is_caught_within_a_step(result, share, passes):
+    failure.check_silent(result, silent_run(None, None), silent_run(1.0, 1.0 + share * 5 / 64))
+    assert only(result) is passes
+
+
+def test_a_silent_failure_that_is_not_caught_fails(result):
+    failure.check_silent(result, silent_run(1.0, None, resets=1), silent_run(None, None))
+    assert not only(result) and "It starts again once, first at 1.50 s" in result.notes[0]
+
+
+def test_where_nothing_fails_nothing_has_to_be_caught(result):
+    failure.check_silent(result, silent_run(None, None), silent_run(None, None, definite=0.0123))
+    assert not result.checks
+    assert "it never starts again, and no failure is silent" in result.notes[0]
+    assert "No failure" in result.notes[1] and "stays definite" in result.notes[1] and "0.0123" in result.notes[1]
+
+
+@pytest.mark.parametrize("definite, word", [(-1e-9, "loses definiteness"), (1e-9, "stays definite")])
+def test_definiteness_is_the_sign_of_an_eigenvalue(definite, word):
+    assert word in failure.gain_in_words(silent_run(definite=definite))
+
+
+def run_with_gain(share):
+    """A free run from the centre that gains a share of the physical bound on its energy as motion in its second state."""
+    q, qd = FREE.start
+    rate = np.sqrt(2.0 * share * 2.0 * gravity_scale(ARM.tree) / tmt.mass_matrix(q)[0, 0])
+    return {"q": np.array([q, q, q]), "qd": np.array([qd, [rate, 0.0, 0.0], qd]), "time": np.arange(3.0), "warnings": 0}
+
+
+@pytest.mark.parametrize("share, found", [(INSIDE, None), (1.001, 1.0)])
+def test_energy_gives_a_failure_away(share, found):
+    t, run = np.arange(3.0), run_with_gain(share)
+    assert failure.caught(FREE, t, run) == found
+    seen = failure.observed(FREE, t, run)
+    assert seen["since_s"] == seen["caught_in_it_s"] == found
+    assert seen["gain"] == pytest.approx(share * seen["range"], rel=1e-3)
+
+
+def test_the_range_of_the_potential_is_found_from_any_postures():
+    """The arm's is from hanging to upright, twice the sum of m g reach; one bent posture leads to both."""
+    one = dataclasses.replace(ARM, postures={"bent": ARM.postures["bent"]}, scenes=()).case("one", posture="bent")
+    assert failure.potential_range(FREE) == pytest.approx(2.0 * gravity_scale(ARM.tree), rel=1e-12)
+    assert failure.potential_range(one) == pytest.approx(failure.potential_range(FREE), rel=1e-9)
+
+
+def test_a_clock_that_goes_back_gives_a_failure_away():
+    run = run_with_gain(0.5) | {"time": np.array([0.0, 1.0, 0.0])}
+    assert failure.caught(FREE, np.arange(3.0), run) == 2.0
+    assert failure.observed(FREE, np.arange(3.0), run)["since_s"] == 2.0
+
+
+def test_a_failure_is_caught_at_the_first_of_its_signs():
+    """A clock that goes back, and more energy than the arm can have: whichever comes first."""
+    t, still = np.arange(5.0), np.tile(FREE.q, (5, 1))
+    for back, fast, first in ((3, 2, 2.0), (2, 3, 2.0), (None, 3, 3.0), (4, None, 4.0), (None, None, None)):
+        time, qd = np.arange(5.0), np.zeros((5, 3))
+        if back is not None:
+            time[back:] -= 2.0
+        if fast is not None:
+            qd[fast:] = 1e3
+        assert failure.caught(FREE, t, {"time": time, "q": still, "qd": qd}) == first
+
+
+# long runs
+
+
+@pytest.mark.parametrize("deviations, kind", [(2.99, "bounded"), (3.01, "drifts"), (-3.01, "drifts")])
+def test_energy_drifts_by_three_standard_deviations(deviations, kind):
+    swing = np.tile([1.0, -1.0], 50)  # standard deviation 1
+    off = np.concatenate([swing, np.zeros(300), swing + deviations])
+    assert long_runs.behaviour(off) == (kind, pytest.approx(deviations))
+
+
+def minute(engine, method, kind, scheme="rk4"):
+    ended = 1.0 if kind == "diverges" else None
+    row = {"scene": "bent, free", "engine": engine, "method": method, "dt_s": 0.01, "energy": kind,
+           "largest_j": None if ended else 0.1, "change_j": None if ended else 0.2, "diverged_at_s": ended}  # fmt: skip
+    return {"row": row, "scheme": scheme, "t": np.arange(3.0), "off": np.zeros(3), "seconds": 60.0}
+
+
+@pytest.mark.parametrize("theirs, passes", [("drifts", True), ("bounded", False), ("diverges", False)])
+def test_energy_does_as_by_the_same_scheme(result, theirs, passes):
+    long_runs.check_minutes(result, [minute("tmt", "rk4", "drifts"), minute("mujoco", "RK4", theirs)])
+    assert only(result) is passes and "drifts: rk4 (by +0.2 J)" in result.notes[0]
+
+
+@pytest.mark.parametrize(
+    "found, rate, words",
+    [
+        (200, 1e200, ("never up to 2 s", "It finds every stage")),
+        (100, 0.99e100, ("fails from 2 s", "before none of them do rates overflow")),
+        (100, 1.01e100, ("fails from 2 s", "the rates are beyond 1e+100 rad/s in 1")),
+        (100, None, ("fails from 2 s",)),
+    ],
+)
+def test_what_ends_newtons_method(result, found, rate, words):
+    rows = [
+        {"method": "implicit_midpoint", "motion": "free", "dt_s": dt, "steps_found": steps, "last_rad_per_s": last,
+         "steps": 200} for dt, steps, last in ((1.0, 200, 5.0), (2.0, found, rate))
+    ]  # fmt: skip
+    long_runs.check_newton(result, "bent", [rows])
+    assert all(text in result.notes[0] for text in words)
+
+
+# figures: the right engine with the right number
+
+
+def test_edge_names_each_engine_with_its_growth(result):
+    near = {
+        IMPLICIT: np.array([[1.5], [200.0]]),
+        INTEGRATORS["implicit"]: np.array([[2.5], [np.inf]]),
+    }
+    result.curves["near"] = {
+        "x": np.array([1.7, 1.75]),
+        "steps": 2000,
+        "grown": {k: v.repeat(2, 1) for k, v in near.items()},
+    }
+    result.curves["edge"] = {"x": np.array([1.0, 2.0]), "y": np.array([1e-3, 1e-2]), "steps": 2000,
+                             "grown": {IMPLICIT: np.ones((2, 2))}}  # fmt: skip
+    caption = figures_failure.edge(result, ARM)[2]
+    assert "TMT implicit 1.50-fold and 200.00-fold; MuJoCo implicit 2.50-fold and diverges" in caption
+
+
+def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
+    runs = [minute("tmt", "rk4", "drifts"), minute("mujoco", "RK4", "drifts")]
+    for run, size in zip(runs, (0.1, 0.2)):
+        run["t"], run["off"] = np.arange(60.0), np.full(60, size)
+    result.curves |= {"minutes": runs, "silent": {"gain": {"range": 18.8}}}
+    _, fig, caption = figures_failure.minutes(result, ARM)
+    drawn = {line.get_label(): (line.get_marker(), line.get_ydata()[0]) for line in fig.axes[0].lines}
+    assert drawn == {"RK4": ("None", 0.1), "MuJoCo, same scheme": ("o", 0.2)}
+    assert "drifts: RK4" in caption

@@ -1,0 +1,135 @@
+"""The checks of amplification, limits and growth on rows just inside and just outside of each tolerance; no runs."""
+
+import numpy as np
+import pytest
+
+from compare.engines.mujoco.engine import METHODS as INTEGRATORS
+from compare.engines.tmt import Tmt
+from compare.experiments.stability import equilibria, figures_limits, limits
+from compare.judge.check import Result
+from compare.robots.arm import ARM
+
+EPS = 2.0**-52
+INSIDE, OUTSIDE = 0.999, 1.001  # of a tolerance
+BOTH = pytest.mark.parametrize("share, passes", [(INSIDE, True), (OUTSIDE, False)])
+RK4 = Tmt().methods["rk4"]
+
+
+@pytest.fixture
+def result():
+    return Result("stability")
+
+
+def only(result) -> bool:
+    """Whether the one check of a result passes."""
+    (check,) = result.checks
+    return check.passed
+
+
+@BOTH
+def test_amplification_within_the_rounding_of_a_difference_quotient(result, share, passes):
+    ours, q = np.diag([3.0, -7.0]), np.array([1.0, -2.0])
+    theirs = ours + [[0.0, share * 64 * EPS * 3.0 * 7.0 / 1e-6], [0.0, 0.0]]
+    equilibria.check_amplification(result, "", q, ours, theirs)
+    assert only(result) is passes
+
+
+def test_an_amplification_that_is_no_number_fails(result):
+    equilibria.check_amplification(result, "", np.ones(1), np.eye(2), np.full((2, 2), np.nan))
+    assert not only(result)
+
+
+# step limits
+
+
+def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more):
+    return {
+        "scene": "bent", "engine": "tmt", "method": "rk4", "damping": 0.0, "mode_per_s": 9.1, "predicted_dt_s": predicted,
+        "observed_dt_s": observed, "limit": kind, "criterion": "", "seen": seen, **more,
+    }  # fmt: skip
+
+
+def check_limits(result, *rows, growths=()):
+    limits.check_limits(result, ARM, [{"rows": list(rows), "growths": list(growths)}])
+
+
+@BOTH
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("damping", [0.0, 0.5])
+def test_observed_limit_within_a_thousandth(result, share, passes, sign, damping):
+    check_limits(result, limit_row(observed=0.1 * (1 + sign * share * 1e-3), damping=damping))
+    assert only(result) is passes
+
+
+@pytest.mark.parametrize("kind", ["never_fails", "always_fails"])
+@pytest.mark.parametrize("seen", ["never_fails", "always_fails", "finite"])
+def test_kind_of_limit_is_as_predicted(result, kind, seen):
+    check_limits(result, limit_row(None, None, kind, seen))
+    assert only(result) is (kind == seen)
+
+
+def test_a_limit_that_no_run_shows_fails_and_is_said(result):
+    check_limits(result, limit_row(observed=None, seen="never_fails"))
+    assert not only(result) and "In 1 cases the runs show no finite limit" in result.notes[0]
+
+
+def test_the_largest_difference_of_a_limit_is_said():
+    (text,) = limits.limits_in_words(ARM, [limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
+    assert "largest difference: 0.500 % undamped" in text and text.startswith("3 finite limits")
+
+
+@BOTH
+def test_growth_in_all_steps_within_a_thousandth(result, share, passes):
+    row = {"scene": "upright", "engine": "mujoco", "method": "Euler", "dt_s": 0.01, "predicted_growth": 1.1,
+           "observed_growth": 1.1, "steps": 70, "total_off": share * 1e-3}  # fmt: skip
+    check_limits(result, growths=[row])
+    assert only(result) is passes and "total_off" not in row
+
+
+@pytest.mark.parametrize(
+    "early, late, grown",
+    [
+        (1.0, 1.0009, False),
+        (1.0, 1.0011, True),
+        (1e-4, 0.9e-3, False),  # decayed: what is left is rounding
+        (1e-4, 1.1e-3, True),
+        (200.0, 99.0, False),
+        (200.0, 101.0, True),  # it has grown before, and no longer grows
+        (np.nan, np.nan, True),
+    ],
+)
+def test_when_a_deviation_grows(early, late, grown):
+    assert limits.grows(np.array([0.5, early]), np.array([0.4, late])) is grown
+
+
+# figures: the right engine with the right number
+
+
+def test_limits_figure_marks_mujoco_where_mujoco_is(result):
+    check_limits(
+        result,
+        limit_row(0.1, 0.1001),
+        limit_row(0.1, 0.0999, engine="mujoco", method="RK4"),
+        limit_row(None, None, "never_fails", "never_fails", method="implicit_midpoint"),
+        limit_row(0.2, None, method="implicit", seen="never_fails"),
+    )
+    names = ("rk4", "implicit_midpoint", "implicit")
+    result.curves["schemes"] = {("tmt", name): name for name in names} | {("mujoco", "RK4"): "rk4"}
+    _, fig, caption = figures_limits.limits(result, ARM)
+    marks = [line.get_xdata() for line in fig.axes[0].lines if line.get_marker() == "|" and len(line.get_xdata())]
+    assert [float(*x) for x in marks] == [0.0999]
+    ends = sorted(bar.get_x() + bar.get_width() for bar in fig.axes[0].patches if bar.get_y() >= -1)
+    assert ends == pytest.approx([0.1, 0.1001, 0.2])
+    assert "2 of 3 predicted limits are observed" in caption and "at most 0.100 %" in caption
+
+
+def test_map_names_who_grows():
+    dts = np.array([0.1, 0.2, 0.4, 0.8])
+    by_method = {
+        RK4: np.array([1.0, 1.0, 1e3, 1e3]), INTEGRATORS["RK4"]: np.array([1.0, 99.0, 99.0, 99.0]),
+        INTEGRATORS["Euler"]: np.full(4, np.inf), INTEGRATORS["implicit"]: np.array([1.0, 101.0, 1.0, 1.0]),
+    }  # fmt: skip
+    limit = {("tmt", "rk4"): 0.3, ("mujoco", "implicit"): 0.3}
+    text = figures_limits.map_in_words(by_method, dts, 100.0, limit)
+    assert "first at 0.20 to 0.40 s, for 1 of 2" in text
+    assert "At every dt: MuJoCo Euler. At none: MuJoCo RK4." in text
