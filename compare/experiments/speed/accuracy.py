@@ -75,14 +75,17 @@ def true_error(rows, steps) -> dict[str, tuple[float | None, float | None]]:
 
 def true_errors_in_words(rows, steps, robot) -> list[str]:
     """How far from the true motion the runs with the coarsest steps are, in words, for each number of them."""
+    groups = {}
+    for scene, count in steps.items():
+        dt = {row["dt_s"] for row in rows if row["scene"] == scene and row["steps"] == count and row["dt_s"]}
+        whose = "the assignment's" if robot.claims and dt == {robot.claims.dt} else "the coarsest"
+        groups.setdefault((whose, count), {})[scene] = count
     sentences = []
-    for count in dict.fromkeys(steps.values()):
-        errors = true_error(rows, {scene: own for scene, own in steps.items() if own == count})
+    for (whose, count), of_group in groups.items():
+        errors = true_error(rows, of_group)
         if not errors:
             continue
         pairs = "; ".join(f"{scene}: TMT {in_rad(a)}, MuJoCo {in_rad(b)}" for scene, (a, b) in errors.items())
-        dt = {row["dt_s"] for row in rows if row["scene"] in errors and row["steps"] == count}
-        whose = "the assignment's" if robot.claims and dt == {robot.claims.dt} else "the coarsest"
         text = f"At {whose} step, {count} steps of RK4, the worst errors against the true motion are: {pairs}."
         far = {s: pair for s, pair in errors.items() if any(v is None or v > ANOTHER_MOTION for v in pair)}
         alike = [s for s, pair in far.items() if None not in pair and abs(pair[0] - pair[1]) < ALIKE * pair[0]]
