@@ -14,6 +14,7 @@ from ...judge.check import Result
 from ...judge.rounding import growth
 from ...judge.run import diverged_at
 from ...judge.scale import EPS, FACTOR
+from ...robots import Robot
 from ...truth.reference import Reference, committed, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets
@@ -31,7 +32,7 @@ COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluatio
            "energy_error_J", "diverged", "why_not"]  # fmt: skip
 
 
-def claim(robot) -> str:
+def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
     return (
         "Every integrator of MuJoCo and every method of tmt, SciPy and (where it is installed) heyoka comes to the same motion "
@@ -41,7 +42,7 @@ def claim(robot) -> str:
     )
 
 
-def tolerance(robot) -> str:
+def tolerance(robot: Robot) -> str:
     """What errors are, and how they are judged."""
     ours = all(committed(case) for case in scenes_of(robot))
     made = "a table, made again in part by the tests" if ours else "made for what no table has, and kept"
@@ -55,7 +56,7 @@ def tolerance(robot) -> str:
     )
 
 
-def skipped(robot) -> str | None:
+def skipped(robot: Robot) -> str | None:
     """Why it cannot serve a robot, or None."""
     return None if scenes_of(robot) else f"the {robot.name} has no scene that every method follows"
 
@@ -65,14 +66,14 @@ def begin(setup) -> None:
     setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
 
 
-def measured(setup, cases, which="all") -> tuple:
+def measured(setup, cases: list[Case], which: str = "all") -> tuple:
     """The scenes, their references, and for each scene, as it comes, its rows without times and its rounding."""
     known = references(cases, setup.map, setup.tell)
     follow = partial(errors, engines=setup.engines, known=known, size=setup.size, which=which)
     return cases, known, setup.map(follow, cases)
 
 
-def rows(setup, timed=True) -> Result:
+def rows(setup, timed: bool = True) -> Result:
     """Errors, times, orders, floors, and what follows for a choice.
 
     timed=False: only the errors of one scene by MuJoCo's integrators and the same schemes in tmt, and their checks, in a
@@ -140,7 +141,7 @@ def unavailable(setup, names) -> list[dict]:
     ]
 
 
-def errors(case, engines, known, size, which) -> tuple[list[dict], float]:
+def errors(case: Case, engines, known: dict[str, Reference], size: str, which: str) -> tuple[list[dict], float]:
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
