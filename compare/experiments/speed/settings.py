@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from tmt.methods import method_named
 
 from ...case import Case
-from ...engines import GRID, Engine, Method, Setting, one_of_each_scheme
+from ...engines import COMPARED, GRID, Engine, Method, Setting, one_of_each_scheme
 
-COMPARED = ("mujoco", "tmt")  # engines of a quick run
 FINEST = {"mujoco": 2**16, "tmt": 2**18}  # steps beyond which a run would take too long to be timed again and again
 FINEST_RK4, FINEST_IMPLICIT = 2**17, 2**15  # of MuJoCo's RK4; of methods that solve their stages, and of other engines
 EXPONENTS = {  # of the coarsest and of the finest tolerance, 10^-k
@@ -43,7 +42,7 @@ def followed(robot, size: str) -> list[Case]:
 
 
 def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
-    """The engines of a run of this size, unavailable ones too."""
+    """The engines of a run of this size, unavailable ones too; of a quick run the two that are compared."""
     return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ...case import Case
-from ...engines import LABELS, Dynamics, Engine, Method, one_of_each_scheme, same_scheme
+from ...engines import LABELS, Dynamics, Engine, Method, compared, one_of_each_scheme, same_scheme
 from ...judge.check import Result
 from ...judge.run import ORDER_MARGIN
 from ...robots import Robot
@@ -26,8 +26,7 @@ def drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Ma
     # in a scene of a user's own the order need not show in a second
     cases = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
     for case in (case for case in cases if not any(case.tree.damping)):
-        dynamics = {name: engines[name].of(case) for name in ("tmt", "mujoco")}
-        quantities = constants(case)
+        dynamics, quantities = compared(engines, case), constants(case)
         for method in methods:
             for name, of_case in dynamics.items():
                 own = same_scheme(engines, method, name) if name != method.engine else method

@@ -8,7 +8,7 @@ import tmt
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import LABELS, Engine
+from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT
 from ...truth.linear import stiffness
@@ -20,7 +20,7 @@ NEAR_PREDICTION = 2  # steps: so near the time that is predicted from rounding, 
 
 def pushes(case: Case, engines: Mapping[str, Engine]) -> dict[str, np.ndarray]:
     """The acceleration that each engine finds at the start under the torque that is to hold, rad/s2, (n,)."""
-    ours, theirs = (engines[name].of(case) for name in ("tmt", "mujoco"))
+    ours, theirs = compared(engines, case).values()
     return {
         "tmt": ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
         "mujoco": theirs.acceleration(*case.start, case.tau),

@@ -8,7 +8,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import Dynamics, Engine, Method
+from ...engines import Dynamics, Engine, Method, compared
 from ...judge.check import Result
 from ...judge.rounding import band, slope_rounding, step_rounding
 from ...judge.run import departure, deviation_alive, diverged_at, step_in_words
@@ -54,7 +54,7 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
     runs = [(case, steps, *item) for steps in counts(case, finer) for item in schemes.items()]
     if smaller := known[case]:
         runs.append((smaller, smaller.steps, "rk4", schemes["rk4"]))
-    dynamics = {each: {name: engines[name].of(each) for name in ("tmt", "mujoco")} for each in {run[0] for run in runs}}
+    dynamics = {each: compared(engines, each) for each in {run[0] for run in runs}}
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for each, steps, scheme, methods in runs:
             if (each, steps, scheme) not in known:
