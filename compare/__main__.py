@@ -120,6 +120,7 @@ def run(options, command) -> int:
                 from . import experiment
                 from .case import SEED
                 from .report import files, provenance, verdict
+                from .setup import Setup, engines
 
                 workers.submit(experiment.warm_up)
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
@@ -127,9 +128,9 @@ def run(options, command) -> int:
                     raise Refused(f"{options.experiment} cannot serve {robot.name}: {reasons[options.experiment]}")
                 shown = str(path) if options.mjcf else "mjcf/arm.xml"
                 origin = provenance.provenance(command, path, shown, SEED)  # of the model as it was read
-                of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
-                make = experiment.Setup.quick if options.quick else experiment.Setup
-                setup = make(robot, experiment.engines(mujoco), **of_run)
+                of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+                make = Setup.quick if options.quick else Setup
+                setup = make(robot, engines(mujoco), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]

@@ -59,7 +59,7 @@ def key(case: Case) -> str:
     return hashlib.sha256(repr(numbers).encode()).hexdigest()[:16]
 
 
-def references(cases: Sequence[Case], map: Callable = map, tell: Callable = print) -> dict[str, Reference]:
+def references(cases: Sequence[Case], map: Callable = map, progress: Callable = print) -> dict[str, Reference]:
     """Each case's reference by its name: from the committed table, else from the user's cache folder, else computed, and kept."""
     rows = read(TABLE)
     for case in cases:
@@ -69,7 +69,7 @@ def references(cases: Sequence[Case], map: Callable = map, tell: Callable = prin
                 if found and begins(found, case):
                     rows[key(case)] = found
     missing = [case for case in cases if key(case) not in rows]
-    for case, made in zip(missing, remade(missing, map, tell)):
+    for case, made in zip(missing, remade(missing, map, progress)):
         rows[key(case)] = made
         with suppress(*UNUSABLE):
             write(kept(case), made)
@@ -97,7 +97,7 @@ def kept(case: Case) -> Path:
     return own_file(f"reference_{key(case)}.csv")
 
 
-def remade(cases: Sequence[Case], map: Callable, tell: Callable) -> list[list[dict]]:
+def remade(cases: Sequence[Case], map: Callable, progress: Callable) -> list[list[dict]]:
     """The rows of each case, computed: with twice the steps until that changes nothing of importance, at most 2048 in 5 s."""
     runs = {case.name: [] for case in cases}  # (steps, path), each with twice the steps of the one before
     going = list(cases)
@@ -105,7 +105,7 @@ def remade(cases: Sequence[Case], map: Callable, tell: Callable) -> list[list[di
         jobs = [(case, RECORDS, count) for case in going for count in next_counts(case, runs[case.name])]
         for done, ((case, _, count), path) in enumerate(zip(jobs, map(run, jobs)), start=1):
             runs[case.name].append((count, path))
-            tell(f"runs with many digits: {done} of {len(jobs)}, {count} steps")
+            progress(f"runs with many digits: {done} of {len(jobs)}, {count} steps")
         going = [case for case in going if next_counts(case, runs[case.name])]
     return [case_rows(case, runs[case.name]) for case in cases]
 

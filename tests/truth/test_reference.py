@@ -87,11 +87,11 @@ def test_a_changed_scene_gets_a_reference_of_its_own(tmp_path, monkeypatch):
         ("locked", ("beta",)))]  # fmt: skip
     assert len({reference.key(case) for case in (BENT, SHORT, *others)}) == 8
     said = []
-    first = reference.references([SHORT], tell=said.append)[SHORT.name]
+    first = reference.references([SHORT], progress=said.append)[SHORT.name]
     assert said == [f"runs with many digits: {k} of 2, {4 * k} steps" for k in (1, 2)] and first.halving < 1e-20
     assert first.error(path, range(3)).max() < 1e-13
     (kept,) = tmp_path.glob("reference_*.csv")
-    again = reference.references([SHORT], tell=said.append)[SHORT.name]
+    again = reference.references([SHORT], progress=said.append)[SHORT.name]
     assert len(said) == 2 and np.array_equal(first.high, again.high)
     text = kept.read_text(encoding="utf-8")
     kept.write_text(text[:1000], encoding="utf-8")
@@ -99,20 +99,20 @@ def test_a_changed_scene_gets_a_reference_of_its_own(tmp_path, monkeypatch):
     planted = text.replace(next(csv.DictReader(text.splitlines()))["beta_rad"], "0.1")
     assert planted != text
     kept.write_text(planted, encoding="utf-8")  # a run of another start: made anew
-    once_more = reference.references([SHORT], tell=said.append)[SHORT.name]
+    once_more = reference.references([SHORT], progress=said.append)[SHORT.name]
     assert len(said) == 4 and np.array_equal(first.high, once_more.high)
 
     def refuse(*_):
         raise RuntimeError("the folder is not the user's own")
 
     monkeypatch.setattr(reference, "kept", refuse)
-    reference.references([SHORT], tell=said.append)
+    reference.references([SHORT], progress=said.append)
     assert len(said) == 6  # nothing is read there, and nothing written
 
 
 def test_what_is_committed_is_not_computed():
     said = []
-    known = reference.references(list(CASES.values()), tell=said.append)
+    known = reference.references(list(CASES.values()), progress=said.append)
     assert list(known) == list(CASES) and said == []
 
 
@@ -120,7 +120,7 @@ def test_a_scene_with_locked_joints_has_columns_of_its_own(tmp_path, monkeypatch
     monkeypatch.setenv("TMT_CACHE", str(tmp_path))
     monkeypatch.setattr(reference, "RECORDS", 4)
     swing = SHORT.changed(name="swing", locked=("alpha", "beta"))
-    first, again = (reference.references([swing], tell=lambda text: None)["swing"] for _ in range(2))
+    first, again = (reference.references([swing], progress=lambda text: None)["swing"] for _ in range(2))
     assert first.high.shape == (5, 2) and np.array_equal(first.low, again.low)
     (kept,) = tmp_path.glob("reference_*.csv")
     assert (
@@ -163,7 +163,7 @@ def test_a_run_that_does_not_reach_its_end_is_none_and_says_so_in_one_line():
     with pytest.raises(
         ValueError, match=r"scene 'fast': runs with many digits and up to 512 steps do not reach"
     ) as error:
-        reference.references([fast], tell=lambda text: None)
+        reference.references([fast], progress=lambda text: None)
     assert "\n" not in str(error.value)
     assert reference.halving([(64, None), (128, np.zeros(1))]) == np.inf  # a coarse one may fail: finer ones are tried
     assert reference.next_counts(fast, [(64, None), (128, np.zeros(1))]) == [256]

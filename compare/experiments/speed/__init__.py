@@ -67,7 +67,7 @@ def begin(setup) -> None:
 
 def measured(setup, cases, which="all") -> tuple:
     """The scenes, their references, and for each scene, as it comes, its rows without times and its rounding."""
-    known = references(cases, setup.map, setup.tell)
+    known = references(cases, setup.map, setup.progress)
     follow = partial(errors, engines=setup.engines, known=known, size=setup.size, which=which)
     return cases, known, setup.map(follow, cases)
 
@@ -114,11 +114,11 @@ def add_times(result, setup, names, of_scenes) -> None:
     setup.quiet()  # nothing else may run beside a timing
     spread = []
     for name, of_scene in zip(names, of_scenes):
-        setup.tell(f"speed: timing {name}")
+        setup.progress(f"speed: timing {name}")
         spread += fill_in(of_scene, take_times(of_scene, setup))
     floors = result.curves["floors"]
     result.tables["what_should_i_use"] = advice.advice(result.rows, list(floors), floors)
-    setup.tell("speed: one evaluation")
+    setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
     aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
     result.tables["speed_targets"] = aims
