@@ -137,7 +137,8 @@ def called(call: Callable) -> str:
     """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
     more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
     more = [value for value in more if isinstance(value, str)]
-    return " ".join([getattr(getattr(call, "func", call), "__name__", "without a name"), *more])
+    name = getattr(getattr(call, "func", call), "__name__", "without a name")
+    return " ".join([name.removeprefix("draw_"), *more])
 
 
 def warm_up() -> None:

@@ -157,6 +157,6 @@ def component(k: int, count: int) -> str:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_sketch  # matplotlib is for the process that draws
 
-    yield partial(draw.sketch, robot)
+    yield partial(draw_sketch, robot)

@@ -127,9 +127,9 @@ class Result:
                 "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if truth else None,
                 "exact_states": len(known) if truth else None,
                 "worst_state": check.note,
-                "worst_q": numbers(sample.q[worst]),
-                "worst_qd": numbers(sample.qd[worst]),
-                "worst_tau": numbers(sample.tau[worst]),
+                "worst_q": all_digits(sample.q[worst]),
+                "worst_qd": all_digits(sample.qd[worst]),
+                "worst_tau": all_digits(sample.tau[worst]),
                 "passed": check.passed,
             }
         )
@@ -138,7 +138,7 @@ class Result:
         self.shown = AGREEMENT
 
 
-def numbers(values) -> str:
+def all_digits(values) -> str:
     """Numbers with all their digits, for whoever wants to see a state again."""
     return " ".join(repr(float(v)) for v in values)
 

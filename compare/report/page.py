@@ -143,7 +143,7 @@ def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
             f"<p><em>Tolerance:</em> {words(section.tolerance)}</p>",
         ]
         if len(failed):
-            body += ["<p><strong>Checks that fail:</strong></p>", folded(failed, f"{len(failed)} checks")]
+            body += ["<p><strong>Checks that fail:</strong></p>", foldable(failed, f"{len(failed)} checks")]
         for name, caption in section.figures:
             data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
             image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
@@ -151,7 +151,7 @@ def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
         for name, rows in section.tables.items():
             table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
             body += [f"<h3>{heading(name)}</h3>"] if name != section.name else []
-            body += [folded(table, f"Table, {len(table)} rows")] if len(table.columns) else []
+            body += [foldable(table, f"Table, {len(table)} rows")] if len(table.columns) else []
         checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
         body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:
@@ -179,7 +179,7 @@ def words(text) -> str:
     return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
 
 
-def folded(table, summary) -> str:
+def foldable(table, summary) -> str:
     """A table in HTML, folded if it is long."""
     text = html_table(table)
     return f"<details><summary>{summary}</summary>{text}</details>" if len(table) > FOLDED else text

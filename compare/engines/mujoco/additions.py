@@ -7,7 +7,7 @@ import numpy as np
 
 from .dynamics import FLAGS, MujocoDynamics
 from .engine import Mujoco
-from .lock import read
+from .lock import editable
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
 MINIMAL = "nothing (minimal)"
@@ -75,7 +75,7 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
 
 def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     """The engine's model from its file, its contact and constraint stages off, with an edit."""
-    spec = read(engine.source)
+    spec = editable(engine.source)
     spec.option.disableflags |= LEFT_OUT
     edit(spec)
     return Mujoco(spec.compile(), engine.joints, engine.carriers, None)

@@ -8,7 +8,7 @@ from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, file_name
 SWING_LINES = {"RK4": (GREEN, "-"), "Euler": (BLUE, "--")}
 
 
-def swing(result, scene: str):
+def draw_swing(result, scene: str):
     """Error of a swing of one joint against the elliptic function, over the step."""
     dt, errors, orders, stated = (result.curves["swings"][scene][key] for key in ("dt", "errors", "orders", "stated"))
     fig = Figure(figsize=(WIDTH, 3.0), layout="constrained")
@@ -36,7 +36,7 @@ def swing(result, scene: str):
     return file_name("reduction", scene), fig, caption
 
 
-def small_oscillations(result, robot):
+def draw_small_oscillations(result, robot):
     """Distance of small oscillations about an equilibrium from the linear modes, over their amplitude."""
     small = result.curves["small"]
     fig = Figure(figsize=(WIDTH, 2.8), layout="constrained")

@@ -25,7 +25,7 @@ def of_case(result, case: Case, setup, integrators=TWO_INTEGRATORS) -> list:
     result.notes.append(need_in_words(case, need))
     if smaller or stays:
         for integrator in integrators:
-            runs(result, case, smaller, setup, integrator)
+            compare_smaller(result, case, smaller, setup, integrator)
     return models
 
 
@@ -56,7 +56,7 @@ def need_in_words(case: Case, need: Needed) -> str:
     )
 
 
-def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> None:
+def compare_smaller(result, case: Case, smaller: Case | None, setup, integrator: str) -> None:
     """Runs of the case and of the smaller one (None: it stays), by the same method, within the band of rounding."""
     scheme, n, steps = scheme_of(setup.engines, integrator), len(case.joints), FINER_RUNS * case.steps
     dt = case.duration / steps

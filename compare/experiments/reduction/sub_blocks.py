@@ -14,7 +14,7 @@ MOST_SUBSETS = 126  # all of seven joints; of more joints so many are chosen at 
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 
 
-def compare(result, setup, angles: int) -> None:
+def compare_blocks(result, setup, angles: int) -> None:
     """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)

@@ -67,12 +67,12 @@ def settings_of(method: Method, case: Case, size: str = "full", which: str = "al
 
 def halvings(method: Method, case: Case) -> tuple[Setting, ...]:
     """Steps that are halved and halved again: first the scene's own, or a little finer, as the times of reading ask for."""
-    count, finest = coarsest(case), finest_steps(method)
+    count, finest = coarsest_steps(case), finest_steps(method)
     doublings = max(1, (finest // count).bit_length())
     return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
 
 
-def coarsest(case: Case) -> int:
+def coarsest_steps(case: Case) -> int:
     """The least multiple of 64 that is no less than the scene's own number of steps."""
     return -(-case.steps // GRID) * GRID
 

@@ -98,7 +98,7 @@ def predicted(at, scheme, dt, moved, off, longest=LONGEST_DEPARTURE, rounded=Tru
     return times
 
 
-def examine(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
+def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
     """Rows for tables/departure.csv: every method and perturbation at one dt, from one saddle."""
     values, vectors = at.modes
     n, steps = len(at.q), round(LONGEST_DEPARTURE / dt)

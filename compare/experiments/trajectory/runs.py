@@ -59,7 +59,7 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
         for each, steps, scheme, methods in runs:
             if (each, steps, scheme) not in known:
                 known[each, steps, scheme] = tmt_side(each, dynamics[each]["tmt"], steps, scheme)
-            compare(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
+            compare_runs(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
     return result
 
 
@@ -85,7 +85,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     )  # fmt: skip
 
 
-def compare(
+def compare_runs(
     result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
 ) -> None:
     """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step."""

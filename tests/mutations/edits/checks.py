@@ -30,7 +30,7 @@ CHECKS = (
     ("needs", "check_movement", '"movement"'),
     ("reduction", "rows", "LOCKABLE"),
     ("sub_blocks", "check_blocks", "name"),
-    ("trajectory", "compare", '"time judged"'),
+    ("trajectory", "compare_runs", '"time judged"'),
     ("trajectory", "check_divergence", "\"step of divergence, MuJoCo's, is TMT's\""),
     ("trajectory", "check_movement", '"movement"'),
     ("trajectory", "check_same_bits", 'f"the same bits as {_1}"'),

@@ -32,7 +32,7 @@ EDITS = (
     Edit("drift", "OF_EULER", "1e-3", "1e3", "RK4 may drift as Euler does"),
     Edit("sentences", "of_errors", "max(ours, theirs) > SAYS_NOTHING * apart", "False",
          "no agreement is far from the true motion"),
-    Edit("leaving", "cause", "size > may", "False", "whatever pushes is rounding"),
+    Edit("leaving", "cause_in_words", "size > may", "False", "whatever pushes is rounding"),
     Edit("sub_blocks", "check_blocks", "np.argmax(_1)", "np.argmin(_1)", "the best state is judged"),
     Edit("sub_blocks", "check_blocks", "FACTOR * EPS * scale", "100 * FACTOR * EPS * scale", "tolerance x 100"),
     Edit("smallest", "ZERO", "mpmath.mpf(10) ** _1", "mpmath.mpf(10)", "an acceleration below 10 rad/s2 is zero"),
