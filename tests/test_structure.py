@@ -20,7 +20,7 @@ DIRECTIONS = {
     "scene_file": {"case", "robots"},
     "engines": {"tmt", "case"},
     "truth": {"tmt", "case"},
-    "judge": {"tmt"},
+    "judge": {"tmt", "case"},
     "process": set(),
     "report": {"judge", "process"},
     "setup": {"case", "states", "robots", "engines"},

@@ -57,6 +57,11 @@ class Motion(NamedTuple):
     ended: str | np.ndarray | None = None  # when and why a run ended early, or None; of a batch an array of its shape
     steps: int | None = None  # that the method took; None: not known
 
+    @property
+    def states(self) -> np.ndarray:
+        """q and v side by side, (..., times, nq + nv)."""
+        return np.concatenate([self.q, self.v], axis=-1)
+
 
 Prepared = tuple[Callable, Callable[..., Motion]]  # run() and read(what it returned)
 

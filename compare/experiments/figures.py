@@ -13,6 +13,7 @@ from tmt import method
 from ..engines import LABELS
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, gravity_scale
+from ..judge.words import listed
 from ..report.style import BLUE, GREY, ORANGE, RED, WIDTH, joint_lines
 from ..robots import Robot
 
@@ -60,10 +61,9 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
         ax.view_init(elev=ELEVATION, azim=AZIMUTH)
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
     bodies = [f"the {body} ({number})" for number, body in enumerate(robot.tree.body_names, start=1)]
-    of = " and ".join(filter(None, (", ".join(bodies[:-1]), bodies[-1])))
     caption = (
         f"The {robot.name} and its hinges, drawn from the method's own kinematics: {', then '.join(hinges(robot))}. Dots: "
-        f"centres of mass of {of}."
+        f"centres of mass of {listed(bodies)}."
     )
     return robot.name.replace(" ", "_"), fig, caption
 

@@ -110,7 +110,6 @@ def rows(setup) -> Result:
             causes.append(about | {"size": np.inf, "quantity": place})
     for option, value in options(setup.engines["mujoco"], dynamics).items():
         result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
-    result.curves["com"] = compiled["com"]
     result.curves["causes"] = sorted(causes, key=lambda cause: (cause["rank"], -cause["size"]))
     return result
 

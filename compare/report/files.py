@@ -31,7 +31,5 @@ def write(folder, sections, robot, origin, result, causes=(), skipped=()) -> Non
 
 
 def for_csv(table) -> pd.DataFrame:
-    """A table of objects for a CSV file: engines, true and false in small letters, whole numbers beside empty cells."""
-    if "engine" in table:
-        table["engine"] = table["engine"].str.lower()
+    """A table of objects for a CSV file: true and false in small letters, whole numbers beside empty cells."""
     return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)

@@ -9,6 +9,7 @@ from string import Template
 
 import pandas as pd
 
+from ..judge.words import capital
 from .questions import answers
 from .verdict import outcome, passed
 
@@ -28,7 +29,7 @@ def introduction(robot) -> str:
     tree, named = robot.tree, robot.described or robot.name
     bodies, hinges = (in_words(count) for count in (len(tree.body_names), len(tree.hinge_names)))
     return (
-        f"{named[:1].upper()}{named[1:]}, {bodies} rigid bodies on {hinges} hinges, modelled twice: as MJCF, run by MuJoCo, and "
+        f"{capital(named)}, {bodies} rigid bodies on {hinges} hinges, modelled twice: as MJCF, run by MuJoCo, and "
         "by the TMT method in a program that shares nothing with it. Each difference stands beside a tolerance that was "
         "fixed beforehand (column bar); 'exact' is the method in 50-digit arithmetic, and distances from it are in eps = "
         "2.2e-16 of the quantity's scale. Of the states in a row, the largest difference is the largest of all; the worst is "

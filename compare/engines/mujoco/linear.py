@@ -32,8 +32,7 @@ def differenced(dynamics: MujocoDynamics, q, tau, dt, integrator) -> np.ndarray:
     n, ends = len(dynamics.dofs), []
     for sign in (1.0, -1.0):
         start = np.concatenate([q, np.zeros(n)]) + sign * NUDGE * np.eye(2 * n)
-        motion = dynamics.run(start[:, :n], start[:, n:], tau, dt, 1, integrator)
-        ends.append(np.concatenate([motion.q[:, 1], motion.v[:, 1]], axis=1))
+        ends.append(dynamics.run(start[:, :n], start[:, n:], tau, dt, 1, integrator).states[:, 1])
     return (ends[0] - ends[1]).T / (2.0 * NUDGE)
 
 

@@ -38,8 +38,7 @@ def measure_costs(result, setup, rounds: int) -> None:
     paths, touching, pushed = {}, {}, set()
     for name, integrator in runs:
         fallen = *case.start, case.tau, dt, FALL_STEPS, integrator
-        motion = models[name].run(*fallen)
-        paths[name, integrator] = np.concatenate([motion.q, motion.v], axis=1)
+        paths[name, integrator] = models[name].run(*fallen).states
         touching[name, integrator], _ = contacts(models[name], *rest, dt, timed, integrator)
         if name.startswith(CAPSULES) and contacts(models[name], *fallen)[1]:
             pushed.add((name, integrator))

@@ -3,6 +3,7 @@
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, file_name
 
 SWING_LINES = {"RK4": (GREEN, "-"), "Euler": (BLUE, "--")}
@@ -30,7 +31,7 @@ def draw_swing(result, scene: str):
         return f"{integrator}: order {ours} and {theirs}, down to {last[0]:.1e} and {last[1]:.1e} rad"
 
     caption = (
-        f"{scene[0].upper()}{scene[1:]}: distance from the exact motion, an elliptic function of time. TMT and MuJoCo with "
+        f"{capital(scene)}: distance from the exact motion, an elliptic function of time. TMT and MuJoCo with "
         f"{'; '.join(map(found, SWING_LINES))}."
     )
     return file_name("reduction", scene), fig, caption

@@ -8,7 +8,7 @@ import tmt
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import GRID, Method, Setting
+from ...engines import GRID, Dynamics, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.rounding import growth
@@ -144,7 +144,7 @@ def rows_of_scene(case, engines, known, size, which) -> tuple[list[dict], float]
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
-    found, left = [], max(floor(case), reference.halving)
+    found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
     taking = methods(engines, size, which)
     for method in taking:
         best, last = np.inf, 0
@@ -185,18 +185,19 @@ def row_of_run(case: Case, whole: Case, engines, method: Method, setting: Settin
     }  # fmt: skip
 
 
-def floor(case: Case) -> float:
+def floor(case: Case, dynamics: Dynamics) -> float:
     """What rounding leaves of the angles: eps times the largest growth of a small difference up to each time, rad.
 
-    Taken along a run of RK4 with 1024 steps, or as many as the scene needs to be followed at all; ValueError if it cannot be.
+    dynamics: tmt's, whose RK4 is run with 1024 steps, or as many as the scene needs to be followed at all; ValueError if it
+    cannot be.
     """
     first = 16 * GRID * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (16 * GRID)))
     for steps in (first, 4 * first, 16 * first):
         dt = case.duration / steps
-        _, q, qd = tmt.simulate(*case.start, case.tau, dt, steps, "rk4", case.tree)
-        if np.isfinite(q).all():
-            growths = growth(METHODS["rk4"], case.tree, q, qd, case.tau, dt, 16)
-            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(q).max()))
+        motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
+        if np.isfinite(motion.q).all():
+            growths = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, 16)
+            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
     raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")
 
 

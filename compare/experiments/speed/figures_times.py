@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ...engines import LABELS
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name
 
 COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
@@ -104,7 +105,7 @@ def draw_times(result, scene):
     if lost:
         ax.plot([], [], "x", color="black", label="diverged (no error)")
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    caption = f"{scene[0].upper()}{scene[1:]}: {spoken(result, scene)}"
+    caption = f"{capital(scene)}: {spoken(result, scene)}"
     if lost:
         caption += f" {len(lost)} {'settings diverge' if len(lost) > 1 else 'setting diverges'} (crosses at the left)."
     return file_name("speed", scene), fig, caption

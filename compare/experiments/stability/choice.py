@@ -74,8 +74,3 @@ def damped(robot, damping: float) -> str:
     if damping:
         return f"damping {damping:g}"
     return "with its own damping" if any(robot.tree.damping) else "undamped"
-
-
-def capital(text: str) -> str:
-    """A name as the first word of a sentence."""
-    return f"{text[0].upper()}{text[1:]}"

@@ -7,8 +7,9 @@ import numpy as np
 from ...engines import one_of_each_scheme
 from ...engines.mujoco.linear import NUDGE, transition
 from ...judge.scale import EPS, FACTOR
+from ...judge.words import capital
 from ...truth.linear import held, region
-from .choice import capital, coarsest_case
+from .choice import coarsest_case
 from .subjects import DAMPINGS, places
 
 FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (

@@ -5,9 +5,10 @@ from matplotlib.figure import Figure
 
 from ...engines import LABELS
 from ...judge.run import LEFT, number_or_nan
+from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from ...truth.linear import of_kind
-from .choice import capital, coarsest_case, step_text
+from .choice import coarsest_case, step_text
 from .departure import DEPARTURE_TOLERANCE, late, near
 from .figures_limits import look
 

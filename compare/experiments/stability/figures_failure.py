@@ -5,9 +5,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH
 from ...truth.linear import of_kind
-from .choice import capital, coarsest_case, fraction, step_text
+from .choice import coarsest_case, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
 from .figures_limits import look
 from .limits import LINEAR_DEVIATION

@@ -53,10 +53,16 @@ def begin(setup) -> None:
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = setup.of(cases, [], cases)
     duration, steps = setup.of(horizon.GROWTH_RUN, horizon.GROWTH_RUN, horizon.SHORT_GROWTH_RUN)
+    of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
         "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer), cases),
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
-        "growth": (grown, setup.map(partial(horizon.grown, duration=duration, steps=steps), grown), duration, steps),
+        "growth": (
+            grown,
+            setup.map(of_growth, grown),
+            duration,
+            steps,
+        ),
     }
 
 

@@ -8,6 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ...engines import LABELS
 from ...judge.run import step_in_words
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, joint_lines
 from .drift import DRIFT_DURATION, found_order
 from .horizon import GROWN_EARLY, power
@@ -101,7 +102,7 @@ def run_caption(result, case, until) -> str:
     most = f"at most {max(used):.1e}" if used else "no measured part"
     errors = result.curves["errors"].get(case.name)
     return (
-        f"{case.name[0].upper()}{case.name[1:]}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
+        f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
             f"With {case.steps} steps of RK4 TMT is {rad(errors[0])} and MuJoCo {rad(errors[1])} from the true motion. "

@@ -50,17 +50,20 @@ def test_the_smaller_model_has_the_error_of_the_whole_one(engines, known_referen
     assert (whole["whole"], small["whole"], small["scene"]) == (None, "zero, free", "zero, free, beta locked")
 
 
-def test_rounding_leaves_eps_times_the_growth(bent):
+def test_rounding_leaves_eps_times_the_growth(bent, engines):
+    def floor(case):
+        return speed.floor(case, engines["tmt"].of(case))
+
     slow = bent.changed(posture=(), gravity=False, duration=1.0, dt=1 / 64)
-    assert 1.0 <= speed.floor(slow) / np.finfo(float).eps < 3.0  # nothing grows, at rest
-    assert speed.floor(bent) > 10 * speed.floor(slow)
+    assert 1.0 <= floor(slow) / np.finfo(float).eps < 3.0  # nothing grows, at rest
+    assert floor(bent) > 10 * floor(slow)
     fast = bent.changed(speed=(1e7, 1e7, 1e7))
     with pytest.raises(ValueError, match="scene 'bent, free': RK4 with 16384 steps does not reach its end"):
-        speed.floor(fast)
+        floor(fast)
 
 
 def test_where_the_reference_is_not_known_nothing_is_judged(engines, bent, known_reference):
-    for halving, left in ((1e-30, speed.floor(bent)), (1e-6, 1e-6)):
+    for halving, left in ((1e-30, speed.floor(bent, engines["tmt"].of(bent))), (1e-6, 1e-6)):
         known = {"bent, free": known_reference._replace(halving=halving)}
         assert speed.rows_of_scene(bent, engines, known, "small", "same schemes")[1] == left
 

@@ -7,7 +7,7 @@ EDITS = (
     Edit("timing", "in_turns", "time.perf_counter() - begin", "7 * (time.perf_counter() - begin)", "seconds x 7"),
     Edit("speed", "fill_in", "min(of_row)", "7 * min(of_row)", "reported seconds x 7", nth=1),
     Edit("speed", "fill_in", "min(of_row)", "max(of_row)", "the slowest run is reported", nth=1),
-    Edit("speed", "rows_of_scene", "max(floor(case), reference.halving)", "floor(case)",
+    Edit("speed", "rows_of_scene", "max(_1, reference.halving)", "_1",
          "a reference of few digits is taken as exact"),
     Edit("evaluations", "per_state", "1e9 * min(taken) / count", "1e9 * min(taken)", "time of all states as that of one"),
     Edit("truth.reference", "Reference.error", "self.low[_1]", "0 * self.low[_1]", "the low part of the reference is dropped"),
