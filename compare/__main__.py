@@ -6,7 +6,7 @@ from .process import interrupt, streams
 
 if __name__ == "__main__":
     streams.prepare()
-    interrupt.answer()  # before anything that takes its time
+    interrupt.listen()  # before anything that takes its time
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is rendered: no further process looks for a display
 
 import argparse
@@ -78,7 +78,7 @@ def main(arguments=None) -> int:
         parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
     try:
-        return run(options, command)
+        return carry_out(options, command)
     except Refused as error:
         line = str(error)
     except OSError as error:
@@ -98,7 +98,7 @@ class Refused(ValueError):
     """A request that cannot be carried out; the message is one line."""
 
 
-def run(options, command) -> int:
+def carry_out(options, command) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
     from .engines.mujoco import ModelError, load
@@ -106,13 +106,13 @@ def run(options, command) -> int:
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
     from .robots.arm import ARM  # imports are here, so that --help and a wrong word answer at once
-    from .scene_file import SceneError, read
+    from .scene_file import SceneError, read_scenes
 
     terminal = Terminal()
     path = options.mjcf or ARM.mjcf
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        robot = ARM.with_scenes(read(options.scenes, ARM)) if options.scenes else ARM
+        robot = ARM.with_scenes(read_scenes(options.scenes, ARM)) if options.scenes else ARM
         mujoco = load(path, robot.tree)
         before = made_by(options.out)
         with new_report(options.out) as folder:
@@ -120,6 +120,7 @@ def run(options, command) -> int:
                 from . import experiment
                 from .case import SEED
                 from .report import files, provenance, verdict
+                from .setup import Setup, engines
 
                 workers.submit(experiment.warm_up)
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
@@ -127,9 +128,9 @@ def run(options, command) -> int:
                     raise Refused(f"{options.experiment} cannot serve {robot.name}: {reasons[options.experiment]}")
                 shown = str(path) if options.mjcf else "mjcf/arm.xml"
                 origin = provenance.provenance(command, path, shown, SEED)  # of the model as it was read
-                of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
-                make = experiment.Setup.quick if options.quick else experiment.Setup
-                setup = make(robot, experiment.engines(mujoco), **of_run)
+                of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+                make = Setup.quick if options.quick else Setup
+                setup = make(robot, engines(mujoco), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]

@@ -220,11 +220,6 @@ class Case:
         """Of values for all joints those of the free ones."""
         return values[[self.robot.joints.index(name) for name in self.joints]]
 
-    def required(self, scheme: str, dt: float) -> float:
-        """For how long a run must be judged, s: with a step of 0.01 s or more only RK4 is stable that long."""
-        judged = self.duration if self.scene.judged is None else self.scene.judged
-        return judged if scheme == "rk4" or dt < 0.01 else min(judged, 0.3)
-
     def changed(self, **changes) -> "Case":
         """The same robot in a scene with other values."""
         return Case(self.robot, dataclasses.replace(self.scene, **changes))

@@ -20,12 +20,13 @@ DIRECTIONS = {
     "scene_file": {"case", "robots"},
     "engines": {"tmt", "case"},
     "truth": {"tmt", "case"},
-    "judge": {"tmt"},
+    "judge": {"tmt", "case"},
     "process": set(),
     "report": {"judge", "process"},
-    "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots"},
-    "experiment": {"case", "states", "robots", "engines", "judge", "process", "report", "experiments"},
-    "__main__": {"case", "robots", "engines", "scene_file", "process", "report", "experiment", "experiments"},
+    "setup": {"case", "states", "robots", "engines"},
+    "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots", "setup"},
+    "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
+    "__main__": {"case", "robots", "engines", "scene_file", "process", "report", "setup", "experiment", "experiments"},
 }
 
 

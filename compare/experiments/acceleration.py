@@ -102,6 +102,6 @@ def first_momentum(tree: tmt.Tree, q, qd):
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_distances  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states", ["bias", "qdd", "energy", "potential energy"])
+    yield partial(draw_distances, result, "random states", ["bias", "qdd", "energy", "potential energy"])

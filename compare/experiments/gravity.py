@@ -61,7 +61,7 @@ def rows(setup) -> Result:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_distances, draw_holding_torques  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states", ["holding torque"])
-    yield partial(draw.holding_torques, result, robot)
+    yield partial(draw_distances, result, "random states", ["holding torque"])
+    yield partial(draw_holding_torques, result, robot)

@@ -61,6 +61,6 @@ def rows(setup) -> Result:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_distances  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states")
+    yield partial(draw_distances, result, "random states")

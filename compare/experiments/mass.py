@@ -123,8 +123,8 @@ def check_conditioning(result: Result, robot: Robot, label: str, value: float, w
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_condition, draw_distances  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states")
+    yield partial(draw_distances, result, "random states")
     if robot.conditioning:
-        yield partial(draw.condition_map, result, robot)
+        yield partial(draw_condition, result, robot)

@@ -110,7 +110,6 @@ def rows(setup) -> Result:
             causes.append(about | {"size": np.inf, "quantity": place})
     for option, value in options(setup.engines["mujoco"], dynamics).items():
         result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
-    result.curves["com"] = compiled["com"]
     result.curves["causes"] = sorted(causes, key=lambda cause: (cause["rank"], -cause["size"]))
     return result
 
@@ -157,6 +156,6 @@ def component(k: int, count: int) -> str:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_sketch  # matplotlib is for the process that draws
 
-    yield partial(draw.sketch, robot)
+    yield partial(draw_sketch, robot)

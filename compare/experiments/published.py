@@ -12,6 +12,7 @@ from tmt.reference import distance, exact
 from ..engines import Dynamics
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
+from ..judge.words import capital, listed
 from ..robots import Printed, Robot
 
 TITLE = "Published numbers: does either engine contradict the assignment?"
@@ -36,7 +37,7 @@ def claim(robot: Robot) -> str:
     parts = [f"that is {item} to every printed digit{', for TMT too' if by_tmt else ''}" for item, by_tmt in every]
     parts += [f"of {item} it shares the size of {entries}" for item, entries in sizes]
     more = "; ".join(parts)
-    return f"{text} {more[0].upper()}{more[1:]}." if more else text
+    return f"{text} {capital(more)}." if more else text
 
 
 def tolerance(robot: Robot) -> str:
@@ -79,11 +80,6 @@ def angles(robot: Robot) -> list[str]:
         f"{'' if turn.numerator == 1 else f'{turn.numerator} '}pi{'' if turn.denominator == 1 else f'/{turn.denominator}'}"
         for turn in turns
     ]
-
-
-def listed(words: list[str]) -> str:
-    """a, b and c."""
-    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
 
 
 class Answer(NamedTuple):

@@ -32,7 +32,7 @@ class Workers(ThreadPoolExecutor):
     def start(self) -> None:
         """One more process."""
         context = get_context("spawn")
-        with interrupt.held(), deaf():
+        with interrupt.postponed(), deaf():
             here, there = context.Pipe()
             self.processes.append(context.Process(target=serve, args=(there,), daemon=True))
             self.processes[-1].start()

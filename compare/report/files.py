@@ -15,7 +15,7 @@ def write(folder, sections, robot, origin, result, causes=(), skipped=()) -> Non
     (folder / "tables").mkdir()
     for section in sections:
         for name, rows in section.tables.items():
-            save(folder / "tables" / f"{name}.csv", plain(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
+            save(folder / "tables" / f"{name}.csv", for_csv(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
     checks = [check.record() for section in sections for check in section.result.checks]
     save(folder / "report.md", markdown(sections, robot, origin, result, causes, skipped))
     save(folder / "index.html", page(folder, sections, robot, origin, result, causes, skipped))
@@ -30,8 +30,6 @@ def write(folder, sections, robot, origin, result, causes=(), skipped=()) -> Non
     save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
 
 
-def plain(table) -> pd.DataFrame:
-    """A table of objects for a CSV file: engines, true and false in small letters, whole numbers beside empty cells."""
-    if "engine" in table:
-        table["engine"] = table["engine"].str.lower()
+def for_csv(table) -> pd.DataFrame:
+    """A table of objects for a CSV file: true and false in small letters, whole numbers beside empty cells."""
     return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)

@@ -70,11 +70,11 @@ class Work:
             try:
                 self.out.mkdir(parents=True, exist_ok=True)
                 with locked(self.out):
-                    with interrupt.held():
+                    with interrupt.postponed():
                         self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
                         self.lock = lock(self.path)
                     (self.path / "new").mkdir()
-                    clear(self.out)
+                    clear_away(self.out)
                     refuse_foreign(self.out)
                 return
             except OSError as error:
@@ -85,8 +85,8 @@ class Work:
 
     def exchange(self):
         """Move the old report away and the new one in; on an error put everything back."""
-        with locked(self.out), interrupt.held():
-            clear(self.out)
+        with locked(self.out), interrupt.postponed():
+            clear_away(self.out)
             refuse_foreign(self.out)
             new, old, moving = (self.path / name for name in ("new", "old", "moving"))
             try:
@@ -133,7 +133,7 @@ def put_back(work, out) -> None:
         move(work / "old", out)
 
 
-def clear(out) -> None:
+def clear_away(out) -> None:
     """Put back and take away what killed runs have left; the folder of a run that is alive is locked, and stays."""
     for work in sorted(out.glob(".new-*")):
         if is_of_a_run(work):

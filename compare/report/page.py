@@ -9,6 +9,7 @@ from string import Template
 
 import pandas as pd
 
+from ..judge.words import capital
 from .questions import answers
 from .verdict import outcome, passed
 
@@ -28,7 +29,7 @@ def introduction(robot) -> str:
     tree, named = robot.tree, robot.described or robot.name
     bodies, hinges = (in_words(count) for count in (len(tree.body_names), len(tree.hinge_names)))
     return (
-        f"{named[:1].upper()}{named[1:]}, {bodies} rigid bodies on {hinges} hinges, modelled twice: as MJCF, run by MuJoCo, and "
+        f"{capital(named)}, {bodies} rigid bodies on {hinges} hinges, modelled twice: as MJCF, run by MuJoCo, and "
         "by the TMT method in a program that shares nothing with it. Each difference stands beside a tolerance that was "
         "fixed beforehand (column bar); 'exact' is the method in 50-digit arithmetic, and distances from it are in eps = "
         "2.2e-16 of the quantity's scale. Of the states in a row, the largest difference is the largest of all; the worst is "
@@ -143,7 +144,7 @@ def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
             f"<p><em>Tolerance:</em> {words(section.tolerance)}</p>",
         ]
         if len(failed):
-            body += ["<p><strong>Checks that fail:</strong></p>", folded(failed, f"{len(failed)} checks")]
+            body += ["<p><strong>Checks that fail:</strong></p>", foldable(failed, f"{len(failed)} checks")]
         for name, caption in section.figures:
             data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
             image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
@@ -151,7 +152,7 @@ def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
         for name, rows in section.tables.items():
             table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
             body += [f"<h3>{heading(name)}</h3>"] if name != section.name else []
-            body += [folded(table, f"Table, {len(table)} rows")] if len(table.columns) else []
+            body += [foldable(table, f"Table, {len(table)} rows")] if len(table.columns) else []
         checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
         body.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
         if section.result.notes:
@@ -179,7 +180,7 @@ def words(text) -> str:
     return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
 
 
-def folded(table, summary) -> str:
+def foldable(table, summary) -> str:
     """A table in HTML, folded if it is long."""
     text = html_table(table)
     return f"<details><summary>{summary}</summary>{text}</details>" if len(table) > FOLDED else text

@@ -6,21 +6,21 @@ NOTHING = "no result: the experiment broke off"
 def answers(sections, robot) -> list[tuple[str, str, str, str]]:
     """For each part: its letter, what is asked, where it is answered, the answer."""
     results = {section.name: section.result for section in sections}
-    parts = [(q.part, q.asked, q.answered_in, answer(results, *q.answer)) for q in robot.questions]
+    parts = [(q.part, q.asked, q.answered_in, answer_in_words(results, *q.answer)) for q in robot.questions]
     return [*parts, *choice(results)]
 
 
-def answer(results, kind, *of) -> str:
+def answer_in_words(results, kind, *of) -> str:
     """One answer: ("figure", name), ("printed", items ...) or ("largest", experiment, quantity, {column: value}, ...)."""
     if kind == "figure":
         return f"figure '{of[0]}'"
     if kind == "printed":
         return printed(results, of)
-    texts = "; ".join(apart(results, *of[k : k + 3]) for k in range(0, len(of), 3))
+    texts = "; ".join(apart_in_words(results, *of[k : k + 3]) for k in range(0, len(of), 3))
     return texts + far_from_true(results) if "trajectory" in of else texts
 
 
-def apart(results, name, quantity, where) -> str:
+def apart_in_words(results, name, quantity, where) -> str:
     """How far the engines are apart in an experiment at most: of the rows with these values, or of this quantity."""
     if name not in results:
         return "not run"

@@ -77,6 +77,11 @@ class Held:
         return {}
 
     @cached_property
+    def mass_matrix(self) -> np.ndarray:
+        """Mbar, kg m2, (n, n)."""
+        return tmt.mass_matrix(self.q, self.tree)
+
+    @cached_property
     def matrix(self) -> np.ndarray:
         """d(qd, qdd)/d(q, qd), (2n, 2n): exact derivatives of the right-hand side of TMT, by dual numbers."""
         n = len(self.q)

@@ -26,7 +26,7 @@ def test_a_report_of_sections_without_rows_is_written_and_says_so(tmp_path):
 
 def test_results_say_what_was_found(tmp_path):
     (tmp_path / "figures").mkdir()
-    sections = [section("mass", GOOD, BAD, rows=[{"a": 1.25, "engine": "TMT", "ok": True}], extra=[{"b": 1 / 3}])]
+    sections = [section("mass", GOOD, BAD, rows=[{"a": 1.25, "engine": "tmt", "ok": True}], extra=[{"b": 1 / 3}])]
     text = verdict.verdict(sections, 1, [CAUSE])
     assert text == (
         "The two models do not agree: 1 of 2 checks fail. Cause: mass of forearm: stated 1. "

@@ -11,7 +11,8 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from .dynamics import FLAGS, INTEGRATORS, MujocoDynamics
+from .. import rows_of_states
+from .dynamics import FLAGS, MujocoDynamics
 
 TINY_STEP = 1e-9  # s: a loop of steps stays where it starts
 
@@ -32,9 +33,7 @@ class MinimalCalls:
 
     def __init__(self, dynamics: MujocoDynamics):
         self.coordinates, self.qpos, self.dofs = dynamics.coordinates, dynamics.qpos, dynamics.dofs
-        self.model = mujoco.MjModel.__copy__(dynamics.model)
-        self.data = mujoco.MjData(self.model)
-        self.model.opt.integrator, self.model.opt.timestep = INTEGRATORS["RK4"], TINY_STEP
+        self.model, self.data = dynamics.own_copy(TINY_STEP, "RK4")
         self.model.opt.disableflags |= int(FLAGS["contact"]) | int(FLAGS["constraint"])
         self.force, self.solution = np.zeros((2, self.model.nv))
         self.functions = functions(library())
@@ -105,8 +104,7 @@ class MinimalCalls:
 
     def each(self, read, q, v, tau) -> np.ndarray:
         """read() after the calls that give M and h, at each state, stacked to the batch shape of the states."""
-        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
-        states = (np.broadcast_to(a, shape).reshape(-1, shape[-1]) for a in (q, v, tau))
+        batch, states = rows_of_states(q, v, tau)
         values = []
         for state in zip(*states):
             self.place(*state)
@@ -114,7 +112,7 @@ class MinimalCalls:
                 self.functions[name](*self.addresses)
             self.functions["mj_rne"](*self.addresses, 0, self.force.ctypes.data)
             values.append(np.array(read()))
-        return np.array(values).reshape(*shape[:-1], *values[0].shape)
+        return np.array(values).reshape(*batch, *values[0].shape)
 
 
 BEFORE_RNE = ("mj_kinematics", "mj_comPos", "mass matrix", "mj_comVel")  # before mj_rne, in this order

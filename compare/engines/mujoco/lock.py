@@ -25,7 +25,7 @@ def name_of(source) -> str:
     return str(source) if isinstance(source, Path) else "the text"
 
 
-def read(source) -> mujoco.MjSpec:
+def editable(source) -> mujoco.MjSpec:
     """The editable form of a file (a Path) or of MJCF text."""
     return (
         mujoco.MjSpec.from_file(os.fsencode(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
@@ -43,7 +43,7 @@ def locked_model(source, angles: dict) -> mujoco.MjModel:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-            return compiled_without(read(source), angles)
+            return compiled_without(editable(source), angles)
     except ValueError as error:
         raise ModelError(f"MuJoCo cannot compile {name_of(source)} with {', '.join(angles)} locked: {error}") from None
 
@@ -72,7 +72,7 @@ def compiled_without(spec, angles) -> mujoco.MjModel:
                 turn, back = np.zeros((2, 4))
                 mujoco.mju_axisAngle2Quat(turn, joint.axis, angle)
                 mujoco.mju_negQuat(back, turn)
-                frame = placed(*frame, joint.pos - turned(joint.pos, turn)), times(frame[1], turn)
+                frame = placed(*frame, joint.pos - turned(joint.pos, turn)), product(frame[1], turn)
                 moved = [
                     (name, joint.pos + turned(pos - joint.pos, back), turned(axis, back)) for name, pos, axis in moved
                 ]
@@ -103,7 +103,7 @@ def turned(vector, quat):
     return result
 
 
-def times(first, second):
+def product(first, second):
     """The product of two quaternions."""
     result = np.zeros(4)
     mujoco.mju_mulQuat(result, first, second)

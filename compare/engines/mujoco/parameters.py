@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 
-from .dynamics import FLAGS
+from .dynamics import FLAGS, MujocoDynamics
+from .engine import Mujoco
 
 STATED_FLAGS = {  # flags that the equations of motion depend on, by the names that MuJoCo's versions give them
     "flag gravity": ("GRAVITY",),
@@ -12,17 +13,17 @@ STATED_FLAGS = {  # flags that the equations of motion depend on, by the names t
 }
 
 
-def parameters(dynamics) -> dict:
+def parameters(dynamics: MujocoDynamics) -> dict:
     """What the compiler made of the file: arrays per hinge, per body, or one number of the file, in world axes.
 
     Read in the file's own configuration (qpos0): there every frame lies as the file says, whatever a hinge's `ref` is.
     """
     m, d = dynamics.model, dynamics.data
-    dynamics._at(m.qpos0[dynamics.qpos])
+    dynamics.forward(m.qpos0[dynamics.qpos])
     anchors = d.xanchor[dynamics.joints].copy()
     carrier = [int(m.jnt_bodyid[j]) for j in dynamics.joints]
     last = [max(i for i, owner in enumerate(carrier) if owner == body) for body in dynamics.bodies]
-    turns = dynamics._turns(d.ximat)
+    turns = dynamics.turns(d.ximat)
     return {
         **{name: float(not m.opt.disableflags & bit(members)) for name, members in STATED_FLAGS.items()},
         **absent(m),
@@ -48,7 +49,7 @@ def parameters(dynamics) -> dict:
     }
 
 
-def parents(m) -> np.ndarray:
+def parents(m: mujoco.MjModel) -> np.ndarray:
     """For each hinge, in the order of the file, the place of the hinge that it hangs on, -1: the world; (njnt,)."""
     found = []
     for j, body in enumerate(m.jnt_bodyid):
@@ -61,7 +62,7 @@ def parents(m) -> np.ndarray:
     return np.array(found)
 
 
-def absent(m) -> dict:
+def absent(m: mujoco.MjModel) -> dict:
     """What the method does not have, and no force at random states need show: sums of what there is of it."""
     names = {"damping beyond linear": "dof_dampingpoly", "stiffness beyond linear": "jnt_stiffnesspoly",
              "actuator damping": "actuator_damping", "actuator armature": "actuator_armature"}  # fmt: skip
@@ -70,7 +71,7 @@ def absent(m) -> dict:
     return sums | {"contact pairs": 0.0 if m.opt.disableflags & stages else float(contact_pairs(m))}
 
 
-def contact_pairs(m) -> int:
+def contact_pairs(m: mujoco.MjModel) -> int:
     """How many pairs of geoms may touch, as MuJoCo chooses them: of two bodies that move against each other."""
     count, weld = m.npair, m.body_weldid
     parent_filter = not m.opt.disableflags & bit(("FILTERPARENT",))
@@ -94,7 +95,7 @@ def bit(members) -> int:
     return 0
 
 
-def options(engine, dynamics) -> dict:
+def options(engine: Mujoco, dynamics: MujocoDynamics) -> dict:
     """Flags, integrator and counts that say what else the file asks of MuJoCo."""
     m = dynamics.model
     flags = {f"flag {name}": "enable" if dynamics.enabled(name) else "disable" for name in FLAGS if name != "gravity"}

@@ -17,7 +17,7 @@ KINDS_OF_JOINT = {
 TIME_MARKS = {"tmt": (-0.15, {"marker": "o", "color": GREEN}), "mujoco": (0.15, {"marker": "s", "color": ORANGE})}
 
 
-def needs(result, robot):
+def draw_needs(result, robot):
     """Which joints each scene needs, and the time of a step of the whole and of the smallest model."""
     scenes, joints = result.curves["needs"], robot.joints
     fig = Figure(figsize=(WIDTH, 0.9 + 0.36 * len(scenes)), layout="constrained")
@@ -30,7 +30,7 @@ def needs(result, robot):
     left.set_yticks(range(len(scenes)), [plain(name) for name in scenes])
     left.tick_params(length=0)
     for y, name in enumerate(scenes):
-        draw_times(right, result, name, y)
+        mark_times(right, result, name, y)
     slowest = max((row["ns_per_step"] or 0.0 for row in result.rows), default=0.0)
     right.set(xscale="log", xlabel="time of an RK4 step, ns", xlim=(15, max(100000, 10 * slowest)))
     right.set_xticks([100, 1000, 10000], ["100", "1000", "10000"])
@@ -60,7 +60,7 @@ def kind_of_joint(joint, found) -> str:
     return "never moves" if joint in found["stays"] else "needed"
 
 
-def draw_times(ax, result, name, y) -> None:
+def mark_times(ax, result, name, y) -> None:
     """The time of a step of each engine in a scene, of the whole model and of the smallest one."""
     for engine, (offset, style) in TIME_MARKS.items():
         times = [row["ns_per_step"] for row in rows_of(result, name, engine)]
@@ -94,7 +94,7 @@ def rows_of(result, scene, engine):
     return [row for row in result.rows if (row["scene"], row["engine"], row["integrator"]) == (scene, engine, "RK4")]
 
 
-def costs(result):
+def draw_costs(result):
     """Cost in MuJoCo of each thing that is added, as a ratio to the minimal model."""
     table = result.tables["cost_in_mujoco"]
     names = [name for name in dict.fromkeys(row["added"] for row in table) if name != MINIMAL]

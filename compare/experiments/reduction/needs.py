@@ -7,8 +7,10 @@ from tmt.reference import DIGITS
 
 from ...case import Case
 from ...engines import LABELS
+from ...judge.check import closest
 from ...judge.rounding import NARROW, band
-from ...judge.run import MOVES, deviation, step_in_words
+from ...judge.run import check_movement, deviation, required_time, step_in_words
+from ...judge.words import capital
 from ...truth.smallest import Needed, needed, reduced
 from .times import FINER_RUNS, TWO_INTEGRATORS, method_of, scheme_of
 
@@ -25,7 +27,7 @@ def of_case(result, case: Case, setup, integrators=TWO_INTEGRATORS) -> list:
     result.notes.append(need_in_words(case, need))
     if smaller or stays:
         for integrator in integrators:
-            runs(result, case, smaller, setup, integrator)
+            compare_smaller(result, case, smaller, setup, integrator)
     return models
 
 
@@ -35,7 +37,7 @@ def need_in_words(case: Case, need: Needed) -> str:
     why = "; ".join(need.moves.values())
     if need.undecided:
         why += f"; of {', '.join(need.undecided)} it is not decided: the acceleration does not fold to 0"
-    why = why[:1].upper() + why[1:]
+    why = capital(why)
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (
@@ -51,12 +53,12 @@ def need_in_words(case: Case, need: Needed) -> str:
     if len(need.stays) > 1:
         never, vanish = "never move: at their start and at rest their accelerations fold", "and are"
     return (
-        f"{case.name}: {left}{declared}. {stays[:1].upper()}{stays[1:]} {never} to 0 for all values of the others, {vanish} 0 "
+        f"{case.name}: {left}{declared}. {capital(stays)} {never} to 0 for all values of the others, {vanish} 0 "
         f"with {DIGITS} digits at random ones. {why}."
     )
 
 
-def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> None:
+def compare_smaller(result, case: Case, smaller: Case | None, setup, integrator: str) -> None:
     """Runs of the case and of the smaller one (None: it stays), by the same method, within the band of rounding."""
     scheme, n, steps = scheme_of(setup.engines, integrator), len(case.joints), FINER_RUNS * case.steps
     dt = case.duration / steps
@@ -72,9 +74,9 @@ def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> No
             free = [case.joints.index(name) for name in smaller.joints]
             reference[:, free + [n + i for i in free]] = references[engine]
             if "own" not in case.scene.tags:  # of a user's own nothing is expected
-                check_movement(result, where, path[:, :n])
+                check_movement(result, where, deviation(path[:, :n], path[0, :n]))
         apart = np.abs(path - reference)[::FINER_RUNS]
-        until = check_smaller(result, where, case.joints, t, apart, width, case.required(scheme, dt))
+        until = check_smaller(result, where, case.joints, t, apart, width, required_time(case, scheme, dt))
         result.curves["apart"][case.name, engine, integrator] = float(apart[t <= until, :n].max())
     if not smaller:
         moved = {LABELS[engine]: result.curves["apart"][case.name, engine, integrator] for engine in paths}
@@ -86,11 +88,6 @@ def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> No
         )
 
 
-def check_movement(result, where: str, q: np.ndarray) -> None:
-    """A check: a run without a torque that holds moves. q: (times, n) rad."""
-    result.check(where, "movement", deviation(q, q[0]), MOVES, "rad", rule="at least")
-
-
 def check_smaller(result, where: str, joints, t, apart, width, required: float) -> float:
     """Checks: the runs stay within the band of rounding while it is narrow, and that is long enough; until when, s.
 
@@ -99,8 +96,7 @@ def check_smaller(result, where: str, joints, t, apart, width, required: float) 
     n = len(joints)
     judged = np.cumsum(~(width[:, :n].max(axis=1) < NARROW)) == 0
     apart, width = apart[judged], width[judged]
-    ratio = np.divide(apart, width, out=np.where(apart > 0, np.inf, apart), where=width > 0)
-    k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
+    k, i = closest(apart, width)
     place, unit = f"{joints[i % n]} at t = {t[k]:.3f} s", ("rad", "rad/s")[i // n]
     result.check(where, "smallest model to whole", apart[k, i], width[k, i], unit, place, True)
     until = float(t[judged][-1])
@@ -113,6 +109,5 @@ def states_of_run(case: Case, setup, integrator: str) -> dict[str, np.ndarray]:
     steps, paths = FINER_RUNS * case.steps, {}
     for engine, dynamics in setup.compared(case).items():
         method = method_of(setup.engines, integrator, engine)
-        motion = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method)
-        paths[engine] = np.concatenate([motion.q, motion.v], axis=1)
+        paths[engine] = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method).states
     return paths

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from ...case import SEED, Case
-from ...judge.check import largest
+from ...judge.check import closest, largest
 from ...judge.scale import EPS, FACTOR, bias_scale, mass_scale
 from .times import operations
 
@@ -14,7 +14,7 @@ MOST_SUBSETS = 126  # all of seven joints; of more joints so many are chosen at 
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 
 
-def compare(result, setup, angles: int) -> None:
+def compare_blocks(result, setup, angles: int) -> None:
     """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)
@@ -53,7 +53,7 @@ def words_of(locked) -> str:
 def check_blocks(result, locked, quantity: str, pair: str, apart, scale, counts) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
-    worst = int(np.argmax(np.where(np.isfinite(apart), apart / tolerance, np.inf)))
+    (worst,) = closest(apart, tolerance)
     unit, name = BLOCK_UNITS[quantity], f"{quantity}, {pair}"
     check = result.check(words_of(locked), name, apart[worst], tolerance[worst], unit, rounding=True)
     result.tables["reduction_subsets"].append(

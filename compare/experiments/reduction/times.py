@@ -34,10 +34,10 @@ def time_models(result, models, setup, rounds) -> None:
                 method = method_of(setup.engines, integrator, engine)
                 call, _ = dynamics.prepare(*case.start, case.tau, setting, method)
                 calls[name, case.joints, engine, integrator] = call
-    result.rows += table(models, setup, fastest(calls, rounds), result.curves["apart"])
+    result.rows += time_rows(models, setup, fastest(calls, rounds), result.curves["apart"])
 
 
-def table(models, setup, seconds, apart) -> list[dict]:
+def time_rows(models, setup, seconds, apart) -> list[dict]:
     """The rows: models as (a case's name, Case or None), seconds of a timed run by (name, joints, engine, integrator)."""
     rows, every = [], setup.robot.joints
     for name, case in models:

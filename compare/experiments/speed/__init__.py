@@ -8,7 +8,7 @@ import tmt
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import GRID, Method, Setting
+from ...engines import GRID, Dynamics, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.rounding import growth
@@ -18,7 +18,7 @@ from ...robots import Robot
 from ...truth.reference import Reference, committed, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets
-from .settings import coarsest, followed, methods, regular_of, scenes_of, settings_of, taking_part
+from .settings import coarsest_steps, followed, methods, regular_of, scenes_of, settings_of, taking_part
 
 TITLE = "Speed against accuracy"
 PARTS = (
@@ -68,8 +68,8 @@ def begin(setup) -> None:
 
 def measured(setup, cases: list[Case], which: str = "all") -> tuple:
     """The scenes, their references, and for each scene, as it comes, its rows without times and its rounding."""
-    known = references(cases, setup.map, setup.tell)
-    follow = partial(errors, engines=setup.engines, known=known, size=setup.size, which=which)
+    known = references(cases, setup.map, setup.progress)
+    follow = partial(rows_of_scene, engines=setup.engines, known=known, size=setup.size, which=which)
     return cases, known, setup.map(follow, cases)
 
 
@@ -97,7 +97,7 @@ def rows(setup, timed: bool = True) -> Result:
     schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
     accuracy.check_same_schemes(result, floors, schemes)
     accuracy.check_smallest_errors(result, floors)
-    steps = {case.name: coarsest(case) for case in cases}
+    steps = {case.name: coarsest_steps(case) for case in cases}
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)
     result.notes += accuracy.references_in_words(known, floors)
     result.notes += accuracy.floors_in_words(result.rows, floors)
@@ -115,11 +115,11 @@ def add_times(result, setup, names, of_scenes) -> None:
     setup.quiet()  # nothing else may run beside a timing
     spread = []
     for name, of_scene in zip(names, of_scenes):
-        setup.tell(f"speed: timing {name}")
+        setup.progress(f"speed: timing {name}")
         spread += fill_in(of_scene, take_times(of_scene, setup))
     floors = result.curves["floors"]
     result.tables["what_should_i_use"] = advice.advice(result.rows, list(floors), floors)
-    setup.tell("speed: one evaluation")
+    setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
     aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
     result.tables["speed_targets"] = aims
@@ -141,16 +141,16 @@ def unavailable(setup, names) -> list[dict]:
     ]
 
 
-def errors(case: Case, engines, known: dict[str, Reference], size: str, which: str) -> tuple[list[dict], float]:
+def rows_of_scene(case: Case, engines, known: dict[str, Reference], size: str, which: str) -> tuple[list[dict], float]:
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
-    found, left = [], max(floor(case), reference.halving)
+    found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
     taking = methods(engines, size, which)
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
-            found.append(follow(case, case, engines, method, setting, reference))
+            found.append(row_of_run(case, case, engines, method, setting, reference))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
             if accuracy.gained_nothing(now, work, best, last, left):
                 break
@@ -158,10 +158,10 @@ def errors(case: Case, engines, known: dict[str, Reference], size: str, which: s
     smaller = reduced(case)
     few = [method for method in taking if smaller and (method.engine, method.name) in SMALLER]
     setting = Setting(case.duration, SMALLER_STEPS)
-    return found + [follow(smaller, case, engines, method, setting, reference) for method in few], left
+    return found + [row_of_run(smaller, case, engines, method, setting, reference) for method in few], left
 
 
-def follow(case: Case, whole: Case, engines, method: Method, setting: Setting, reference: Reference) -> dict:
+def row_of_run(case: Case, whole: Case, engines, method: Method, setting: Setting, reference: Reference) -> dict:
     """A row: one run of a scene, or of the smaller model that has the motion of the whole one."""
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
     true = np.split(reference.high, 2, axis=1)
@@ -186,18 +186,19 @@ def follow(case: Case, whole: Case, engines, method: Method, setting: Setting, r
     }  # fmt: skip
 
 
-def floor(case: Case) -> float:
+def floor(case: Case, dynamics: Dynamics) -> float:
     """What rounding leaves of the angles: eps times the largest growth of a small difference up to each time, rad.
 
-    Taken along a run of RK4 with 1024 steps, or as many as the scene needs to be followed at all; ValueError if it cannot be.
+    dynamics: tmt's, whose RK4 is run with 1024 steps, or as many as the scene needs to be followed at all; ValueError if it
+    cannot be.
     """
-    first = 16 * GRID * max(1, round(case.duration / 5.0), -(-coarsest(case) // (16 * GRID)))
+    first = 16 * GRID * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (16 * GRID)))
     for steps in (first, 4 * first, 16 * first):
         dt = case.duration / steps
-        _, q, qd = tmt.simulate(*case.start, case.tau, dt, steps, "rk4", case.tree)
-        if np.isfinite(q).all():
-            growths = growth(METHODS["rk4"], case.tree, q, qd, case.tau, dt, 16)
-            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(q).max()))
+        motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
+        if np.isfinite(motion.q).all():
+            growths = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, 16)
+            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
     raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")
 
 
@@ -230,13 +231,12 @@ def spread_in_words(spread) -> list[str]:
 
 def figures(result, robot):
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
-    from . import figures_evaluations  # matplotlib is for the process that draws
-    from . import figures_times as draw
+    from . import figures_evaluations, figures_times  # matplotlib is for the process that draws
 
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
-    for scene in draw.scenes(result):
-        yield partial(draw.times, result, scene)
-    yield partial(draw.evaluations, result)
-    yield partial(draw.energy, result)
-    yield partial(figures_evaluations.cost_of_one, result, robot.name)
+    for scene in figures_times.scenes(result):
+        yield partial(figures_times.draw_times, result, scene)
+    yield partial(figures_times.draw_evaluations, result)
+    yield partial(figures_times.draw_energy, result)
+    yield partial(figures_evaluations.draw_cost, result, robot.name)

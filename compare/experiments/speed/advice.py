@@ -48,7 +48,7 @@ def advice(rows: list[dict], scenes: Sequence[str], floors: Floors) -> list[dict
             }
             for who, row in (("mujoco", theirs), ("tmt", ours), ("of_all", best)):
                 line |= {
-                    who: named(row) if row else None,
+                    who: setting_in_words(row) if row else None,
                     f"{who}_dt_s": row and row["dt_s"],
                     f"{who}_ms": row and 1e3 * row["seconds"],
                     f"{who}_evaluations": row and row["evaluations"],
@@ -58,7 +58,7 @@ def advice(rows: list[dict], scenes: Sequence[str], floors: Floors) -> list[dict
     return table
 
 
-def named(row: dict) -> str:
+def setting_in_words(row: dict) -> str:
     """A setting in words."""
     setting = f"{row['steps']} steps" if row["dt_s"] else f"tolerance {row['tolerance']:.0e}"
     return f"{row['engine']} {row['method']}, {setting}"

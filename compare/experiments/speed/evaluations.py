@@ -10,7 +10,7 @@ from tmt import generic, kernels, method
 
 from ...case import SEED, Case
 from ...judge import timing
-from .settings import coarsest, regular_of
+from .settings import coarsest_steps, regular_of
 
 STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
@@ -43,7 +43,7 @@ def costs(setup) -> tuple[list[dict], list[str]]:
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
     operations = [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
     overhead = simulate_overhead(regular_of(setup.robot))
-    return table(nanoseconds), costs_in_words(nanoseconds, overhead, operations, setup.robot.name, missing)
+    return evaluation_rows(nanoseconds), costs_in_words(nanoseconds, overhead, operations, setup.robot.name, missing)
 
 
 def per_state(counts: dict, times: list[list[float]]) -> dict:
@@ -51,7 +51,7 @@ def per_state(counts: dict, times: list[list[float]]) -> dict:
     return {key: 1e9 * min(taken) / count for (key, count), taken in zip(counts.items(), times)}
 
 
-def table(nanoseconds: dict) -> list[dict]:
+def evaluation_rows(nanoseconds: dict) -> list[dict]:
     """The rows of evaluations.csv, by quantity, the slowest first."""
     return [
         dict(zip(("quantity", "implementation", "states", "threads"), key)) | {"ns_per_state": value}
@@ -136,7 +136,7 @@ def of_many_states(tree: tmt.Tree, states: np.ndarray, pool: ThreadPoolExecutor)
 
 def simulate_overhead(case: Case) -> tuple[float, float, int]:
     """Seconds of tmt.simulate with the coarsest steps of RK4 of a scene, and of its compiled loop; how many steps."""
-    steps = coarsest(case)
+    steps = coarsest_steps(case)
     dt, path = case.duration / steps, np.zeros((2, 1, steps + 1, len(case.q)))
     path[:, 0, 0] = case.start
     run = kernels.stepper(case.tree, "rk4")

@@ -6,7 +6,7 @@ from ...report.style import BLUE, ORANGE, WIDTH
 from .evaluations import WHOLE
 
 
-def cost_of_one(result, name):
+def draw_cost(result, name):
     """What one evaluation costs, way by way; name: of the robot."""
     rows = [row for row in result.tables["evaluations"] if row["quantity"] == "forward_dynamics"]
     fig = Figure(figsize=(WIDTH, 0.9 + 0.24 * len(rows)), layout="constrained")

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ...engines import LABELS
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name
 
 COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
@@ -24,13 +25,13 @@ def colour_of(engine) -> str:
     return COLOURS.get(engine, GREY)
 
 
-def runs(result) -> list[dict]:
+def rows_of_runs(result) -> list[dict]:
     """The rows that are runs, not those of an engine that is not there."""
     return [row for row in result.rows if row["why_not"] is None]
 
 
 def runs_of(result, scene) -> list[dict]:
-    return [row for row in runs(result) if row["scene"] == scene]
+    return [row for row in rows_of_runs(result) if row["scene"] == scene]
 
 
 def curves(result, scene) -> dict:
@@ -68,7 +69,7 @@ def pareto(rows, of) -> list[dict]:
     return front
 
 
-def times(result, scene):
+def draw_times(result, scene):
     """One scene: worst error against time, a curve for each method, the Pareto front marked."""
     fig = Figure(figsize=(WIDTH, 5.2), layout="constrained")
     ax = fig.subplots()
@@ -104,7 +105,7 @@ def times(result, scene):
     if lost:
         ax.plot([], [], "x", color="black", label="diverged (no error)")
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    caption = f"{scene[0].upper()}{scene[1:]}: {spoken(result, scene)}"
+    caption = f"{capital(scene)}: {spoken(result, scene)}"
     if lost:
         caption += f" {len(lost)} {'settings diverge' if len(lost) > 1 else 'setting diverges'} (crosses at the left)."
     return file_name("speed", scene), fig, caption
@@ -148,7 +149,7 @@ def spoken(result, scene) -> str:
     )
 
 
-def evaluations(result):
+def draw_evaluations(result):
     """Worst error against evaluations of the right-hand side: independent of the machine and of who wrote the kernel."""
     fig, axes = panels(result)
     for ax, scene in zip(axes, scenes(result)):
@@ -191,7 +192,7 @@ def fewest(result, scene, target) -> str:
     return f"For {target:.0e} rad ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
 
 
-def energy(result):
+def draw_energy(result):
     """Energy error against time."""
     fig, axes = panels(result)
     for ax, scene in zip(axes, scenes(result)):
@@ -201,7 +202,7 @@ def energy(result):
                 errors = np.clip([r["energy_error_J"] for r in good], 1e-15, 10)
                 line(ax, engine, method, errors, [1e3 * r["seconds"] for r in good])
         ax.set(xlim=(20, 3e-16))
-    fig.supylabel(f"time for {motion(runs(result))} of motion, ms", fontsize=9)
+    fig.supylabel(f"time for {motion(rows_of_runs(result))} of motion, ms", fontsize=9)
     finish(fig, axes, "largest energy error on the grid, J")
     least = []
     for engine, method in (("tmt", "semi_implicit_euler"), ("tmt", "rk4"), ("mujoco", "Euler"), ("mujoco", "RK4")):

@@ -14,7 +14,7 @@ def main(cases=None) -> None:
     """Remake the table."""
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         tables = reference.remade(scenes_of(ARM) if cases is None else cases, pool.map, partial(print, file=sys.stderr))
-    reference.write(reference.TABLE, [row for rows in tables for row in rows])
+    reference.write_table(reference.TABLE, [row for rows in tables for row in rows])
     for rows in tables:
         print(f"{rows[0]['scene']}: {rows[0]['steps']} steps, {rows[0]['halving_difference']} from half as many")
 

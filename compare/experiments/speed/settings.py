@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from tmt.methods import method_named
 
 from ...case import Case
-from ...engines import GRID, Engine, Method, Setting, one_of_each_scheme
+from ...engines import COMPARED, GRID, Engine, Method, Setting, one_of_each_scheme
 from ...robots import Robot
 
-COMPARED = ("mujoco", "tmt")  # engines of a quick run
 FINEST = {"mujoco": 2**16, "tmt": 2**18}  # steps beyond which a run would take too long to be timed again and again
 FINEST_RK4, FINEST_IMPLICIT = 2**17, 2**15  # of MuJoCo's RK4; of methods that solve their stages, and of other engines
 EXPONENTS = {  # of the coarsest and of the finest tolerance, 10^-k
@@ -44,7 +43,7 @@ def followed(robot: Robot, size: str) -> list[Case]:
 
 
 def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
-    """The engines of a run of this size, unavailable ones too."""
+    """The engines of a run of this size, unavailable ones too; of a quick run the two that are compared."""
     return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
 
 
@@ -69,12 +68,12 @@ def settings_of(method: Method, case: Case, size: str = "full", which: str = "al
 
 def halvings(method: Method, case: Case) -> tuple[Setting, ...]:
     """Steps that are halved and halved again: first the scene's own, or a little finer, as the times of reading ask for."""
-    count, finest = coarsest(case), finest_steps(method)
+    count, finest = coarsest_steps(case), finest_steps(method)
     doublings = max(1, (finest // count).bit_length())
     return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
 
 
-def coarsest(case: Case) -> int:
+def coarsest_steps(case: Case) -> int:
     """The least multiple of 64 that is no less than the scene's own number of steps."""
     return -(-case.steps // GRID) * GRID
 

@@ -49,7 +49,7 @@ def is_let_go(case: Case) -> bool:
     return case.is_free and scene.gravity and not (scene.damping or scene.locked or any(scene.speed))
 
 
-def coarsest(robot) -> Case:
+def coarsest_case(robot) -> Case:
     """The case whose step is the coarsest that is looked at: the free motion, or what a scene takes if nothing is said."""
     return free_motion(robot) or robot.case()
 
@@ -74,8 +74,3 @@ def damped(robot, damping: float) -> str:
     if damping:
         return f"damping {damping:g}"
     return "with its own damping" if any(robot.tree.damping) else "undamped"
-
-
-def capital(text: str) -> str:
-    """A name as the first word of a sentence."""
-    return f"{text[0].upper()}{text[1:]}"

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-import tmt
-
 from ...engines import Engine, Method, same_scheme
 from ...judge.run import departure, deviation, number_or_none
 from ...truth.linear import Held, held
@@ -79,7 +77,7 @@ def pushes(at: Held) -> np.ndarray:
     """
     n, vectors = len(at.q), at.modes[1]
     measure = np.linalg.inv(vectors)[0] * np.sign(vectors[0, 0].real)
-    return (measure[n:] / np.linalg.norm(measure[n:])).real @ np.linalg.inv(tmt.mass_matrix(at.q, at.tree))
+    return (measure[n:] / np.linalg.norm(measure[n:])).real @ np.linalg.inv(at.mass_matrix)
 
 
 def ulps(difference, tau) -> list[int | None]:

@@ -5,8 +5,6 @@ from itertools import product
 
 import numpy as np
 
-import tmt
-
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
 from ...truth.linear import NEGLIGIBLE, Held
@@ -48,7 +46,7 @@ def residual(method, engines, at, tau) -> np.ndarray:
     """
     start = at.q + np.zeros_like(tau)
     motion = engines[method.engine].of(at.case).run(start, np.zeros_like(tau), tau, INSTANT, 1, method.name)
-    return motion.v[..., 1, :] @ tmt.mass_matrix(at.q, at.tree) / INSTANT
+    return motion.v[..., 1, :] @ at.mass_matrix / INSTANT
 
 
 def variants(tau: np.ndarray, reach: int = 1) -> np.ndarray:
@@ -71,7 +69,7 @@ def offset(at, off) -> np.ndarray:
     A torque along a mode without stiffness has no equilibrium, and is too small to matter.
     """
     n = len(at.q)
-    accelerations = np.linalg.solve(tmt.mass_matrix(at.q, at.tree), np.transpose(off))
+    accelerations = np.linalg.solve(at.mass_matrix, np.transpose(off))
     return (np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2) @ accelerations).T
 
 
@@ -98,7 +96,7 @@ def predicted(at, scheme, dt, moved, off, longest=LONGEST_DEPARTURE, rounded=Tru
     return times
 
 
-def examine(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
+def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
     """Rows for tables/departure.csv: every method and perturbation at one dt, from one saddle."""
     values, vectors = at.modes
     n, steps = len(at.q), round(LONGEST_DEPARTURE / dt)
@@ -108,7 +106,7 @@ def examine(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[M
         own = own_torque(method, engines, at)
         sizes = [(size, size * shape, own) for size in PERTURBATIONS]
         # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
-        push = tmt.mass_matrix(at.q, at.tree) @ shape * values[0].real ** 2
+        push = at.mass_matrix @ shape * values[0].real ** 2
         sizes += [(size, np.zeros(n), own + size * push) for size in TORQUE_ERRORS]
         starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
         with np.errstate(over="ignore", invalid="ignore"):

@@ -7,8 +7,9 @@ import numpy as np
 from ...engines import one_of_each_scheme
 from ...engines.mujoco.linear import NUDGE, transition
 from ...judge.scale import EPS, FACTOR
+from ...judge.words import capital
 from ...truth.linear import held, region
-from .choice import capital, coarsest
+from .choice import coarsest_case
 from .subjects import DAMPINGS, places
 
 FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
@@ -21,7 +22,7 @@ def check_equilibria(result, setup) -> None:
     """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
     robot, mujoco, table = setup.robot, setup.engines["mujoco"], []
     least, some, much = DAMPINGS
-    usual = (FINE_AMPLIFICATION, coarsest(robot).scene.dt)
+    usual = (FINE_AMPLIFICATION, coarsest_case(robot).scene.dt)
     for name in robot.postures:
         at = held(robot, name)
         values = at.modes[0]

@@ -12,7 +12,7 @@ from ...engines.mujoco.linear import left_to_itself
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
 from .choice import fraction
-from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth, stiffest
+from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth_in_run, stiffest
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
 RESONANT_SWINGS = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
@@ -23,11 +23,11 @@ LARGE_DEVIATION = 1e-3  # rad, with which a small one is compared at the resonan
 DIVERGED_GROWTH = 1e300  # stands for the growth of a run that has diverged
 
 
-def edge(method, at, engines: Mapping[str, Engine], sizes, swings, steps=GROWTH_STEPS) -> np.ndarray:
+def edge_growth(method, at, engines: Mapping[str, Engine], sizes, swings, steps=GROWTH_STEPS) -> np.ndarray:
     """Growth in so many steps along the stiffest mode of a posture, (sizes, swings): size in rad, swing = omega dt."""
     omega, direction = stiffest(at)
     return np.array([
-        [growth(method, engines, at, direction, swing / omega, size, steps) for swing in swings] for size in sizes
+        [growth_in_run(method, engines, at, direction, swing / omega, size, steps) for swing in swings] for size in sizes
     ])  # fmt: skip
 
 

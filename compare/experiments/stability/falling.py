@@ -10,8 +10,8 @@ from tmt.dual import seeded
 
 from ...engines import LABELS, Engine, Method
 from ...judge.run import LEFT, departure
+from ...judge.words import capital
 from ...truth.linear import NEGLIGIBLE, Held
-from .choice import capital
 from .departure import own_torque, span
 
 EXPONENT_TOLERANCE = 0.02  # how near -1/2 the exponent of the time to leave is to be
@@ -58,7 +58,7 @@ def cubic(at: Held) -> tuple[np.ndarray, float]:
 
     c by nested dual numbers: the second derivative of the torque dV/dq along the mode.
     """
-    n, inertia = len(at.q), tmt.mass_matrix(at.q, at.tree)
+    n, inertia = len(at.q), at.mass_matrix
     values, vectors = np.linalg.eigh(-inertia @ at.matrix[n:, :n])
     shape = vectors[:, np.argmin(np.abs(values))]
     shape = shape / np.abs(shape).max()

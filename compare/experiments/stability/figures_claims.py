@@ -15,7 +15,7 @@ from .figures_departure import ENGINE_LOOKS
 NOTHING_MOVES = 1e-17  # rad, where no movement is drawn
 
 
-def torques(result, robot):
+def draw_torques(result, robot):
     """Departure under the torques that differ in the last bit: when, and to which side."""
     claims, symbol = robot.claims, robot.symbol(robot.joints[0])
     rows = [row for row in result.tables["stability_torques"] if row["torque"].startswith(VARIANT)]
@@ -78,7 +78,7 @@ def sides_in_words(rows, engine, symbol) -> str:
     return f"{label} after {span(gone)}, {up} to larger {symbol}, {down} to smaller, {never} never"
 
 
-def finer_steps(result, robot):
+def draw_finer_steps(result, robot):
     """The torque one ulp off: time to leave and movement after a run of the claims against the number of steps."""
     rows, claims, joint = result.tables["stability_finer_steps"], robot.claims, robot.joints[0]
     column, symbol, run = ulps_of(robot)[0], robot.symbol(joint), f"{claims.duration:g} s"
@@ -141,7 +141,7 @@ def finest_in_words(robot, rows) -> str:
     )
 
 
-def kept(result, robot):
+def draw_kept(result, robot):
     """The posture that is kept, under RK4 below and beyond its limit: deviation against the number of steps."""
     data, claims = result.curves["kept"], robot.claims
     steps = [dt for engine, torque, dt in data["paths"] if (engine, torque) == ("tmt", ONE_ULP)][:5]

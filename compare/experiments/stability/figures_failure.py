@@ -5,15 +5,16 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH
 from ...truth.linear import of_kind
-from .choice import capital, coarsest, fraction, step_text
+from .choice import coarsest_case, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
 from .figures_limits import look
 from .limits import LINEAR_DEVIATION
 
 
-def edge(result, robot):
+def draw_edge(result, robot):
     """The nonlinear edge: tongues of growth over omega dt and the size of the perturbation; the resonance close up."""
     drawn, close = result.curves["edge"], result.curves["near"]
     maps, near, swings = drawn["grown"], close["grown"], close["x"]
@@ -64,7 +65,7 @@ def edge(result, robot):
     return "stability_edge", fig, caption
 
 
-def silent(result, robot):
+def draw_silent(result, robot):
     """Runs that fail without a word: reset by MuJoCo, and `implicit` gaining energy."""
     reset, gain = (result.curves["silent"][key] for key in ("reset", "gain"))
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
@@ -100,9 +101,9 @@ def silent(result, robot):
     return "stability_silent", fig, caption
 
 
-def minutes(result, robot):
+def draw_minutes(result, robot):
     """Energy over a minute of free motion, method by method, at a coarse and a fine step."""
-    runs, coarse = result.curves["minutes"], coarsest(robot)
+    runs, coarse = result.curves["minutes"], coarsest_case(robot)
     steps = sorted({run["row"]["dt_s"] for run in runs}, reverse=True)
     seconds = runs[0]["seconds"]
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from ...engines import LABELS
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...truth.linear import all_of_kind, of_kind
-from .choice import coarsest, damped, fraction
+from .choice import coarsest_case, damped, fraction
 from .departure import span
 from .limits import LINEAR_DEVIATION, apart
 
@@ -32,7 +32,7 @@ def in_print(method) -> str:
     return f"{LABELS[method.engine]} {look(method.name)[2]}"
 
 
-def limits(result, robot):
+def draw_limits(result, robot):
     """Predicted and observed limits as paired bars, scene by scene and damping by damping."""
     rows = [row for row in result.rows if row["scene"] in all_of_kind(robot, "centre")]
     panels = list(dict.fromkeys((row["scene"], row["damping"]) for row in rows))
@@ -93,9 +93,9 @@ def limits(result, robot):
     return "stability_limits", fig, caption
 
 
-def regions(result, robot):
+def draw_regions(result, robot):
     """Eigenvalues times dt inside each method's stability region."""
-    drawn, points, case = result.curves["regions"], result.curves["points"], coarsest(robot)
+    drawn, points, case = result.curves["regions"], result.curves["points"], coarsest_case(robot)
     centre, dt = of_kind(robot, "centre"), case.scene.dt
     columns = 2 if len(drawn) == 4 else 3
     lines = -(-len(drawn) // columns)
@@ -149,7 +149,7 @@ def regions(result, robot):
     return "stability_regions", fig, caption
 
 
-def growth_map(result, robot):
+def draw_growth_map(result, robot):
     """Growth over dt, a row for each engine and method."""
     drawn, centre = result.curves["map"], of_kind(robot, "centre")
     by_method, dts, steps, allowed = (drawn[key] for key in ("grown", "x", "steps", "allowed"))

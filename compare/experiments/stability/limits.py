@@ -25,7 +25,7 @@ TINY_DEVIATION, TOTAL_GROWTH, MOST_GROWTH_STEPS = 1e-8, 1e3, 200
 LIMIT_KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
 
 
-def examine(
+def limits_and_growths(
     at: Held,
     engines: Mapping[str, Engine],
     methods: tuple[Method, ...],
@@ -52,7 +52,7 @@ def examine(
     return {"rows": rows, "growths": growths}
 
 
-def growth(method, engines, at, direction, dt, size=LINEAR_DEVIATION, steps=GROWTH_STEPS) -> float:
+def growth_in_run(method, engines, at, direction, dt, size=LINEAR_DEVIATION, steps=GROWTH_STEPS) -> float:
     """The largest deviation of a run over that at its start, which is size x direction, rad; inf if it diverged."""
     dynamics, start = engines[method.engine].of(at.case), at.q + size * direction
     with np.errstate(over="ignore", invalid="ignore"):
@@ -131,7 +131,7 @@ def growth_per_step(method, engines, at, dt) -> dict:
 def map_of_growth(method, engines, at, dts, steps=GROWTH_STEPS) -> np.ndarray:
     """Growth of the deviation in so many steps along the stiffest mode of a posture, for each dt."""
     direction = stiffest(at)[1]
-    return np.array([growth(method, engines, at, direction, dt, steps=steps) for dt in dts])
+    return np.array([growth_in_run(method, engines, at, direction, dt, steps=steps) for dt in dts])
 
 
 def stiffest(at: Held) -> tuple[float, np.ndarray]:
@@ -160,7 +160,7 @@ def check_limits(result, robot, parts) -> None:
         result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
     result.tables["stability_growth"] = growths
     result.notes[:0] = limits_in_words(robot, result.rows)
-    result.notes += growth_in_words(growths)
+    result.notes += growth_per_step_in_words(growths)
 
 
 def apart(row) -> float | None:
@@ -188,7 +188,7 @@ def limits_in_words(robot, rows) -> list[str]:
     ]
 
 
-def growth_in_words(rows) -> list[str]:
+def growth_per_step_in_words(rows) -> list[str]:
     """How far the growth of one step is from the predicted one, where a method always fails."""
     if not rows:
         return ["No method fails at every step in these scenes."]

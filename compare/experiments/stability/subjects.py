@@ -4,8 +4,9 @@ from itertools import product
 from typing import NamedTuple
 
 from ...case import Case
+from ...judge.words import capital
 from ...truth.linear import Held, all_of_kind, held, of_kind
-from .choice import capital, free_motion
+from .choice import free_motion
 from .falling import without_law
 from .limits import stiffest
 

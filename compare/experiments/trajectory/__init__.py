@@ -53,10 +53,16 @@ def begin(setup) -> None:
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = setup.of(cases, [], cases)
     duration, steps = setup.of(horizon.GROWTH_RUN, horizon.GROWTH_RUN, horizon.SHORT_GROWTH_RUN)
+    of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
         "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer), cases),
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
-        "growth": (grown, setup.map(partial(horizon.grown, duration=duration, steps=steps), grown), duration, steps),
+        "growth": (
+            grown,
+            setup.map(of_growth, grown),
+            duration,
+            steps,
+        ),
     }
 
 
@@ -70,7 +76,7 @@ def rows(setup) -> Result:
         begin(setup)
     work = setup.background.pop("trajectory")
     compare_derivatives(result, setup.robot, setup.engines)
-    drift.drift(
+    drift.measure_drift(
         result, setup.robot, setup.engines, setup.of(drift.DRIFT_STEPS, drift.DRIFT_STEPS, drift.FEW_DRIFT_STEPS)
     )
     result.curves["runs"] = {}
@@ -85,26 +91,28 @@ def rows(setup) -> Result:
         )
     if work["growth"][0]:
         horizon.growth_of_errors(result, *work["growth"])
-    result.curves["errors"] = errors.held(result, setup.robot) | errors.free(result, setup.robot)
+    result.curves["errors"] = errors.errors_when_held(result, setup.robot) | errors.errors_when_free(
+        result, setup.robot
+    )
     result.notes = sentences.notes(result, setup.robot, setup.engines, setup.finer) + result.notes
     return result
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Those of the assignment that show a held posture, one for each scene, drift, and the growth of errors."""
-    from . import figures_runs as draw  # matplotlib is for the processes that draw; `figures` is this function
+    from . import figures_runs  # matplotlib is for the process that draws
 
     names = {name for name, *_ in result.curves["runs"]}
     cases = [case for case in robot.cases if case.name in names]
     numbers = robot.claims.figures if robot.claims else {}
     numbered = [case for case in cases if case.is_held and case.name in numbers]
     for case in numbered:
-        yield partial(draw.held, result, case, numbers[case.name])
+        yield partial(figures_runs.draw_held, result, case, numbers[case.name])
     grown = "growth" in result.curves
     for case in cases:
         if grown or case not in numbered:  # a quick run has nothing more to show of those
-            yield partial(draw.run, result, case)
+            yield partial(figures_runs.draw_run, result, case)
     if result.curves["drift"]["drifts"]:
-        yield partial(draw.drift, result)
+        yield partial(figures_runs.draw_drift, result)
     if grown:
-        yield partial(draw.growth, result)
+        yield partial(figures_runs.draw_growth, result)

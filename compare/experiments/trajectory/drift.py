@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ...case import Case
-from ...engines import LABELS, Dynamics, Engine, Method, one_of_each_scheme, same_scheme
+from ...engines import LABELS, Dynamics, Engine, Method, compared, one_of_each_scheme, same_scheme
 from ...judge.check import Result
 from ...judge.run import ORDER_MARGIN
 from ...robots import Robot
@@ -19,22 +19,21 @@ FEW_DRIFT_STEPS = DRIFT_STEPS | {1: (512, 1024, 2048)}
 OF_EULER = 1e-3  # of Euler's drift: RK4's is below, with fewer steps
 
 
-def drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
+def measure_drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
     """Energy and, without gravity, momentum of the first joint along free, undamped runs; steps: so many, by the order."""
     drifts = {}  # (scene, quantity, unit): method of MuJoCo: engine: a value for each of the steps
     methods = one_of_each_scheme(engines["mujoco"])
     # in a scene of a user's own the order need not show in a second
     cases = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
     for case in (case for case in cases if not any(case.tree.damping)):
-        dynamics = {name: engines[name].of(case) for name in ("tmt", "mujoco")}
-        quantities = constants(case)
+        dynamics, quantities = compared(engines, case), constants(case)
         for method in methods:
             for name, of_case in dynamics.items():
                 own = same_scheme(engines, method, name) if name != method.engine else method
-                paths = [run(case, of_case, own, count) for count in steps[method.order]]
+                paths = [path_in(case, of_case, own, count) for count in steps[method.order]]
                 for quantity, value in quantities.items():
                     of_scene = drifts.setdefault((case.name, *quantity), {}).setdefault(method, {})
-                    of_scene[name] = [largest(value, path) for path in paths]
+                    of_scene[name] = [largest_drift(value, path) for path in paths]
     check_drifts(result, drifts)
     result.curves["drift"] = {"drifts": drifts, "steps": {method: steps[method.order] for method in methods}}
     if not drifts:
@@ -49,7 +48,7 @@ def constants(case: Case) -> dict[tuple, Callable]:
     return found
 
 
-def run(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
+def path_in(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
     """q and v of a second in so many steps."""
     return dynamics.run(*case.start, case.tau, DRIFT_DURATION / count, count, method.name)[1:3]
 
@@ -68,7 +67,7 @@ def check_drifts(result: Result, drifts: dict) -> None:
                     result.check(where, f"drift of {quantity} over that of Euler", share, OF_EULER, "")
 
 
-def largest(quantity, path) -> float:
+def largest_drift(quantity, path) -> float:
     """How far a quantity of the state goes from its start along a run; NaN if the run has diverged."""
     if not np.isfinite(path).all():
         return np.nan

@@ -1,16 +1,16 @@
 """How far digits reach: the growth of a small difference, and runs of the same scheme with many digits."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mpmath
 import numpy as np
 
-import tmt
 from tmt.methods import METHODS, one_step
 from tmt.reference import DIGITS, distance
 
 from ...case import Case
-from ...judge.check import Result
+from ...engines import Engine
+from ...judge.check import Result, closest
 from ...judge.rounding import growth
 from ...judge.run import step_in_words
 
@@ -23,12 +23,12 @@ MOST_EXACT_STEPS = 64  # of a run with many digits
 TOO_FAST = 1e4  # rad/s: a run with many digits that is faster has diverged
 
 
-def grown(case: Case, duration: float, steps: int) -> np.ndarray:
+def grown(case: Case, engines: Mapping[str, Engine], duration: float, steps: int) -> np.ndarray:
     """log10 of the growth of a small difference over so many steps of RK4, every 16 steps; NaN where the run diverges."""
     dt = duration / steps
-    _, *path = tmt.simulate(*case.start, case.tau, dt, steps, "rk4", case.tree)
+    motion = engines["tmt"].of(case).run(*case.start, case.tau, dt, steps, "rk4")
     with np.errstate(over="ignore", invalid="ignore"):  # of a run that is about to end
-        return growth(METHODS["rk4"], case.tree, *path, case.tau, dt, GROWTH_EVERY)
+        return growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_EVERY)
 
 
 def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, duration: float, steps: int) -> None:
@@ -98,8 +98,7 @@ def many_digits(result: Result, cases: Sequence[Case], runs: Iterable[dict]) -> 
 def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: float) -> None:
     """The state of each engine's run that comes closest to the band of rounding, {engine: distances in rad, (states,)}."""
     for label, apart in (("TMT", off["tmt"]), ("MuJoCo", off["mujoco"])):
-        ratio = np.divide(apart, band, out=np.zeros_like(apart), where=band > 0)
-        k = int(np.argmax(ratio))  # NaN counts as the largest
+        (k,) = closest(apart, band)
         at = f"t = {k * dt:.3f} s"
         result.check(where, f"{label} to many digits of its own scheme", apart[k], band[k], "rad", at, True)
     result.notes.append(

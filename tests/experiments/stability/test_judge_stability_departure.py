@@ -112,7 +112,7 @@ def test_departure_figure_marks_each_engine_at_its_times(result):
         departure_row(None, None),
         departure_row(1.0, 1.0, scene="ball catch, printed torque"),
     ]
-    _, fig, caption = figures_departure.times(result, ARM)
+    _, fig, caption = figures_departure.draw_departure(result, ARM)
     lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].lines}
     assert lines["MuJoCo RK4"] == 3.0 and lines["RK4"] == 2.0
     assert "Marks: 3 runs. 2 leave as the map does, 2 of them" in caption

@@ -180,7 +180,7 @@ def test_edge_names_each_engine_with_its_growth(result):
     }
     result.curves["edge"] = {"x": np.array([1.0, 2.0]), "y": np.array([1e-3, 1e-2]), "steps": 2000,
                              "grown": {IMPLICIT: np.ones((2, 2))}}  # fmt: skip
-    caption = figures_failure.edge(result, ARM)[2]
+    caption = figures_failure.draw_edge(result, ARM)[2]
     assert "TMT implicit 1.50-fold and 200.00-fold; MuJoCo implicit 2.50-fold and diverges" in caption
 
 
@@ -189,7 +189,7 @@ def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
     for run, size in zip(runs, (0.1, 0.2)):
         run["t"], run["off"] = np.arange(60.0), np.full(60, size)
     result.curves |= {"minutes": runs, "silent": {"gain": {"range": 18.8}}}
-    _, fig, caption = figures_failure.minutes(result, ARM)
+    _, fig, caption = figures_failure.draw_minutes(result, ARM)
     drawn = {line.get_label(): (line.get_marker(), line.get_ydata()[0]) for line in fig.axes[0].lines}
     assert drawn == {"RK4": ("None", 0.1), "MuJoCo, same scheme": ("o", 0.2)}
     assert "drifts: RK4" in caption

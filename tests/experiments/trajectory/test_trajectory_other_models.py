@@ -45,9 +45,9 @@ def other(request, known, engines):
         part = trajectory.follow(case, engines, (1,), known[0])
         result.rows += part.rows
         result.curves["runs"] |= part.curves
-    drift.drift(result, ARM, engines, STEPS)
+    drift.measure_drift(result, ARM, engines, STEPS)
     horizon.many_digits(result, [FREE], known[1])
-    result.curves["errors"] = errors.held(result, ARM) | errors.free(result, ARM)
+    result.curves["errors"] = errors.errors_when_held(result, ARM) | errors.errors_when_free(result, ARM)
     result.notes = sentences.notes(result, ARM, engines, (1,)) + result.notes
     return request.param, result
 
