@@ -1,6 +1,6 @@
 """Energy and momentum along runs: what should be constant drifts with the step at the method's order."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -67,7 +67,7 @@ def check_drifts(result: Result, drifts: dict) -> None:
                     result.check(where, f"drift of {quantity} over that of Euler", share, OF_EULER, "")
 
 
-def largest_drift(quantity, path) -> float:
+def largest_drift(quantity: Callable, path: tuple) -> float:
     """How far a quantity of the state goes from its start along a run; NaN if the run has diverged."""
     if not np.isfinite(path).all():
         return np.nan
@@ -75,17 +75,17 @@ def largest_drift(quantity, path) -> float:
     return float(np.abs(values - values[0]).max())
 
 
-def found_order(values) -> float:
+def found_order(values: Sequence[float]) -> float:
     """The order at which the last two drifts fall, the last with half the step; NaN where nothing drifts."""
     ratio = over(values[-2], values[-1])
     return float(np.log2(ratio)) if ratio > 0.0 else np.nan
 
 
-def over(one, other) -> float:
+def over(one: float, other: float) -> float:
     """One drift over another; NaN if that is zero, or a run has diverged."""
     return one / other if other > 0.0 else np.nan
 
 
-def first_momentum(tree, q, v) -> np.ndarray:
+def first_momentum(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Angular momentum about the first hinge, which hangs on the world, along a run, N m s."""
     return np.einsum("sj,sj->s", tmt.mass_matrix(q, tree)[:, 0], v)
