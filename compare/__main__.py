@@ -1,6 +1,7 @@
 """python -m compare: compare the two models and write a report."""
 
 import os
+from collections.abc import Sequence
 
 from .process import interrupt, streams
 
@@ -36,13 +37,13 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {' '.join(readable(message).split())}\n")
 
 
-def not_empty(text):
+def not_empty(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("it is empty; a name is expected")
     return text
 
 
-def main(arguments=None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = Parser(
         prog="python -m compare",
@@ -98,7 +99,7 @@ class Refused(ValueError):
     """A request that cannot be carried out; the message is one line."""
 
 
-def carry_out(options, command) -> int:
+def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
     from .engines.mujoco import ModelError, load

@@ -225,7 +225,7 @@ class Case:
         return Case(self.robot, dataclasses.replace(self.scene, **changes))
 
 
-def is_number(value) -> bool:
+def is_number(value: object) -> bool:
     """Whether a value is one finite real number; neither text nor true and false."""
     try:
         number = np.asarray(value)
@@ -234,7 +234,7 @@ def is_number(value) -> bool:
     return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
 
 
-def are_numbers(values) -> bool:
+def are_numbers(values: object) -> bool:
     """Whether the values are such numbers in a row."""
     row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
     return row and all(is_number(value) for value in values)

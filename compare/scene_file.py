@@ -1,6 +1,7 @@
 """Scenes of a user's own, from a TOML file with a table [[scene]] for each."""
 
 import tomllib
+from pathlib import Path
 
 from .case import TORQUES, Case, Scene, are_numbers, shorten
 from .robots import Robot
@@ -15,7 +16,7 @@ class SceneError(ValueError):
     """A file that does not describe scenes of the robot; the message is one line with file and entry."""
 
 
-def read_scenes(path, robot: Robot) -> tuple[Scene, ...]:
+def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     """The scenes of a file, of a robot: angles in deg, speeds in deg/s, torques in N m, damping in N m s/rad, times in s.
 
     Each needs a name; it starts at rest with all joints at zero, free, if nothing else is said. SceneError for a file that

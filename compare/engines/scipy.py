@@ -107,7 +107,9 @@ class NotFinite(ArithmeticError):
     """A slope at a time, s, that is not finite."""
 
 
-def as_far_as_it_goes(t, found, start, why) -> tuple[np.ndarray, np.ndarray, str | None]:
+def as_far_as_it_goes(
+    t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str
+) -> tuple[np.ndarray, np.ndarray, str | None]:
     """q and v at the times t, NaN from where a run has no finite state any more, and why and when that is, or None.
 
     found: (times reached, 2n), the states of a run that may have ended early; start: (2n,), its first.
@@ -120,7 +122,7 @@ def as_far_as_it_goes(t, found, start, why) -> tuple[np.ndarray, np.ndarray, str
     return *np.split(path, 2, axis=1), ended
 
 
-def each(solved, q, v, tau, *more) -> Motion:
+def each(solved: Callable[..., Motion], q: np.ndarray, v: np.ndarray, tau: np.ndarray, *more) -> Motion:
     """The motions of a batch, one run after the other: solved(q, v, tau, *more) is the motion of one."""
     batch, states = rows_of_states(q, v, tau)
     motions = [solved(*state, *more) for state in zip(*states)]

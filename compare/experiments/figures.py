@@ -3,6 +3,8 @@
 Each function returns (file name, figure, caption).
 """
 
+from collections.abc import Sequence
+
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
@@ -121,7 +123,7 @@ def hinges(robot: Robot) -> list[str]:
     return words
 
 
-def triple(values) -> str:
+def triple(values: Sequence[float]) -> str:
     return f"({', '.join(f'{v:.3g}' for v in values)})"
 
 

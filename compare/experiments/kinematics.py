@@ -8,6 +8,7 @@ import numpy as np
 from ..judge.check import Result
 from ..judge.scale import reaches
 from ..robots import Robot
+from ..setup import Setup
 
 TITLE = "Kinematics: do the bodies move alike?"
 
@@ -36,7 +37,7 @@ def origin(robot: Robot) -> str:
     return next((name for name, point in landmarks.items() if not np.any(point)), "origin")
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Six quantities at the named postures and at random states."""
     result = Result("kinematics")
     engines = tuple(setup.compared().values())

@@ -11,6 +11,7 @@ from ..engines.mujoco.parameters import STATED_FLAGS, options, parameters
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
+from ..setup import Setup
 
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
@@ -80,7 +81,7 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     return tree.body_names if quantity in OF_BODIES else tree.hinge_names
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """One row for each number; one check for each quantity of each hinge or body; the causes that follow."""
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
     tree, dynamics = setup.robot.tree, setup.compared()["mujoco"]
@@ -114,7 +115,9 @@ def rows(setup) -> Result:
     return result
 
 
-def causes_in(tree, owner, quantity, stated, found, off, tolerance) -> list[dict]:
+def causes_in(
+    tree: tmt.Tree, owner: str, quantity: str, stated: np.ndarray, found: np.ndarray, off: np.ndarray, tolerance: float
+) -> list[dict]:
     """The causes in one quantity of one hinge or body: each number that is off by more than the tolerance.
 
     Rank 1: an option, or a convention of a hinge (its order, its sign, its zero); 2: one number.
@@ -131,7 +134,9 @@ def causes_in(tree, owner, quantity, stated, found, off, tolerance) -> list[dict
     return causes
 
 
-def cause(tree, rank, quantity, place, stated, found, size, remark="") -> dict:
+def cause(
+    tree: tmt.Tree, rank: int, quantity: str, place: str, stated: float, found: float, size: float, remark: str = ""
+) -> dict:
     """A cause with its sentence; size: its difference over its tolerance."""
     unit = QUANTITIES[quantity]
     if quantity.startswith("flag "):

@@ -14,6 +14,7 @@ from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
 from ..judge.words import capital, listed
 from ..robots import Printed, Robot
+from ..setup import Setup
 
 TITLE = "Published numbers: does either engine contradict the assignment?"
 
@@ -118,7 +119,7 @@ def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Dynamics]) -> Ans
     return Answer(truth.gravity_balance, *(d.gravity_balance(q) for d in engines), gravity_scale(tree))
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """One row for each printed component, one check for each item and engine."""
     result = Result("published", shown=["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"])
     robot, dynamics = setup.robot, setup.compared()

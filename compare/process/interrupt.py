@@ -9,6 +9,7 @@ import signal
 import socket
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -38,7 +39,7 @@ def listen() -> None:
 
 
 @contextmanager
-def postponed():
+def postponed() -> Iterator[None]:
     """An interrupt that comes in this block is answered at its end."""
     Now.held += 1
     try:

@@ -4,6 +4,7 @@ import base64
 import html
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
@@ -11,7 +12,7 @@ import pandas as pd
 
 from ..judge.words import capital
 from .questions import answers
-from .verdict import outcome, passed
+from .verdict import Section, outcome, passed
 
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
 DIGITS |= dict.fromkeys(
@@ -43,7 +44,7 @@ def in_words(count: int) -> str:
     return words[count] if count < len(words) else str(count)
 
 
-def shown(table, columns=None) -> pd.DataFrame:
+def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """A table as text, with the digits that a reader needs."""
     table = table if columns is None else table[columns]
 
@@ -58,12 +59,12 @@ def shown(table, columns=None) -> pd.DataFrame:
     return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
 
 
-def of_causes(causes) -> pd.DataFrame:
+def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
     """The causes as a table for readers."""
     return pd.DataFrame([(cause["rank"], cause["text"]) for cause in causes], columns=["rank", "cause"])
 
 
-def questions(sections, robot) -> pd.DataFrame:
+def questions(sections: Sequence[Section], robot) -> pd.DataFrame:
     """What was asked and the answers, as a table for readers."""
     return pd.DataFrame(answers(sections, robot), columns=["part", "asked", "answered in", "answer"])
 
@@ -73,15 +74,22 @@ def asked_by(robot) -> str:
     return "The assignment's questions" if robot.questions else "Questions"
 
 
-def failing(section) -> pd.DataFrame:
+def failing(section: Section) -> pd.DataFrame:
     """The checks of a section that fail, as text."""
     failed = [check.record() for check in section.result.checks if not check.passed]
     return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
 
 
-def markdown(sections, robot, origin, result, causes=(), skipped=()) -> str:
-    """The report as Markdown; `result`: the verdict; `causes`: of what fails."""
-    lines = [f"# {title(robot)}", f"**{result}**"]
+def markdown(
+    sections: Sequence[Section],
+    robot,
+    origin: dict,
+    verdict: str,
+    causes: Sequence[dict] = (),
+    skipped: Sequence[tuple[str, str]] = (),
+) -> str:
+    """The report as Markdown; `verdict`: in words; `causes`: of what fails."""
+    lines = [f"# {title(robot)}", f"**{verdict}**"]
     lines += ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
     lines += [introduction(robot)]
     asked = questions(sections, robot)
@@ -108,25 +116,33 @@ def markdown(sections, robot, origin, result, causes=(), skipped=()) -> str:
     return "\n\n".join(lines).replace("\n\n- ", "\n- ") + "\n"
 
 
-def heading(name) -> str:
+def heading(name: str) -> str:
     """A table's name as words."""
     return {"what_should_i_use": "What should I use?"}.get(name, name.replace("_", " ").capitalize())
 
 
-def link(name) -> str:
+def link(name: str) -> str:
     return f"[tables/{name}.csv](tables/{name}.csv)"
 
 
-def md_table(table) -> str:
+def md_table(table: pd.DataFrame) -> str:
     cells = [list(table.columns), ["---"] * len(table.columns), *table.astype(str).values.tolist()]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
 
 
-def origins(origin) -> pd.DataFrame:
+def origins(origin: dict) -> pd.DataFrame:
     return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
 
 
-def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
+def page(
+    folder: Path,
+    sections: Sequence[Section],
+    robot,
+    origin: dict,
+    verdict: str,
+    causes: Sequence[dict] = (),
+    skipped: Sequence[tuple[str, str]] = (),
+) -> str:
     """The report as one HTML file with its figures inside."""
     body = (
         ["<h2>Causes (1: an option or a convention, 2: a number)</h2>", html_table(of_causes(causes), "text")]
@@ -169,22 +185,22 @@ def page(folder, sections, robot, origin, result, causes=(), skipped=()) -> str:
     return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
         title=title(robot),
         colour="#009E73" if passed(sections) else "#D55E00",
-        verdict=html.escape(result),
+        verdict=html.escape(verdict),
         contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),
         body="\n".join(body),
     )
 
 
-def words(text) -> str:
+def words(text: str) -> str:
     """A sentence in HTML; what stands between backticks is code."""
     return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
 
 
-def foldable(table, summary) -> str:
+def foldable(table: pd.DataFrame, summary: str) -> str:
     """A table in HTML, folded if it is long."""
     text = html_table(table)
     return f"<details><summary>{summary}</summary>{text}</details>" if len(table) > FOLDED else text
 
 
-def html_table(table, kind="data") -> str:
+def html_table(table: pd.DataFrame, kind: str = "data") -> str:
     return f'<div class="scroll">{table.to_html(index=False, border=0, classes=kind)}</div>'

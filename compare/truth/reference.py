@@ -110,7 +110,7 @@ def remade(cases: Sequence[Case], map: Callable, progress: Callable) -> list[lis
     return [case_rows(case, runs[case.name]) for case in cases]
 
 
-def next_counts(case, runs) -> list[int]:
+def next_counts(case: Case, runs: Sequence[tuple]) -> list[int]:
     """The numbers of steps with which the case is to be run next: two at first; none where the digits are enough."""
     first = max(1, round(case.duration / 5.0 * FIRST_STEPS / RECORDS)) * RECORDS
     if not runs:
@@ -120,13 +120,13 @@ def next_counts(case, runs) -> list[int]:
     return [] if enough else [2 * count]
 
 
-def halving(runs) -> float:
+def halving(runs: Sequence[tuple]) -> float:
     """The largest difference of the two finest runs, rad or rad/s; infinite if one of them did not reach its end."""
     (_, coarse), (_, fine) = runs[-2:]
     return np.inf if coarse is None or fine is None else float(abs(fine - coarse).max())
 
 
-def case_rows(case, runs) -> list[dict]:
+def case_rows(case: Case, runs: Sequence[tuple]) -> list[dict]:
     """The rows of a case from its two finest runs; ValueError if they did not reach its end."""
     count, fine = runs[-1]
     if not np.isfinite(halving(runs)):
@@ -142,7 +142,7 @@ def case_rows(case, runs) -> list[dict]:
     ]
 
 
-def path_with_many_digits(job) -> np.ndarray | None:
+def path_with_many_digits(job: tuple[Case, int, int]) -> np.ndarray | None:
     """One run with many digits, None if its numbers overflow; a job is a case, the number of records and that of steps."""
     case, records, steps = job
     try:

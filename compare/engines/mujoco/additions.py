@@ -81,7 +81,9 @@ def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     return Mujoco(spec.compile(), engine.joints, engine.bodies, None)
 
 
-def contacts(dynamics: MujocoDynamics, q, v, tau, dt: float, steps: int, integrator: str) -> tuple[float, bool]:
+def contacts(
+    dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray, tau: np.ndarray, dt: float, steps: int, integrator: str
+) -> tuple[float, bool]:
     """How many contacts there are in a step of a run, on average, and whether any of them pushes a joint."""
     model, data = dynamics.own_copy(dt, integrator, q, v, tau)
     total, pushed = 0, False

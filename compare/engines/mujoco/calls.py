@@ -4,7 +4,7 @@ The C library that the Python package brings is called through its function poin
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import mujoco
@@ -118,7 +118,7 @@ class MinimalCalls:
 BEFORE_RNE = ("mj_kinematics", "mj_comPos", "mass matrix", "mj_comVel")  # before mj_rne, in this order
 
 
-def functions(lib) -> dict[str, Callable]:
+def functions(lib: ctypes.CDLL) -> dict[str, Callable]:
     """MuJoCo's functions of model and data by their names."""
     more = {"mj_rne": (ctypes.c_int, ctypes.c_void_p), "mj_solveM": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)}
     mass_matrix = "mj_makeM" if hasattr(lib, "mj_makeM") else "mj_crb"
@@ -135,7 +135,7 @@ def repeated(function, model, data, count):
         function(model, data)
 
 
-def equal_work(call) -> tuple[Callable, Callable]:
+def equal_work(call: Mapping[str, Callable]) -> tuple[Callable, Callable]:
     """Compiled loops: mass matrix and bias; and the acceleration from them."""
     kinematics, com, inertia, velocities = (call[name] for name in BEFORE_RNE)
     factor, rne, solve = call["mj_factorM"], call["mj_rne"], call["mj_solveM"]

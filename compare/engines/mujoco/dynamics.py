@@ -251,6 +251,6 @@ class MujocoDynamics:
         return np.stack([T, self._to_body(B)])
 
 
-def refuse_tolerance(tolerance, method) -> None:
+def refuse_tolerance(tolerance: float | None, method: str) -> None:
     if tolerance is not None:
         raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")

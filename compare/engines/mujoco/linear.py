@@ -8,7 +8,7 @@ from .dynamics import FLAGS, MujocoDynamics
 NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/s
 
 
-def transition(dynamics: MujocoDynamics, q, tau, dt, integrator) -> np.ndarray:
+def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
     """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, (2n, 2n).
 
     q, tau: (n,) rad, N m. By mjd_transitionFD, central differences of 1e-6; where it refuses (RK4, delays) steps are
@@ -27,7 +27,7 @@ def transition(dynamics: MujocoDynamics, q, tau, dt, integrator) -> np.ndarray:
     return A[np.ix_(order, order)]
 
 
-def differenced(dynamics: MujocoDynamics, q, tau, dt, integrator) -> np.ndarray:
+def differenced(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
     """The same by central differences of steps."""
     n, ends = len(dynamics.dofs), []
     for sign in (1.0, -1.0):
@@ -36,7 +36,9 @@ def differenced(dynamics: MujocoDynamics, q, tau, dt, integrator) -> np.ndarray:
     return (ends[0] - ends[1]).T / (2.0 * NUDGE)
 
 
-def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt, steps, integrator) -> dict:
+def left_to_itself(
+    dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, steps: int, integrator: str
+) -> dict:
     """A run with MuJoCo's defaults, automatic reset included, and what MuJoCo says of it.
 
     q, qd: (steps + 1, n); time: (steps + 1,) s, of MuJoCo's own clock; warnings: their number at the end.
@@ -53,7 +55,7 @@ def left_to_itself(dynamics: MujocoDynamics, q, qd, tau, dt, steps, integrator) 
     return {"time": time[:, 0], "q": time[:, 1 : 1 + n], "qd": time[:, 1 + n :], "warnings": warnings}
 
 
-def implicit_derivative(dynamics: MujocoDynamics, q, qd, dt=1e-3) -> np.ndarray:
+def implicit_derivative(dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, dt: float = 1e-3) -> np.ndarray:
     """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (n, n): qDeriv."""
     model, data = dynamics.own_copy(dt, "implicit", q, qd)
     mujoco.mj_step(model, data)

@@ -1,5 +1,7 @@
 """The compiled model read back in the project's symbols: what the compiler made of the file."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -104,7 +106,7 @@ def contact_pairs(m: mujoco.MjModel) -> int:
     return count
 
 
-def bit(members) -> int:
+def bit(members: Sequence[str]) -> int:
     """The bit of the first of these disable flags that the installed MuJoCo has; 0 if it has none of them."""
     for member in members:
         if hasattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"):

@@ -1,15 +1,17 @@
 """What each scene needs of the model: the fewest joints, an integrator at all; and what the rest costs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from tmt.reference import DIGITS
 
+from ...case import Case
 from ...engines.mujoco import ModelError
 from ...judge.check import LOCKABLE, Result
 from ...judge.rounding import NARROW
 from ...judge.scale import FACTOR
 from ...robots import Robot
+from ...setup import Setup
 from . import exact_motion, sub_blocks
 from .cost import measure_costs
 from .needs import of_case
@@ -40,7 +42,7 @@ def tolerance(robot: Robot) -> str:
     )
 
 
-def rows(setup, cases=None, timed: bool = True) -> Result:
+def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> Result:
     """Sub-blocks for every subset; for each case what it needs, runs and times; exact solutions; costs in MuJoCo.
 
     cases: the robot's, if none are given. timed=False: one choice of angles, the scenes with fewer joints, and the exact
@@ -55,7 +57,7 @@ def rows(setup, cases=None, timed: bool = True) -> Result:
     return result
 
 
-def fill(result: Result, setup, cases, timed: bool) -> None:
+def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> None:
     """All parts of `rows`, one after the other."""
     sub_blocks.compare_blocks(result, setup, angles=setup.of(10, 3, 1) if timed else 1)
     integrators = TWO_INTEGRATORS if timed else TWO_INTEGRATORS[-1:]

@@ -1,6 +1,7 @@
 """What each thing that is added to the minimal model costs in MuJoCo, and whether it changes the motion."""
 
 import dataclasses
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -9,17 +10,19 @@ import tmt
 from ...case import Case
 from ...engines import Setting
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR, contacts, with_additions
+from ...judge.check import Result
 from ...judge.run import step_in_words
 from ...judge.scale import reaches
 from ...judge.timing import fastest
 from ...robots import Robot
+from ...setup import Setup
 from .times import TIMED_STEPS, TWO_INTEGRATORS
 
 FALL_TIME, FALL_STEPS = 5.0, 1024  # s, long enough to come to rest on the floor; of the run whose bits are compared
 SETTLED = 0.5  # N m s/rad, with which the robot comes to rest
 
 
-def measure_costs(result, setup, rounds: int) -> None:
+def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
     """A table: time of a step with each thing added, as a ratio to the minimal model, and bits of a fall."""
     case = fall_case(setup.robot)
     dt, timed = case.scene.dt, TIMED_STEPS["mujoco"]
@@ -73,7 +76,9 @@ def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
     return radius, lowest - near, lowest - far
 
 
-def cost_rows(seconds, paths, touching) -> list[dict]:
+def cost_rows(
+    seconds: Mapping[tuple, float], paths: Mapping[tuple, np.ndarray], touching: Mapping[tuple, float]
+) -> list[dict]:
     """The rows, by integrator, from what is known of each (addition, integrator).
 
     seconds: of a timed run; paths: (steps + 1, 2 n), rad and rad/s; touching: contacts in a step.
@@ -97,7 +102,7 @@ def cost_rows(seconds, paths, touching) -> list[dict]:
     return rows
 
 
-def check_bits(result, where: str, rows, pushed) -> None:
+def check_bits(result: Result, where: str, rows: list[dict], pushed: set[tuple]) -> None:
     """Checks: what exerts no force leaves the bits of the motion, and capsules that something pushes do not.
 
     pushed: of which (addition, integrator) that is so. The minimal model itself, which is timed twice, is not compared with its

@@ -1,5 +1,7 @@
 """What a case needs of its model, in words; and its motion by the smallest model beside that by the whole one."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 import tmt
@@ -7,15 +9,16 @@ from tmt.reference import DIGITS
 
 from ...case import Case
 from ...engines import LABELS
-from ...judge.check import closest
+from ...judge.check import Result, closest
 from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, required_time, step_in_words
 from ...judge.words import capital
+from ...setup import Setup
 from ...truth.smallest import Needed, needed, reduced
 from .times import FINER_RUNS, TWO_INTEGRATORS, method_of, scheme_of
 
 
-def of_case(result, case: Case, setup, integrators=TWO_INTEGRATORS) -> list:
+def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str] = TWO_INTEGRATORS) -> list:
     """What the case needs, in words; runs of it and of a smaller model; the models to be timed, None for none at all."""
     need = needed(case)
     smaller = reduced(case, need)
@@ -58,7 +61,7 @@ def need_in_words(case: Case, need: Needed) -> str:
     )
 
 
-def compare_smaller(result, case: Case, smaller: Case | None, setup, integrator: str) -> None:
+def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Setup, integrator: str) -> None:
     """Runs of the case and of the smaller one (None: it stays), by the same method, within the band of rounding."""
     scheme, n, steps = scheme_of(setup.engines, integrator), len(case.joints), FINER_RUNS * case.steps
     dt = case.duration / steps
@@ -88,7 +91,15 @@ def compare_smaller(result, case: Case, smaller: Case | None, setup, integrator:
         )
 
 
-def check_smaller(result, where: str, joints, t, apart, width, required: float) -> float:
+def check_smaller(
+    result: Result,
+    where: str,
+    joints: Sequence[str],
+    t: np.ndarray,
+    apart: np.ndarray,
+    width: np.ndarray,
+    required: float,
+) -> float:
     """Checks: the runs stay within the band of rounding while it is narrow, and that is long enough; until when, s.
 
     apart, width: (times, 2 n), rad and rad/s, the distance of the smaller model's run from the whole one's, and the band.
@@ -104,7 +115,7 @@ def check_smaller(result, where: str, joints, t, apart, width, required: float) 
     return until
 
 
-def states_of_run(case: Case, setup, integrator: str) -> dict[str, np.ndarray]:
+def states_of_run(case: Case, setup: Setup, integrator: str) -> dict[str, np.ndarray]:
     """Positions and speeds of the case's joints by engine, each (steps + 1, 2 n)."""
     steps, paths = FINER_RUNS * case.steps, {}
     for engine, dynamics in setup.compared(case).items():

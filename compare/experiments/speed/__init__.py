@@ -1,5 +1,6 @@
 """Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -8,7 +9,7 @@ import tmt
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import GRID, Dynamics, Method, Setting
+from ...engines import GRID, Dynamics, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.rounding import growth
@@ -61,7 +62,7 @@ def skipped(robot: Robot) -> str | None:
     return None if scenes_of(robot) else f"the {robot.name} has no scene that every method follows"
 
 
-def begin(setup) -> None:
+def begin(setup: Setup) -> None:
     """Measure all errors beside other work: they are no timings."""
     setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
 
@@ -110,7 +111,7 @@ def rows(setup, timed: bool = True) -> Result:
     return result
 
 
-def add_times(result, setup, names, of_scenes) -> None:
+def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Sequence[list[dict]]) -> None:
     """The seconds of all rows, what one evaluation costs, and what follows: what to use, and which aims are met."""
     setup.quiet()  # nothing else may run beside a timing
     spread = []
@@ -127,7 +128,7 @@ def add_times(result, setup, names, of_scenes) -> None:
     result.notes += accuracy.smaller_models_in_words(result.rows)
 
 
-def unavailable(setup, names) -> list[dict]:
+def unavailable(setup: Setup, names: Sequence[str]) -> list[dict]:
     """A row for each scene and each engine that cannot take part: its methods, and why; no numbers."""
     absent = {
         engine: reason
@@ -161,7 +162,9 @@ def rows_of_scene(case: Case, engines, known: dict[str, Reference], size: str, w
     return found + [row_of_run(smaller, case, engines, method, setting, reference) for method in few], left
 
 
-def row_of_run(case: Case, whole: Case, engines, method: Method, setting: Setting, reference: Reference) -> dict:
+def row_of_run(
+    case: Case, whole: Case, engines: Mapping[str, Engine], method: Method, setting: Setting, reference: Reference
+) -> dict:
     """A row: one run of a scene, or of the smaller model that has the motion of the whole one."""
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
     true = np.split(reference.high, 2, axis=1)
@@ -202,7 +205,7 @@ def floor(case: Case, dynamics: Dynamics) -> float:
     raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")
 
 
-def take_times(rows, setup) -> list[list[float]]:
+def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
     """Seconds of the runs of one scene's rows, all settings in turns."""
     runs = []
     for case, method, setting in (row["run"] for row in rows):
@@ -211,14 +214,14 @@ def take_times(rows, setup) -> list[list[float]]:
     return timing.in_turns(runs, rounds=setup.of(5, 2, 2))
 
 
-def fill_in(rows, times) -> list[float]:
+def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
     """Give each row the least of its times; of those that have more than one, the median over the least."""
     for row, of_row in zip(rows, times):
         row["seconds"] = min(of_row)
     return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]
 
 
-def spread_in_words(spread) -> list[str]:
+def spread_in_words(spread: Sequence[float]) -> list[str]:
     """How the times of one setting differ, in words."""
     if not spread:
         return ["Each time is that of one run."]
@@ -229,7 +232,7 @@ def spread_in_words(spread) -> list[str]:
     ]
 
 
-def figures(result, robot):
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
     from . import figures_evaluations, figures_times  # matplotlib is for the process that draws
 

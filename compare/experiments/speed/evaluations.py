@@ -10,6 +10,7 @@ from tmt import generic, kernels, method
 
 from ...case import SEED, Case
 from ...judge import timing
+from ...setup import Setup
 from .settings import coarsest_steps, regular_of
 
 STATES = (1, 1000, 1_000_000)
@@ -21,7 +22,7 @@ WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_
 WAITING, EACH, IN_LANES = "traced kernel, each waits for the last", "traced kernel", "lanes"
 
 
-def costs(setup) -> tuple[list[dict], list[str]]:
+def costs(setup: Setup) -> tuple[list[dict], list[str]]:
     """The rows of evaluations.csv, and sentences about them."""
     from ...engines.mujoco.calls import MinimalCalls  # here, for numba takes its time
 

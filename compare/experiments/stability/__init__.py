@@ -1,5 +1,6 @@
 """Stability: where each method fails, predicted from one step of it and shown in runs, with all joints together."""
 
+from collections.abc import Iterator
 from functools import partial
 from itertools import product
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from ...engines import same_scheme
 from ...judge.check import Result
+from ...robots import Robot
+from ...setup import Setup
 from ...truth.linear import held
 from . import beyond, choice, claims, departure, failure, falling, limits, long_runs
 from .claims_judged import check_claims
@@ -19,7 +22,7 @@ MAP_STEPS = np.geomspace(0.03, 1.0, 100)  # s
 SMALL_RESONANCE = failure.RESONANCE + np.array([-0.01, -0.005, 0.0, 0.005])  # of a small run
 
 
-def claim(robot) -> str:
+def claim(robot: Robot) -> str:
     """What is examined."""
     return (
         "Every method fails somewhere, and where can be said beforehand. The equations of motion are linearised about "
@@ -30,7 +33,7 @@ def claim(robot) -> str:
     )
 
 
-def tolerance(robot) -> str:
+def tolerance(robot: Robot) -> str:
     """How far apart what is compared may be."""
     return (
         "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
@@ -43,13 +46,13 @@ def tolerance(robot) -> str:
     )
 
 
-def methods_of(setup) -> tuple:
+def methods_of(setup: Setup) -> tuple:
     """The methods that a run of this size takes."""
     few = choice.of_schemes(setup.engines, choice.FEW_SCHEMES)
     return setup.of(choice.all_methods(setup.engines), few, few + choice.of_schemes(setup.engines, ("implicit",)))
 
 
-def begin(setup) -> None:
+def begin(setup: Setup) -> None:
     """Set the runs going side by side. A quick run takes fewer methods and scenes, and no map, minute or fine step."""
     robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects_of(setup.robot)
     methods, each, coarse = methods_of(setup), choice.of_schemes(engines), choice.coarsest_case(robot).scene.dt
@@ -114,7 +117,7 @@ def begin(setup) -> None:
     }  # fmt: skip
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Equilibria; step limits and growth per step; departures; what is claimed; failures beyond the linear ones."""
     result, robot = Result("stability"), setup.robot
     if "stability" not in setup.background:
@@ -146,7 +149,7 @@ def rows(setup) -> Result:
     return result
 
 
-def figures(result, robot):
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Limits, the map of growth, regions, the nonlinear edge; departures; the claims; silent failure; a minute."""
     # matplotlib is for the process that draws
     from . import figures_claims, figures_departure, figures_failure, figures_limits

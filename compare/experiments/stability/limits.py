@@ -1,11 +1,13 @@
 """Step limits: up to which dt a method keeps a small deviation small, predicted from one step and observed in runs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...engines import Engine, Method
+from ...judge.check import Result
 from ...judge.run import deviation, number_or_none
+from ...robots import Robot
 from ...truth.linear import Held
 from .choice import damped, who
 
@@ -30,7 +32,7 @@ def limits_and_growths(
     engines: Mapping[str, Engine],
     methods: tuple[Method, ...],
     steps: int = GROWTH_STEPS,
-    growth_dts=(1e-3, 1e-2),
+    growth_dts: Sequence[float] = (1e-3, 1e-2),
 ) -> dict:
     """Rows for tables/stability.csv and tables/stability_growth.csv of one posture.
 
@@ -56,7 +58,15 @@ def limits_and_growths(
     return {"rows": rows, "growths": growths}
 
 
-def growth_in_run(method, engines, at, direction, dt, size=LINEAR_DEVIATION, steps=GROWTH_STEPS) -> float:
+def growth_in_run(
+    method: Method,
+    engines: Mapping[str, Engine],
+    at: Held,
+    direction: np.ndarray,
+    dt: float,
+    size: float = LINEAR_DEVIATION,
+    steps: int = GROWTH_STEPS,
+) -> float:
     """The largest deviation of a run over that at its start, which is size x direction, rad; inf if it diverged."""
     dynamics, start = engines[method.engine].of(at.case), at.q + size * direction
     with np.errstate(over="ignore", invalid="ignore"):
@@ -64,7 +74,9 @@ def growth_in_run(method, engines, at, direction, dt, size=LINEAR_DEVIATION, ste
         return deviation(motion.q, at.q) / size
 
 
-def observed_limit(method, engines, at, steps=GROWTH_STEPS) -> tuple[str, float | None]:
+def observed_limit(
+    method: Method, engines: Mapping[str, Engine], at: Held, steps: int = GROWTH_STEPS
+) -> tuple[str, float | None]:
     """The largest dt at which no mode of the equations of motion grows in a run, found without the prediction.
 
     Upwards through TRIED_STEPS to the first step that fails, then by bisection; ("never_fails", None) if none does,
@@ -85,7 +97,9 @@ def observed_limit(method, engines, at, steps=GROWTH_STEPS) -> tuple[str, float 
     return "finite", float(low)
 
 
-def shares(method, engines, at, dt, steps) -> tuple[np.ndarray, np.ndarray]:
+def shares(
+    method: Method, engines: Mapping[str, Engine], at: Held, dt: float, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Shares of the modes in the deviation, over those at the start, in the second and the last quarter of a run, (2n,).
 
     All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of motion, not of
@@ -134,7 +148,7 @@ def grows(early, late) -> bool:
     return bool(((late > GROWTH_ALLOWED) | ((late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED))).any())
 
 
-def growth_per_step(method, engines, at, dt) -> dict:
+def growth_per_step(method: Method, engines: Mapping[str, Engine], at: Held, dt: float) -> dict:
     """How much the fastest-growing mode grows in one step: in a run, by its share in the deviation, and predicted."""
     predicted, shape, measure = at.fastest_growing(method.scheme, dt)
     steps = int(np.clip(np.log(TOTAL_GROWTH) / np.log(predicted), 2, MOST_GROWTH_STEPS))
@@ -150,7 +164,9 @@ def growth_per_step(method, engines, at, dt) -> dict:
     }  # fmt: skip
 
 
-def map_of_growth(method, engines, at, dts, steps=GROWTH_STEPS) -> np.ndarray:
+def map_of_growth(
+    method: Method, engines: Mapping[str, Engine], at: Held, dts: Sequence[float], steps: int = GROWTH_STEPS
+) -> np.ndarray:
     """Growth of the deviation in so many steps along the stiffest mode of a posture, for each dt."""
     direction = stiffest(at)[1]
     return np.array([growth_in_run(method, engines, at, direction, dt, steps=steps) for dt in dts])
@@ -164,7 +180,7 @@ def stiffest(at: Held) -> tuple[float, np.ndarray]:
     return float(values[k].imag), angles / np.abs(angles).max()
 
 
-def check_limits(result, robot, parts) -> None:
+def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
     """The table of limits and that of growth per step, and a check for each row."""
     late = {}
     for row in (row for part in parts for row in part["rows"]):
@@ -188,13 +204,13 @@ def check_limits(result, robot, parts) -> None:
     result.notes += growth_per_step_in_words(growths)
 
 
-def apart(row) -> float | None:
+def apart(row: dict) -> float | None:
     """How far an observed limit is from the predicted one, relative; None if one of them is missing."""
     known = row["observed_dt_s"] and row["predicted_dt_s"]
     return abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if known else None
 
 
-def limits_in_words(robot, rows) -> list[str]:
+def limits_in_words(robot: Robot, rows: list[dict]) -> list[str]:
     """How far observed limits are from the predicted ones, damping by damping."""
     expected = [row for row in rows if row["limit"] == "finite"]
     known = [row for row in expected if apart(row) is not None]

@@ -8,6 +8,7 @@ from ...judge.check import Result
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES
 from ...robots import Robot
+from ...setup import Setup
 from . import drift, errors, horizon, sentences
 from .derivative import compare_derivatives
 from .runs import follow
@@ -41,7 +42,7 @@ def tolerance(robot: Robot) -> str:
     )
 
 
-def begin(setup) -> None:
+def begin(setup: Setup) -> None:
     """Set the long work going, side by side, while other experiments compute.
 
     A quick run takes fewer scenes, and leaves out many digits and the growth of errors.
@@ -66,7 +67,7 @@ def begin(setup) -> None:
     }
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Each scene, integrator and step: three levels of agreement; then drift, growth of errors, many digits."""
     result = Result("trajectory", shown=[
         "scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",

@@ -1,6 +1,6 @@
 """Energy and momentum along runs: what should be constant drifts with the step at the method's order."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -110,17 +110,17 @@ def largest_drift(quantity, path) -> float:
     return float(np.abs(values - values[0]).max())
 
 
-def found_order(values) -> float:
+def found_order(values: Sequence[float]) -> float:
     """The order at which the last two drifts fall, the last with half the step; NaN where nothing drifts."""
     ratio = over(values[-2], values[-1])
     return float(np.log2(ratio)) if ratio > 0.0 else np.nan
 
 
-def over(one, other) -> float:
+def over(one: float, other: float) -> float:
     """One drift over another; NaN if that is zero, or a run has diverged."""
     return one / other if other > 0.0 else np.nan
 
 
-def first_momentum(tree, q, v) -> np.ndarray:
+def first_momentum(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Angular momentum about the first hinge, which hangs on the world, along a run, N m s."""
     return np.einsum("sj,sj->s", tmt.mass_matrix(q, tree)[:, 0], v)

@@ -1,12 +1,16 @@
 """Figures of runs: angles and rates against time, differences in their bands, drift, growth of errors."""
 
+from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ...case import Case
 from ...engines import LABELS
+from ...judge.check import Result
 from ...judge.run import step_in_words
 from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, joint_lines
@@ -20,7 +24,7 @@ DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEGEND_COLUMNS = 4  # of a legend
 
 
-def over_time(ax, t, ours, theirs, case):
+def over_time(ax: Axes, t: np.ndarray, ours: np.ndarray, theirs: np.ndarray, case: Case) -> None:
     """Joint angles or rates against time: lines for TMT, up to 65 marks for MuJoCo."""
     every = slice(None, None, max(1, len(t) // 64))
     marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
@@ -32,7 +36,7 @@ def over_time(ax, t, ours, theirs, case):
     ax.plot([], [], color="black", label="MuJoCo", **marks)
 
 
-def draw_held(result, case, number):
+def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str]:
     """The assignment's figure of a held posture: joint angles against time."""
     curve = result.curves["runs"][(case.name, "rk4", case.steps)]
     fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
@@ -52,7 +56,7 @@ def draw_held(result, case, number):
     return f"assignment_figure_{number}", fig, caption
 
 
-def draw_run(result, case):
+def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     """One scene under each scheme: angles, rates, and the difference under its band; grey: not judged."""
     of_case = [key for key in result.curves["runs"] if key[0] == case.name]
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
@@ -93,7 +97,7 @@ def draw_run(result, case):
     return file_name("trajectory", case.name), fig, run_caption(result, case, until)
 
 
-def run_caption(result, case, until) -> str:
+def run_caption(result: Result, case: Case, until: Sequence[str]) -> str:
     """How far the engines are apart in a scene, how far from the true motion, and what diverges."""
     rows = [row for row in result.rows if row["scene"] == case.name and row["level"] == "open loop"]
     diverged = [row for row in rows if row["diverged_at_s"] is not None]
@@ -114,7 +118,7 @@ def run_caption(result, case, until) -> str:
     )
 
 
-def draw_drift(result):
+def draw_drift(result: Result) -> tuple[str, Figure, str]:
     """Drift of energy and momentum against the step size, both engines."""
     drifts, steps = (result.curves["drift"][key] for key in ("drifts", "steps"))
     lines = -(-len(drifts) // 3)
@@ -137,7 +141,7 @@ def draw_drift(result):
     return "trajectory_drift", fig, drift_caption(drifts, steps)
 
 
-def drift_caption(drifts, steps) -> str:
+def drift_caption(drifts: dict, steps: dict) -> str:
     """At which order the drift falls, how large that of the energy is, and how alike the engines are in it."""
     orders, largest = [], []
     for method in dict.fromkeys(method for of in drifts.values() for method in of):
@@ -162,13 +166,13 @@ def drift_caption(drifts, steps) -> str:
     )
 
 
-def range_in_words(values, digits) -> str:
+def range_in_words(values: Sequence[float], digits: str) -> str:
     """The least and the largest of some numbers in words."""
     values = [value for value in values if np.isfinite(value)]
     return f"{min(values):{digits}} to {max(values):{digits}}" if values else "no number"
 
 
-def draw_growth(result):
+def draw_growth(result: Result) -> tuple[str, Figure, str]:
     """Growth of a small difference over the whole time, scene by scene."""
     t, curves = (result.curves["growth"][key] for key in ("t", "curves"))
     fig = Figure(figsize=(WIDTH, 3.2), layout="constrained")

@@ -39,7 +39,7 @@ def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, du
     result.notes += growth_in_words(t, curves)
 
 
-def growth_in_words(t, curves) -> list[str]:
+def growth_in_words(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> list[str]:
     """How much small differences have grown after 5 s and at the end, and which scenes have a horizon."""
     early = int(np.searchsorted(t, GROWN_EARLY))
     each = "; ".join(f"{name}: {power(g[early], 1)} and {power(g[-1], 1)}" for name, g in curves.items())
@@ -58,23 +58,23 @@ def growth_in_words(t, curves) -> list[str]:
     ]
 
 
-def power(exponent, digits) -> str:
+def power(exponent: float, digits: int) -> str:
     """A growth in words."""
     return f"10^{exponent:.{digits}f}" if np.isfinite(exponent) else "no number (the run diverges)"
 
 
-def known_until(t, grown) -> float:
+def known_until(t: np.ndarray, grown: np.ndarray) -> float:
     """Until when a growth is known, s."""
     return float(t[np.isfinite(grown)][-1])
 
 
-def reach(t, grown, digits) -> float | None:
+def reach(t: np.ndarray, grown: np.ndarray, digits: int) -> float | None:
     """When a difference of 10^-digits has grown to 1 rad, s; None: not in this time."""
     beyond = grown > digits
     return float(t[beyond][0]) if beyond.any() else None
 
 
-def time_in_words(t, grown, time) -> str:
+def time_in_words(t: np.ndarray, grown: np.ndarray, time: float | None) -> str:
     """A horizon in words."""
     return f"more than {known_until(t, grown):.0f} s" if time is None else f"about {time:.0f} s"
 

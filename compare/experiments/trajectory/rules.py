@@ -1,8 +1,9 @@
 """The rules of a run: until when it is judged, how close the engines must be, how they end."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...judge.check import Result, closest
 from ...judge.rounding import NARROW
@@ -39,7 +40,16 @@ def check_same_bits(result: Result, where: str, integrator: str, first: list, ot
     result.check(where, f"the same bits as {integrator}", differ, 0.0, "arrays that differ", rule="equal")
 
 
-def check_level(result: Result, where: str, about: dict, joints, difference, tolerance, times, ending: dict) -> None:
+def check_level(
+    result: Result,
+    where: str,
+    about: dict,
+    joints: Sequence[str],
+    difference: np.ndarray,
+    tolerance: ArrayLike,
+    times: np.ndarray,
+    ending: dict,
+) -> None:
     """A row and a check: the component and state of the recorded ones that come closest to their tolerance.
 
     about, ending: the first and the last columns of the row; difference: (states, n) rad/s2, or (states, 2n) rad and rad/s;

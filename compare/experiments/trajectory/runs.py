@@ -130,6 +130,6 @@ def compare_runs(
             check_same_bits(result, where, first[0].name, first[1], theirs)
 
 
-def one_step(dynamics: Dynamics, states, tau, dt: float, method: str) -> np.ndarray:
+def one_step(dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str) -> np.ndarray:
     """Angles and rates one step after each of the states, (states, 2n)."""
     return dynamics.run(*states, tau, dt, 1, method).states[:, 1]

@@ -1,6 +1,6 @@
 """What a trajectory's runs say: claims about held postures, errors beside agreement, the methods of order 1."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def of_first_order(runs: dict, cases: Mapping[str, Case]) -> list[str]:
     ]
 
 
-def ends_in_words(ended) -> str:
+def ends_in_words(ended: Mapping[str, float | None]) -> str:
     """When the runs of both engines diverge."""
     if not any(ended.values()):
         return "nothing diverges"
@@ -127,7 +127,7 @@ def of_left_out(cases: Sequence[Case], finer: Sequence[int]) -> list[str]:
     )
 
 
-def the_same(values):
+def the_same(values: Iterable) -> object:
     """The value that all are, or None."""
     values = set(values)
     return values.pop() if len(values) == 1 else None
