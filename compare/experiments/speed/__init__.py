@@ -16,6 +16,7 @@ from ...judge.rounding import growth
 from ...judge.run import diverged_at
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
+from ...setup import Setup
 from ...truth.reference import Reference, committed, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets
