@@ -111,9 +111,11 @@ def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
     assert (
         "swing about x at the origin, then lift about y at the origin, then bend about y at (0, 0, -0.4) m" in caption
     )
-    assert caption.endswith("centres of mass of the boom (1), the jib (2) and the tool (3).")
-    lines = draw.chains(robot, np.zeros(4))
-    assert [line[1].tolist() for line in lines] == [[0, 0, 0], [0, 0, -0.4], [0, 0, -0.4 - 0.3], [0, 0.05, -0.7 - 0.08]]
+    assert caption.endswith("of the foot (1), the boom (2), the jib (3), the hook (4) and the weight (5).")
+    ends = [line[1].tolist() for line in draw.chains(robot, np.zeros(4))]
+    hinges, centres = ends[:3], np.array(ends[3:])
+    assert hinges == [[0, 0, 0], [0, 0, -0.4], [0, 0, 0.3]]
+    assert np.allclose(centres, [[0, 0.01, -0.55], [0.03, 0, -0.7], [0, 0.05, 0.22]])
 
 
 def test_labels_stand_away_from_what_meets_in_a_point():
