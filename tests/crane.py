@@ -1,4 +1,7 @@
-"""A second robot, of four hinges: nothing in compare knows it."""
+"""A second robot, of four hinges: nothing in compare knows it.
+
+Its hinges branch, and stand in another order in the file; one body is fixed to the world, and two are on one hinge.
+"""
 
 from pathlib import Path
 
@@ -11,16 +14,22 @@ XML = """
   <compiler angle="radian"/>
   <option gravity="0 0 -9.81"><flag contact="disable" constraint="disable" autoreset="disable"/></option>
   <worldbody>
+    <body name="foot">
+      <inertial pos="0 0.1 -0.5" mass="4.0" diaginertia="0.2 0.2 0.3"/>
+    </body>
     <body name="boom">
       <joint name="swing" axis="1 0 0"/>
       <joint name="lift" axis="0 1 0"/>
       <inertial pos="0.02 0 -0.2" mass="2.0" diaginertia="0.03 0.028 0.004"/>
+      <body name="weight" pos="0 0 0.3">
+        <joint name="twist" axis="0.6 0 0.8"/>
+        <inertial pos="0 0.05 -0.08" mass="0.5" diaginertia="0.002 0.0018 0.0009"/>
+      </body>
       <body name="jib" pos="0 0 -0.4">
         <joint name="bend" axis="0 1 0"/>
         <inertial pos="0 0.01 -0.15" mass="1.2" diaginertia="0.012 0.011 0.002"/>
-        <body name="tool" pos="0 0 -0.3">
-          <joint name="twist" axis="0.6 0 0.8"/>
-          <inertial pos="0 0.05 -0.08" mass="0.5" diaginertia="0.002 0.0018 0.0009"/>
+        <body name="hook">
+          <inertial pos="0.03 0 -0.3" mass="0.3" diaginertia="0.001 0.0012 0.0009"/>
         </body>
       </body>
     </body>
@@ -34,16 +43,22 @@ def diagonal(x, y, z):
 
 
 TREE = tmt.Tree(
-    hinge_names=("swing", "lift", "bend", "twist"),
-    parent=(-1, 0, 1, 2),
-    offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.4), (0.0, 0.0, -0.3)),
+    hinge_names=("swing", "lift", "bend", "twist"),  # the file has twist before bend
+    parent=(-1, 0, 1, 1),
+    offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.4), (0.0, 0.0, 0.3)),
     axis=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8)),
     damping=(0.0,) * 4,
-    body_names=("boom", "jib", "tool"),
-    body_hinge=(1, 2, 3),
-    mass=(2.0, 1.2, 0.5),
-    com=((0.02, 0.0, -0.2), (0.0, 0.01, -0.15), (0.0, 0.05, -0.08)),
-    inertia=(diagonal(0.03, 0.028, 0.004), diagonal(0.012, 0.011, 0.002), diagonal(0.002, 0.0018, 0.0009)),
+    body_names=("foot", "boom", "jib", "hook", "weight"),
+    body_hinge=(-1, 1, 2, 2, 3),
+    mass=(4.0, 2.0, 1.2, 0.3, 0.5),
+    com=((0.0, 0.1, -0.5), (0.02, 0.0, -0.2), (0.0, 0.01, -0.15), (0.03, 0.0, -0.3), (0.0, 0.05, -0.08)),
+    inertia=(
+        diagonal(0.2, 0.2, 0.3),
+        diagonal(0.03, 0.028, 0.004),
+        diagonal(0.012, 0.011, 0.002),
+        diagonal(0.001, 0.0012, 0.0009),
+        diagonal(0.002, 0.0018, 0.0009),
+    ),
     gravity=(0.0, 0.0, -9.81),
 )
 SHORT = {"duration": 0.25, "dt": 0.25 / 64}

@@ -101,7 +101,7 @@ class Result:
             known = sample.truth(truth)
             for engine, values in (("TMT", tmt_values), ("MuJoCo", mujoco_values)):
                 apart[f"{engine} to exact"] = largest(distance(values[: len(known)], known))
-        in_eps = {name: d / (EPS * scale[: len(d)]) for name, d in apart.items()}
+        in_eps = {name: over(d, EPS * scale[: len(d)]) for name, d in apart.items()}
         difference = apart["TMT to MuJoCo"]
 
         def check_closest(quantity, difference):
@@ -145,9 +145,13 @@ def closest(difference: np.ndarray, tolerance: np.ndarray) -> tuple[int, ...]:
     One that is no number comes before all, and so does any where none is allowed.
     """
     difference, tolerance = np.broadcast_arrays(np.abs(difference), tolerance)
-    share = np.divide(difference, tolerance, out=np.where(difference == 0.0, 0.0, np.inf), where=tolerance > 0.0)
-    share = np.where(np.isfinite(difference), share, np.inf)
+    share = np.where(np.isfinite(difference), over(difference, tolerance), np.inf)
     return tuple(map(int, np.unravel_index(np.argmax(share), share.shape)))
+
+
+def over(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """A difference over its scale, of the same shape; nothing over nothing is 0."""
+    return np.divide(difference, scale, out=np.where(difference == 0.0, 0.0, np.inf), where=scale > 0.0)
 
 
 def all_digits(values: Iterable[float]) -> str:

@@ -92,5 +92,5 @@ def test_joints_are_those_of_the_tree_in_its_order(rng):
     swapped = [1, 0, 2]
     assert np.allclose(other.bias(q, v), arm.bias(q[:, swapped], v[:, swapped])[:, swapped], atol=1e-12)
     engine = parse(XML, ARM.tree)
-    assert engine.joints == ARM.joints and engine.carriers == ["beta", "gamma"] and engine.source == XML
+    assert engine.joints == ARM.joints and engine.bodies == [1, 2] and engine.source == XML
     assert load(ARM.mjcf, ARM.tree).source == ARM.mjcf

@@ -78,7 +78,7 @@ def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     spec = editable(engine.source)
     spec.option.disableflags |= LEFT_OUT
     edit(spec)
-    return Mujoco(spec.compile(), engine.joints, engine.carriers, None)
+    return Mujoco(spec.compile(), engine.joints, engine.bodies, None)
 
 
 def contacts(

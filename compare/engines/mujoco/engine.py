@@ -27,20 +27,16 @@ MODELS = 64  # that are kept: those of the cases that were asked for last
 class Mujoco:
     """MuJoCo with one compiled model of given joints.
 
-    A body is the one that moves with the joint named in `carriers`. source: what the model was read from, a Path or MJCF text;
-    None if it was changed since then, so that no joint can be taken out.
+    bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if it was changed since
+    then, so that no joint can be taken out.
     """
 
     name = "mujoco"
     methods: ClassVar[Mapping[str, Method]] = METHODS
 
-    def __init__(
-        self, model: mujoco.MjModel, joints: Sequence[str], carriers: Sequence[str], source: Path | str | None
-    ):
+    def __init__(self, model: mujoco.MjModel, joints: Sequence[str], bodies: Sequence[int], source: Path | str | None):
         self.integrator = model.opt.integrator  # of the file
-        self.model, self.source, self.joints, self.carriers = model, source, tuple(joints), list(carriers)
-        joint_ids = {name: model.joint(name).id for name in joints}
-        self.bodies = [int(model.jnt_bodyid[joint_ids[name]]) for name in carriers]
+        self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
         self.known = {}
 
     def __getstate__(self):

@@ -43,4 +43,21 @@ def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> Mu
         raise ModelError(
             f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected"
         )
-    return Mujoco(model, hinges, [hinges[hinge] for hinge in tree.body_hinge], source)
+    return Mujoco(model, hinges, bodies(model, source, tree), source)
+
+
+def bodies(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> list[int]:
+    """The numbers of the Tree's bodies in the model: the body that a hinge moves, whatever its name.
+
+    By its name if it is fixed to the world, or one of several on a hinge; ModelError if the model has no body of that name.
+    """
+    found = []
+    for name, hinge in zip(tree.body_names, tree.body_hinge):
+        if hinge >= 0 and tree.body_hinge.count(hinge) == 1:
+            found.append(int(model.jnt_bodyid[model.joint(tree.hinge_names[hinge]).id]))
+            continue
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if number < 0:
+            raise ModelError(f"{name_of(source)} has no body {name!r}; it is expected, for no hinge tells which it is")
+        found.append(number)
+    return found

@@ -22,15 +22,13 @@ def parameters(dynamics: MujocoDynamics) -> dict:
     """
     m, d = dynamics.model, dynamics.data
     dynamics.forward(m.qpos0[dynamics.qpos])
-    anchors = d.xanchor[dynamics.joints].copy()
-    carrier = [int(m.jnt_bodyid[j]) for j in dynamics.joints]
-    last = [max(i for i, owner in enumerate(carrier) if owner == body) for body in dynamics.bodies]
-    turns = dynamics.turns(d.ximat)
+    anchors, turns = d.xanchor[dynamics.joints].copy(), dynamics.turns(d.ximat)
+    places = placed(m, dynamics.joints)
     return {
         **{name: float(not m.opt.disableflags & bit(members)) for name, members in STATED_FLAGS.items()},
         **absent(m),
-        "parent": parents(m),
-        "order": np.argsort(np.argsort(dynamics.joints)).astype(float),
+        "parent": [float(places.index(hinge)) if hinge >= 0 else -1.0 for hinge in (before(m, j) for j in places)],
+        "order": [float(places.index(j)) for j in dynamics.joints],
         "ref": m.qpos0[dynamics.qpos],
         "axis": d.xaxis[dynamics.joints].copy(),
         "anchor": anchors,
@@ -40,7 +38,7 @@ def parameters(dynamics: MujocoDynamics) -> dict:
         "stiffness": m.jnt_stiffness[dynamics.joints],
         "limited": m.jnt_limited[dynamics.joints].astype(float),
         "mass": m.body_mass[dynamics.bodies],
-        "com": d.xipos[dynamics.bodies] - anchors[last],
+        "com": d.xipos[dynamics.bodies] - [origin(dynamics, anchors, body) for body in dynamics.bodies],
         "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[dynamics.bodies])]),
         "gravcomp": m.body_gravcomp[dynamics.bodies],
         "gravity": m.opt.gravity.copy(),
@@ -51,17 +49,36 @@ def parameters(dynamics: MujocoDynamics) -> dict:
     }
 
 
-def parents(m: mujoco.MjModel) -> np.ndarray:
-    """For each hinge, in the order of the file, the place of the hinge that it hangs on, -1: the world; (njnt,)."""
-    found = []
-    for j, body in enumerate(m.jnt_bodyid):
-        place = j - 1 if j and m.jnt_bodyid[j - 1] == body else -1
-        while place < 0 and body:
-            body = m.body_parentid[body]
-            if body and m.body_jntnum[body]:
-                place = m.body_jntadr[body] + m.body_jntnum[body] - 1
-        found.append(float(place))
-    return np.array(found)
+def before(m: mujoco.MjModel, joint: int) -> int:
+    """The hinge on which a hinge hangs, -1: the world; both by their numbers in the model."""
+    body = m.jnt_bodyid[joint]
+    if joint > m.body_jntadr[body]:
+        return joint - 1
+    body = m.body_parentid[body]
+    while body and not m.body_jntnum[body]:
+        body = m.body_parentid[body]
+    return int(m.body_jntadr[body] + m.body_jntnum[body] - 1) if body else -1
+
+
+def placed(m: mujoco.MjModel, joints: np.ndarray) -> list[int]:
+    """The hinges of a model in the order of the coordinates, as far as each comes after the one on which it hangs.
+
+    In which order the file has hinges that do not hang on each other means nothing.
+    """
+    found, left = [-1], list(map(int, joints))
+    while left:
+        found.append(next(j for j in left if before(m, j) in found))
+        left.remove(found[-1])
+    return found[1:]
+
+
+def origin(dynamics: MujocoDynamics, anchors: np.ndarray, body: int) -> np.ndarray:
+    """From where the centre of mass of a body is counted, m: the anchor of the last of the hinges that move it; the world's."""
+    m = dynamics.model
+    while body and not m.body_jntnum[body]:
+        body = m.body_parentid[body]
+    moving = [i for i, j in enumerate(dynamics.joints) if m.jnt_bodyid[j] == body]
+    return anchors[max(moving)] if moving else np.zeros(3)
 
 
 def absent(m: mujoco.MjModel) -> dict:

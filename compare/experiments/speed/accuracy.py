@@ -1,6 +1,6 @@
 """What is concluded from the errors of speed's runs, row by row: checks, and sentences that follow from these numbers."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -9,17 +9,19 @@ from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...truth.reference import Reference
 
+Floors = Mapping[str, float]  # {scene: rad}, what rounding leaves in each
+
 NEAR_ROUNDING = 30  # times the error of rounding: an error below has come to it
 SMALL_DEVIATION = 0.1  # rad: rounding changes an error below no more than the growth of a small difference says
 ANOTHER_MOTION = 0.1  # rad: a run that is farther off is another motion
 ALIKE = 0.01  # of an error: two that differ by less are the same in a sentence
 
 
-def check_same_schemes(result: Result, floors: Mapping[str, float], schemes: Mapping[str, str]) -> None:
+def check_same_schemes(result: Result, floors: Floors, schemes: Mapping[str, str]) -> None:
     """MuJoCo's integrators and the same schemes in tmt make the same error, but for rounding.
 
     Judged where either error is below 0.1 rad: one that is not, or a run that has diverged, beside one that is, fails.
-    floors: {scene: rad}, what rounding leaves in each; schemes: {integrator of MuJoCo: the method of tmt}.
+    schemes: {integrator of MuJoCo: the method of tmt}.
     """
     by_place = {(row["scene"], row["engine"], row["method"], row["dt_s"]): row for row in result.rows}
     for (scene, engine, method, dt), row in by_place.items():
@@ -31,7 +33,7 @@ def check_same_schemes(result: Result, floors: Mapping[str, float], schemes: Map
             result.check(where, quantity, difference, FACTOR * floors[scene], "rad", rounding=True)
 
 
-def check_smallest_errors(result: Result, floors: Mapping[str, float]) -> None:
+def check_smallest_errors(result: Result, floors: Floors) -> None:
     """MuJoCo's RK4 comes as near to the reference as tmt's; and where errors stop falling, they are of the size of rounding."""
     for scene, left in floors.items():
         least = {}
@@ -60,7 +62,7 @@ def errors_of(rows: list[dict], scene: str, engine: str, method: str) -> list[fl
     return [error(row) for row in rows if (row["scene"], row["engine"], row["method"]) == (scene, engine, method)]
 
 
-def stopped(errors: Sequence[float]) -> bool:
+def stopped(errors: list[float]) -> bool:
     """Whether the least of these errors is not the last: smaller steps gained nothing."""
     return bool(errors) and np.isfinite(min(errors)) and errors.index(min(errors)) < len(errors) - 1
 
@@ -108,7 +110,7 @@ def in_rad(value: float | None) -> str:
     return "no number" if value is None else f"{value:.2g} rad"
 
 
-def floors_in_words(rows: list[dict], floors: Mapping[str, float]) -> list[str]:
+def floors_in_words(rows: list[dict], floors: Floors) -> list[str]:
     """How large the error of rounding is, and how many methods come to it and stop there, in words."""
     sizes = "; ".join(f"{scene}: {left:.1e} rad" for scene, left in floors.items())
     came, stay, below = 0, 0, 0
@@ -124,7 +126,7 @@ def floors_in_words(rows: list[dict], floors: Mapping[str, float]) -> list[str]:
     ]
 
 
-def references_in_words(known: Mapping[str, Reference], floors: Mapping[str, float]) -> list[str]:
+def references_in_words(known: Mapping[str, Reference], floors: Floors) -> list[str]:
     """Of which scenes the reference is known to fewer digits than doubles have, in words."""
     coarse = [f"{scene}: {known[scene].halving:.0e}" for scene, left in floors.items() if known[scene].halving >= left]
     if not coarse:

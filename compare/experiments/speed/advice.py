@@ -1,13 +1,13 @@
 """What follows from times and errors: which setting to choose, how much of the gain is whose, the measured orders."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from ...engines import Method
 from ...judge.check import Result
 from ...judge.run import ORDER_MARGIN
-from .accuracy import NEAR_ROUNDING
+from .accuracy import NEAR_ROUNDING, Floors
 
 TARGETS = (1e-2, 1e-3, 1e-6, 1e-9, 1e-12)  # rad, worst on the way
 EARLY = 1.0  # s: up to here chaos has not yet grown, and errors fall regularly
@@ -15,7 +15,7 @@ REGULAR, CLEAR = 3e-2, 2e-12  # rad, in that time: an error in between falls wit
 LEAST_ORDER = {8: 7.0}  # of order 8 only the least, as rounding comes before it has settled
 
 
-def advice(rows: list[dict], scenes: Sequence[str], floors: Mapping[str, float]) -> list[dict]:
+def advice(rows: list[dict], scenes: Sequence[str], floors: Floors) -> list[dict]:
     """For each scene and error the cheapest setting of MuJoCo, of tmt and of all, and whose the gain is.
 
     ratio: MuJoCo's time over tmt's. It is the product of three: integrator_part, MuJoCo's cheapest against its RK4;
@@ -33,7 +33,7 @@ def advice(rows: list[dict], scenes: Sequence[str], floors: Mapping[str, float])
 
             theirs, ours, best = cheapest(engine="mujoco"), cheapest(engine="tmt"), cheapest()
             rk4 = cheapest(engine="mujoco", method="RK4")
-            twin = cheapest(reach=of_scene, engine="tmt", method="rk4", dt_s=rk4["dt_s"]) if rk4 else None
+            alike = cheapest(reach=of_scene, engine="tmt", method="rk4", dt_s=rk4["dt_s"]) if rk4 else None
 
             def part(slow, fast):
                 return slow["seconds"] / fast["seconds"] if slow and fast else None
@@ -43,8 +43,8 @@ def advice(rows: list[dict], scenes: Sequence[str], floors: Mapping[str, float])
                 "target_rad": target,
                 "ratio": part(theirs, ours),
                 "integrator_part": part(theirs, rk4),
-                "kernel_part": part(rk4, twin),
-                "method_part": part(twin, ours),
+                "kernel_part": part(rk4, alike),
+                "method_part": part(alike, ours),
             }
             for who, row in (("mujoco", theirs), ("tmt", ours), ("of_all", best)):
                 line |= {

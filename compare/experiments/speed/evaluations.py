@@ -1,6 +1,6 @@
 """What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -47,12 +47,12 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
     return evaluation_rows(nanoseconds), costs_in_words(nanoseconds, overhead, operations, setup.robot.name, missing)
 
 
-def per_state(counts: Mapping[tuple, int], times: Sequence[Sequence[float]]) -> dict:
+def per_state(counts: dict, times: list[list[float]]) -> dict:
     """Nanoseconds of one state for each key of `counts`, {key: states in a call}, from the seconds of its calls."""
     return {key: 1e9 * min(taken) / count for (key, count), taken in zip(counts.items(), times)}
 
 
-def evaluation_rows(nanoseconds: Mapping[tuple, float]) -> list[dict]:
+def evaluation_rows(nanoseconds: dict) -> list[dict]:
     """The rows of evaluations.csv, by quantity, the slowest first."""
     return [
         dict(zip(("quantity", "implementation", "states", "threads"), key)) | {"ns_per_state": value}
@@ -66,7 +66,7 @@ def again(run: Callable, calls: int, count: int) -> tuple[Callable, int]:
     return (lambda: [run() for _ in range(calls)]), calls * count
 
 
-def counted(loop: Callable) -> tuple[Callable, int]:
+def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
     """A call that does the same so often that it takes a millisecond, or very often, and how often."""
     loop(1)
     (once,) = timing.in_turns([lambda: loop(4)], 5)
@@ -74,7 +74,7 @@ def counted(loop: Callable) -> tuple[Callable, int]:
     return lambda: loop(count), count
 
 
-def of_one_state(tree: tmt.Tree, state: Sequence[np.ndarray]) -> Iterator[tuple[str, str, Callable]]:
+def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
     (q, qd, tau), n = state, len(tree.parent)
     floats = [a.tolist() for a in state]
@@ -149,7 +149,7 @@ def simulate_overhead(case: Case) -> tuple[float, float, int]:
     return times["call"], times["loop"], steps
 
 
-def lanes_in_words(by_states: Mapping[int, float]) -> str:
+def lanes_in_words(by_states: dict[int, float]) -> str:
     """Times by the number of states in words, the least first."""
     (best, least), *others = sorted(by_states.items(), key=lambda pair: pair[1])
     return (
@@ -157,9 +157,7 @@ def lanes_in_words(by_states: Mapping[int, float]) -> str:
     )
 
 
-def costs_in_words(
-    ns: Mapping[tuple, float], overhead: tuple, operations: Sequence[int], name: str, missing: str | None = None
-) -> list[str]:
+def costs_in_words(ns: dict, overhead: tuple, operations: list, name: str, missing: str | None = None) -> list[str]:
     """The ratios in words.
 
     overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form; name: of

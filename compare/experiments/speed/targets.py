@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 
 from ...judge.check import Result
+from .accuracy import Floors
 from .evaluations import EACH, EQUAL, FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WAITING, WHOLE
 
 LANES_AIM = {"AVX-512": 300}  # over lanes, by the width of the vectors; 120 for AVX2
 
 
-def targets(result: Result, floors: Mapping[str, float], vectors: str, aims: Mapping[tuple, float]) -> list[dict]:
+def targets(result: Result, floors: Floors, vectors: str, aims: Mapping[tuple[str, float], float]) -> list[dict]:
     """A row for each aim: what is compared, the ratio that was aimed at, the ratio that is reached.
 
     aims: of the robot, {(scene, rad): MuJoCo's cheapest setting over tmt's}.

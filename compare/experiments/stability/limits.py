@@ -41,15 +41,19 @@ def limits_and_growths(
     rows, growths = [], []
     for method in methods:
         kind, predicted = at.limit(method.scheme)
+        tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
         dt = 1e-2 if predicted is None else 1.001 * predicted  # just above the limit its mode grows fastest
         _, shape, _ = at.fastest_growing(method.scheme, dt)
         seen, observed = observed_limit(method, engines, at, steps)
+        if kind == "finite" and seen == "always_fails" and predicted < TRIED_STEPS[0]:
+            kind, predicted = seen, None  # it fails at every step that is tried
         if kind == "always_fails":
             growths += [growth_per_step(method, engines, at, dt) for dt in growth_dts]
         rows.append({
             "scene": at.name, "engine": method.engine, "method": method.name, "damping": at.case.scene.damping,
             "mode_per_s": np.abs(at.modes[0]).max() if kind == "never_fails" else at.rate(shape),
-            "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION, "seen": seen,
+            "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION,
+            "seen": seen, "allowed": tolerance,
         })  # fmt: skip
     return {"rows": rows, "growths": growths}
 
@@ -102,10 +106,9 @@ def shares(
     a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that swings in it cancel.
     """
     n = len(at.q)
-    values, vectors = at.modes
+    vectors = at.modes[1]
     vectors = vectors / vectors[np.argmax(np.abs(vectors[:n]), axis=0), np.arange(2 * n)]
-    swings = values.imag[values.imag > 1e-3]
-    quarter = max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))) if len(swings) else 0)
+    quarter = quarter_of(at, dt, steps)
     start = LINEAR_DEVIATION * vectors.sum(axis=1).real / (2 * n)
     weight = np.hanning(quarter + 2)[1:-1]
     weight /= weight.sum()
@@ -117,6 +120,25 @@ def shares(
         first, *found = (np.abs(off @ np.linalg.inv(vectors).T) ** 2 for off in deviations)
         early, late = (np.sqrt(weight @ part / first[0]) for part in found)
         return early, late
+
+
+def quarter_of(at: Held, dt: float, steps: int) -> int:
+    """A quarter of a run of at least so many steps: it holds a swing of the slowest mode."""
+    swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
+    return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))) if len(swings) else 0)
+
+
+def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
+    """How far an observed limit may be from the predicted one, relative: 0.1 %, or more where that makes too little difference.
+
+    So it is if little damping alone keeps a mode from growing: then it hardly grows just above the limit. So far above it that
+    from the second to the last quarter of a run the growth can be seen.
+    """
+    for excess in np.geomspace(LIMIT_TOLERANCE, 1e3, 100):
+        dt = limit * (1.0 + excess)
+        if at.growth(scheme, np.array([dt]))[0] ** (2 * quarter_of(at, dt, steps)) > 1.0 + GROWTH_MARGIN:
+            break
+    return float(excess)
 
 
 def grows(early: np.ndarray, late: np.ndarray) -> bool:
@@ -160,22 +182,25 @@ def stiffest(at: Held) -> tuple[float, np.ndarray]:
 
 def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
     """The table of limits and that of growth per step, and a check for each row."""
+    late = {}
     for row in (row for part in parts for row in part["rows"]):
-        seen = row.pop("seen")
+        seen, tolerance = row.pop("seen"), row.pop("allowed")
         result.rows.append(row)
         where = f"{row['scene']}, {who(row)}, damping {row['damping']:g}"
         if row["limit"] == "finite":
             note = "" if seen == "finite" else f"it {LIMIT_KINDS[seen]}"
-            result.check(where, "limit, observed / predicted - 1", apart(row), LIMIT_TOLERANCE, "", note)
+            result.check(where, "limit, observed / predicted - 1", apart(row), tolerance, "", note)
         else:
             quantity = f"runs in which it {LIMIT_KINDS[row['limit']]}, as predicted"
             result.check(where, quantity, int(seen == row["limit"]), 1, "runs", rule="equal")
+        if tolerance > LIMIT_TOLERANCE:
+            late[where] = tolerance
     growths = [row for part in parts for row in part["growths"]]
     for row in growths:
         where, off = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s", row.pop("total_off")
         result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
     result.tables["stability_growth"] = growths
-    result.notes[:0] = limits_in_words(robot, result.rows)
+    result.notes[:0] = limits_in_words(robot, result.rows) + late_in_words(late)
     result.notes += growth_per_step_in_words(growths)
 
 
@@ -201,6 +226,17 @@ def limits_in_words(robot: Robot, rows: list[dict]) -> list[str]:
         f"{len(expected)} finite limits are predicted without a run. "
         + (f"{len(known)} are observed without the prediction; largest difference: {differences}. " if known else "")
         + (f"In {missing} cases the runs show no finite limit." if missing else "The runs show each of them.")
+    ]
+
+
+def late_in_words(late: Mapping[str, float]) -> list[str]:
+    """Where growth is seen only far above a limit, {where: how far, relative}."""
+    if not late:
+        return []
+    places = "; ".join(f"{where}: {100 * excess:.2g} %" for where, excess in late.items())
+    return [
+        f"With little damping a mode hardly grows just above its limit. So far above it a run of this length shows the growth, "
+        f"and so far from the prediction an observed limit may be: {places}."
     ]
 
 

@@ -22,7 +22,7 @@ def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
         def of(self, case):
             return mujoco.of(case.changed(posture=()) if case.locked else case)
 
-    wrong = Deleted(mujoco.model, mujoco.joints, mujoco.carriers, mujoco.source)
+    wrong = Deleted(mujoco.model, mujoco.joints, mujoco.bodies, mujoco.source)
     results = []
     for engine in (mujoco, wrong):
         results.append(Result("reduction"))

@@ -36,7 +36,7 @@ def test_drift_falls_at_the_order_of_the_scheme_and_rk4s_is_far_below_that_of_eu
         ({"euler": np.nan}, {order, share}), ({"euler": 0.0}, {order, share}),
     ):  # fmt: skip
         result = Result("trajectory")
-        drift.check_drifts(result, drifts(engine=engine, **made))
+        drift.check_drifts(result, drifts(engine=engine, **made), {})
         assert len(result.checks) == 6
         assert {f"{check.quantity} {check.scene}" for check in result.checks if not check.passed} == failed
 
