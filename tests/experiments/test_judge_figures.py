@@ -111,7 +111,9 @@ def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
     assert (
         "swing about x at the origin, then lift about y at the origin, then bend about y at (0, 0, -0.4) m" in caption
     )
-    assert caption.endswith("centres of mass of the boom (1), the jib (2) and the tool (3).")
+    assert caption.endswith(
+        "centres of mass of the foot (1), the boom (2), the jib (3), the hook (4) and the weight (5)."
+    )
     lines = draw.chains(robot, np.zeros(4))
     assert [line[1].tolist() for line in lines] == [[0, 0, 0], [0, 0, -0.4], [0, 0, -0.4 - 0.3], [0, 0.05, -0.7 - 0.08]]
 
