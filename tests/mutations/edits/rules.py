@@ -28,7 +28,7 @@ EDITS = (
          "the largest difference is judged, whatever its tolerance"),
     Edit("judge.check", "closest", "np.where(np.isfinite(difference), _1, np.inf)",
          "np.where(np.isfinite(difference), _1, 0.0)", "a state without a number is not judged"),
-    Edit("judge.check", "closest", "np.where(difference == 0.0, _1, np.inf)", "np.zeros_like(difference)",
+    Edit("judge.check", "over", "np.where(difference == 0.0, _1, np.inf)", "np.zeros_like(difference)",
          "a difference where none is allowed is not judged"),
     Edit("judge.check", "Result.agree.check_closest", "closest(_1, _2)", "(0,)", "the first state is judged"),
     Edit("judge.check", "largest", "np.abs(_1)", "_1", "a negative difference passes"),
