@@ -138,7 +138,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS), causes)
             origin["seconds"] = round(time.perf_counter() - started, 1)
-            files.write(folder, sections, robot, origin, words, causes, list(reasons.items()))
+            files.write(folder, verdict.Report(sections, robot, origin, words, causes, list(reasons.items())))
     except (ModelError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()

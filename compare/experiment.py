@@ -115,11 +115,11 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
         for call in module(experiment).figures(result, robot):
             name, path = called(call), None
             try:
-                name, figure, caption = call()
-                path = folder / f"{name}.png"
+                file, figure, caption = call()
+                path = folder / f"{file}.png"
                 with writing(path):
                     figure.savefig(path)
-                drawn.append((name, caption))
+                drawn.append((file, caption))
             except OSError:
                 raise
             except Exception as error:

@@ -55,7 +55,8 @@ def of_crane():
             [n for n in EXPERIMENTS if n not in reasons], setup, folder, lines, Here()
         )
         words = verdict.verdict(sections, len(EXPERIMENTS), causes)
-        files.write(folder, sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
+        report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
+        files.write(folder, report)
         texts = {name: (folder / name).read_text(encoding="utf-8") for name in ("report.md", "results.json")}
         sizes = {path.stem: path.stat().st_size for path in (folder / "figures").iterdir()}
     for section in sections:

@@ -154,6 +154,18 @@ def test_a_constant_has_one_meaning_in_all_of_compare():
     assert not several
 
 
+def test_a_function_has_one_meaning_in_all_of_compare():
+    """Public functions of several files, but for what every experiment has."""
+    of_all = {"rows", "figures", "claim", "tolerance", "begin", "skipped", "main"}
+    places = {}
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name not in of_all:
+                places.setdefault(node.name, set()).add(dotted(path))
+    several = {name: sorted(files) for name, files in places.items() if len(files) > 1}
+    assert not several
+
+
 def test_no_file_is_long():
     reasons = {"trace.py": "the tape, one class"}
     for path in [*FILES, *(ROOT / "tmt").glob("*.py")]:

@@ -26,12 +26,12 @@ def tolerance(robot: Robot) -> str:
     """By what the claim is judged, with the robot's own scale."""
     reach = reaches(robot.tree).max()
     return (
-        f"64 eps x scale. Lengths and T_b: the largest distance from the {origin(robot)}, {reach:.2f} m. B_b: 1. Angular "
-        f"velocity: the sum S of |rates|. Convective terms: {reach:.2f} m x S^2 and S^2."
+        f"64 eps x scale. Lengths and T_b: the largest distance from the {origin_in_words(robot)}, {reach:.2f} m. B_b: 1. "
+        f"Angular velocity: the sum S of |rates|. Convective terms: {reach:.2f} m x S^2 and S^2."
     )
 
 
-def origin(robot: Robot) -> str:
+def origin_in_words(robot: Robot) -> str:
     """What is at the origin, in words: the landmark that is there."""
     landmarks = robot.landmarks(robot.posture()) if robot.landmarks else {}
     return next((name for name, point in landmarks.items() if not np.any(point)), "origin")

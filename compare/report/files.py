@@ -1,7 +1,6 @@
 """Results to files: CSV, JSON, Markdown and HTML."""
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,33 +8,27 @@ import pandas as pd
 
 from .folder import files, save
 from .page import markdown, page
-from .verdict import Section, passed
+from .verdict import Report, passed
 
 
-def write(
-    folder: Path,
-    sections: Sequence[Section],
-    robot,
-    origin: dict,
-    verdict: str,
-    causes: Sequence[dict] = (),
-    skipped: Sequence[tuple[str, str]] = (),
-) -> None:
-    """All files of a report, the figures excepted, into a folder that has those; `verdict`: in words."""
+def write(folder: Path, report: Report) -> None:
+    """All files of a report, the figures excepted, into a folder that has those."""
     (folder / "tables").mkdir()
-    for section in sections:
+    for section in report.sections:
         for name, rows in section.tables.items():
             save(folder / "tables" / f"{name}.csv", for_csv(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
-    checks = [check.record() for section in sections for check in section.result.checks]
-    save(folder / "report.md", markdown(sections, robot, origin, verdict, causes, skipped))
-    save(folder / "index.html", page(folder, sections, robot, origin, verdict, causes, skipped))
-    origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
+    checks = [check.record() for section in report.sections for check in section.result.checks]
+    save(folder / "report.md", markdown(report))
+    save(folder / "index.html", page(folder, report))
     results = {
-        "passed": passed(sections),
+        "passed": passed(report.sections),
         "checks": checks,
-        "causes": [{name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in causes],
-        "skipped": [{"experiment": name, "reason": reason} for name, reason in skipped],
-        "provenance": origin,
+        "causes": [
+            {name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in report.causes
+        ],
+        "skipped": [{"experiment": name, "reason": reason} for name, reason in report.skipped],
+        # its files: what may be replaced by the next report
+        "provenance": report.origin | {"files": [*files(folder), "results.json"]},
     }
     save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..judge.words import capital
 from .questions import answers
-from .verdict import Section, outcome, passed
+from .verdict import Report, Section, outcome, passed
 
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
 DIGITS |= dict.fromkeys(
@@ -80,15 +80,9 @@ def failing(section: Section) -> pd.DataFrame:
     return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
 
 
-def markdown(
-    sections: Sequence[Section],
-    robot,
-    origin: dict,
-    verdict: str,
-    causes: Sequence[dict] = (),
-    skipped: Sequence[tuple[str, str]] = (),
-) -> str:
-    """The report as Markdown; `verdict`: in words; `causes`: of what fails."""
+def markdown(report: Report) -> str:
+    """The report as Markdown."""
+    sections, robot, origin, verdict, causes, skipped = report
     lines = [f"# {title(robot)}", f"**{verdict}**"]
     lines += ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
     lines += [introduction(robot)]
@@ -134,16 +128,9 @@ def origins(origin: dict) -> pd.DataFrame:
     return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
 
 
-def page(
-    folder: Path,
-    sections: Sequence[Section],
-    robot,
-    origin: dict,
-    verdict: str,
-    causes: Sequence[dict] = (),
-    skipped: Sequence[tuple[str, str]] = (),
-) -> str:
-    """The report as one HTML file with its figures inside."""
+def page(folder: Path, report: Report) -> str:
+    """The report as one HTML file with its figures inside; folder: where these are."""
+    sections, robot, origin, verdict, causes, skipped = report
     body = (
         ["<h2>Causes (1: an option or a convention, 2: a number)</h2>", html_table(of_causes(causes), "text")]
         if causes

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from ..judge.check import DRAWN, ENDS, LOCKABLE, Check, Result
 
@@ -22,6 +23,17 @@ class Section:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables
         return {name: rows for name, rows in tables.items() if rows}
+
+
+class Report(NamedTuple):
+    """What a report is made of."""
+
+    sections: Sequence[Section]
+    robot: object  # a robots.Robot
+    origin: dict  # see provenance
+    verdict: str  # in words
+    causes: Sequence[dict] = ()  # of what fails, the gravest first
+    skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
 
 
 def failures(sections: Sequence[Section]) -> tuple[list, list]:

@@ -111,11 +111,12 @@ def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
     assert (
         "swing about x at the origin, then lift about y at the origin, then bend about y at (0, 0, -0.4) m" in caption
     )
-    assert caption.endswith("of the foot (1), the boom (2), the jib (3), the hook (4) and the weight (5).")
-    ends = [line[1].tolist() for line in draw.chains(robot, np.zeros(4))]
-    hinges, centres = ends[:3], np.array(ends[3:])
-    assert hinges == [[0, 0, 0], [0, 0, -0.4], [0, 0, 0.3]]
-    assert np.allclose(centres, [[0, 0.01, -0.55], [0.03, 0, -0.7], [0, 0.05, 0.22]])
+    assert caption.endswith(
+        "centres of mass of the foot (1), the boom (2), the jib (3), the hook (4) and the weight (5)."
+    )
+    lines = draw.chains(robot, np.zeros(4))
+    ends = [[0, 0, 0], [0, 0, -0.4], [0, 0, 0.3], [0, 0.01, -0.55], [0.03, 0, -0.7], [0, 0.05, 0.22]]
+    assert np.allclose([line[1] for line in lines], ends, rtol=0.0, atol=1e-15)
 
 
 def test_labels_stand_away_from_what_meets_in_a_point():

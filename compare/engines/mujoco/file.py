@@ -46,7 +46,7 @@ def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> Mu
     return Mujoco(model, hinges, bodies(model, source, tree), source)
 
 
-def bodies(model, source, tree) -> list[int]:
+def bodies(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> list[int]:
     """The numbers of the Tree's bodies in the model: the body that a hinge moves, whatever its name.
 
     By its name if it is fixed to the world, or one of several on a hinge; ModelError if the model has no body of that name.

@@ -23,7 +23,7 @@ def parameters(dynamics: MujocoDynamics) -> dict:
     m, d = dynamics.model, dynamics.data
     dynamics.forward(m.qpos0[dynamics.qpos])
     anchors, turns = d.xanchor[dynamics.joints].copy(), dynamics.turns(d.ximat)
-    places = placed(m, dynamics.joints)
+    places = sorted_hinges(m, dynamics.joints)
     return {
         **{name: float(not m.opt.disableflags & bit(members)) for name, members in STATED_FLAGS.items()},
         **absent(m),
@@ -38,7 +38,7 @@ def parameters(dynamics: MujocoDynamics) -> dict:
         "stiffness": m.jnt_stiffness[dynamics.joints],
         "limited": m.jnt_limited[dynamics.joints].astype(float),
         "mass": m.body_mass[dynamics.bodies],
-        "com": d.xipos[dynamics.bodies] - [origin(dynamics, anchors, body) for body in dynamics.bodies],
+        "com": d.xipos[dynamics.bodies] - [com_origin(dynamics, anchors, body) for body in dynamics.bodies],
         "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[dynamics.bodies])]),
         "gravcomp": m.body_gravcomp[dynamics.bodies],
         "gravity": m.opt.gravity.copy(),
@@ -60,7 +60,7 @@ def before(m: mujoco.MjModel, joint: int) -> int:
     return int(m.body_jntadr[body] + m.body_jntnum[body] - 1) if body else -1
 
 
-def placed(m: mujoco.MjModel, joints: np.ndarray) -> list[int]:
+def sorted_hinges(m: mujoco.MjModel, joints: np.ndarray) -> list[int]:
     """The hinges of a model in the order of the coordinates, as far as each comes after the one on which it hangs.
 
     In which order the file has hinges that do not hang on each other means nothing.
@@ -72,7 +72,7 @@ def placed(m: mujoco.MjModel, joints: np.ndarray) -> list[int]:
     return found[1:]
 
 
-def origin(dynamics: MujocoDynamics, anchors: np.ndarray, body: int) -> np.ndarray:
+def com_origin(dynamics: MujocoDynamics, anchors: np.ndarray, body: int) -> np.ndarray:
     """From where the centre of mass of a body is counted, m: the anchor of the last of the hinges that move it; the world's."""
     m = dynamics.model
     while body and not m.body_jntnum[body]:

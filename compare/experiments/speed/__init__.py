@@ -68,14 +68,14 @@ def begin(setup: Setup) -> None:
     setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
 
 
-def measured(setup, cases: list[Case], which: str = "all") -> tuple:
+def measured(setup: Setup, cases: Sequence[Case], which: str = "all") -> tuple:
     """The scenes, their references, and for each scene, as it comes, its rows without times and its rounding."""
     known = references(cases, setup.map, setup.progress)
     follow = partial(rows_of_scene, engines=setup.engines, known=known, size=setup.size, which=which)
     return cases, known, setup.map(follow, cases)
 
 
-def rows(setup, timed: bool = True) -> Result:
+def rows(setup: Setup, timed: bool = True) -> Result:
     """Errors, times, orders, floors, and what follows for a choice.
 
     timed=False: only the errors of one scene by MuJoCo's integrators and the same schemes in tmt, and their checks, in a
@@ -143,7 +143,9 @@ def unavailable(setup: Setup, names: Sequence[str]) -> list[dict]:
     ]
 
 
-def rows_of_scene(case: Case, engines, known: dict[str, Reference], size: str, which: str) -> tuple[list[dict], float]:
+def rows_of_scene(
+    case: Case, engines: Mapping[str, Engine], known: Mapping[str, Reference], size: str, which: str
+) -> tuple[list[dict], float]:
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[case.name]
     # beyond the digits of the reference nothing is known

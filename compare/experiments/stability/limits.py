@@ -41,7 +41,7 @@ def limits_and_growths(
     rows, growths = [], []
     for method in methods:
         kind, predicted = at.limit(method.scheme)
-        tolerance = allowed(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
+        tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
         dt = 1e-2 if predicted is None else 1.001 * predicted  # just above the limit its mode grows fastest
         _, shape, _ = at.fastest_growing(method.scheme, dt)
         seen, observed = observed_limit(method, engines, at, steps)
@@ -122,13 +122,13 @@ def shares(
         return early, late
 
 
-def quarter_of(at, dt, steps) -> int:
+def quarter_of(at: Held, dt: float, steps: int) -> int:
     """A quarter of a run of at least so many steps: it holds a swing of the slowest mode."""
     swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
     return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))) if len(swings) else 0)
 
 
-def allowed(at, scheme, limit, steps) -> float:
+def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
     """How far an observed limit may be from the predicted one, relative: 0.1 %, or more where that makes too little difference.
 
     So it is if little damping alone keeps a mode from growing: then it hardly grows just above the limit. So far above it that
@@ -141,7 +141,7 @@ def allowed(at, scheme, limit, steps) -> float:
     return float(excess)
 
 
-def grows(early, late) -> bool:
+def grows(early: np.ndarray, late: np.ndarray) -> bool:
     """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run."""
     if not np.isfinite(late).all():
         return True
@@ -229,7 +229,7 @@ def limits_in_words(robot: Robot, rows: list[dict]) -> list[str]:
     ]
 
 
-def late_in_words(late) -> list[str]:
+def late_in_words(late: Mapping[str, float]) -> list[str]:
     """Where growth is seen only far above a limit, {where: how far, relative}."""
     if not late:
         return []
@@ -240,7 +240,7 @@ def late_in_words(late) -> list[str]:
     ]
 
 
-def growth_per_step_in_words(rows) -> list[str]:
+def growth_per_step_in_words(rows: list[dict]) -> list[str]:
     """How far the growth of one step is from the predicted one, where a method always fails."""
     if not rows:
         return ["No method fails at every step in these scenes."]

@@ -46,7 +46,7 @@ def constants(case: Case) -> dict[tuple, Callable]:
     """What stays constant in a free case without damping: (name, unit): a function of q and v along a run."""
     first, found = case.robot.joints[0], {("energy", "J"): partial(tmt.energy, model=case.tree)}
     if not any(case.tree.gravity) and first in case.joints:
-        found[f"{first}-momentum", "N m s"] = partial(first_momentum, case.tree)
+        found[f"{first}-momentum", "N m s"] = partial(momentum_along, case.tree)
     return found
 
 
@@ -83,7 +83,7 @@ def check_drifts(result: Result, drifts: dict, rounding: Mapping[tuple, float]) 
                     off = abs(found[engine] - method.order)
                     result.check(where, f"order of the drift of {quantity}, from {method.order}", off, ORDER_MARGIN, "")
                 if method.scheme == "rk4" and not is_rounding(of_scene[euler], allowed):
-                    share = over(values[-1], of_scene[euler][engine][-1])
+                    share = drift_ratio(values[-1], of_scene[euler][engine][-1])
                     result.check(where, f"drift of {quantity} over that of Euler", share, OF_EULER, "")
 
 
@@ -102,7 +102,7 @@ def is_rounding(engines: dict, allowed: float | None) -> bool:
     return allowed is not None and all(values[-1] <= allowed for values in engines.values())
 
 
-def largest_drift(quantity, path) -> float:
+def largest_drift(quantity: Callable, path: tuple) -> float:
     """How far a quantity of the state goes from its start along a run; NaN if the run has diverged."""
     if not np.isfinite(path).all():
         return np.nan
@@ -112,15 +112,15 @@ def largest_drift(quantity, path) -> float:
 
 def found_order(values: Sequence[float]) -> float:
     """The order at which the last two drifts fall, the last with half the step; NaN where nothing drifts."""
-    ratio = over(values[-2], values[-1])
+    ratio = drift_ratio(values[-2], values[-1])
     return float(np.log2(ratio)) if ratio > 0.0 else np.nan
 
 
-def over(one: float, other: float) -> float:
+def drift_ratio(one: float, other: float) -> float:
     """One drift over another; NaN if that is zero, or a run has diverged."""
     return one / other if other > 0.0 else np.nan
 
 
-def first_momentum(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def momentum_along(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Angular momentum about the first hinge, which hangs on the world, along a run, N m s."""
     return np.einsum("sj,sj->s", tmt.mass_matrix(q, tree)[:, 0], v)

@@ -6,16 +6,10 @@ import pytest
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import beyond, claims, claims_judged, departure, figures_claims
-from compare.judge.check import Result
 from compare.robots.arm import ARM
 
 RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])
 NAMES = (*(f"{claims.VARIANT} {k}" for k in range(1, 28)), claims.NEAREST, *claims.CLEAR_TORQUES)
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
 
 
 def torque_rows(times=(4.7, 4.7), ulps=2.0, moved=0.0, sides=(1, 1), clear=(1, 1)):

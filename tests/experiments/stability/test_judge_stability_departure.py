@@ -4,25 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from judged import BOTH, only
 
 from compare.experiments.stability import departure, falling, figures_departure
 from compare.judge import run
-from compare.judge.check import Result
 from compare.robots.arm import ARM
 from compare.truth.linear import held
-
-BOTH = pytest.mark.parametrize("share, passes", [(0.999, True), (1.001, False)])
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
-
-
-def only(result) -> bool:
-    """Whether the one check of a result passes."""
-    (check,) = result.checks
-    return check.passed
 
 
 def departure_row(observed, predicted, dt=0.01, size=1e-6, engine="tmt", scene="ball catch"):

@@ -4,30 +4,17 @@ import dataclasses
 
 import numpy as np
 import pytest
+from judged import BOTH, INSIDE, only
 
 import tmt
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import choice, failure, figures_failure, long_runs
-from compare.judge.check import Result
 from compare.judge.scale import gravity_scale
 from compare.robots.arm import ARM
 
-INSIDE, OUTSIDE = 0.999, 1.001  # of a tolerance
-BOTH = pytest.mark.parametrize("share, passes", [(INSIDE, True), (OUTSIDE, False)])
 IMPLICIT = Tmt().methods["implicit"]
 FREE = choice.free_motion(ARM)
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
-
-
-def only(result) -> bool:
-    """Whether the one check of a result passes."""
-    (check,) = result.checks
-    return check.passed
 
 
 @pytest.mark.parametrize(

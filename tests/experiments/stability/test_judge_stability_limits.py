@@ -2,28 +2,15 @@
 
 import numpy as np
 import pytest
+from judged import BOTH, only
 
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import equilibria, figures_limits, limits
-from compare.judge.check import Result
 from compare.robots.arm import ARM
 
 EPS = 2.0**-52
-INSIDE, OUTSIDE = 0.999, 1.001  # of a tolerance
-BOTH = pytest.mark.parametrize("share, passes", [(INSIDE, True), (OUTSIDE, False)])
 RK4 = Tmt().methods["rk4"]
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
-
-
-def only(result) -> bool:
-    """Whether the one check of a result passes."""
-    (check,) = result.checks
-    return check.passed
 
 
 @BOTH
