@@ -1,12 +1,13 @@
 """python -m compare: compare the two models and write a report."""
 
 import os
+from collections.abc import Sequence
 
 from .process import interrupt, streams
 
 if __name__ == "__main__":
     streams.prepare()
-    interrupt.answer()  # before anything that takes its time
+    interrupt.listen()  # before anything that takes its time
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is rendered: no further process looks for a display
 
 import argparse
@@ -36,13 +37,13 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {' '.join(readable(message).split())}\n")
 
 
-def not_empty(text):
+def not_empty(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("it is empty; a name is expected")
     return text
 
 
-def main(arguments=None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = Parser(
         prog="python -m compare",
@@ -78,7 +79,7 @@ def main(arguments=None) -> int:
         parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
     try:
-        return run(options, command)
+        return carry_out(options, command)
     except Refused as error:
         line = str(error)
     except OSError as error:
@@ -98,7 +99,7 @@ class Refused(ValueError):
     """A request that cannot be carried out; the message is one line."""
 
 
-def run(options, command) -> int:
+def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
     from .engines.mujoco import ModelError, load
@@ -106,13 +107,13 @@ def run(options, command) -> int:
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
     from .robots.arm import ARM  # imports are here, so that --help and a wrong word answer at once
-    from .scene_file import SceneError, read
+    from .scene_file import SceneError, read_scenes
 
     terminal = Terminal()
     path = options.mjcf or ARM.mjcf
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        robot = ARM.with_scenes(read(options.scenes, ARM)) if options.scenes else ARM
+        robot = ARM.with_scenes(read_scenes(options.scenes, ARM)) if options.scenes else ARM
         mujoco = load(path, robot.tree)
         before = made_by(options.out)
         with new_report(options.out) as folder:
@@ -120,6 +121,7 @@ def run(options, command) -> int:
                 from . import experiment
                 from .case import SEED
                 from .report import files, provenance, verdict
+                from .setup import Setup, engines
 
                 workers.submit(experiment.warm_up)
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
@@ -127,16 +129,16 @@ def run(options, command) -> int:
                     raise Refused(f"{options.experiment} cannot serve {robot.name}: {reasons[options.experiment]}")
                 shown = str(path) if options.mjcf else "mjcf/arm.xml"
                 origin = provenance.provenance(command, path, shown, SEED)  # of the model as it was read
-                of_run = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.show}
-                make = experiment.Setup.quick if options.quick else experiment.Setup
-                setup = make(robot, experiment.engines(mujoco), **of_run)
+                of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+                make = Setup.quick if options.quick else Setup
+                setup = make(robot, engines(mujoco), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
                 sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
             words = verdict.verdict(sections, len(EXPERIMENTS), causes)
             origin["seconds"] = round(time.perf_counter() - started, 1)
-            files.write(folder, sections, robot, origin, words, causes, list(reasons.items()))
+            files.write(folder, verdict.Report(sections, robot, origin, words, causes, list(reasons.items())))
     except (ModelError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()

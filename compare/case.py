@@ -220,17 +220,12 @@ class Case:
         """Of values for all joints those of the free ones."""
         return values[[self.robot.joints.index(name) for name in self.joints]]
 
-    def required(self, scheme: str, dt: float) -> float:
-        """For how long a run must be judged, s: with a step of 0.01 s or more only RK4 is stable that long."""
-        judged = self.duration if self.scene.judged is None else self.scene.judged
-        return judged if scheme == "rk4" or dt < 0.01 else min(judged, 0.3)
-
     def changed(self, **changes) -> "Case":
         """The same robot in a scene with other values."""
         return Case(self.robot, dataclasses.replace(self.scene, **changes))
 
 
-def is_number(value) -> bool:
+def is_number(value: object) -> bool:
     """Whether a value is one finite real number; neither text nor true and false."""
     try:
         number = np.asarray(value)
@@ -239,7 +234,7 @@ def is_number(value) -> bool:
     return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
 
 
-def are_numbers(values) -> bool:
+def are_numbers(values: object) -> bool:
     """Whether the values are such numbers in a row."""
     row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
     return row and all(is_number(value) for value in values)

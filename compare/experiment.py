@@ -1,82 +1,28 @@
-"""What the experiments need, and how they are run: one after the other, long work and drawing beside it."""
+"""How the experiments are run: one after the other, long work and drawing beside it."""
 
 import importlib
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 
-from . import states as samples
-from .case import Case
-from .engines import Dynamics, Engine
-from .engines.heyoka import Heyoka
-from .engines.scipy import Scipy
-from .engines.tmt import Tmt
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
 from .process.crash import described
-from .process.workers import WorkerEnded
+from .process.workers import WorkerEnded, Workers
 from .report.folder import writing
+from .report.terminal import Terminal
 from .report.verdict import Section, failures
 from .robots import Robot
+from .setup import Setup as Setup
+from .setup import engines as engines
 
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
 
-def engines(mujoco: Engine) -> dict[str, Engine]:
-    """All engines by their names; some may be unavailable."""
-    return {engine.name: engine for engine in (mujoco, Tmt(), Scipy(), Heyoka())}
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What an experiment needs: the robot, the engines, and how much is to be done."""
-
-    robot: Robot
-    engines: Mapping[str, Engine]
-    states: int = 10_000  # random states
-    exact_states: int = 200  # of these, how many are compared with the exact values too
-    map: Callable = map  # where the scenes of an experiment may run side by side
-    quiet: Callable = lambda: None  # waits until nothing runs beside: for timings
-    tell: Callable = lambda text: None  # says how far long work has come
-    background: dict = field(default_factory=dict)  # work under way, by its name
-    finer: tuple = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
-    size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
-
-    @property
-    def is_quick(self) -> bool:
-        return self.size == "quick"
-
-    def of(self, full, quick, small):
-        """What a run of this size takes."""
-        return {"full": full, "quick": quick, "small": small}[self.size]
-
-    @classmethod
-    def quick(cls, robot, engines, **more) -> "Setup":
-        """Fewer of everything, for a first answer in seconds."""
-        return cls(robot, engines, states=1000, exact_states=20, finer=(1,), size="quick", **more)
-
-    @classmethod
-    def small(cls, robot, engines, **more) -> "Setup":
-        """Every path of a full run with few states and steps: for tests."""
-        return cls(robot, engines, states=50, exact_states=2, finer=(1, 2), size="small", **more)
-
-    def compared(self, case: Case | None = None) -> dict[str, Dynamics]:
-        """The dynamics of a case (of the robot as it is) in the two engines that are compared, tmt and mujoco."""
-        case = case or self.robot.case()
-        return {name: self.engines[name].of(case) for name in ("tmt", "mujoco")}
-
-    @cached_property
-    def named(self) -> samples.Sample:
-        return samples.named(self.robot)
-
-    @cached_property
-    def random(self) -> samples.Sample:
-        return samples.random(self.robot, self.states, self.exact_states)
-
-
-def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
+def examine(
+    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers
+) -> tuple[list[Section], list[dict]]:
     """The section of each experiment, its figures drawn, and the causes of what fails.
 
     An experiment that raises is one failed check; the others go on.
@@ -90,7 +36,7 @@ def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
         if hasattr(experiment, "begin")
     }
     for name, experiment in modules.items():
-        setup.tell(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
+        setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
         asked = experiment.TITLE, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
@@ -98,21 +44,21 @@ def examine(names, setup, folder, terminal, workers) -> tuple[list, list]:
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
         new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
         causes += new
-        outcome(terminal, sections[-1], time.perf_counter() - started, new)
-    setup.tell("figures")
+        say_outcome(terminal, sections[-1], time.perf_counter() - started, new)
+    setup.progress("figures")
     for section, drawing in zip(sections, drawings):
         if drawing is not None:
             take_figures(terminal, section, drawing)
     return sections, causes
 
 
-def find_causes(setup) -> list:
+def find_causes(setup: Setup) -> list[dict]:
     """What of the model explains that checks fail: each number, as stated and as compiled; the gravest first."""
     result, _ = attempt("parameters", module("parameters").rows, setup)
     return result.curves["causes"] if result else []
 
 
-def attempt(name, act, setup) -> tuple:
+def attempt(name: str, act: Callable, setup: Setup) -> tuple:
     """What an experiment's function returns, and None; if it raises, None and a Result with one failed check."""
     try:
         return act(setup), None
@@ -124,7 +70,7 @@ def attempt(name, act, setup) -> tuple:
         return None, result
 
 
-def take_figures(terminal, section, drawing) -> None:
+def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
     try:
         section.figures, failed = drawing.result()
@@ -137,7 +83,7 @@ def take_figures(terminal, section, drawing) -> None:
         terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
 
 
-def outcome(terminal, section, seconds, causes) -> None:
+def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Sequence[dict]) -> None:
     """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks."""
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
@@ -169,13 +115,13 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
         for call in module(experiment).figures(result, robot):
             name, path = called(call), None
             try:
-                name, figure, caption = call()
-                while name.casefold() in {other.casefold() for other, _ in drawn}:
-                    name += "_"  # names that differ in signs alone may give one file
-                path = folder / f"{name}.png"
+                file, figure, caption = call()
+                while file.casefold() in {other.casefold() for other, _ in drawn}:
+                    file += "_"  # names that differ in signs alone may give one file
+                path = folder / f"{file}.png"
                 with writing(path):
                     figure.savefig(path)
-                drawn.append((name, caption))
+                drawn.append((file, caption))
             except OSError:
                 raise
             except Exception as error:
@@ -189,11 +135,12 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
     return drawn, failed
 
 
-def called(call) -> str:
+def called(call: Callable) -> str:
     """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
     more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
     more = [value for value in more if isinstance(value, str)]
-    return " ".join([getattr(getattr(call, "func", call), "__name__", "without a name"), *more])
+    name = getattr(getattr(call, "func", call), "__name__", "without a name")
+    return " ".join([name.removeprefix("draw_"), *more])
 
 
 def warm_up() -> None:

@@ -1,14 +1,14 @@
 """Scenes of a user's own, from a TOML file with a table [[scene]] for each."""
 
-import math
 import tomllib
+from pathlib import Path
 
-from .case import Case, Scene, shorten
+from .case import TORQUES, Case, Scene, are_numbers, shorten
 from .robots import Robot
 
 KEYS = ("name", "posture", "q", "speed", "torque", "gravity", "damping", "locked", "duration", "dt")
 UNITS = {"q": "deg", "speed": "deg/s", "torque": "N m"}
-WORDS = {"torque": ("free", "hold")}
+WORDS = {"torque": TORQUES}
 STEPS = 64  # of a scene that states no dt
 
 
@@ -16,7 +16,7 @@ class SceneError(ValueError):
     """A file that does not describe scenes of the robot; the message is one line with file and entry."""
 
 
-def read(path, robot: Robot) -> tuple[Scene, ...]:
+def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     """The scenes of a file, of a robot: angles in deg, speeds in deg/s, torques in N m, damping in N m s/rad, times in s.
 
     Each needs a name; it starts at rest with all joints at zero, free, if nothing else is said. SceneError for a file that
@@ -47,12 +47,6 @@ def read(path, robot: Robot) -> tuple[Scene, ...]:
     return tuple(scenes)
 
 
-def numbers(values, count: int) -> bool:
-    """Whether these are so many finite numbers in a list."""
-    is_list = isinstance(values, tuple) and len(values) == count
-    return is_list and all(type(value) in (int, float) and math.isfinite(value) for value in values)
-
-
 def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
     """One entry as a scene of the robot."""
     for key in entry:
@@ -70,7 +64,11 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
             raise SceneError(
                 f"{where}: posture is {shorten(repr(value))}; one of {', '.join(robot.postures)} is expected"
             )
-        if key in UNITS and value not in WORDS.get(key, ()) and not numbers(value, len(robot.joints)):
+        if (
+            key in UNITS
+            and value not in WORDS.get(key, ())
+            and not (are_numbers(value) and len(value) == len(robot.joints))
+        ):
             count = f"{len(robot.joints)} numbers, one per joint ({', '.join(robot.joints)}), in {UNITS[key]}"
             accepted = f"free, hold, or {count}" if key == "torque" else count
             raise SceneError(f"{where}: {key} is {shorten(repr(entry[key]))}; {accepted} is expected")

@@ -3,6 +3,7 @@ from functools import cache
 import numpy as np
 import pytest
 from hypothesis import settings
+from small_runs import JOBS, Beside, of_arm
 
 from compare import experiment
 from compare.engines.mujoco import load
@@ -24,10 +25,19 @@ def engines(mujoco):
     return experiment.engines(mujoco)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def beside(request):
+    """Where all tests are run, what takes long is computed beside them from the start."""
+    files = {item.path.name for item in request.session.items}
+    beside = Beside(JOBS if {"test_agreement.py", "test_second_robot.py", "test_judge_check.py"} <= files else ())
+    yield beside
+    beside.end()
+
+
 @pytest.fixture(scope="session")
-def small(engines):
+def small(beside):
     """small(name): the result of an experiment in a small run, every path with few states and steps; made once."""
-    return cache(lambda name: experiment.module(name).rows(experiment.Setup.small(ARM, engines)))
+    return cache(lambda name: beside.result(of_arm, name))
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from compare.experiments import EXPERIMENTS, module
 from compare.experiments.parameters import stated
 from compare.judge.scale import EPS, FACTOR, bias_scale, reaches
 from compare.report import files
-from compare.report.verdict import Section, verdict
+from compare.report.verdict import Report, Section, verdict
 from compare.robots import Robot
 from compare.robots.arm import ARM
 
@@ -49,7 +49,7 @@ def test_a_report_of_all_experiments_has_every_figure(small, tmp_path):
         sections.append(section)
     words = verdict(sections, len(EXPERIMENTS))
     assert words.startswith(f"The two models agree: all {sum(len(s.result.checks) for s in sections)} checks pass.")
-    files.write(tmp_path, sections, ARM, {"command": "a small run"}, words)
+    files.write(tmp_path, Report(sections, ARM, {"command": "a small run"}, words))
     drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
     of_more_scenes = {"speed_ball_catch_free", "speed_bent_damped"}
     assert drawn | of_more_scenes == {path.stem for path in (ROOT / "reports/example/figures").iterdir()}

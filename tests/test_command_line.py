@@ -241,7 +241,9 @@ def late(result, robot):
 def test_a_figure_that_raises_leaves_the_others_alone(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "compare.experiments.broken", SimpleNamespace(figures=late))
     drawn, failed = experiment.draw("broken", None, None, tmp_path)
-    assert drawn == [(name, "A caption.") for name in ("first", "second", "First_")]  # one file where capitals do not count
+    assert drawn == [
+        (name, "A caption.") for name in ("first", "second", "First_")
+    ]  # one file where capitals do not count
     assert [name for name, _ in failed] == ["plot", "half third", "number 6"]
     assert failed[0][1].startswith("TypeError: plot() missing") and failed[2][1].startswith("ValueError: no more")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["First_.png", "first.png", "second.png"]

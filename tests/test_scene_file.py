@@ -5,7 +5,7 @@ import pytest
 
 from compare.case import Case
 from compare.robots.arm import ARM
-from compare.scene_file import SceneError, read
+from compare.scene_file import SceneError, read_scenes
 
 WHOLE = """
 [[scene]]
@@ -33,7 +33,7 @@ name = "as it is"
 def from_text(tmp_path, text):
     path = tmp_path / "my.toml"
     path.write_text(text, encoding="utf-8")
-    return read(path, ARM)
+    return read_scenes(path, ARM)
 
 
 def test_every_key_is_read(tmp_path):
@@ -86,9 +86,9 @@ def test_what_cannot_be_is_one_line_with_file_and_entry(tmp_path, text, says):
 
 def test_a_file_that_cannot_be_read(tmp_path):
     with pytest.raises(SceneError, match=r"cannot read .*no\.toml: No such file"):
-        read(tmp_path / "no.toml", ARM)
+        read_scenes(tmp_path / "no.toml", ARM)
     with pytest.raises(SceneError, match=r"cannot read .*: Is a directory"):
-        read(tmp_path, ARM)
+        read_scenes(tmp_path, ARM)
     (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(SceneError, match="is not TOML"):
-        read(tmp_path / "bytes.toml", ARM)
+        read_scenes(tmp_path / "bytes.toml", ARM)

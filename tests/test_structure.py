@@ -20,12 +20,13 @@ DIRECTIONS = {
     "scene_file": {"case", "robots"},
     "engines": {"tmt", "case"},
     "truth": {"tmt", "case"},
-    "judge": {"tmt"},
+    "judge": {"tmt", "case"},
     "process": set(),
     "report": {"judge", "process"},
-    "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots"},
-    "experiment": {"case", "states", "robots", "engines", "judge", "process", "report", "experiments"},
-    "__main__": {"case", "robots", "engines", "scene_file", "process", "report", "experiment", "experiments"},
+    "setup": {"case", "states", "robots", "engines"},
+    "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots", "setup"},
+    "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
+    "__main__": {"case", "robots", "engines", "scene_file", "process", "report", "setup", "experiment", "experiments"},
 }
 
 
@@ -149,6 +150,18 @@ def test_a_constant_has_one_meaning_in_all_of_compare():
             for target in (name for t in targets for name in ast.walk(t) if isinstance(name, ast.Name)):
                 if target.id.isupper() and target.id not in of_all:
                     places.setdefault(target.id, set()).add(dotted(path))
+    several = {name: sorted(files) for name, files in places.items() if len(files) > 1}
+    assert not several
+
+
+def test_a_function_has_one_meaning_in_all_of_compare():
+    """Public functions of several files, but for what every experiment has."""
+    of_all = {"rows", "figures", "claim", "tolerance", "begin", "skipped", "main"}
+    places = {}
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name not in of_all:
+                places.setdefault(node.name, set()).add(dotted(path))
     several = {name: sorted(files) for name, files in places.items() if len(files) > 1}
     assert not several
 

@@ -9,10 +9,12 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..case import Case, Coordinates
 
 LABELS = {"tmt": "TMT", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
+COMPARED = ("tmt", "mujoco")  # the two engines that every experiment compares
 GRID = 64  # equal times, and the start, at which a prepared run is read
 
 
@@ -55,6 +57,14 @@ class Motion(NamedTuple):
     ended: str | np.ndarray | None = None  # when and why a run ended early, or None; of a batch an array of its shape
     steps: int | None = None  # that the method took; None: not known
 
+    @property
+    def states(self) -> np.ndarray:
+        """q and v side by side, (..., times, nq + nv)."""
+        return np.concatenate([self.q, self.v], axis=-1)
+
+
+Prepared = tuple[Callable, Callable[..., Motion]]  # run() and read(what it returned)
+
 
 class Dynamics(Protocol):
     """One case in one engine. Engines may know more: energy, com_positions, jacobians, convective_terms ..."""
@@ -73,7 +83,7 @@ class Dynamics(Protocol):
     def run(self, q, v, tau, dt: float, steps: int, method: str, tolerance: float | None = None) -> Motion:
         """Motion under constant torque from q, v, recorded at every multiple of dt."""
 
-    def prepare(self, q, v, tau, setting: Setting, method: str) -> tuple[Callable, Callable[..., Motion]]:
+    def prepare(self, q, v, tau, setting: Setting, method: str) -> Prepared:
         """run() follows one motion once more and does nothing else; read(what it returned) is what is judged of it.
 
         q, v, tau: (n,). read gives the motion at 64 equal times and the start.
@@ -83,14 +93,29 @@ class Dynamics(Protocol):
 class Engine(Protocol):
     """One engine with its methods of integration."""
 
-    name: str
-    methods: Mapping[str, Method]
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def methods(self) -> Mapping[str, Method]:
+        """By their names."""
 
     def unavailable(self) -> str | None:
         """Why it cannot take part here, or None."""
 
     def of(self, case: Case) -> Dynamics:
         """The dynamics of a case."""
+
+
+def compared(engines: Mapping[str, Engine], case: Case) -> dict[str, Dynamics]:
+    """The dynamics of a case in the two engines that are compared, by their names, tmt first."""
+    return {name: engines[name].of(case) for name in COMPARED}
+
+
+def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray]]:
+    """The batch shape that values (..., n) have together, and each of them as rows, (states, n), contiguous; a number is n."""
+    shape = np.broadcast_shapes(*map(np.shape, values))
+    return shape[:-1], [np.array(np.broadcast_to(a, shape), float, order="C").reshape(-1, shape[-1]) for a in values]
 
 
 def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:

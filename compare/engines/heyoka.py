@@ -1,16 +1,18 @@
 """heyoka's Taylor method on the same equations of motion; only where heyoka is installed (the extra `taylor`)."""
 
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.util import find_spec
 from typing import ClassVar
 
 import numpy as np
 
-from tmt import composite
+from tmt import Tree, composite
 from tmt.method import acceleration
 from tmt.space import cos, sin
 
-from . import GRID, Method, Motion, Setting
+from ..case import Case
+from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .scipy import as_far_as_it_goes, each
 from .tmt import TmtDynamics
 
@@ -21,14 +23,14 @@ class Heyoka:
     """The engine of heyoka's Taylor method, which chooses its own steps."""
 
     name = "heyoka"
-    methods: ClassVar[dict[str, Method]] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
+    methods: ClassVar[Mapping[str, Method]] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
     def unavailable(self) -> str | None:
         if find_spec("heyoka") is None:
             return "heyoka is not installed; the extra `taylor` brings it, on Linux"
         return None
 
-    def of(self, case) -> "HeyokaDynamics":
+    def of(self, case: Case) -> "HeyokaDynamics":
         return HeyokaDynamics(case)
 
 
@@ -48,22 +50,23 @@ class HeyokaDynamics(TmtDynamics):
 
     def evaluated(self, q, v=0.0, tau=0.0) -> np.ndarray:
         """Mbar by rows, h and the acceleration at each state, (..., n (n + 2))."""
-        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
-        states = np.array([np.broadcast_to(a, shape).reshape(-1, shape[-1]).T for a in (q, v, tau)])
-        return dynamics(self.tree)(states.reshape(-1, states.shape[-1])).T.reshape(*shape[:-1], -1)
+        batch, states = rows_of_states(q, v, tau)
+        return dynamics(self.tree)(np.concatenate(states, axis=1).T.copy()).T.reshape(*batch, -1)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), tolerance or FULL)
+        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), tolerance)
 
     def solved(self, q, v, tau, t, tolerance) -> Motion:
         run, read = self.prepared(q, v, tau, t, tolerance)
         return read(run())
 
-    def prepare(self, q, v, tau, setting: Setting, method):
+    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
         return self.prepared(q, v, tau, np.linspace(0.0, setting.duration, GRID + 1), setting.tolerance)
 
-    def prepared(self, q, v, tau, t, tolerance):
-        stepper = integrator(self.tree, tuple(np.asarray(tau, float).tolist()), tolerance)
+    def prepared(self, q, v, tau, t, tolerance) -> Prepared:
+        stepper = integrator(
+            self.tree, tuple(np.asarray(tau, float).tolist()), FULL if tolerance is None else tolerance
+        )
         start = np.concatenate([q, v])
 
         def run():
@@ -79,7 +82,7 @@ class HeyokaDynamics(TmtDynamics):
 
 
 @lru_cache(maxsize=32)
-def integrator(tree, tau, tolerance):
+def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
     """heyoka's integrator of a Tree: the composite form traced on its expressions, compiled for this tolerance."""
     import heyoka
 
@@ -89,7 +92,7 @@ def integrator(tree, tau, tolerance):
 
 
 @lru_cache(maxsize=32)
-def dynamics(tree):
+def dynamics(tree: Tree):
     """Mbar by rows, h and the acceleration as one function that heyoka compiles, of q, qd and tau one after the other."""
     import heyoka
 
@@ -102,7 +105,7 @@ def dynamics(tree):
     return heyoka.cfunc(values, vars=[*q, *qd, *tau])
 
 
-def variables(tree, *names) -> list:
+def variables(tree: Tree, *names: str) -> list:
     """heyoka's variables for each hinge: one list for each name."""
     import heyoka
 

@@ -1,13 +1,14 @@
 """SciPy's solve_ivp with tmt's compiled equations."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from tmt import kernels
 
-from . import GRID, Method, Motion, Setting
+from ..case import Case
+from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .tmt import TmtDynamics
 
 DEFAULT = 1e-9  # tolerance
@@ -18,14 +19,14 @@ class Scipy:
     """The engine of SciPy's methods, all of which choose their own steps."""
 
     name = "scipy"
-    methods: ClassVar[dict[str, Method]] = {
+    methods: ClassVar[Mapping[str, Method]] = {
         name: Method("scipy", name, None, name, adaptive=True) for name in ("RK45", "DOP853", "Radau", "LSODA")
     }
 
     def unavailable(self) -> str | None:
         return None
 
-    def of(self, case) -> "ScipyDynamics":
+    def of(self, case: Case) -> "ScipyDynamics":
         return ScipyDynamics(case)
 
 
@@ -53,26 +54,25 @@ class ScipyDynamics(TmtDynamics):
 
     def evaluated(self, quantity, size, q, v=0.0, tau=0.0) -> np.ndarray:
         """A compiled quantity of so many numbers at each state, (..., size)."""
-        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
-        states = [np.array(np.broadcast_to(a, shape), float, order="C").reshape(-1, shape[-1]) for a in (q, v, tau)]
+        batch, states = rows_of_states(q, v, tau)
         result = np.empty((len(states[0]), size))
         kernels.evaluator(self.tree, quantity).each(*states, result)
-        return result.reshape(*shape[:-1], size)
+        return result.reshape(*batch, size)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), method, tolerance or DEFAULT)
+        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), method, tolerance)
 
     def solved(self, q, v, tau, t, method, tolerance) -> Motion:
         run, read = self.prepared(q, v, tau, t, method, tolerance)
         return read(run())
 
-    def prepare(self, q, v, tau, setting: Setting, method):
+    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
         return self.prepared(q, v, tau, np.linspace(0.0, setting.duration, GRID + 1), method, setting.tolerance)
 
-    def prepared(self, q, v, tau, t, method, tolerance):
+    def prepared(self, q, v, tau, t, method, tolerance) -> Prepared:
         from scipy.integrate import solve_ivp
 
-        rate = self.rate()
+        rate, tolerance = self.rate(), DEFAULT if tolerance is None else tolerance
         start, torque, nothing = np.concatenate([q, v]), np.array(tau, float), np.zeros(2 * len(q))
         options = {"rtol": max(tolerance, LEAST_RELATIVE), "atol": tolerance}
 
@@ -107,7 +107,9 @@ class NotFinite(ArithmeticError):
     """A slope at a time, s, that is not finite."""
 
 
-def as_far_as_it_goes(t, found, start, why) -> tuple[np.ndarray, np.ndarray, str | None]:
+def as_far_as_it_goes(
+    t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str
+) -> tuple[np.ndarray, np.ndarray, str | None]:
     """q and v at the times t, NaN from where a run has no finite state any more, and why and when that is, or None.
 
     found: (times reached, 2n), the states of a run that may have ended early; start: (2n,), its first.
@@ -120,12 +122,11 @@ def as_far_as_it_goes(t, found, start, why) -> tuple[np.ndarray, np.ndarray, str
     return *np.split(path, 2, axis=1), ended
 
 
-def each(solved, q, v, tau, *more) -> Motion:
+def each(solved: Callable[..., Motion], q: np.ndarray, v: np.ndarray, tau: np.ndarray, *more) -> Motion:
     """The motions of a batch, one run after the other: solved(q, v, tau, *more) is the motion of one."""
-    shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
-    states = (np.broadcast_to(a, shape).reshape(-1, shape[-1]) for a in (q, v, tau))
+    batch, states = rows_of_states(q, v, tau)
     motions = [solved(*state, *more) for state in zip(*states)]
-    batch, times = shape[:-1], motions[0].t
+    times = motions[0].t
     q, v = (np.array([getattr(m, name) for m in motions]).reshape(*batch, len(times), -1) for name in ("q", "v"))
     ended = np.array([m.ended for m in motions], dtype=object).reshape(batch)[()]
     counts = [m.evaluations for m in motions]

@@ -1,5 +1,6 @@
 """tmt's own equations, integrated by its compiled loops."""
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,8 @@ from tmt import kernels
 from tmt.methods import method_named
 from tmt.simulation import reasons
 
-from . import GRID, Method, Motion, Setting
+from ..case import Case
+from . import GRID, Method, Motion, Prepared, Setting
 
 
 class Tmt:
@@ -18,7 +20,7 @@ class Tmt:
     name = "tmt"
 
     @property
-    def methods(self) -> dict[str, Method]:
+    def methods(self) -> Mapping[str, Method]:
         return {
             name: Method(self.name, name, None if method.adaptive else method.order, name, method.adaptive)
             for name, method in tmt.METHODS.items()
@@ -27,14 +29,14 @@ class Tmt:
     def unavailable(self) -> str | None:
         return None
 
-    def of(self, case) -> "TmtDynamics":
+    def of(self, case: Case) -> "TmtDynamics":
         return TmtDynamics(case)
 
 
 class TmtDynamics:
     """A case's Tree, each quantity by the method as it stands."""
 
-    def __init__(self, case):
+    def __init__(self, case: Case):
         self.tree, self.coordinates = case.tree, case.coordinates
 
     def com_positions(self, q) -> np.ndarray:
@@ -71,7 +73,7 @@ class TmtDynamics:
         motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
         return Motion(*motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps)
 
-    def prepare(self, q, v, tau, setting: Setting, method):
+    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
         stepping = method_named(method)
         if setting.tolerance is not None and not stepping.adaptive:
             raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")

@@ -8,6 +8,8 @@ it cannot serve a robot.
 import importlib
 from types import ModuleType
 
+from ..robots import Robot
+
 EXPERIMENTS = {
     "parameters": "MuJoCo's compiled model read back beside the stated numbers",
     "published": "every number that the assignment prints",
@@ -27,7 +29,7 @@ def module(name: str) -> ModuleType:
     return importlib.import_module(f".{name}", __package__)
 
 
-def skipped(name: str, robot) -> str | None:
+def skipped(name: str, robot: Robot) -> str | None:
     """Why an experiment cannot serve a robot, or None."""
     why = getattr(module(name), "skipped", None)
     return why(robot) if why else None

@@ -13,6 +13,7 @@ from ..engines import LABELS
 from ..judge.check import Result
 from ..judge.scale import acceleration_scale, bias_scale, condition, gravity_scale, mass_scale
 from ..robots import Robot
+from ..setup import Setup
 
 TITLE = "Accelerations: the same equations in motion?"
 
@@ -40,7 +41,7 @@ def tolerance(robot: Robot) -> str:
     )
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Each quantity at the named postures and at random states."""
     result, tree = Result("acceleration"), setup.robot.tree
     dynamics = ours, theirs = tuple(setup.compared().values())
@@ -89,19 +90,19 @@ def rate(quantity: Callable, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> 
     return quantity(state[: q.shape[1]], state[q.shape[1] :]).slope
 
 
-def total_energy(tree: tmt.Tree, q, qd):
+def total_energy(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
     """Potential and kinetic energy over any scalars, J."""
     parts = method.bodies(tree, q, qd)
     return method.potential(parts, tree.gravity) + method.kinetic(parts, qd)
 
 
-def first_momentum(tree: tmt.Tree, q, qd):
+def first_momentum(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
     """The first row of Mbar qd over any scalars: angular momentum about the first hinge, whose axis is fixed, N m s."""
     first_row = method.mass_matrix(method.bodies(tree, q, qd))[0]
     return sum(m * v for m, v in zip(first_row, qd))
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_distances  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states", ["bias", "qdd", "energy", "potential energy"])
+    yield partial(draw_distances, result, "random states", ["bias", "qdd", "energy", "potential energy"])

@@ -3,6 +3,8 @@
 Each function returns (file name, figure, caption).
 """
 
+from collections.abc import Sequence
+
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,6 +15,7 @@ from tmt import method
 from ..engines import LABELS
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, gravity_scale
+from ..judge.words import listed
 from ..report.style import BLUE, GREY, ORANGE, RED, WIDTH, file_name, joint_lines
 from ..robots import Robot
 
@@ -24,7 +27,7 @@ RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
 UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
-def sketch(robot: Robot) -> tuple[str, Figure, str]:
+def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
     """The robot with its hinge axes in two postures, from the method's own frames."""
     poses = {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
     parts = {name: (chains(robot, q), tmt.com_positions(q, robot.tree)) for name, q in poses.items()}
@@ -49,7 +52,7 @@ def sketch(robot: Robot) -> tuple[str, Figure, str]:
             ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
         if robot.landmarks:
             names, (chain,) = robot.landmarks(poses[name]), lines
-            for text, point, (right, up) in zip(names, chain, beside(chain, arrows[name])):
+            for text, point, (right, up) in zip(names, chain, label_directions(chain, arrows[name])):
                 side = {"ha": "left" if right > 0.0 else "right", "va": "bottom" if up > 0.5 else "center"}
                 ax.text(*(point + 0.1 * size * (right * RIGHTWARD + up * UPWARD)), text, color=GREY, fontsize=8, **side)
         ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(poses[name]))})°")
@@ -60,10 +63,9 @@ def sketch(robot: Robot) -> tuple[str, Figure, str]:
         ax.view_init(elev=ELEVATION, azim=AZIMUTH)
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
     bodies = [f"the {body} ({number})" for number, body in enumerate(robot.tree.body_names, start=1)]
-    of = " and ".join(filter(None, (", ".join(bodies[:-1]), bodies[-1])))
     caption = (
         f"The {robot.name} and its hinges, drawn from the method's own kinematics: {', then '.join(hinges(robot))}. Dots: "
-        f"centres of mass of {of}."
+        f"centres of mass of {listed(bodies)}."
     )
     return file_name(robot.name), fig, caption
 
@@ -92,7 +94,7 @@ def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:
     return np.array([[list(frame.origin), [length * c for c in frame.axis]] for frame in frames], dtype=float)
 
 
-def beside(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
+def label_directions(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
     """Where on paper the labels of a chain's points, (k, 3) m, stand free: to the right and up, (k, 2), of length 1.
 
     Away from the links and from the arrows, (n, 2, 3), that meet in the point; to the left if these are balanced.
@@ -121,11 +123,11 @@ def hinges(robot: Robot) -> list[str]:
     return words
 
 
-def triple(values) -> str:
+def triple(values: Sequence[float]) -> str:
     return f"({', '.join(f'{v:.3g}' for v in values)})"
 
 
-def distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
+def draw_distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
     """How far apart the engines are over all states, and how far each is from the exact value."""
     curves = result.curves[sample]
     quantities = quantities or [name for name, c in curves.items() if "TMT to exact" in c]
@@ -158,7 +160,7 @@ def distances(result: Result, sample: str, quantities: list[str] | None = None) 
     return f"{result.experiment}_distances", fig, caption
 
 
-def condition_map(result: Result, robot: Robot) -> tuple[str, Figure, str]:
+def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """The condition number of Mbar over the two joints on which it is said to depend."""
     *angles, values = result.curves["condition"]
     first, second = np.degrees(angles)
@@ -184,7 +186,7 @@ def condition_map(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     return "mass_condition", fig, caption
 
 
-def holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
+def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Holding torques at the named postures."""
     postures = result.curves["postures"]
     fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")

@@ -8,6 +8,7 @@ import numpy as np
 from ..judge.check import Result
 from ..judge.scale import acceleration_scale, gravity_scale
 from ..robots import Robot
+from ..setup import Setup
 
 TITLE = "Gravity balance: do both hold the model with the same torque?"
 
@@ -37,7 +38,7 @@ def gradient(potential_energy: Callable, q: np.ndarray) -> np.ndarray:
     return (potential_energy(q[:, None] + quarter) - potential_energy(q[:, None] - quarter)) / 2
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Torques at each named posture and at random ones, their gradients, and TMT's torque given to MuJoCo."""
     result, tree = Result("gravity"), setup.robot.tree
     tmt, mujoco = setup.compared().values()
@@ -61,7 +62,7 @@ def rows(setup) -> Result:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_distances, draw_holding_torques  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states", ["holding torque"])
-    yield partial(draw.holding_torques, result, robot)
+    yield partial(draw_distances, result, "random states", ["holding torque"])
+    yield partial(draw_holding_torques, result, robot)

@@ -8,6 +8,7 @@ import numpy as np
 from ..judge.check import Result
 from ..judge.scale import reaches
 from ..robots import Robot
+from ..setup import Setup
 
 TITLE = "Kinematics: do the bodies move alike?"
 
@@ -25,18 +26,18 @@ def tolerance(robot: Robot) -> str:
     """By what the claim is judged, with the robot's own scale."""
     reach = reaches(robot.tree).max()
     return (
-        f"64 eps x scale. Lengths and T_b: the largest distance from the {origin(robot)}, {reach:.2f} m. B_b: 1. Angular "
-        f"velocity: the sum S of |rates|. Convective terms: {reach:.2f} m x S^2 and S^2."
+        f"64 eps x scale. Lengths and T_b: the largest distance from the {origin_in_words(robot)}, {reach:.2f} m. B_b: 1. "
+        f"Angular velocity: the sum S of |rates|. Convective terms: {reach:.2f} m x S^2 and S^2."
     )
 
 
-def origin(robot: Robot) -> str:
+def origin_in_words(robot: Robot) -> str:
     """What is at the origin, in words: the landmark that is there."""
     landmarks = robot.landmarks(robot.posture()) if robot.landmarks else {}
     return next((name for name, point in landmarks.items() if not np.any(point)), "origin")
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Six quantities at the named postures and at random states."""
     result = Result("kinematics")
     engines = tuple(setup.compared().values())
@@ -61,6 +62,6 @@ def rows(setup) -> Result:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_distances  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states")
+    yield partial(draw_distances, result, "random states")

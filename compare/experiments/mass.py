@@ -12,6 +12,7 @@ from ..engines import LABELS
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, mass_scale
 from ..robots import Robot
+from ..setup import Setup
 
 TITLE = "Mass matrix: is Mbar MuJoCo's M?"
 SAME_PLACE = np.radians(0.01)  # what a search finds of the place of a flat maximum
@@ -72,7 +73,7 @@ def worst_condition(robot: Robot, mass_matrix: Callable) -> tuple:
     return -found.fun, found.x
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Agreement at each named posture and at random states; symmetry, definiteness, conditioning."""
     result, robot, compared = Result("mass"), setup.robot, setup.compared()
     for sample in (*setup.named.each(), setup.random):
@@ -123,8 +124,8 @@ def check_conditioning(result: Result, robot: Robot, label: str, value: float, w
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_condition, draw_distances  # matplotlib is for the process that draws
 
-    yield partial(draw.distances, result, "random states")
+    yield partial(draw_distances, result, "random states")
     if robot.conditioning:
-        yield partial(draw.condition_map, result, robot)
+        yield partial(draw_condition, result, robot)

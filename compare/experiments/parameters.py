@@ -11,6 +11,7 @@ from ..engines.mujoco.parameters import STATED_FLAGS, options, parameters
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
+from ..setup import Setup
 
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
@@ -80,7 +81,7 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     return tree.body_names if quantity in OF_BODIES else tree.hinge_names
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """One row for each number; one check for each quantity of each hinge or body; the causes that follow."""
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
     tree, dynamics = setup.robot.tree, setup.compared()["mujoco"]
@@ -110,12 +111,13 @@ def rows(setup) -> Result:
             causes.append(about | {"size": np.inf, "quantity": place})
     for option, value in options(setup.engines["mujoco"], dynamics).items():
         result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
-    result.curves["com"] = compiled["com"]
     result.curves["causes"] = sorted(causes, key=lambda cause: (cause["rank"], -cause["size"]))
     return result
 
 
-def causes_in(tree, owner, quantity, stated, found, off, tolerance) -> list[dict]:
+def causes_in(
+    tree: tmt.Tree, owner: str, quantity: str, stated: np.ndarray, found: np.ndarray, off: np.ndarray, tolerance: float
+) -> list[dict]:
     """The causes in one quantity of one hinge or body: each number that is off by more than the tolerance.
 
     Rank 1: an option, or a convention of a hinge (its order, its sign, its zero); 2: one number.
@@ -132,7 +134,9 @@ def causes_in(tree, owner, quantity, stated, found, off, tolerance) -> list[dict
     return causes
 
 
-def cause(tree, rank, quantity, place, stated, found, size, remark="") -> dict:
+def cause(
+    tree: tmt.Tree, rank: int, quantity: str, place: str, stated: float, found: float, size: float, remark: str = ""
+) -> dict:
     """A cause with its sentence; size: its difference over its tolerance."""
     unit = QUANTITIES[quantity]
     if quantity.startswith("flag "):
@@ -157,6 +161,6 @@ def component(k: int, count: int) -> str:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures as draw  # matplotlib is for the process that draws
+    from .figures import draw_sketch  # matplotlib is for the process that draws
 
-    yield partial(draw.sketch, robot)
+    yield partial(draw_sketch, robot)

@@ -12,7 +12,9 @@ from tmt.reference import distance, exact
 from ..engines import Dynamics
 from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
+from ..judge.words import capital, listed
 from ..robots import Printed, Robot
+from ..setup import Setup
 
 TITLE = "Published numbers: does either engine contradict the assignment?"
 
@@ -36,7 +38,7 @@ def claim(robot: Robot) -> str:
     parts = [f"that is {item} to every printed digit{', for TMT too' if by_tmt else ''}" for item, by_tmt in every]
     parts += [f"of {item} it shares the size of {entries}" for item, entries in sizes]
     more = "; ".join(parts)
-    return f"{text} {more[0].upper()}{more[1:]}." if more else text
+    return f"{text} {capital(more)}." if more else text
 
 
 def tolerance(robot: Robot) -> str:
@@ -81,11 +83,6 @@ def angles(robot: Robot) -> list[str]:
     ]
 
 
-def listed(words: list[str]) -> str:
-    """a, b and c."""
-    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
-
-
 class Answer(NamedTuple):
     """What is found beside one printed answer, in its shape and unit."""
 
@@ -122,7 +119,7 @@ def answer(item: Printed, robot: Robot, dynamics: Mapping[str, Dynamics]) -> Ans
     return Answer(truth.gravity_balance, *(d.gravity_balance(q) for d in engines), gravity_scale(tree))
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """One row for each printed component, one check for each item and engine."""
     result = Result("published", shown=["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"])
     robot, dynamics = setup.robot, setup.compared()

@@ -1,8 +1,10 @@
 """Checks and their rules, and what an experiment finds: rows, checks, curves and sentences."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tmt.reference import distance
 
@@ -102,15 +104,14 @@ class Result:
         in_eps = {name: over(d, EPS * scale[: len(d)]) for name, d in apart.items()}
         difference = apart["TMT to MuJoCo"]
 
-        def closest(quantity, difference):
+        def check_closest(quantity, difference):
             """A check of the state that comes closest to its tolerance, and which one that is."""
-            share = np.where(np.isfinite(difference), over(difference, tolerance[: len(difference)]), np.inf)
-            k = int(np.argmax(share))
+            (k,) = closest(difference, tolerance[: len(difference)])
             return self.check(sample.name, quantity, difference[k], tolerance[k], unit, sample.describe(k), True), k
 
-        check, worst = closest(quantity, difference)
+        check, worst = check_closest(quantity, difference)
         for name in list(apart)[1:]:
-            closest(f"{quantity}, {name}", apart[name])
+            check_closest(f"{quantity}, {name}", apart[name])
         self.rows.append(
             {
                 "scene": sample.name,
@@ -127,9 +128,9 @@ class Result:
                 "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if truth else None,
                 "exact_states": len(known) if truth else None,
                 "worst_state": check.note,
-                "worst_q": numbers(sample.q[worst]),
-                "worst_qd": numbers(sample.qd[worst]),
-                "worst_tau": numbers(sample.tau[worst]),
+                "worst_q": all_digits(sample.q[worst]),
+                "worst_qd": all_digits(sample.qd[worst]),
+                "worst_tau": all_digits(sample.tau[worst]),
                 "passed": check.passed,
             }
         )
@@ -138,17 +139,27 @@ class Result:
         self.shown = AGREEMENT
 
 
-def over(difference, scale) -> np.ndarray:
-    """A difference over its scale, (states,); nothing over nothing is 0."""
+def closest(difference: np.ndarray, tolerance: np.ndarray) -> tuple[int, ...]:
+    """The place of the difference that comes closest to its tolerance, of a shape that stands for the same.
+
+    One that is no number comes before all, and so does any where none is allowed.
+    """
+    difference, tolerance = np.broadcast_arrays(np.abs(difference), tolerance)
+    share = np.where(np.isfinite(difference), over(difference, tolerance), np.inf)
+    return tuple(map(int, np.unravel_index(np.argmax(share), share.shape)))
+
+
+def over(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """A difference over its scale, of the same shape; nothing over nothing is 0."""
     return np.divide(difference, scale, out=np.where(difference == 0.0, 0.0, np.inf), where=scale > 0.0)
 
 
-def numbers(values) -> str:
+def all_digits(values: Iterable[float]) -> str:
     """Numbers with all their digits, for whoever wants to see a state again."""
     return " ".join(repr(float(v)) for v in values)
 
 
-def largest(values) -> np.ndarray:
+def largest(values: ArrayLike) -> np.ndarray:
     """The largest absolute value of each state, (states, ...) -> (states,)."""
     values = np.abs(np.asarray(values, dtype=float))
     return values.reshape(len(values), -1).max(axis=1)

@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from tmt import Tree
 from tmt.methods import amplification
+from tmt.stepping import Method
 
 from .scale import EPS, FACTOR, bias_scale
 
@@ -10,7 +12,7 @@ SAMPLED = 16  # states of a block at which the bound of a step is taken
 NARROW = 1e-3  # rad: while the band of the angles is below, a run is judged
 
 
-def slope_rounding(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
+def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
     """a, |a| and the bound of the rounding of a, rad/s2; (states,) each: a solves A a = force, A the method's matrix.
 
     |A^-1| (64 eps |A| |a| + 64 eps S): A by its singular values, S the sum of the absolute terms of the force.
@@ -25,7 +27,9 @@ def slope_rounding(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarra
     return a, size, FACTOR * EPS * (values[:, 0] * size + force) / values[:, -1]
 
 
-def step_rounding(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> np.ndarray:
+def step_rounding(
+    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float
+) -> np.ndarray:
     """Bound delta, to first order in dt, of the difference that rounding adds in one step, (steps, 2n).
 
     Rates: dt x the rounding of the slope, the largest over the stages of the step, plus that of the sum qd + dt a.
@@ -45,7 +49,9 @@ def step_rounding(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray
     return np.concatenate([angles, rates], axis=1)
 
 
-def band(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int = 1) -> np.ndarray:
+def band(
+    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int = 1
+) -> np.ndarray:
     """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, n), at every so many steps.
 
     Shape (steps / every + 1, 2n). Infinite from where the run has diverged, or the band is far too wide to judge by.
@@ -83,7 +89,9 @@ def band(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: flo
     return widths
 
 
-def growth(stepping, tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int) -> np.ndarray:
+def growth(
+    stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int
+) -> np.ndarray:
     """log10 of how much a small difference of the state at the start has grown, at every so many steps.
 
     The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled on the way so that it may grow without limit. NaN from where

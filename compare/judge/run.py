@@ -4,16 +4,33 @@ import numpy as np
 
 import tmt
 
+from ..case import Case
+from .check import Result
 from .scale import gravity_scale
 
 LEFT = 0.1  # rad: a held model that is so far from its posture has left it
 MOVES = 0.1  # rad: a run without a torque that holds shows nothing if it moves less
 ORDER_MARGIN = 0.15  # of an order that is measured
+COARSE_STEP, STABLE_SO_LONG = (
+    0.01,
+    0.3,
+)  # s: with such a step, or a coarser one, only RK4 is sure to be stable any longer
 
 
-def step_in_words(case, steps: int) -> str:
+def step_in_words(case: Case, steps: int) -> str:
     """The step of a run of a case in words."""
     return f"dt = {case.duration:g}/{steps} s"
+
+
+def required_time(case: Case, scheme: str, dt: float) -> float:
+    """For how long a run of a case by a scheme must be judged, s."""
+    judged = case.duration if case.scene.judged is None else case.scene.judged
+    return judged if scheme == "rk4" or dt < COARSE_STEP else min(judged, STABLE_SO_LONG)
+
+
+def check_movement(result: Result, where: str, moved: float) -> None:
+    """A run without a torque that holds moves, rad: one that stays shows nothing."""
+    result.check(where, "movement", moved, MOVES, "rad", rule="at least")
 
 
 def deviation(q: np.ndarray, start: np.ndarray) -> float:
@@ -33,7 +50,7 @@ def departure(t: np.ndarray, q: np.ndarray) -> float | None:
     return float(t[away][0]) if away.any() else None
 
 
-def diverged_at(case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> float | None:
+def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> float | None:
     """The first time at which a run of a case has stopped, is not finite, or is beyond its physical energy; None: never.
 
     Energy less the work of the constant torque cannot grow, on the stated robot. The bound is a gain of its whole potential

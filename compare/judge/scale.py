@@ -6,6 +6,7 @@ never the quantity itself (which may be zero).
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import tmt
 
@@ -50,7 +51,7 @@ def condition(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     return np.linalg.cond(tmt.mass_matrix(q, tree))
 
 
-def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force, size=None) -> np.ndarray:
+def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: ArrayLike | None = None) -> np.ndarray:
     """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): what errors of eps in Mbar and in the force do to qdd.
 
     force: scale of the forces, N m, (states,). size: |qdd| where it is known; without it, its bound |Mbar^-1| force,

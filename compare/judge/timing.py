@@ -40,7 +40,7 @@ def vectors() -> str:
     return f"{cpu()}, {next((name for flag, name in WIDTHS if flag in flags), 'width of its vectors unknown')}"
 
 
-def first_line(name) -> str:
+def first_line(name: str) -> str:
     """The first value of that name that Linux tells of the processor; "" elsewhere."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()

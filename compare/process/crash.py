@@ -7,7 +7,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LONGEST = 300  # characters of a message
 
 
-def described(error, with_place=True) -> str:
+def described(error: BaseException, with_place: bool = True) -> str:
     """An exception in one line: "ValueError: message (compare/mass.py:12)"."""
     message = " ".join(str(error).split())
     message = message if len(message) <= LONGEST else message[: LONGEST - 3] + "..."
@@ -15,7 +15,7 @@ def described(error, with_place=True) -> str:
     return type(error).__name__ + (f": {message}" if message else "") + (f" ({where})" if where else "")
 
 
-def place(error) -> str:
+def place(error: BaseException) -> str:
     """The last line of this project that an exception came through, "compare/mass.py:12"; "" if there is none."""
     if getattr(error, "place", ""):  # it comes from another process, which knew
         return error.place

@@ -9,6 +9,7 @@ import signal
 import socket
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -26,7 +27,7 @@ class Now:
     settled = False  # how the run ends is decided
 
 
-def answer() -> None:
+def listen() -> None:
     """From now on an interrupt ends the process. What is ignored (behind nohup, in a script's background) stays so."""
     receiver, sender = socket.socketpair()
     sender.setblocking(False)
@@ -38,7 +39,7 @@ def answer() -> None:
 
 
 @contextmanager
-def held():
+def postponed() -> Iterator[None]:
     """An interrupt that comes in this block is answered at its end."""
     Now.held += 1
     try:
@@ -52,7 +53,7 @@ def held():
 
 def settle() -> None:
     """How the run ends is decided: an interrupt no longer changes it."""
-    with held():
+    with postponed():
         Now.settled = True
 
 

@@ -40,7 +40,7 @@ class Stream:
         return getattr(self.stream, "encoding", None) or "utf-8"
 
 
-def readable(text) -> str:
+def readable(text: str) -> str:
     """Text that can be written anywhere: what the locale could not read of a file's name is UTF-8, or is shown as numbers."""
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 

@@ -5,6 +5,7 @@ import os
 import pickle
 import signal
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process, resource_tracker
@@ -32,7 +33,7 @@ class Workers(ThreadPoolExecutor):
     def start(self) -> None:
         """One more process."""
         context = get_context("spawn")
-        with interrupt.held(), deaf():
+        with interrupt.postponed(), deaf():
             here, there = context.Pipe()
             self.processes.append(context.Process(target=serve, args=(there,), daemon=True))
             self.processes[-1].start()
@@ -71,7 +72,7 @@ class Workers(ThreadPoolExecutor):
 
 
 @contextmanager
-def start_workers():
+def start_workers() -> Iterator[Workers]:
     """Yields a pool of two processes."""
     pool = Workers(2)
     try:
@@ -85,7 +86,7 @@ def start_workers():
 
 
 @contextmanager
-def deaf():
+def deaf() -> Iterator[None]:
     """Processes that are started in this block hear no Ctrl-C: that is the business of the one that started them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -127,7 +128,7 @@ def end_with_parent() -> None:
     os._exit(1)
 
 
-def portable(error) -> Exception:
+def portable(error: Exception) -> Exception:
     """An exception that can be sent, and knows where it was raised."""
     error.place = place(error)
     try:

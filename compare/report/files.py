@@ -1,37 +1,38 @@
 """Results to files: CSV, JSON, Markdown and HTML."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from .folder import files, save
 from .page import markdown, page
-from .verdict import passed
+from .verdict import Report, passed
 
 
-def write(folder, sections, robot, origin, result, causes=(), skipped=()) -> None:
-    """All files of a report, the figures excepted, into a folder that has those; `result`: the verdict in words."""
+def write(folder: Path, report: Report) -> None:
+    """All files of a report, the figures excepted, into a folder that has those."""
     (folder / "tables").mkdir()
-    for section in sections:
+    for section in report.sections:
         for name, rows in section.tables.items():
-            save(folder / "tables" / f"{name}.csv", plain(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
-    checks = [check.record() for section in sections for check in section.result.checks]
-    save(folder / "report.md", markdown(sections, robot, origin, result, causes, skipped))
-    save(folder / "index.html", page(folder, sections, robot, origin, result, causes, skipped))
-    origin = origin | {"files": [*files(folder), "results.json"]}  # what may be replaced by the next report
+            save(folder / "tables" / f"{name}.csv", for_csv(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
+    checks = [check.record() for section in report.sections for check in section.result.checks]
+    save(folder / "report.md", markdown(report))
+    save(folder / "index.html", page(folder, report))
     results = {
-        "passed": passed(sections),
+        "passed": passed(report.sections),
         "checks": checks,
-        "causes": [{name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in causes],
-        "skipped": [{"experiment": name, "reason": reason} for name, reason in skipped],
-        "provenance": origin,
+        "causes": [
+            {name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in report.causes
+        ],
+        "skipped": [{"experiment": name, "reason": reason} for name, reason in report.skipped],
+        # its files: what may be replaced by the next report
+        "provenance": report.origin | {"files": [*files(folder), "results.json"]},
     }
     save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
 
 
-def plain(table) -> pd.DataFrame:
-    """A table of objects for a CSV file: engines, true and false in small letters, whole numbers beside empty cells."""
-    if "engine" in table:
-        table["engine"] = table["engine"].str.lower()
+def for_csv(table: pd.DataFrame) -> pd.DataFrame:
+    """A table of objects for a CSV file: true and false in small letters, whole numbers beside empty cells."""
     return table.map(lambda value: str(value).lower() if isinstance(value, bool | np.bool_) else value)

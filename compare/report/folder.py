@@ -12,6 +12,7 @@ import re
 import shutil
 import tempfile
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -32,7 +33,7 @@ class FolderError(ValueError):
 
 
 @contextmanager
-def new_report(out):
+def new_report(out: str | Path) -> Iterator[Path]:
     """A fresh folder inside `out`; what is in it takes the old report's place when the block ends well.
 
     Whatever else is in `out` stays. If the block raises, `out` is as it was. FolderError if `out` cannot be
@@ -70,11 +71,11 @@ class Work:
             try:
                 self.out.mkdir(parents=True, exist_ok=True)
                 with locked(self.out):
-                    with interrupt.held():
+                    with interrupt.postponed():
                         self.path = Path(tempfile.mkdtemp(prefix=".new-", dir=self.out))
                         self.lock = lock(self.path)
                     (self.path / "new").mkdir()
-                    clear(self.out)
+                    clear_away(self.out)
                     refuse_foreign(self.out)
                 return
             except OSError as error:
@@ -85,8 +86,8 @@ class Work:
 
     def exchange(self):
         """Move the old report away and the new one in; on an error put everything back."""
-        with locked(self.out), interrupt.held():
-            clear(self.out)
+        with locked(self.out), interrupt.postponed():
+            clear_away(self.out)
             refuse_foreign(self.out)
             new, old, moving = (self.path / name for name in ("new", "old", "moving"))
             try:
@@ -117,14 +118,14 @@ class Work:
                 return
 
 
-def move(source, target) -> None:
+def move(source: Path, target: Path) -> None:
     """Move a report's files, as far as the target does not have them."""
     for name in OWN:
         if os.path.lexists(source / name) and not os.path.lexists(target / name):
             (source / name).rename(target / name)
 
 
-def put_back(work, out) -> None:
+def put_back(work: Path, out: Path) -> None:
     """The old report as it was before an exchange that did not come to its end."""
     if (work / "moving").exists():
         move(out, work / "moving")  # what the new report lacks is what had been moved
@@ -133,7 +134,7 @@ def put_back(work, out) -> None:
         move(work / "old", out)
 
 
-def clear(out) -> None:
+def clear_away(out: Path) -> None:
     """Put back and take away what killed runs have left; the folder of a run that is alive is locked, and stays."""
     for work in sorted(out.glob(".new-*")):
         if is_of_a_run(work):
@@ -144,14 +145,14 @@ def clear(out) -> None:
                 os.close(number)
 
 
-def is_of_a_run(path) -> bool:
+def is_of_a_run(path: Path) -> bool:
     """Whether a folder was made by a run: by its name, and by the names in it."""
     if not re.fullmatch(r"\.new-[a-z0-9_]{8}", path.name) or path.is_symlink() or not path.is_dir():
         return False
     return {child.name for child in path.iterdir()} <= {*STAGES, *OWN}
 
 
-def delete(work) -> None:
+def delete(work: Path) -> None:
     """Delete a run's folder, unless an old report that could not be put back is in it."""
     unfinished = (work / "new").exists() or (work / "moving").exists()
     if unfinished and (work / "old").exists() and any((work / "old").iterdir()):
@@ -164,7 +165,7 @@ def delete(work) -> None:
 
 
 @contextmanager
-def locked(folder):
+def locked(folder: Path) -> Iterator[None]:
     """No other run is here at the same time."""
     number = lock(folder)
     try:
@@ -174,7 +175,7 @@ def locked(folder):
             os.close(number)
 
 
-def lock(folder, wait=True) -> int | None:
+def lock(folder: Path, wait: bool = True) -> int | None:
     """A file descriptor with the folder's lock; None where somebody else has it, or there are no locks.
 
     The system takes a lock away when its process ends, however that ends.
@@ -192,7 +193,7 @@ def lock(folder, wait=True) -> int | None:
         return None
 
 
-def what_is_wrong(out, error) -> str:
+def what_is_wrong(out: Path, error: OSError) -> str:
     """Why there is no such folder, in words: what stands in its place."""
     for path in (*reversed(out.parents), out):
         name = "it" if path == out else str(path)
@@ -204,7 +205,7 @@ def what_is_wrong(out, error) -> str:
 
 
 @contextmanager
-def writing(path):
+def writing(path: Path) -> Iterator[None]:
     """An error of the disk in this block names the file, which Python leaves out when it writes."""
     try:
         yield
@@ -212,19 +213,19 @@ def writing(path):
         raise OSError(error.errno, error.strerror or str(error), str(path)) from None
 
 
-def save(path, text) -> None:
+def save(path: Path, text: str) -> None:
     """A text file, UTF-8 wherever it is written."""
     with writing(path):
         path.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
-def files(folder) -> list[str]:
+def files(folder: Path) -> list[str]:
     """What lies in a folder under a report's names, relative to it."""
     found = [path for name in OWN for path in [folder / name, *(folder / name).rglob("*")]]
     return sorted(str(path.relative_to(folder)) for path in found if path.is_file() or path.is_symlink())
 
 
-def refuse_foreign(out) -> None:
+def refuse_foreign(out: Path) -> None:
     """FolderError for a file under a report's names that the report in `out` does not list as its own."""
     try:
         own = json.loads((out / "results.json").read_text(encoding="utf-8"))["provenance"]["files"]
@@ -237,7 +238,7 @@ def refuse_foreign(out) -> None:
         )
 
 
-def made_by(out) -> str | None:
+def made_by(out: str | Path) -> str | None:
     """The command that made the report in a folder; None if there is none."""
     try:
         return str(json.loads((Path(out) / "results.json").read_text(encoding="utf-8"))["provenance"]["command"])

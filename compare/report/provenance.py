@@ -15,7 +15,7 @@ OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich", "heyoka")
 
 
-def provenance(command: str, model, shown: str, seed: int) -> dict:
+def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
     """What a reader needs to repeat the run: command, model, versions, machine, commit, seed; `seconds` come at its end.
 
     model: the file; shown: how the report calls it.
@@ -35,7 +35,7 @@ def provenance(command: str, model, shown: str, seed: int) -> dict:
     } | {package: installed(package) for package in (OURS, *PACKAGES)}
 
 
-def installed(package) -> str | None:
+def installed(package: str) -> str | None:
     """The version of an installed package; None for this one where it runs from a checkout that is not installed."""
     try:
         return version(package)

@@ -1,26 +1,31 @@
 """The answers to the questions of a robot's assignment, and to what a user of MuJoCo asks."""
 
+from collections.abc import Mapping, Sequence
+
+from ..judge.check import Result
+from .verdict import Section
+
 NOTHING = "no result: the experiment broke off"
 
 
-def answers(sections, robot) -> list[tuple[str, str, str, str]]:
+def answers(sections: Sequence[Section], robot) -> list[tuple[str, str, str, str]]:
     """For each part: its letter, what is asked, where it is answered, the answer."""
     results = {section.name: section.result for section in sections}
-    parts = [(q.part, q.asked, q.answered_in, answer(results, *q.answer)) for q in robot.questions]
+    parts = [(q.part, q.asked, q.answered_in, answer_in_words(results, *q.answer)) for q in robot.questions]
     return [*parts, *choice(results)]
 
 
-def answer(results, kind, *of) -> str:
+def answer_in_words(results: Mapping[str, Result], kind: str, *of) -> str:
     """One answer: ("figure", name), ("printed", items ...) or ("largest", experiment, quantity, {column: value}, ...)."""
     if kind == "figure":
         return f"figure '{of[0]}'"
     if kind == "printed":
         return printed(results, of)
-    texts = "; ".join(apart(results, *of[k : k + 3]) for k in range(0, len(of), 3))
+    texts = "; ".join(apart_in_words(results, *of[k : k + 3]) for k in range(0, len(of), 3))
     return texts + far_from_true(results) if "trajectory" in of else texts
 
 
-def apart(results, name, quantity, where) -> str:
+def apart_in_words(results: Mapping[str, Result], name: str, quantity: str, where: Mapping[str, object]) -> str:
     """How far the engines are apart in an experiment at most: of the rows with these values, or of this quantity."""
     if name not in results:
         return "not run"
@@ -35,7 +40,7 @@ def apart(results, name, quantity, where) -> str:
     return f"{quantity}: at most {top['largest_difference']:.1e} {top['unit']} apart ({top['scene']}{judged})"
 
 
-def printed(results, items) -> str:
+def printed(results: Mapping[str, Result], items: Sequence[str]) -> str:
     """What is printed, beside what the engines find."""
     if "published" not in results:
         return "not run"
@@ -53,7 +58,7 @@ def printed(results, items) -> str:
     return "; ".join(texts)
 
 
-def far_from_true(results) -> str:
+def far_from_true(results: Mapping[str, Result]) -> str:
     """What the agreement of two runs with the coarse step does not say: how far both are from the true motion."""
     errors = results["trajectory"].curves.get("errors") if "trajectory" in results else None
     if not errors:
@@ -69,7 +74,7 @@ def far_from_true(results) -> str:
     )
 
 
-def choice(results) -> list[tuple]:
+def choice(results: Mapping[str, Result]) -> list[tuple]:
     """What a user of MuJoCo asks: which integrator, which step; one line of the table that answers it."""
     lines = results["speed"].tables.get("what_should_i_use", []) if "speed" in results else []
     line = next((line for line in lines if line["target_rad"] == 1e-6 and line["mujoco"] and line["tmt"]), None)

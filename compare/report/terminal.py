@@ -51,7 +51,7 @@ class Terminal:
             yield
             return
         spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
-        interrupt.undo.append(clear)
+        interrupt.undo.append(wipe)
         self.status = self.beside.status("", spinner=spinner)
         self.show(text)
         try:
@@ -59,7 +59,7 @@ class Terminal:
                 yield
         finally:
             self.status = None
-            interrupt.undo.remove(clear)
+            interrupt.undo.remove(wipe)
 
     @contextmanager
     def paused(self):
@@ -73,7 +73,7 @@ class Terminal:
                 self.status.start()
 
 
-def clear() -> None:
+def wipe() -> None:
     """Take what is in progress from the terminal, at an early end."""
     Stream.silent = True
     with suppress(OSError):

@@ -1,8 +1,10 @@
 """The outcome of a report in words: its sections, and whether all checks pass."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from ..judge.check import DRAWN, ENDS, LOCKABLE
+from ..judge.check import DRAWN, ENDS, LOCKABLE, Check, Result
 
 
 @dataclass
@@ -13,7 +15,7 @@ class Section:
     title: str
     claim: str
     tolerance: str
-    result: object
+    result: Result
     figures: list = field(default_factory=list)  # (file name, caption)
 
     @property
@@ -23,24 +25,35 @@ class Section:
         return {name: rows for name, rows in tables.items() if rows}
 
 
-def failures(sections) -> tuple[list, list]:
+class Report(NamedTuple):
+    """What a report is made of."""
+
+    sections: Sequence[Section]
+    robot: object  # a robots.Robot
+    origin: dict  # see provenance
+    verdict: str  # in words
+    causes: Sequence[dict] = ()  # of what fails, the gravest first
+    skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
+
+
+def failures(sections: Sequence[Section]) -> tuple[list, list]:
     """The checks that fail: those that compare, and those that say that something broke off."""
     failed = [check for section in sections for check in section.result.checks if not check.passed]
     broke = [check for check in failed if check.quantity in (ENDS, LOCKABLE) or check.quantity.startswith(f"{DRAWN} ")]
     return [check for check in failed if check not in broke], broke
 
 
-def passed(sections) -> bool:
+def passed(sections: Sequence[Section]) -> bool:
     return not any(failures(sections))
 
 
-def worst(sections):
+def worst(sections: Sequence[Section]) -> Check | None:
     """The check that uses most of a tolerance of rounding, or None."""
     checks = [check for section in sections for check in section.result.checks if check.over_tolerance is not None]
     return max(checks, key=lambda check: check.over_tolerance, default=None)
 
 
-def verdict(sections, experiments, causes=()) -> str:
+def verdict(sections: Sequence[Section], experiments: int, causes: Sequence[dict] = ()) -> str:
     """The outcome in words, with its cause or its worst figure; `experiments`: how many there are in all."""
     checks = [check for section in sections for check in section.result.checks]
     names = ", ".join(section.name for section in sections)
@@ -71,7 +84,7 @@ def verdict(sections, experiments, causes=()) -> str:
     )
 
 
-def outcome(section) -> str:
+def outcome(section: Section) -> str:
     """Whether a section's claim holds, in words."""
     checks = section.result.checks
     differing, broke = failures([section])

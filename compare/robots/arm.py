@@ -1,5 +1,6 @@
 """The assignment's arm: its names, postures and scenes, and what the assignment prints and claims."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -72,13 +73,13 @@ AIMS = {
 }  # fmt: skip
 
 
-def landmarks(q) -> dict:
+def landmarks(q: np.ndarray) -> dict:
     """Shoulder, elbow and hand in the world, m, at hinge angles q, rad."""
     points = tmt.arm.points([float(angle) for angle in q])
     return {name: np.array([float(c) for c in point]) for name, point in zip(("shoulder", "elbow", "hand"), points)}
 
 
-def remarks(answers, dynamics) -> list[str]:
+def remarks(answers: Mapping, dynamics: Mapping) -> list[str]:
     """The slips of the original, with what is right.
 
     answers: by item, what TMT (`.tmt`) and MuJoCo (`.mujoco`) find; dynamics: of the arm, by engine.

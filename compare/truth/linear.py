@@ -34,7 +34,7 @@ def modes(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(squares), shapes
 
 
-def small_oscillation(t, tree, q, away) -> np.ndarray:
+def small_oscillation(t: np.ndarray, tree: tmt.Tree, q: np.ndarray, away: np.ndarray) -> np.ndarray:
     """Angles, rad, (times, n), of the linear modes about q, let go at rest so far `away`, (n,) rad."""
     frequencies, shapes = modes(tree, q)
     parts = shapes.T @ tmt.mass_matrix(q, tree) @ away
@@ -75,6 +75,11 @@ class Held:
     def limits(self) -> dict:
         """What `limit` found, by method."""
         return {}
+
+    @cached_property
+    def mass_matrix(self) -> np.ndarray:
+        """Mbar, kg m2, (n, n)."""
+        return tmt.mass_matrix(self.q, self.tree)
 
     @cached_property
     def matrix(self) -> np.ndarray:
@@ -183,7 +188,7 @@ def all_of_kind(robot, kind: str) -> tuple[str, ...]:
     return () if first is None else (first, *others)
 
 
-def region(name, z: np.ndarray) -> np.ndarray:
+def region(name: str, z: np.ndarray) -> np.ndarray:
     """Growth in one step of a single hinge whose eigenvalues times dt are z and its conjugate, shape of z.
 
     The step is taken on qdd = -|z|^2 q + 2 Re(z) qd with dt = 1; so it exists for partitioned methods too, whose growth

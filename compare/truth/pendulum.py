@@ -25,7 +25,7 @@ def pendulum(tree: tmt.Tree) -> tuple[float, float]:
     return float(hanging), float(np.sqrt(np.linalg.norm(across) * np.linalg.norm(pull) / inertia))
 
 
-def swing(t, q, qd, hanging, frequency) -> np.ndarray:
+def swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:
     """Angle of a pendulum that started at q, qd (rad, rad/s), at times t in s: rad.
 
     sin(theta / 2) = k sn(frequency t + u, k), theta from hanging; k = sin(half the amplitude). Whittaker, Analytical
@@ -38,7 +38,7 @@ def swing(t, q, qd, hanging, frequency) -> np.ndarray:
     return q - theta + 2 * np.arcsin(k * sn) if k < 1.0 else np.full_like(t, np.nan)
 
 
-def exact_swing(t, q, qd, hanging, frequency) -> np.ndarray:
+def exact_swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:
     """The same with 50 digits of mpmath's elliptic functions."""
     with mpmath.workdps(DIGITS):
         q, qd, hanging, frequency = (mpmath.mpf(float(v)) for v in (q, qd, hanging, frequency))

@@ -59,26 +59,26 @@ def key(case: Case) -> str:
     return hashlib.sha256(repr(numbers).encode()).hexdigest()[:16]
 
 
-def references(cases: Sequence[Case], map: Callable = map, tell: Callable = print) -> dict[str, Reference]:
+def references(cases: Sequence[Case], map: Callable = map, progress: Callable = print) -> dict[str, Reference]:
     """Each case's reference by its name: from the committed table, else from the user's cache folder, else computed, and kept."""
-    rows = read(TABLE)
+    rows = read_table(TABLE)
     for case in cases:
         if key(case) not in rows:
             with suppress(*UNUSABLE):  # it only costs time
-                found = read(kept(case)).get(key(case))
+                found = read_table(cache_file(case)).get(key(case))
                 if found and begins(found, case):
                     rows[key(case)] = found
     missing = [case for case in cases if key(case) not in rows]
-    for case, made in zip(missing, remade(missing, map, tell)):
+    for case, made in zip(missing, remade(missing, map, progress)):
         rows[key(case)] = made
         with suppress(*UNUSABLE):
-            write(kept(case), made)
+            write_table(cache_file(case), made)
     return {case.name: reference(rows[key(case)]) for case in cases}
 
 
 def committed(case: Case) -> Reference | None:
     """The reference of a case, if it is in the committed table."""
-    rows = read(TABLE).get(key(case))
+    rows = read_table(TABLE).get(key(case))
     return rows and reference(rows)
 
 
@@ -92,25 +92,25 @@ def begins(rows: list[dict], case: Case) -> bool:
     return start == np.concatenate(case.start).tolist() and [float(row["t_s"]) for row in rows] == times.tolist()
 
 
-def kept(case: Case) -> Path:
+def cache_file(case: Case) -> Path:
     """Where the reference of a case is kept that the committed table does not have."""
     return own_file(f"reference_{key(case)}.csv")
 
 
-def remade(cases: Sequence[Case], map: Callable, tell: Callable) -> list[list[dict]]:
+def remade(cases: Sequence[Case], map: Callable, progress: Callable) -> list[list[dict]]:
     """The rows of each case, computed: with twice the steps until that changes nothing of importance, at most 2048 in 5 s."""
     runs = {case.name: [] for case in cases}  # (steps, path), each with twice the steps of the one before
     going = list(cases)
     while going:
         jobs = [(case, RECORDS, count) for case in going for count in next_counts(case, runs[case.name])]
-        for done, ((case, _, count), path) in enumerate(zip(jobs, map(run, jobs)), start=1):
+        for done, ((case, _, count), path) in enumerate(zip(jobs, map(path_with_many_digits, jobs)), start=1):
             runs[case.name].append((count, path))
-            tell(f"runs with many digits: {done} of {len(jobs)}, {count} steps")
+            progress(f"runs with many digits: {done} of {len(jobs)}, {count} steps")
         going = [case for case in going if next_counts(case, runs[case.name])]
     return [case_rows(case, runs[case.name]) for case in cases]
 
 
-def next_counts(case, runs) -> list[int]:
+def next_counts(case: Case, runs: Sequence[tuple]) -> list[int]:
     """The numbers of steps with which the case is to be run next: two at first; none where the digits are enough."""
     first = max(1, round(case.duration / 5.0 * FIRST_STEPS / RECORDS)) * RECORDS
     if not runs:
@@ -120,13 +120,13 @@ def next_counts(case, runs) -> list[int]:
     return [] if enough else [2 * count]
 
 
-def halving(runs) -> float:
+def halving(runs: Sequence[tuple]) -> float:
     """The largest difference of the two finest runs, rad or rad/s; infinite if one of them did not reach its end."""
     (_, coarse), (_, fine) = runs[-2:]
     return np.inf if coarse is None or fine is None else float(abs(fine - coarse).max())
 
 
-def case_rows(case, runs) -> list[dict]:
+def case_rows(case: Case, runs: Sequence[tuple]) -> list[dict]:
     """The rows of a case from its two finest runs; ValueError if they did not reach its end."""
     count, fine = runs[-1]
     if not np.isfinite(halving(runs)):
@@ -142,7 +142,7 @@ def case_rows(case, runs) -> list[dict]:
     ]
 
 
-def run(job) -> np.ndarray | None:
+def path_with_many_digits(job: tuple[Case, int, int]) -> np.ndarray | None:
     """One run with many digits, None if its numbers overflow; a job is a case, the number of records and that of steps."""
     case, records, steps = job
     try:
@@ -161,7 +161,7 @@ def reference(rows: list[dict]) -> Reference:
     return Reference(times, high, low, float(rows[0]["halving_difference"]), int(rows[0]["steps"]))
 
 
-def read(path: Path) -> dict[str, list[dict]]:
+def read_table(path: Path) -> dict[str, list[dict]]:
     """The rows of a table by their key, of each run that is whole and has a finite number wherever one belongs."""
     if not path.exists():
         return {}
@@ -180,7 +180,7 @@ def whole(rows: list[dict]) -> bool:
     return len(rows) == RECORDS + 1 and {*ABOUT} < {*rows[0]} and all(number.is_finite() for number in numbers)
 
 
-def write(path: Path, rows: list[dict]) -> None:
+def write_table(path: Path, rows: list[dict]) -> None:
     """The rows as a table, written aside and moved."""
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     aside = {"dir": path.parent, "suffix": ".new", "delete": False}

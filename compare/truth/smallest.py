@@ -8,12 +8,13 @@ the number 0; "moves" is decided by one state at which 50 digits give another va
 be said is kept: sin of the double nearest to pi is not 0, and terms that only cancel in sum do not fold.
 """
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import mpmath
 import numpy as np
 
-from tmt import method
+from tmt import Tree, method
 from tmt.reference import DIGITS
 from tmt.trace import Tape
 
@@ -55,7 +56,7 @@ def needed(case: Case) -> Needed:
     return Needed(still, moves, undecided)
 
 
-def accelerations(case, tree, still, scalar, q, qd) -> dict:
+def accelerations(case: Case, tree: Tree, still: Sequence[str], scalar: Callable, q: Sequence, qd: Sequence) -> dict:
     """Accelerations of the joints in `still`, at their start and at rest, the others at q, qd: by name, over any scalar.
 
     A torque that holds is the model's own bias at the start, over the same scalar: not its rounded value.
@@ -71,14 +72,14 @@ def accelerations(case, tree, still, scalar, q, qd) -> dict:
     return {name: by_name[name] for name in still}
 
 
-def exact_accelerations(case, tree, still, q, qd) -> dict:
+def exact_accelerations(case: Case, tree: Tree, still: Sequence[str], q: np.ndarray, qd: np.ndarray) -> dict:
     """The accelerations with 50 digits, rad/s2."""
     with mpmath.workdps(DIGITS):
         q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd))
         return accelerations(case, tree, still, mpmath.mpf, q, qd)
 
 
-def folded(case, tree, still) -> dict:
+def folded(case: Case, tree: Tree, still: Sequence[str]) -> dict:
     """The numbers to which the traced accelerations fold; None where one remains an expression."""
     tape = Tape()
     q, qd = (tape.inputs(*(f"{name}{i}" for i in range(len(tree.parent)))) for name in ("q", "qd"))

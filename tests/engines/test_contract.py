@@ -315,4 +315,6 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed
         found = read(run())
         ended_as_it_says(found.t, found.q, found.v, found.ended)
         assert found.ended == alone.ended and found.evaluations == alone.evaluations
-    assert list(tmp_path.iterdir()) == [] and capfd.readouterr() == ("", "")
+    lines = "".join(capfd.readouterr()).splitlines()
+    of_fortran = ("capi_return is NULL", "Call-back cb_f_in_lsoda")  # of SciPy's LSODA before 1.15, on its way out
+    assert list(tmp_path.iterdir()) == [] and [line for line in lines if not line.startswith(of_fortran)] == []

@@ -32,12 +32,12 @@ def both(ours, theirs) -> dict:
 def test_the_figure_of_distances_says_who_is_how_far_from_what():
     curves = {"TMT to MuJoCo": [1.0, 5.0], "TMT to exact": [1.5, 2.0], "MuJoCo to exact": [2.5, 3.0]}
     result = Result("mass", curves={"random states": {"Mbar": {name: np.array(v) for name, v in curves.items()}}})
-    name, fig, caption = draw.distances(result, "random states")
+    name, fig, caption = draw.draw_distances(result, "random states")
     assert name == "mass_distances" and "at most 5 eps apart (Mbar)" in caption
     assert "the first 2 of the states, TMT is at most 2 eps off and MuJoCo at most 3." in caption
     larger = {name: np.array([7.0, 9.0]) for name in curves}
     result.curves["random states"]["Abar"] = larger
-    said = draw.distances(result, "random states")[2]
+    said = draw.draw_distances(result, "random states")[2]
     assert "at most 9 eps apart (Abar)" in said and "TMT is at most 9 eps off and MuJoCo at most 9." in said
     for label, values in curves.items():
         (line,) = (line for line in fig.axes[0].lines if line.get_label() == label)
@@ -48,7 +48,7 @@ def test_the_figure_of_distances_says_who_is_how_far_from_what():
 def test_the_figure_of_holding_torques_says_whose_they_are_and_where_none_is_needed():
     ours, theirs = np.array([1.0, 2.0, 3.0]), np.array([-1.0, -2.0, -3.0])
     postures = {"zero": both(ours, theirs), "hanging": both(0 * ours, 0 * ours)}
-    _, fig, caption = draw.holding_torques(Result("gravity", curves={"postures": postures}), ARM)
+    _, fig, caption = draw.draw_holding_torques(Result("gravity", curves={"postures": postures}), ARM)
     assert [bar.get_height() for bar in fig.axes[0].patches][::2] == ours.tolist()
     assert [line.get_ydata()[0] for line in fig.axes[0].lines][:3] == theirs.tolist()
     assert "at most 6.0e+00 N m apart. Both need none, but for rounding, at: hanging." in caption
@@ -66,7 +66,7 @@ def test_the_map_of_the_condition_number_says_whose_maximum_is_where():
     result.curves["condition"] = mass.condition_grid(ARM, tmt.mass_matrix, 30.0)
     ours, theirs = np.radians([-90.0, 90.0]), np.radians([45.0, -60.0])
     result.curves["worst"] = both((126.8, ours, 126.8), (99.0, theirs, 50.0))
-    _, fig, caption = draw.condition_map(result, ARM)
+    _, fig, caption = draw.draw_condition(result, ARM)
     assert caption.startswith("Condition number of TMT's Mbar over β and γ, α = 0.")
     assert "TMT's is 126.80 at β = -90.0°, γ = 90.0°, and the same at -β" in caption
     assert "MuJoCo's is 99.00 at β = 45.0°, γ = -60.0°, and 50.00 at -β" in caption
@@ -94,7 +94,7 @@ def test_the_sketch_says_where_each_hinge_is():
 
 
 def test_the_sketch_of_the_arm_names_its_landmarks_and_shows_both_postures():
-    name, fig, caption = draw.sketch(ARM)
+    name, fig, caption = draw.draw_sketch(ARM)
     assert name == "arm" and caption.startswith("The arm and its hinges, drawn from")
     assert caption.endswith("Dots: centres of mass of the upper arm (1) and the forearm (2).")
     assert [ax.get_title() for ax in fig.axes] == ["zero: (0, 0, 0)°", "ball catch: (-70, 70, -30)°"]
@@ -106,20 +106,23 @@ def test_the_sketch_of_the_arm_names_its_landmarks_and_shows_both_postures():
 
 def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
     robot = crane(tmp_path)
-    name, fig, caption = draw.sketch(robot)
+    name, fig, caption = draw.draw_sketch(robot)
     assert name == "crane" and [ax.get_title().split(":")[0] for ax in fig.axes] == ["down", "raised"]
     assert (
         "swing about x at the origin, then lift about y at the origin, then bend about y at (0, 0, -0.4) m" in caption
     )
-    assert caption.endswith("centres of mass of the boom (1), the jib (2) and the tool (3).")
+    assert caption.endswith(
+        "centres of mass of the foot (1), the boom (2), the jib (3), the hook (4) and the weight (5)."
+    )
     lines = draw.chains(robot, np.zeros(4))
-    assert [line[1].tolist() for line in lines] == [[0, 0, 0], [0, 0, -0.4], [0, 0, -0.4 - 0.3], [0, 0.05, -0.7 - 0.08]]
+    ends = [[0, 0, 0], [0, 0, -0.4], [0, 0, 0.3], [0, 0.01, -0.55], [0.03, 0, -0.7], [0, 0.05, 0.22]]
+    assert np.allclose([line[1] for line in lines], ends, rtol=0.0, atol=1e-15)
 
 
 def test_labels_stand_away_from_what_meets_in_a_point():
     chain = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, -2.0]])
     arrow = np.array([[chain[1], draw.RIGHTWARD]])
-    first, middle, last = draw.beside(chain, arrow)
+    first, middle, last = draw.label_directions(chain, arrow)
     assert first[1] > 0.9 and last[1] < -0.9  # beyond the ends of the chain
     assert middle[0] == pytest.approx(-1.0)  # on the other side of the arrow
     assert np.allclose(np.linalg.norm([first, middle, last], axis=1), 1.0)

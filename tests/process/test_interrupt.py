@@ -16,7 +16,7 @@ LINE = "interrupted; a report that was there is unchanged"
 ROLLOUT = """
 from compare.process import interrupt
 
-interrupt.answer()
+interrupt.listen()
 import numpy as np
 from compare.engines.mujoco import load
 from compare.robots.arm import ARM
@@ -29,7 +29,7 @@ run()  # some seconds in C
 COMPILATION = """
 from compare.process import interrupt
 
-interrupt.answer()
+interrupt.listen()
 import numba
 
 text = "\\n".join(["def f(x):", *(f"    x = np.sin(x) + np.array([x, {k}.0])[0] * x" for k in range(150)), "    return x"])
@@ -103,7 +103,7 @@ def test_what_kill_9_leaves_is_cleared_by_the_next_run(tmp_path):
 
 def test_a_signal_that_is_ignored_stays_ignored():
     text = (
-        "import os, signal; from compare.process import interrupt; interrupt.answer(); "
+        "import os, signal; from compare.process import interrupt; interrupt.listen(); "
         "os.kill(os.getpid(), signal.SIGINT); os.kill(os.getpid(), signal.SIGHUP); print('well')"
     )
     line = ["bash", "-c", "trap '' INT HUP; exec \"$@\"", "-", sys.executable, "-c", text]

@@ -81,7 +81,7 @@ def hook(event, _):
         renamed += 1
 
 
-interrupt.answer()
+interrupt.listen()
 with new_report(out) as work:
     (work / "tables").mkdir()
     (work / "tables" / "mass.csv").write_text("new")

@@ -3,7 +3,7 @@
 import pytest
 from sections import BAD, GOOD, section
 
-from compare.experiment import outcome
+from compare.experiment import say_outcome
 from compare.report import verdict
 
 
@@ -37,10 +37,10 @@ class Lines(list):
 
 def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     said = Lines()
-    outcome(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
+    say_outcome(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
     assert said == ["mass          ok           2 checks  uses 0.5 of a tolerance      1.2 s"]
     said.clear()
-    outcome(
+    say_outcome(
         said,
         section("mass", *[BAD] * 7, ("b", 0.5, 1.0, "at most", True)),
         1.0,

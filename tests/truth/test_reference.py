@@ -19,7 +19,7 @@ SHORT = BENT.changed(name="short", duration=0.02, dt=0.005)
 
 
 def test_the_committed_table_is_of_the_stated_numbers():
-    rows = reference.read(reference.TABLE)
+    rows = reference.read_table(reference.TABLE)
     assert len(CASES) == 4 and {reference.key(case) for case in CASES.values()} == set(rows)
     assert all(float(of_scene[0]["halving_difference"]) < reference.SMALL_ENOUGH for of_scene in rows.values())
     for name, case in CASES.items():
@@ -32,7 +32,7 @@ def test_the_committed_table_is_of_the_stated_numbers():
 def test_a_record_is_computed_from_the_one_before(name):
     """With half as many steps as its command takes; the table has 32 digits. In seconds, where the whole takes minutes."""
     case = CASES[name]
-    rows, n = reference.read(reference.TABLE)[reference.key(case)], len(case.joints)
+    rows, n = reference.read_table(reference.TABLE)[reference.key(case)], len(case.joints)
     with reference_run.localcontext() as context:
         context.prec = reference_run.DIGITS
         exact = np.array([[Decimal(row[column]) for column in reference.columns(case)] for row in rows])
@@ -49,7 +49,7 @@ def test_a_record_is_computed_from_the_one_before(name):
 
 
 def test_only_a_whole_run_of_the_scene_is_a_reference(tmp_path):
-    rows = reference.read(reference.TABLE)[reference.key(BENT)]
+    rows = reference.read_table(reference.TABLE)[reference.key(BENT)]
     assert reference.whole(rows) and reference.begins(rows, BENT)
     assert not reference.whole(rows[:-1])
     for wrong in ("nan", "Infinity", "", "x", None):
@@ -60,12 +60,12 @@ def test_only_a_whole_run_of_the_scene_is_a_reference(tmp_path):
     for text in ("", "\0", "no,table\n1,2\n", "key\n\n"):
         path = tmp_path / "reference.csv"
         path.write_text(text, encoding="utf-8")
-        assert reference.read(path) == {}
+        assert reference.read_table(path) == {}
 
 
 def test_a_reference_is_more_than_a_double():
     """Its numbers are the table's, to 30 digits; an error is taken from both halves of them."""
-    for rows in reference.read(reference.TABLE).values():
+    for rows in reference.read_table(reference.TABLE).values():
         known, names = reference.reference(rows), reference.columns(BENT)
         for row, high, low in zip(rows, known.high.tolist(), known.low.tolist()):
             for name, h, v in zip(names, high, low):
@@ -87,32 +87,32 @@ def test_a_changed_scene_gets_a_reference_of_its_own(tmp_path, monkeypatch):
         ("locked", ("beta",)))]  # fmt: skip
     assert len({reference.key(case) for case in (BENT, SHORT, *others)}) == 8
     said = []
-    first = reference.references([SHORT], tell=said.append)[SHORT.name]
+    first = reference.references([SHORT], progress=said.append)[SHORT.name]
     assert said == [f"runs with many digits: {k} of 2, {4 * k} steps" for k in (1, 2)] and first.halving < 1e-20
     assert first.error(path, range(3)).max() < 1e-13
     (kept,) = tmp_path.glob("reference_*.csv")
-    again = reference.references([SHORT], tell=said.append)[SHORT.name]
+    again = reference.references([SHORT], progress=said.append)[SHORT.name]
     assert len(said) == 2 and np.array_equal(first.high, again.high)
     text = kept.read_text(encoding="utf-8")
     kept.write_text(text[:1000], encoding="utf-8")
-    assert reference.read(kept) == {}  # damaged: as if it were not there
+    assert reference.read_table(kept) == {}  # damaged: as if it were not there
     planted = text.replace(next(csv.DictReader(text.splitlines()))["beta_rad"], "0.1")
     assert planted != text
     kept.write_text(planted, encoding="utf-8")  # a run of another start: made anew
-    once_more = reference.references([SHORT], tell=said.append)[SHORT.name]
+    once_more = reference.references([SHORT], progress=said.append)[SHORT.name]
     assert len(said) == 4 and np.array_equal(first.high, once_more.high)
 
     def refuse(*_):
         raise RuntimeError("the folder is not the user's own")
 
-    monkeypatch.setattr(reference, "kept", refuse)
-    reference.references([SHORT], tell=said.append)
+    monkeypatch.setattr(reference, "cache_file", refuse)
+    reference.references([SHORT], progress=said.append)
     assert len(said) == 6  # nothing is read there, and nothing written
 
 
 def test_what_is_committed_is_not_computed():
     said = []
-    known = reference.references(list(CASES.values()), tell=said.append)
+    known = reference.references(list(CASES.values()), progress=said.append)
     assert list(known) == list(CASES) and said == []
 
 
@@ -120,7 +120,7 @@ def test_a_scene_with_locked_joints_has_columns_of_its_own(tmp_path, monkeypatch
     monkeypatch.setenv("TMT_CACHE", str(tmp_path))
     monkeypatch.setattr(reference, "RECORDS", 4)
     swing = SHORT.changed(name="swing", locked=("alpha", "beta"))
-    first, again = (reference.references([swing], tell=lambda text: None)["swing"] for _ in range(2))
+    first, again = (reference.references([swing], progress=lambda text: None)["swing"] for _ in range(2))
     assert first.high.shape == (5, 2) and np.array_equal(first.low, again.low)
     (kept,) = tmp_path.glob("reference_*.csv")
     assert (
@@ -159,11 +159,11 @@ def test_the_committed_runs_have_the_steps_of_this_rule():
 
 def test_a_run_that_does_not_reach_its_end_is_none_and_says_so_in_one_line():
     fast = SHORT.changed(name="fast", speed=(1e8, -1e8, 1e8))
-    assert reference.run((fast, 64, 64)) is None
+    assert reference.path_with_many_digits((fast, 64, 64)) is None
     with pytest.raises(
         ValueError, match=r"scene 'fast': runs with many digits and up to 512 steps do not reach"
     ) as error:
-        reference.references([fast], tell=lambda text: None)
+        reference.references([fast], progress=lambda text: None)
     assert "\n" not in str(error.value)
     assert reference.halving([(64, None), (128, np.zeros(1))]) == np.inf  # a coarse one may fail: finer ones are tried
     assert reference.next_counts(fast, [(64, None), (128, np.zeros(1))]) == [256]
@@ -173,7 +173,7 @@ def test_the_command_remakes_the_table(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(reference, "TABLE", tmp_path / "reference.csv")
     monkeypatch.setattr(reference, "RECORDS", 8)
     remake.main([SHORT])
-    (rows,) = reference.read(reference.TABLE).values()
+    (rows,) = reference.read_table(reference.TABLE).values()
     assert reference.begins(rows, SHORT) and float(rows[0]["halving_difference"]) < 1e-28
     printed = capsys.readouterr()
     assert printed.out.startswith("short: 16 steps, ") and "digits: 2 of 2" in printed.err

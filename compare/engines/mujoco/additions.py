@@ -5,9 +5,9 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from .dynamics import FLAGS, INTEGRATORS, MujocoDynamics
+from .dynamics import FLAGS, MujocoDynamics
 from .engine import Mujoco
-from .lock import read
+from .lock import editable
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
 MINIMAL = "nothing (minimal)"
@@ -75,17 +75,17 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
 
 def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     """The engine's model from its file, its contact and constraint stages off, with an edit."""
-    spec = read(engine.source)
+    spec = editable(engine.source)
     spec.option.disableflags |= LEFT_OUT
     edit(spec)
     return Mujoco(spec.compile(), engine.joints, engine.bodies, None)
 
 
-def contacts(dynamics: MujocoDynamics, q, v, tau, dt: float, steps: int, integrator: str) -> tuple[float, bool]:
+def contacts(
+    dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray, tau: np.ndarray, dt: float, steps: int, integrator: str
+) -> tuple[float, bool]:
     """How many contacts there are in a step of a run, on average, and whether any of them pushes a joint."""
-    model, data = mujoco.MjModel.__copy__(dynamics.model), mujoco.MjData(dynamics.model)
-    model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
-    data.qpos[dynamics.qpos], data.qvel[dynamics.dofs], data.qfrc_applied[dynamics.dofs] = q, v, tau
+    model, data = dynamics.own_copy(dt, integrator, q, v, tau)
     total, pushed = 0, False
     for _ in range(steps):
         mujoco.mj_step(model, data)

@@ -4,14 +4,15 @@ The C library that the Python package brings is called through its function poin
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numba import njit
 
-from .dynamics import FLAGS, INTEGRATORS, MujocoDynamics
+from .. import rows_of_states
+from .dynamics import FLAGS, MujocoDynamics
 
 TINY_STEP = 1e-9  # s: a loop of steps stays where it starts
 
@@ -32,9 +33,7 @@ class MinimalCalls:
 
     def __init__(self, dynamics: MujocoDynamics):
         self.coordinates, self.qpos, self.dofs = dynamics.coordinates, dynamics.qpos, dynamics.dofs
-        self.model = mujoco.MjModel.__copy__(dynamics.model)
-        self.data = mujoco.MjData(self.model)
-        self.model.opt.integrator, self.model.opt.timestep = INTEGRATORS["RK4"], TINY_STEP
+        self.model, self.data = dynamics.own_copy(TINY_STEP, "RK4")
         self.model.opt.disableflags |= int(FLAGS["contact"]) | int(FLAGS["constraint"])
         self.force, self.solution = np.zeros((2, self.model.nv))
         self.functions = functions(library())
@@ -105,8 +104,7 @@ class MinimalCalls:
 
     def each(self, read, q, v, tau) -> np.ndarray:
         """read() after the calls that give M and h, at each state, stacked to the batch shape of the states."""
-        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
-        states = (np.broadcast_to(a, shape).reshape(-1, shape[-1]) for a in (q, v, tau))
+        batch, states = rows_of_states(q, v, tau)
         values = []
         for state in zip(*states):
             self.place(*state)
@@ -114,13 +112,13 @@ class MinimalCalls:
                 self.functions[name](*self.addresses)
             self.functions["mj_rne"](*self.addresses, 0, self.force.ctypes.data)
             values.append(np.array(read()))
-        return np.array(values).reshape(*shape[:-1], *values[0].shape)
+        return np.array(values).reshape(*batch, *values[0].shape)
 
 
 BEFORE_RNE = ("mj_kinematics", "mj_comPos", "mass matrix", "mj_comVel")  # before mj_rne, in this order
 
 
-def functions(lib) -> dict[str, Callable]:
+def functions(lib: ctypes.CDLL) -> dict[str, Callable]:
     """MuJoCo's functions of model and data by their names."""
     more = {"mj_rne": (ctypes.c_int, ctypes.c_void_p), "mj_solveM": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)}
     mass_matrix = "mj_makeM" if hasattr(lib, "mj_makeM") else "mj_crb"
@@ -137,7 +135,7 @@ def repeated(function, model, data, count):
         function(model, data)
 
 
-def equal_work(call) -> tuple[Callable, Callable]:
+def equal_work(call: Mapping[str, Callable]) -> tuple[Callable, Callable]:
     """Compiled loops: mass matrix and bias; and the acceleration from them."""
     kinematics, com, inertia, velocities = (call[name] for name in BEFORE_RNE)
     factor, rne, solve = call["mj_factorM"], call["mj_rne"], call["mj_solveM"]

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-from .. import GRID, Motion, Setting
+from .. import GRID, Motion, Prepared, Setting, rows_of_states
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
@@ -53,10 +53,11 @@ class MujocoDynamics:
         self.joints = np.array([joint.id for joint in joints])
         self.qpos = np.array([joint.qposadr[0] for joint in joints])
         self.dofs = np.array([joint.dofadr[0] for joint in joints])
-        self._at(np.zeros(len(joints)))
-        self.zero_axes = self._turns(self.data.xmat)
+        self.forward(np.zeros(len(joints)))
+        self.zero_axes = self.turns(self.data.xmat)
 
-    def enabled(self, flag) -> bool:
+    def enabled(self, flag: str) -> bool:
+        """Whether a stage of FLAGS is on."""
         return not self.model.opt.disableflags & int(FLAGS[flag])
 
     # quantities at states
@@ -157,7 +158,7 @@ class MujocoDynamics:
         evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(shape[:-1])[()]
         return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
 
-    def prepare(self, q, v, tau, setting: Setting, method):
+    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
         refuse_tolerance(setting.tolerance, method)
         every, dt = setting.every, setting.duration / setting.steps
         starts, run = self.runner(q, v, tau, dt, setting.steps, method)
@@ -187,15 +188,14 @@ class MujocoDynamics:
 
         States are MuJoCo's, time first; the call returns those after each step, (runs, steps, ...), without a copy.
         """
-        model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
-        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[method]
+        model, data = self.own_copy(dt, method)
         model.opt.disableflags |= int(FLAGS["autoreset"])  # a reset would hide the divergence
-        q, v, tau = np.broadcast_arrays(q, v, tau)
-        runs, spec = q.size // q.shape[-1], mujoco.mjtState.mjSTATE_FULLPHYSICS
+        given, spec = rows_of_states(q, v, tau)[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
+        runs = len(given[0])
         starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
         torques = np.zeros((runs, steps, model.nv))
-        for start, torque, *state in zip(starts, torques, *(a.reshape(runs, -1) for a in (q, v, tau))):
+        for start, torque, *state in zip(starts, torques, *given):
             data.qpos[self.qpos], data.qvel[self.dofs], torque[:, self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
@@ -209,17 +209,23 @@ class MujocoDynamics:
 
         return starts, run
 
+    def own_copy(self, dt, integrator, q=0.0, v=0.0, tau=0.0) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """A copy of the model with this step and integrator, and data at a state (n,), for whoever steps on their own."""
+        model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
+        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, tau
+        return model, data
+
     # how the fields are read
 
-    def _each(self, read, q, v=None, tau=None) -> np.ndarray:
+    def _each(self, read, q, v=0.0, tau=0.0) -> np.ndarray:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
-        given = [np.asarray(0.0 if a is None else a, dtype=float) for a in (q, v, tau)]
-        shape = np.broadcast_shapes(*(a.shape for a in given))
-        states = [np.broadcast_to(a, shape).reshape(-1, shape[-1]) for a in given]
-        values = [np.array(read(self._at(*state))) for state in zip(*states)]
-        return np.array(values).reshape(*shape[:-1], *values[0].shape)
+        batch, states = rows_of_states(q, v, tau)
+        values = [np.array(read(self.forward(*state))) for state in zip(*states)]
+        return np.array(values).reshape(*batch, *values[0].shape)
 
-    def _at(self, q, v=0.0, tau=0.0):
+    def forward(self, q, v=0.0, tau=0.0) -> mujoco.MjData:
+        """The data after mj_forward at a state (n,)."""
         d = self.data
         d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
         mujoco.mj_forward(self.model, d)
@@ -230,12 +236,13 @@ class MujocoDynamics:
         mujoco.mj_energyVel(self.model, d)
         return d.energy
 
-    def _turns(self, xmat):
+    def turns(self, xmat) -> np.ndarray:
+        """The orientations of the bodies, (m, 3, 3), of xmat or ximat."""
         return xmat[self.bodies].reshape(-1, 3, 3).copy()
 
     def _to_body(self, vectors):
         """World components to body axes, the axes of the world at q = 0."""
-        turns = self._turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
+        turns = self.turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
         return np.einsum("bji,bj...->bi...", turns, vectors)
 
     def _reduced(self, pair):
@@ -244,6 +251,6 @@ class MujocoDynamics:
         return np.stack([T, self._to_body(B)])
 
 
-def refuse_tolerance(tolerance, method) -> None:
+def refuse_tolerance(tolerance: float | None, method: str) -> None:
     if tolerance is not None:
         raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")

@@ -1,5 +1,9 @@
 """MuJoCo as an engine: a compiled model, and what a case changes in it."""
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import ClassVar
+
 import mujoco
 
 from ...case import Case
@@ -28,9 +32,9 @@ class Mujoco:
     """
 
     name = "mujoco"
-    methods = METHODS
+    methods: ClassVar[Mapping[str, Method]] = METHODS
 
-    def __init__(self, model, joints, bodies, source):
+    def __init__(self, model: mujoco.MjModel, joints: Sequence[str], bodies: Sequence[int], source: Path | str | None):
         self.integrator = model.opt.integrator  # of the file
         self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
         self.known = {}
@@ -46,14 +50,14 @@ class Mujoco:
 
         A model with locked joints is compiled from the source again, without them. ModelError if that is not possible.
         """
-        changes = tuple(case.locked.items()), bool(case.scene.gravity), float(case.scene.damping), case.joints
+        changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints
         dynamics = self.known.pop(changes, None) or MujocoDynamics(self.changed(case), case.coordinates, self.bodies)
         self.known[changes] = dynamics
         if len(self.known) > MODELS:
             del self.known[next(iter(self.known))]
         return dynamics
 
-    def changed(self, case) -> mujoco.MjModel:
+    def changed(self, case: Case) -> mujoco.MjModel:
         """The model with what the case changes."""
         model = locked_model(self.source, case.locked) if case.locked else mujoco.MjModel.__copy__(self.model)
         if not case.scene.gravity:

@@ -11,7 +11,7 @@ from .engine import Mujoco
 from .lock import ModelError, name_of
 
 
-def load(path, tree: tmt.Tree) -> Mujoco:
+def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
     """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
     if Path(path).exists() and not (Path(path).is_file() or Path(path).is_dir()):
         raise ModelError(f"{path} is no file that can be read again; an MJCF file is expected")
@@ -33,7 +33,7 @@ def parse(text: str, tree: tmt.Tree) -> Mujoco:
     return with_hinges(mujoco.MjModel.from_xml_string(text), text, tree)
 
 
-def with_hinges(model, source, tree) -> Mujoco:
+def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> Mujoco:
     """The engine, if the model moves by exactly the hinges of the Tree; it remembers its source, a Path or MJCF text."""
     hinges = tree.hinge_names
     names = [model.joint(j).name for j in range(model.njnt)]
@@ -46,7 +46,7 @@ def with_hinges(model, source, tree) -> Mujoco:
     return Mujoco(model, hinges, bodies(model, source, tree), source)
 
 
-def bodies(model, source, tree) -> list[int]:
+def bodies(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> list[int]:
     """The numbers of the Tree's bodies in the model: the body that a hinge moves, whatever its name.
 
     By its name if it is fixed to the world, or one of several on a hinge; ModelError if the model has no body of that name.

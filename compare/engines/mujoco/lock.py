@@ -7,6 +7,7 @@ gives wrong inertias up to MuJoCo 3.10) and nothing is printed as XML (which has
 
 import os
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
 import mujoco
@@ -20,19 +21,19 @@ class ModelError(ValueError):
         return " ".join(super().__str__().split())
 
 
-def name_of(source) -> str:
+def name_of(source: Path | str) -> str:
     """What a message calls a source, a Path or MJCF text."""
     return str(source) if isinstance(source, Path) else "the text"
 
 
-def read(source) -> mujoco.MjSpec:
+def editable(source: Path | str) -> mujoco.MjSpec:
     """The editable form of a file (a Path) or of MJCF text."""
     return (
         mujoco.MjSpec.from_file(os.fsencode(source)) if isinstance(source, Path) else mujoco.MjSpec.from_string(source)
     )
 
 
-def locked_model(source, angles: dict) -> mujoco.MjModel:
+def locked_model(source: Path | str | None, angles: dict) -> mujoco.MjModel:
     """The compiled model without the joints that are named in `angles`, {name: rad}; every body keeps its number.
 
     Keyframes and sensors go, and so do the actuators and equalities of a locked joint. ModelError if more refers to it, or
@@ -43,12 +44,12 @@ def locked_model(source, angles: dict) -> mujoco.MjModel:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-            return compiled_without(read(source), angles)
+            return compiled_without(editable(source), angles)
     except ValueError as error:
         raise ModelError(f"MuJoCo cannot compile {name_of(source)} with {', '.join(angles)} locked: {error}") from None
 
 
-def compiled_without(spec, angles) -> mujoco.MjModel:
+def compiled_without(spec: mujoco.MjSpec, angles: Mapping[str, float]) -> mujoco.MjModel:
     """The model of a spec whose joints at these angles have been taken out."""
     spec.compiler.fusestatic = False
     whole = spec.compile()  # anchors, axes and frames as they are after defaults, degrees and nested frames
@@ -72,7 +73,7 @@ def compiled_without(spec, angles) -> mujoco.MjModel:
                 turn, back = np.zeros((2, 4))
                 mujoco.mju_axisAngle2Quat(turn, joint.axis, angle)
                 mujoco.mju_negQuat(back, turn)
-                frame = placed(*frame, joint.pos - turned(joint.pos, turn)), times(frame[1], turn)
+                frame = placed(*frame, joint.pos - turned(joint.pos, turn)), product(frame[1], turn)
                 moved = [
                     (name, joint.pos + turned(pos - joint.pos, back), turned(axis, back)) for name, pos, axis in moved
                 ]
@@ -91,19 +92,19 @@ def compiled_without(spec, angles) -> mujoco.MjModel:
     return spec.compile()
 
 
-def placed(origin, quat, point):
+def placed(origin: np.ndarray, quat: np.ndarray, point: np.ndarray) -> np.ndarray:
     """A point of a frame, where that frame is described."""
     return origin + turned(point, quat)
 
 
-def turned(vector, quat):
+def turned(vector: np.ndarray, quat: np.ndarray) -> np.ndarray:
     """A vector turned by a quaternion."""
     result = np.zeros(3)
     mujoco.mju_rotVecQuat(result, vector, quat)
     return result
 
 
-def times(first, second):
+def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """The product of two quaternions."""
     result = np.zeros(4)
     mujoco.mju_mulQuat(result, first, second)

@@ -1,9 +1,12 @@
 """The compiled model read back in the project's symbols: what the compiler made of the file."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
-from .dynamics import FLAGS
+from .dynamics import FLAGS, MujocoDynamics
+from .engine import Mujoco
 
 STATED_FLAGS = {  # flags that the equations of motion depend on, by the names that MuJoCo's versions give them
     "flag gravity": ("GRAVITY",),
@@ -12,15 +15,15 @@ STATED_FLAGS = {  # flags that the equations of motion depend on, by the names t
 }
 
 
-def parameters(dynamics) -> dict:
+def parameters(dynamics: MujocoDynamics) -> dict:
     """What the compiler made of the file: arrays per hinge, per body, or one number of the file, in world axes.
 
     Read in the file's own configuration (qpos0): there every frame lies as the file says, whatever a hinge's `ref` is.
     """
     m, d = dynamics.model, dynamics.data
-    dynamics._at(m.qpos0[dynamics.qpos])
-    anchors, turns = d.xanchor[dynamics.joints].copy(), dynamics._turns(d.ximat)
-    places = placed(m, dynamics.joints)
+    dynamics.forward(m.qpos0[dynamics.qpos])
+    anchors, turns = d.xanchor[dynamics.joints].copy(), dynamics.turns(d.ximat)
+    places = sorted_hinges(m, dynamics.joints)
     return {
         **{name: float(not m.opt.disableflags & bit(members)) for name, members in STATED_FLAGS.items()},
         **absent(m),
@@ -35,7 +38,7 @@ def parameters(dynamics) -> dict:
         "stiffness": m.jnt_stiffness[dynamics.joints],
         "limited": m.jnt_limited[dynamics.joints].astype(float),
         "mass": m.body_mass[dynamics.bodies],
-        "com": d.xipos[dynamics.bodies] - [origin(dynamics, anchors, body) for body in dynamics.bodies],
+        "com": d.xipos[dynamics.bodies] - [com_origin(dynamics, anchors, body) for body in dynamics.bodies],
         "inertia": np.array([R @ np.diag(i) @ R.T for R, i in zip(turns, m.body_inertia[dynamics.bodies])]),
         "gravcomp": m.body_gravcomp[dynamics.bodies],
         "gravity": m.opt.gravity.copy(),
@@ -46,7 +49,7 @@ def parameters(dynamics) -> dict:
     }
 
 
-def before(m, joint) -> int:
+def before(m: mujoco.MjModel, joint: int) -> int:
     """The hinge on which a hinge hangs, -1: the world; both by their numbers in the model."""
     body = m.jnt_bodyid[joint]
     if joint > m.body_jntadr[body]:
@@ -57,7 +60,7 @@ def before(m, joint) -> int:
     return int(m.body_jntadr[body] + m.body_jntnum[body] - 1) if body else -1
 
 
-def placed(m, joints) -> list[int]:
+def sorted_hinges(m: mujoco.MjModel, joints: np.ndarray) -> list[int]:
     """The hinges of a model in the order of the coordinates, as far as each comes after the one on which it hangs.
 
     In which order the file has hinges that do not hang on each other means nothing.
@@ -69,7 +72,7 @@ def placed(m, joints) -> list[int]:
     return found[1:]
 
 
-def origin(dynamics, anchors, body) -> np.ndarray:
+def com_origin(dynamics: MujocoDynamics, anchors: np.ndarray, body: int) -> np.ndarray:
     """From where the centre of mass of a body is counted, m: the anchor of the last of the hinges that move it; the world's."""
     m = dynamics.model
     while body and not m.body_jntnum[body]:
@@ -78,7 +81,7 @@ def origin(dynamics, anchors, body) -> np.ndarray:
     return anchors[max(moving)] if moving else np.zeros(3)
 
 
-def absent(m) -> dict:
+def absent(m: mujoco.MjModel) -> dict:
     """What the method does not have, and no force at random states need show: sums of what there is of it."""
     names = {"damping beyond linear": "dof_dampingpoly", "stiffness beyond linear": "jnt_stiffnesspoly",
              "actuator damping": "actuator_damping", "actuator armature": "actuator_armature"}  # fmt: skip
@@ -87,7 +90,7 @@ def absent(m) -> dict:
     return sums | {"contact pairs": 0.0 if m.opt.disableflags & stages else float(contact_pairs(m))}
 
 
-def contact_pairs(m) -> int:
+def contact_pairs(m: mujoco.MjModel) -> int:
     """How many pairs of geoms may touch, as MuJoCo chooses them: of two bodies that move against each other."""
     count, weld = m.npair, m.body_weldid
     parent_filter = not m.opt.disableflags & bit(("FILTERPARENT",))
@@ -103,7 +106,7 @@ def contact_pairs(m) -> int:
     return count
 
 
-def bit(members) -> int:
+def bit(members: Sequence[str]) -> int:
     """The bit of the first of these disable flags that the installed MuJoCo has; 0 if it has none of them."""
     for member in members:
         if hasattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"):
@@ -111,7 +114,7 @@ def bit(members) -> int:
     return 0
 
 
-def options(engine, dynamics) -> dict:
+def options(engine: Mujoco, dynamics: MujocoDynamics) -> dict:
     """Flags, integrator and counts that say what else the file asks of MuJoCo."""
     m = dynamics.model
     flags = {f"flag {name}": "enable" if dynamics.enabled(name) else "disable" for name in FLAGS if name != "gravity"}

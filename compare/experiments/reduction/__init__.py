@@ -1,17 +1,19 @@
 """What each scene needs of the model: the fewest joints, an integrator at all; and what the rest costs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from tmt.reference import DIGITS
 
+from ...case import Case
 from ...engines.mujoco import ModelError
 from ...judge.check import LOCKABLE, Result
 from ...judge.rounding import NARROW
 from ...judge.scale import FACTOR
 from ...robots import Robot
+from ...setup import Setup
 from . import exact_motion, sub_blocks
-from .cost import costs
+from .cost import measure_costs
 from .needs import of_case
 from .times import TWO_INTEGRATORS, time_models
 
@@ -40,7 +42,7 @@ def tolerance(robot: Robot) -> str:
     )
 
 
-def rows(setup, cases=None, timed: bool = True) -> Result:
+def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> Result:
     """Sub-blocks for every subset; for each case what it needs, runs and times; exact solutions; costs in MuJoCo.
 
     cases: the robot's, if none are given. timed=False: one choice of angles, the scenes with fewer joints, and the exact
@@ -55,9 +57,9 @@ def rows(setup, cases=None, timed: bool = True) -> Result:
     return result
 
 
-def fill(result: Result, setup, cases, timed: bool) -> None:
+def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> None:
     """All parts of `rows`, one after the other."""
-    sub_blocks.compare(result, setup, angles=setup.of(10, 3, 1) if timed else 1)
+    sub_blocks.compare_blocks(result, setup, angles=setup.of(10, 3, 1) if timed else 1)
     integrators = TWO_INTEGRATORS if timed else TWO_INTEGRATORS[-1:]
     models = [model for case in cases for model in of_case(result, case, setup, integrators)]
     exact_motion.swings(result, setup, cases)
@@ -67,7 +69,7 @@ def fill(result: Result, setup, cases, timed: bool) -> None:
         setup.quiet()
         rounds = setup.of(160, 16, 2)
         time_models(result, models, setup, rounds)
-        costs(result, setup, rounds)
+        measure_costs(result, setup, rounds)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
@@ -75,10 +77,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     from . import figures_motion, figures_needs  # matplotlib is for the process that draws
 
     if result.rows:  # none of a model that cannot be locked
-        yield partial(figures_needs.needs, result, robot)
+        yield partial(figures_needs.draw_needs, result, robot)
     for scene in result.curves["swings"]:
-        yield partial(figures_motion.swing, result, scene)
+        yield partial(figures_motion.draw_swing, result, scene)
     if "small" in result.curves:
-        yield partial(figures_motion.small_oscillations, result, robot)
+        yield partial(figures_motion.draw_small_oscillations, result, robot)
     if "cost_in_mujoco" in result.tables:
-        yield partial(figures_needs.costs, result)
+        yield partial(figures_needs.draw_costs, result)

@@ -1,6 +1,7 @@
 """What each thing that is added to the minimal model costs in MuJoCo, and whether it changes the motion."""
 
 import dataclasses
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -9,19 +10,21 @@ import tmt
 from ...case import Case
 from ...engines import Setting
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR, contacts, with_additions
+from ...judge.check import Result
 from ...judge.run import step_in_words
 from ...judge.scale import reaches
 from ...judge.timing import fastest
 from ...robots import Robot
+from ...setup import Setup
 from .times import TIMED_STEPS, TWO_INTEGRATORS
 
 FALL_TIME, FALL_STEPS = 5.0, 1024  # s, long enough to come to rest on the floor; of the run whose bits are compared
 SETTLED = 0.5  # N m s/rad, with which the robot comes to rest
 
 
-def costs(result, setup, rounds: int) -> None:
+def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
     """A table: time of a step with each thing added, as a ratio to the minimal model, and bits of a fall."""
-    case = fall(setup.robot)
+    case = fall_case(setup.robot)
     dt, timed = case.scene.dt, TIMED_STEPS["mujoco"]
     engines = with_additions(setup.engines["mujoco"], *sizes(setup.robot.tree))
     models = {name: engine.of(case) for name, engine in engines.items()}
@@ -38,18 +41,17 @@ def costs(result, setup, rounds: int) -> None:
     paths, touching, pushed = {}, {}, set()
     for name, integrator in runs:
         fallen = *case.start, case.tau, dt, FALL_STEPS, integrator
-        motion = models[name].run(*fallen)
-        paths[name, integrator] = np.concatenate([motion.q, motion.v], axis=1)
+        paths[name, integrator] = models[name].run(*fallen).states
         touching[name, integrator], _ = contacts(models[name], *rest, dt, timed, integrator)
         if name.startswith(CAPSULES) and contacts(models[name], *fallen)[1]:
             pushed.add((name, integrator))
-    result.tables["cost_in_mujoco"] = table(seconds, paths, touching)
+    result.tables["cost_in_mujoco"] = cost_rows(seconds, paths, touching)
     check_bits(result, f"{case.name}, {step_in_words(case, FALL_STEPS)}", result.tables["cost_in_mujoco"], pushed)
     if not pushed:
         result.notes.append(f"{case.name}: the floor that is in reach pushes no joint, nor does anything else.")
 
 
-def fall(robot: Robot) -> Case:
+def fall_case(robot: Robot) -> Case:
     """The whole robot let go under gravity for five seconds.
 
     As in the scene where errors fall regularly, else in its first scene that lets it go, else from its first posture.
@@ -74,7 +76,9 @@ def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
     return radius, lowest - near, lowest - far
 
 
-def table(seconds, paths, touching) -> list[dict]:
+def cost_rows(
+    seconds: Mapping[tuple, float], paths: Mapping[tuple, np.ndarray], touching: Mapping[tuple, float]
+) -> list[dict]:
     """The rows, by integrator, from what is known of each (addition, integrator).
 
     seconds: of a timed run; paths: (steps + 1, 2 n), rad and rad/s; touching: contacts in a step.
@@ -98,7 +102,7 @@ def table(seconds, paths, touching) -> list[dict]:
     return rows
 
 
-def check_bits(result, where: str, rows, pushed) -> None:
+def check_bits(result: Result, where: str, rows: list[dict], pushed: set[tuple]) -> None:
     """Checks: what exerts no force leaves the bits of the motion, and capsules that something pushes do not.
 
     pushed: of which (addition, integrator) that is so. The minimal model itself, which is timed twice, is not compared with its

@@ -1,5 +1,7 @@
 """Both engines against motions that are known exactly: swings of a single free joint, small oscillations about an equilibrium."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 import tmt
@@ -7,9 +9,11 @@ from tmt.reference import DIGITS, distance
 
 from ...case import SEED, Case
 from ...engines import LABELS
+from ...judge.check import Result
 from ...judge.run import MOVES, ORDER_MARGIN
 from ...judge.scale import EPS, FACTOR, gravity_scale, mass_scale
 from ...robots import Robot
+from ...setup import Setup
 from ...truth.linear import held, modes, small_oscillation
 from ...truth.pendulum import exact_swing, pendulum, swing
 from .times import TWO_INTEGRATORS, method_of
@@ -27,7 +31,7 @@ OSCILLATION_STEPS, LESS_FINE = 8192, 1024  # at which the error of RK4 is far be
 # a single free joint
 
 
-def swings(result, setup, cases) -> None:
+def swings(result: Result, setup: Setup, cases: Sequence[Case]) -> None:
     """Each case in which one joint is free, a physical pendulum, against its elliptic function."""
     for case in cases:
         if len(case.joints) == 1 and case.is_free and case.scene.gravity and not any(case.tree.damping):
@@ -57,7 +61,7 @@ def not_compared(case: Case, exact: np.ndarray) -> str | None:
     return None
 
 
-def of_pendulum(result, setup, case: Case, t, exact) -> None:
+def of_pendulum(result: Result, setup: Setup, case: Case, t: np.ndarray, exact: np.ndarray) -> None:
     """Errors of both engines against the elliptic function, which fall at the method's order; that function's own."""
     (q,), (v,) = case.start
     hanging, frequency = pendulum(case.tree)
@@ -87,12 +91,14 @@ def of_pendulum(result, setup, case: Case, t, exact) -> None:
     )
 
 
-def check_function(result, scene: str, off: float, scale: float) -> None:
+def check_function(result: Result, scene: str, off: float, scale: float) -> None:
     """A check: the elliptic function in doubles is that with 50 digits, but for rounding. off, scale: rad."""
     result.check(scene, f"elliptic function, scipy to {DIGITS} digits", off, FACTOR * EPS * scale, "rad", rounding=True)
 
 
-def check_falling(result, scene: str, errors, stated) -> dict:
+def check_falling(
+    result: Result, scene: str, errors: Mapping[tuple, Sequence[float]], stated: Mapping[str, int]
+) -> dict:
     """Checks: errors fall at the method's order. errors: {(engine, integrator): rad, each step half the last}; orders found.
 
     stated: the order of each integrator. Measured between the last two errors above 1e-11 rad, below which rounding comes in;
@@ -115,7 +121,9 @@ def check_falling(result, scene: str, errors, stated) -> dict:
 # an equilibrium
 
 
-def small_oscillations(result, setup, amplitudes=AMPLITUDES, steps=OSCILLATION_STEPS) -> None:
+def small_oscillations(
+    result: Result, setup: Setup, amplitudes: Sequence[float] = AMPLITUDES, steps: int = OSCILLATION_STEPS
+) -> None:
     """The whole robot let go near an equilibrium: relative distance from the linear modes falls with the amplitude squared."""
     robot, tree = setup.robot, setup.robot.tree
     posture = equilibrium(robot)
@@ -175,7 +183,7 @@ def odd(tree: tmt.Tree, q: np.ndarray) -> bool:
     return bool(same.all() and opposite.all())
 
 
-def check_modes(result, posture: str, off) -> dict:
+def check_modes(result: Result, posture: str, off: Mapping[str, Sequence[float]]) -> dict:
     """Checks: halving the amplitude divides the relative distance from the linear modes by 4. off, powers: by engine."""
     powers = {}
     for engine, values in off.items():

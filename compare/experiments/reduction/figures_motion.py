@@ -3,12 +3,15 @@
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
+from ...judge.check import Result
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, file_name
+from ...robots import Robot
 
 SWING_LINES = {"RK4": (GREEN, "-"), "Euler": (BLUE, "--")}
 
 
-def swing(result, scene: str):
+def draw_swing(result: Result, scene: str) -> tuple[str, Figure, str]:
     """Error of a swing of one joint against the elliptic function, over the step."""
     dt, errors, orders, stated = (result.curves["swings"][scene][key] for key in ("dt", "errors", "orders", "stated"))
     fig = Figure(figsize=(WIDTH, 3.0), layout="constrained")
@@ -30,13 +33,13 @@ def swing(result, scene: str):
         return f"{integrator}: order {ours} and {theirs}, down to {last[0]:.1e} and {last[1]:.1e} rad"
 
     caption = (
-        f"{scene[0].upper()}{scene[1:]}: distance from the exact motion, an elliptic function of time. TMT and MuJoCo with "
+        f"{capital(scene)}: distance from the exact motion, an elliptic function of time. TMT and MuJoCo with "
         f"{'; '.join(map(found, SWING_LINES))}."
     )
     return file_name("reduction", scene), fig, caption
 
 
-def small_oscillations(result, robot):
+def draw_small_oscillations(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Distance of small oscillations about an equilibrium from the linear modes, over their amplitude."""
     small = result.curves["small"]
     fig = Figure(figsize=(WIDTH, 2.8), layout="constrained")

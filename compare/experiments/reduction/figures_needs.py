@@ -1,13 +1,16 @@
 """Figures of what a scene needs, joints and time, and of what additions cost in MuJoCo."""
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ...engines import LABELS
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR
+from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, plain
+from ...robots import Robot
 
 KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
@@ -17,7 +20,7 @@ KINDS_OF_JOINT = {
 TIME_MARKS = {"tmt": (-0.15, {"marker": "o", "color": GREEN}), "mujoco": (0.15, {"marker": "s", "color": ORANGE})}
 
 
-def needs(result, robot):
+def draw_needs(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Which joints each scene needs, and the time of a step of the whole and of the smallest model."""
     scenes, joints = result.curves["needs"], robot.joints
     fig = Figure(figsize=(WIDTH, 0.9 + 0.36 * len(scenes)), layout="constrained")
@@ -30,7 +33,7 @@ def needs(result, robot):
     left.set_yticks(range(len(scenes)), [plain(name) for name in scenes])
     left.tick_params(length=0)
     for y, name in enumerate(scenes):
-        draw_times(right, result, name, y)
+        mark_times(right, result, name, y)
     slowest = max((row["ns_per_step"] or 0.0 for row in result.rows), default=0.0)
     right.set(xscale="log", xlabel="time of an RK4 step, ns", xlim=(15, max(100000, 10 * slowest)))
     right.set_xticks([100, 1000, 10000], ["100", "1000", "10000"])
@@ -53,14 +56,14 @@ def needs(result, robot):
     return "reduction_needs", fig, " ".join([start, *words, gain(result.rows, len(joints))])
 
 
-def kind_of_joint(joint, found) -> str:
+def kind_of_joint(joint: str, found: dict) -> str:
     """What a scene has to do with a joint."""
     if joint in found["locked"]:
         return "declared locked"
     return "never moves" if joint in found["stays"] else "needed"
 
 
-def draw_times(ax, result, name, y) -> None:
+def mark_times(ax: Axes, result: Result, name: str, y: float) -> None:
     """The time of a step of each engine in a scene, of the whole model and of the smallest one."""
     for engine, (offset, style) in TIME_MARKS.items():
         times = [row["ns_per_step"] for row in rows_of(result, name, engine)]
@@ -77,7 +80,7 @@ def draw_times(ax, result, name, y) -> None:
             ax.text(smallest / 1.15, y + offset, f"×{whole / smallest:.2f}", ha="right", va="center", fontsize=8)
 
 
-def gain(rows, joints: int) -> str:
+def gain(rows: list[dict], joints: int) -> str:
     """The largest gain of a model with fewer joints than so many, in words."""
     smaller = [row for row in rows if row["speedup"] and row["nv"] < joints]
     best = max(smaller, key=lambda row: row["speedup"], default=None)
@@ -89,12 +92,12 @@ def gain(rows, joints: int) -> str:
     )
 
 
-def rows_of(result, scene, engine):
+def rows_of(result: Result, scene: str, engine: str) -> list[dict]:
     """The rows of a scene and an engine with RK4, the whole model first."""
     return [row for row in result.rows if (row["scene"], row["engine"], row["integrator"]) == (scene, engine, "RK4")]
 
 
-def costs(result):
+def draw_costs(result: Result) -> tuple[str, Figure, str]:
     """Cost in MuJoCo of each thing that is added, as a ratio to the minimal model."""
     table = result.tables["cost_in_mujoco"]
     names = [name for name in dict.fromkeys(row["added"] for row in table) if name != MINIMAL]

@@ -1,5 +1,7 @@
 """What a case needs of its model, in words; and its motion by the smallest model beside that by the whole one."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 import tmt
@@ -7,13 +9,16 @@ from tmt.reference import DIGITS
 
 from ...case import Case
 from ...engines import LABELS
+from ...judge.check import Result, closest
 from ...judge.rounding import NARROW, band
-from ...judge.run import MOVES, deviation, step_in_words
+from ...judge.run import check_movement, deviation, required_time, step_in_words
+from ...judge.words import capital
+from ...setup import Setup
 from ...truth.smallest import Needed, needed, reduced
 from .times import FINER_RUNS, TWO_INTEGRATORS, method_of, scheme_of
 
 
-def of_case(result, case: Case, setup, integrators=TWO_INTEGRATORS) -> list:
+def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str] = TWO_INTEGRATORS) -> list:
     """What the case needs, in words; runs of it and of a smaller model; the models to be timed, None for none at all."""
     need = needed(case)
     smaller = reduced(case, need)
@@ -25,7 +30,7 @@ def of_case(result, case: Case, setup, integrators=TWO_INTEGRATORS) -> list:
     result.notes.append(need_in_words(case, need))
     if smaller or stays:
         for integrator in integrators:
-            runs(result, case, smaller, setup, integrator)
+            compare_smaller(result, case, smaller, setup, integrator)
     return models
 
 
@@ -35,7 +40,7 @@ def need_in_words(case: Case, need: Needed) -> str:
     why = "; ".join(need.moves.values())
     if need.undecided:
         why += f"; of {', '.join(need.undecided)} it is not decided: the acceleration does not fold to 0"
-    why = why[:1].upper() + why[1:]
+    why = capital(why)
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (
@@ -51,12 +56,12 @@ def need_in_words(case: Case, need: Needed) -> str:
     if len(need.stays) > 1:
         never, vanish = "never move: at their start and at rest their accelerations fold", "and are"
     return (
-        f"{case.name}: {left}{declared}. {stays[:1].upper()}{stays[1:]} {never} to 0 for all values of the others, {vanish} 0 "
+        f"{case.name}: {left}{declared}. {capital(stays)} {never} to 0 for all values of the others, {vanish} 0 "
         f"with {DIGITS} digits at random ones. {why}."
     )
 
 
-def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> None:
+def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Setup, integrator: str) -> None:
     """Runs of the case and of the smaller one (None: it stays), by the same method, within the band of rounding."""
     scheme, n, steps = scheme_of(setup.engines, integrator), len(case.joints), FINER_RUNS * case.steps
     dt = case.duration / steps
@@ -72,9 +77,9 @@ def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> No
             free = [case.joints.index(name) for name in smaller.joints]
             reference[:, free + [n + i for i in free]] = references[engine]
             if "own" not in case.scene.tags:  # of a user's own nothing is expected
-                check_movement(result, where, path[:, :n])
+                check_movement(result, where, deviation(path[:, :n], path[0, :n]))
         apart = np.abs(path - reference)[::FINER_RUNS]
-        until = check_smaller(result, where, case.joints, t, apart, width, case.required(scheme, dt))
+        until = check_smaller(result, where, case.joints, t, apart, width, required_time(case, scheme, dt))
         result.curves["apart"][case.name, engine, integrator] = float(apart[t <= until, :n].max())
     if not smaller:
         moved = {LABELS[engine]: result.curves["apart"][case.name, engine, integrator] for engine in paths}
@@ -86,12 +91,15 @@ def runs(result, case: Case, smaller: Case | None, setup, integrator: str) -> No
         )
 
 
-def check_movement(result, where: str, q: np.ndarray) -> None:
-    """A check: a run without a torque that holds moves. q: (times, n) rad."""
-    result.check(where, "movement", deviation(q, q[0]), MOVES, "rad", rule="at least")
-
-
-def check_smaller(result, where: str, joints, t, apart, width, required: float) -> float:
+def check_smaller(
+    result: Result,
+    where: str,
+    joints: Sequence[str],
+    t: np.ndarray,
+    apart: np.ndarray,
+    width: np.ndarray,
+    required: float,
+) -> float:
     """Checks: the runs stay within the band of rounding while it is narrow, and that is long enough; until when, s.
 
     apart, width: (times, 2 n), rad and rad/s, the distance of the smaller model's run from the whole one's, and the band.
@@ -99,8 +107,7 @@ def check_smaller(result, where: str, joints, t, apart, width, required: float) 
     n = len(joints)
     judged = np.cumsum(~(width[:, :n].max(axis=1) < NARROW)) == 0
     apart, width = apart[judged], width[judged]
-    ratio = np.divide(apart, width, out=np.where(apart > 0, np.inf, apart), where=width > 0)
-    k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
+    k, i = closest(apart, width)
     place, unit = f"{joints[i % n]} at t = {t[k]:.3f} s", ("rad", "rad/s")[i // n]
     result.check(where, "smallest model to whole", apart[k, i], width[k, i], unit, place, True)
     until = float(t[judged][-1])
@@ -108,11 +115,10 @@ def check_smaller(result, where: str, joints, t, apart, width, required: float) 
     return until
 
 
-def states_of_run(case: Case, setup, integrator: str) -> dict[str, np.ndarray]:
+def states_of_run(case: Case, setup: Setup, integrator: str) -> dict[str, np.ndarray]:
     """Positions and speeds of the case's joints by engine, each (steps + 1, 2 n)."""
     steps, paths = FINER_RUNS * case.steps, {}
     for engine, dynamics in setup.compared(case).items():
         method = method_of(setup.engines, integrator, engine)
-        motion = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method)
-        paths[engine] = np.concatenate([motion.q, motion.v], axis=1)
+        paths[engine] = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method).states
     return paths

@@ -1,12 +1,14 @@
 """Every subset of joints locked: Mbar and the bias of what is left against the sub-blocks of the whole model."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 
 from ...case import SEED, Case
-from ...judge.check import largest
+from ...judge.check import Result, closest, largest
 from ...judge.scale import EPS, FACTOR, bias_scale, mass_scale
+from ...setup import Setup
 from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
@@ -14,7 +16,7 @@ MOST_SUBSETS = 126  # all of seven joints; of more joints so many are chosen at 
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 
 
-def compare(result, setup, angles: int) -> None:
+def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)
@@ -35,7 +37,7 @@ def compare(result, setup, angles: int) -> None:
             check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts)
 
 
-def subsets(joints) -> list[tuple[str, ...]]:
+def subsets(joints: Sequence[str]) -> list[tuple[str, ...]]:
     """The sets of joints to be locked, the small ones first: all but none and all, or so many of them chosen at random."""
     if 2 ** len(joints) - 2 <= MOST_SUBSETS:
         return [names for count in range(1, len(joints)) for names in combinations(joints, count)]
@@ -46,14 +48,22 @@ def subsets(joints) -> list[tuple[str, ...]]:
     return sorted(chosen, key=len)
 
 
-def words_of(locked) -> str:
+def words_of(locked: Sequence[str]) -> str:
     return f"{' and '.join(locked)} locked"
 
 
-def check_blocks(result, locked, quantity: str, pair: str, apart, scale, counts) -> None:
+def check_blocks(
+    result: Result,
+    locked: Sequence[str],
+    quantity: str,
+    pair: str,
+    apart: np.ndarray,
+    scale: np.ndarray,
+    counts: Mapping[str, int],
+) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
-    worst = int(np.argmax(np.where(np.isfinite(apart), apart / tolerance, np.inf)))
+    (worst,) = closest(apart, tolerance)
     unit, name = BLOCK_UNITS[quantity], f"{quantity}, {pair}"
     check = result.check(words_of(locked), name, apart[worst], tolerance[worst], unit, rounding=True)
     result.tables["reduction_subsets"].append(
@@ -70,7 +80,7 @@ def check_blocks(result, locked, quantity: str, pair: str, apart, scale, counts)
     )
 
 
-def differences(setup, case: Case, q, v):
+def differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Iterator[tuple]:
     """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it."""
     joints, tree = setup.robot.joints, setup.robot.tree
     free = [i for i, name in enumerate(joints) if name in case.joints]

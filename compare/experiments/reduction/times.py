@@ -1,29 +1,32 @@
 """How long a step takes, of the whole model and of the smallest one that has the motion of a case."""
 
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import tmt
 from tmt.kernels import slope_source
 
-from ...engines import Setting, same_scheme
+from ...engines import Engine, Setting, same_scheme
+from ...judge.check import Result
 from ...judge.timing import fastest
+from ...setup import Setup
 
 TWO_INTEGRATORS = ("Euler", "RK4")  # of MuJoCo, a cheap and an accurate one, with the same schemes in tmt
 TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a timed run: it passes between the interruptions of a busy machine
 FINER_RUNS = 16  # steps of a run for each of the case's own
 
 
-def method_of(engines, integrator: str, name: str) -> str:
+def method_of(engines: Mapping[str, Engine], integrator: str, name: str) -> str:
     """What the engine of that name calls the scheme of an integrator of MuJoCo."""
     return same_scheme(engines, engines["mujoco"].methods[integrator], name).name
 
 
-def scheme_of(engines, integrator: str) -> str:
+def scheme_of(engines: Mapping[str, Engine], integrator: str) -> str:
     """The method of tmt that is the same scheme as an integrator of MuJoCo."""
     return engines["mujoco"].methods[integrator].scheme
 
 
-def time_models(result, models, setup, rounds) -> None:
+def time_models(result: Result, models: Sequence[tuple], setup: Setup, rounds: int) -> None:
     """The rows: all models of all cases, timed in turn, against the whole model of the same case."""
     calls = {}
     for name, case in models:
@@ -34,10 +37,12 @@ def time_models(result, models, setup, rounds) -> None:
                 method = method_of(setup.engines, integrator, engine)
                 call, _ = dynamics.prepare(*case.start, case.tau, setting, method)
                 calls[name, case.joints, engine, integrator] = call
-    result.rows += table(models, setup, fastest(calls, rounds), result.curves["apart"])
+    result.rows += time_rows(models, setup, fastest(calls, rounds), result.curves["apart"])
 
 
-def table(models, setup, seconds, apart) -> list[dict]:
+def time_rows(
+    models: Sequence[tuple], setup: Setup, seconds: Mapping[tuple, float], apart: Mapping[tuple, float]
+) -> list[dict]:
     """The rows: models as (a case's name, Case or None), seconds of a timed run by (name, joints, engine, integrator)."""
     rows, every = [], setup.robot.joints
     for name, case in models:

@@ -1,5 +1,6 @@
 """Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -8,16 +9,18 @@ import tmt
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import GRID, Method, Setting
+from ...engines import GRID, Dynamics, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.rounding import growth
 from ...judge.run import diverged_at
 from ...judge.scale import EPS, FACTOR
+from ...robots import Robot
+from ...setup import Setup
 from ...truth.reference import Reference, committed, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets
-from .settings import coarsest, followed, methods, regular_of, scenes_of, settings_of, taking_part
+from .settings import coarsest_steps, followed, methods, regular_of, scenes_of, settings_of, taking_part
 
 TITLE = "Speed against accuracy"
 PARTS = (
@@ -31,7 +34,7 @@ COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluatio
            "energy_error_J", "diverged", "why_not"]  # fmt: skip
 
 
-def claim(robot) -> str:
+def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
     return (
         "Every integrator of MuJoCo and every method of tmt, SciPy and (where it is installed) heyoka comes to the same motion "
@@ -41,7 +44,7 @@ def claim(robot) -> str:
     )
 
 
-def tolerance(robot) -> str:
+def tolerance(robot: Robot) -> str:
     """What errors are, and how they are judged."""
     ours = all(committed(case) for case in scenes_of(robot))
     made = "a table, made again in part by the tests" if ours else "made for what no table has, and kept"
@@ -55,24 +58,24 @@ def tolerance(robot) -> str:
     )
 
 
-def skipped(robot) -> str | None:
+def skipped(robot: Robot) -> str | None:
     """Why it cannot serve a robot, or None."""
     return None if scenes_of(robot) else f"the {robot.name} has no scene that every method follows"
 
 
-def begin(setup) -> None:
+def begin(setup: Setup) -> None:
     """Measure all errors beside other work: they are no timings."""
     setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
 
 
-def measured(setup, cases, which="all") -> tuple:
+def measured(setup: Setup, cases: Sequence[Case], which: str = "all") -> tuple:
     """The scenes, their references, and for each scene, as it comes, its rows without times and its rounding."""
-    known = references(cases, setup.map, setup.tell)
-    follow = partial(errors, engines=setup.engines, known=known, size=setup.size, which=which)
+    known = references(cases, setup.map, setup.progress)
+    follow = partial(rows_of_scene, engines=setup.engines, known=known, size=setup.size, which=which)
     return cases, known, setup.map(follow, cases)
 
 
-def rows(setup, timed=True) -> Result:
+def rows(setup: Setup, timed: bool = True) -> Result:
     """Errors, times, orders, floors, and what follows for a choice.
 
     timed=False: only the errors of one scene by MuJoCo's integrators and the same schemes in tmt, and their checks, in a
@@ -96,7 +99,7 @@ def rows(setup, timed=True) -> Result:
     schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
     accuracy.check_same_schemes(result, floors, schemes)
     accuracy.check_smallest_errors(result, floors)
-    steps = {case.name: coarsest(case) for case in cases}
+    steps = {case.name: coarsest_steps(case) for case in cases}
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)
     result.notes += accuracy.references_in_words(known, floors)
     result.notes += accuracy.floors_in_words(result.rows, floors)
@@ -109,16 +112,16 @@ def rows(setup, timed=True) -> Result:
     return result
 
 
-def add_times(result, setup, names, of_scenes) -> None:
+def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Sequence[list[dict]]) -> None:
     """The seconds of all rows, what one evaluation costs, and what follows: what to use, and which aims are met."""
     setup.quiet()  # nothing else may run beside a timing
     spread = []
     for name, of_scene in zip(names, of_scenes):
-        setup.tell(f"speed: timing {name}")
+        setup.progress(f"speed: timing {name}")
         spread += fill_in(of_scene, take_times(of_scene, setup))
     floors = result.curves["floors"]
     result.tables["what_should_i_use"] = advice.advice(result.rows, list(floors), floors)
-    setup.tell("speed: one evaluation")
+    setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
     aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
     result.tables["speed_targets"] = aims
@@ -126,7 +129,7 @@ def add_times(result, setup, names, of_scenes) -> None:
     result.notes += accuracy.smaller_models_in_words(result.rows)
 
 
-def unavailable(setup, names) -> list[dict]:
+def unavailable(setup: Setup, names: Sequence[str]) -> list[dict]:
     """A row for each scene and each engine that cannot take part: its methods, and why; no numbers."""
     absent = {
         engine: reason
@@ -140,16 +143,18 @@ def unavailable(setup, names) -> list[dict]:
     ]
 
 
-def errors(case, engines, known, size, which) -> tuple[list[dict], float]:
+def rows_of_scene(
+    case: Case, engines: Mapping[str, Engine], known: Mapping[str, Reference], size: str, which: str
+) -> tuple[list[dict], float]:
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
-    found, left = [], max(floor(case), reference.halving)
+    found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
     taking = methods(engines, size, which)
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
-            found.append(follow(case, case, engines, method, setting, reference))
+            found.append(row_of_run(case, case, engines, method, setting, reference))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
             if accuracy.gained_nothing(now, work, best, last, left):
                 break
@@ -157,10 +162,12 @@ def errors(case, engines, known, size, which) -> tuple[list[dict], float]:
     smaller = reduced(case)
     few = [method for method in taking if smaller and (method.engine, method.name) in SMALLER]
     setting = Setting(case.duration, SMALLER_STEPS)
-    return found + [follow(smaller, case, engines, method, setting, reference) for method in few], left
+    return found + [row_of_run(smaller, case, engines, method, setting, reference) for method in few], left
 
 
-def follow(case: Case, whole: Case, engines, method: Method, setting: Setting, reference: Reference) -> dict:
+def row_of_run(
+    case: Case, whole: Case, engines: Mapping[str, Engine], method: Method, setting: Setting, reference: Reference
+) -> dict:
     """A row: one run of a scene, or of the smaller model that has the motion of the whole one."""
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
     true = np.split(reference.high, 2, axis=1)
@@ -185,22 +192,23 @@ def follow(case: Case, whole: Case, engines, method: Method, setting: Setting, r
     }  # fmt: skip
 
 
-def floor(case: Case) -> float:
+def floor(case: Case, dynamics: Dynamics) -> float:
     """What rounding leaves of the angles: eps times the largest growth of a small difference up to each time, rad.
 
-    Taken along a run of RK4 with 1024 steps, or as many as the scene needs to be followed at all; ValueError if it cannot be.
+    dynamics: tmt's, whose RK4 is run with 1024 steps, or as many as the scene needs to be followed at all; ValueError if it
+    cannot be.
     """
-    first = 16 * GRID * max(1, round(case.duration / 5.0), -(-coarsest(case) // (16 * GRID)))
+    first = 16 * GRID * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (16 * GRID)))
     for steps in (first, 4 * first, 16 * first):
         dt = case.duration / steps
-        _, q, qd = tmt.simulate(*case.start, case.tau, dt, steps, "rk4", case.tree)
-        if np.isfinite(q).all():
-            growths = growth(METHODS["rk4"], case.tree, q, qd, case.tau, dt, 16)
-            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(q).max()))
+        motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
+        if np.isfinite(motion.q).all():
+            growths = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, 16)
+            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
     raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")
 
 
-def take_times(rows, setup) -> list[list[float]]:
+def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
     """Seconds of the runs of one scene's rows, all settings in turns."""
     runs = []
     for case, method, setting in (row["run"] for row in rows):
@@ -209,14 +217,14 @@ def take_times(rows, setup) -> list[list[float]]:
     return timing.in_turns(runs, rounds=setup.of(5, 2, 2))
 
 
-def fill_in(rows, times) -> list[float]:
+def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
     """Give each row the least of its times; of those that have more than one, the median over the least."""
     for row, of_row in zip(rows, times):
         row["seconds"] = min(of_row)
     return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]
 
 
-def spread_in_words(spread) -> list[str]:
+def spread_in_words(spread: Sequence[float]) -> list[str]:
     """How the times of one setting differ, in words."""
     if not spread:
         return ["Each time is that of one run."]
@@ -227,15 +235,14 @@ def spread_in_words(spread) -> list[str]:
     ]
 
 
-def figures(result, robot):
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
-    from . import figures_evaluations  # matplotlib is for the process that draws
-    from . import figures_times as draw
+    from . import figures_evaluations, figures_times  # matplotlib is for the process that draws
 
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
-    for scene in draw.scenes(result):
-        yield partial(draw.times, result, scene)
-    yield partial(draw.evaluations, result)
-    yield partial(draw.energy, result)
-    yield partial(figures_evaluations.cost_of_one, result, robot.name)
+    for scene in figures_times.scenes(result):
+        yield partial(figures_times.draw_times, result, scene)
+    yield partial(figures_times.draw_evaluations, result)
+    yield partial(figures_times.draw_energy, result)
+    yield partial(figures_evaluations.draw_cost, result, robot.name)

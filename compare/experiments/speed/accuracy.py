@@ -1,8 +1,15 @@
 """What is concluded from the errors of speed's runs, row by row: checks, and sentences that follow from these numbers."""
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 
+from ...judge.check import Result
 from ...judge.scale import FACTOR
+from ...robots import Robot
+from ...truth.reference import Reference
+
+Floors = Mapping[str, float]  # {scene: rad}, what rounding leaves in each
 
 NEAR_ROUNDING = 30  # times the error of rounding: an error below has come to it
 SMALL_DEVIATION = 0.1  # rad: rounding changes an error below no more than the growth of a small difference says
@@ -10,11 +17,11 @@ ANOTHER_MOTION = 0.1  # rad: a run that is farther off is another motion
 ALIKE = 0.01  # of an error: two that differ by less are the same in a sentence
 
 
-def check_same_schemes(result, floors, schemes) -> None:
+def check_same_schemes(result: Result, floors: Floors, schemes: Mapping[str, str]) -> None:
     """MuJoCo's integrators and the same schemes in tmt make the same error, but for rounding.
 
     Judged where either error is below 0.1 rad: one that is not, or a run that has diverged, beside one that is, fails.
-    floors: {scene: rad}, what rounding leaves in each; schemes: {integrator of MuJoCo: the method of tmt}.
+    schemes: {integrator of MuJoCo: the method of tmt}.
     """
     by_place = {(row["scene"], row["engine"], row["method"], row["dt_s"]): row for row in result.rows}
     for (scene, engine, method, dt), row in by_place.items():
@@ -26,7 +33,7 @@ def check_same_schemes(result, floors, schemes) -> None:
             result.check(where, quantity, difference, FACTOR * floors[scene], "rad", rounding=True)
 
 
-def check_smallest_errors(result, floors) -> None:
+def check_smallest_errors(result: Result, floors: Floors) -> None:
     """MuJoCo's RK4 comes as near to the reference as tmt's; and where errors stop falling, they are of the size of rounding."""
     for scene, left in floors.items():
         least = {}
@@ -40,27 +47,27 @@ def check_smallest_errors(result, floors) -> None:
         result.check(scene, "smallest error of MuJoCo's RK4, beside that of tmt's rk4", least["RK4"], tolerance, "rad")
 
 
-def gained_nothing(found, work, best, last, left) -> bool:
+def gained_nothing(found: float, work: int, best: float, last: int, left: float) -> bool:
     """Whether a run that cost more than the last one came no nearer, though the best error was near that of rounding."""
     return best < NEAR_ROUNDING * left and work > 1.2 * last and not found < 0.7 * best
 
 
-def error(row) -> float:
+def error(row: dict) -> float:
     """The worst error of a row on the way, rad; infinite if the run diverged."""
     return np.inf if row["diverged"] else row["worst_error_rad"]
 
 
-def errors_of(rows, scene, engine, method) -> list[float]:
+def errors_of(rows: list[dict], scene: str, engine: str, method: str) -> list[float]:
     """The errors of a method in a scene, rad, in the order of its settings."""
     return [error(row) for row in rows if (row["scene"], row["engine"], row["method"]) == (scene, engine, method)]
 
 
-def stopped(errors) -> bool:
+def stopped(errors: list[float]) -> bool:
     """Whether the least of these errors is not the last: smaller steps gained nothing."""
     return bool(errors) and np.isfinite(min(errors)) and errors.index(min(errors)) < len(errors) - 1
 
 
-def true_error(rows, steps) -> dict[str, tuple[float | None, float | None]]:
+def true_error(rows: list[dict], steps: Mapping[str, int]) -> dict[str, tuple[float | None, float | None]]:
     """{scene: (TMT's, MuJoCo's)}: the worst error of RK4 with the coarsest steps, rad; None: diverged, not run.
 
     steps: {scene: how many}.
@@ -73,16 +80,19 @@ def true_error(rows, steps) -> dict[str, tuple[float | None, float | None]]:
     return {scene: (pair.get("tmt"), pair.get("mujoco")) for scene, pair in found.items()}
 
 
-def true_errors_in_words(rows, steps, robot) -> list[str]:
+def true_errors_in_words(rows: list[dict], steps: Mapping[str, int], robot: Robot) -> list[str]:
     """How far from the true motion the runs with the coarsest steps are, in words, for each number of them."""
+    groups = {}
+    for scene, count in steps.items():
+        dt = {row["dt_s"] for row in rows if row["scene"] == scene and row["steps"] == count and row["dt_s"]}
+        whose = "the assignment's" if robot.claims and dt == {robot.claims.dt} else "the coarsest"
+        groups.setdefault((whose, count), {})[scene] = count
     sentences = []
-    for count in dict.fromkeys(steps.values()):
-        errors = true_error(rows, {scene: own for scene, own in steps.items() if own == count})
+    for (whose, count), of_group in groups.items():
+        errors = true_error(rows, of_group)
         if not errors:
             continue
         pairs = "; ".join(f"{scene}: TMT {in_rad(a)}, MuJoCo {in_rad(b)}" for scene, (a, b) in errors.items())
-        dt = {row["dt_s"] for row in rows if row["scene"] in errors and row["steps"] == count}
-        whose = "the assignment's" if robot.claims and dt == {robot.claims.dt} else "the coarsest"
         text = f"At {whose} step, {count} steps of RK4, the worst errors against the true motion are: {pairs}."
         far = {s: pair for s, pair in errors.items() if any(v is None or v > ANOTHER_MOTION for v in pair)}
         alike = [s for s, pair in far.items() if None not in pair and abs(pair[0] - pair[1]) < ALIKE * pair[0]]
@@ -96,11 +106,11 @@ def true_errors_in_words(rows, steps, robot) -> list[str]:
     return sentences
 
 
-def in_rad(value) -> str:
+def in_rad(value: float | None) -> str:
     return "no number" if value is None else f"{value:.2g} rad"
 
 
-def floors_in_words(rows, floors) -> list[str]:
+def floors_in_words(rows: list[dict], floors: Floors) -> list[str]:
     """How large the error of rounding is, and how many methods come to it and stop there, in words."""
     sizes = "; ".join(f"{scene}: {left:.1e} rad" for scene, left in floors.items())
     came, stay, below = 0, 0, 0
@@ -116,7 +126,7 @@ def floors_in_words(rows, floors) -> list[str]:
     ]
 
 
-def references_in_words(known, floors) -> list[str]:
+def references_in_words(known: Mapping[str, Reference], floors: Floors) -> list[str]:
     """Of which scenes the reference is known to fewer digits than doubles have, in words."""
     coarse = [f"{scene}: {known[scene].halving:.0e}" for scene, left in floors.items() if known[scene].halving >= left]
     if not coarse:
@@ -126,7 +136,7 @@ def references_in_words(known, floors) -> list[str]:
     ]
 
 
-def first_order_in_words(rows, scenes) -> list[str]:
+def first_order_in_words(rows: list[dict], scenes: Iterable[str]) -> list[str]:
     """How far MuJoCo's integrators of order 1 come, in words."""
     found = []
     for scene in scenes:
@@ -139,7 +149,7 @@ def first_order_in_words(rows, scenes) -> list[str]:
     return [f"The least errors of MuJoCo's integrators of order 1: {'; '.join(found)}."] if found else []
 
 
-def smaller_models_in_words(rows) -> list[str]:
+def smaller_models_in_words(rows: list[dict]) -> list[str]:
     """What the smaller model of a scene saves, in words; such a row says in `whole` of which scene it is."""
     sentences = []
     for row in (row for row in rows if row["whole"]):

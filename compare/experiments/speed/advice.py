@@ -1,9 +1,13 @@
 """What follows from times and errors: which setting to choose, how much of the gain is whose, the measured orders."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ...engines import Method
+from ...judge.check import Result
 from ...judge.run import ORDER_MARGIN
-from .accuracy import NEAR_ROUNDING
+from .accuracy import NEAR_ROUNDING, Floors
 
 TARGETS = (1e-2, 1e-3, 1e-6, 1e-9, 1e-12)  # rad, worst on the way
 EARLY = 1.0  # s: up to here chaos has not yet grown, and errors fall regularly
@@ -11,7 +15,7 @@ REGULAR, CLEAR = 3e-2, 2e-12  # rad, in that time: an error in between falls wit
 LEAST_ORDER = {8: 7.0}  # of order 8 only the least, as rounding comes before it has settled
 
 
-def advice(rows, scenes, floors) -> list[dict]:
+def advice(rows: list[dict], scenes: Sequence[str], floors: Floors) -> list[dict]:
     """For each scene and error the cheapest setting of MuJoCo, of tmt and of all, and whose the gain is.
 
     ratio: MuJoCo's time over tmt's. It is the product of three: integrator_part, MuJoCo's cheapest against its RK4;
@@ -29,7 +33,7 @@ def advice(rows, scenes, floors) -> list[dict]:
 
             theirs, ours, best = cheapest(engine="mujoco"), cheapest(engine="tmt"), cheapest()
             rk4 = cheapest(engine="mujoco", method="RK4")
-            twin = cheapest(reach=of_scene, engine="tmt", method="rk4", dt_s=rk4["dt_s"]) if rk4 else None
+            alike = cheapest(reach=of_scene, engine="tmt", method="rk4", dt_s=rk4["dt_s"]) if rk4 else None
 
             def part(slow, fast):
                 return slow["seconds"] / fast["seconds"] if slow and fast else None
@@ -39,12 +43,12 @@ def advice(rows, scenes, floors) -> list[dict]:
                 "target_rad": target,
                 "ratio": part(theirs, ours),
                 "integrator_part": part(theirs, rk4),
-                "kernel_part": part(rk4, twin),
-                "method_part": part(twin, ours),
+                "kernel_part": part(rk4, alike),
+                "method_part": part(alike, ours),
             }
             for who, row in (("mujoco", theirs), ("tmt", ours), ("of_all", best)):
                 line |= {
-                    who: named(row) if row else None,
+                    who: setting_in_words(row) if row else None,
                     f"{who}_dt_s": row and row["dt_s"],
                     f"{who}_ms": row and 1e3 * row["seconds"],
                     f"{who}_evaluations": row and row["evaluations"],
@@ -54,13 +58,13 @@ def advice(rows, scenes, floors) -> list[dict]:
     return table
 
 
-def named(row) -> str:
+def setting_in_words(row: dict) -> str:
     """A setting in words."""
     setting = f"{row['steps']} steps" if row["dt_s"] else f"tolerance {row['tolerance']:.0e}"
     return f"{row['engine']} {row['method']}, {setting}"
 
 
-def why_not(rows, theirs, ours, floor) -> str | None:
+def why_not(rows: list[dict], theirs: dict | None, ours: dict | None, floor: float) -> str | None:
     """Why no setting of an engine reaches the error; None if both do. rows: of one scene, those that did not diverge."""
     reasons = []
     for name, engine, row in (("MuJoCo", "mujoco", theirs), ("tmt", "tmt", ours)):
@@ -80,7 +84,7 @@ def why_not(rows, theirs, ours, floor) -> str | None:
     return "; ".join(reasons) or None
 
 
-def orders(result, scenes, methods, complete=True) -> list[dict]:
+def orders(result: Result, scenes: Sequence[str], methods: Sequence[Method], complete: bool = True) -> list[dict]:
     """Rows and checks: each method of fixed step, its order and the one measured where the error falls regularly.
 
     complete: every method must show its order in one scene at least, which the coarse steps of a quick run do not allow; but
@@ -107,19 +111,19 @@ def orders(result, scenes, methods, complete=True) -> list[dict]:
     return table
 
 
-def near_rounding(result, scenes, method) -> bool:
+def near_rounding(result: Result, scenes: Sequence[str], method: Method) -> bool:
     """Whether errors of a method are so small with its coarsest steps that half of these would show rounding."""
     firsts = [runs[0]["early"] for scene in scenes if (runs := early_runs(result, scene, method))]
     return bool(firsts) and all(first < CLEAR * 2.0**method.order for first in firsts)
 
 
-def early_runs(result, scene, method) -> list[dict]:
+def early_runs(result: Result, scene: str, method: Method) -> list[dict]:
     """The rows of a method in a scene, from coarse to fine."""
     place = (scene, method.engine, method.name)
     return [row for row in result.rows if (row["scene"], row["engine"], row["method"]) == place]
 
 
-def check_order(result, where, order, measured) -> None:
+def check_order(result: Result, where: str, order: int, measured: float) -> None:
     """A check: the measured order is the method's; of order 8 it is at least 7."""
     least = LEAST_ORDER.get(order)
     if least is None:

@@ -1,6 +1,6 @@
 """What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -10,7 +10,8 @@ from tmt import generic, kernels, method
 
 from ...case import SEED, Case
 from ...judge import timing
-from .settings import coarsest, regular_of
+from ...setup import Setup
+from .settings import coarsest_steps, regular_of
 
 STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
@@ -21,7 +22,7 @@ WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_
 WAITING, EACH, IN_LANES = "traced kernel, each waits for the last", "traced kernel", "lanes"
 
 
-def costs(setup) -> tuple[list[dict], list[str]]:
+def costs(setup: Setup) -> tuple[list[dict], list[str]]:
     """The rows of evaluations.csv, and sentences about them."""
     from ...engines.mujoco.calls import MinimalCalls  # here, for numba takes its time
 
@@ -43,15 +44,15 @@ def costs(setup) -> tuple[list[dict], list[str]]:
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
     operations = [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
     overhead = simulate_overhead(regular_of(setup.robot))
-    return table(nanoseconds), costs_in_words(nanoseconds, overhead, operations, setup.robot.name, missing)
+    return evaluation_rows(nanoseconds), costs_in_words(nanoseconds, overhead, operations, setup.robot.name, missing)
 
 
-def per_state(counts, times) -> dict:
+def per_state(counts: dict, times: list[list[float]]) -> dict:
     """Nanoseconds of one state for each key of `counts`, {key: states in a call}, from the seconds of its calls."""
     return {key: 1e9 * min(taken) / count for (key, count), taken in zip(counts.items(), times)}
 
 
-def table(nanoseconds) -> list[dict]:
+def evaluation_rows(nanoseconds: dict) -> list[dict]:
     """The rows of evaluations.csv, by quantity, the slowest first."""
     return [
         dict(zip(("quantity", "implementation", "states", "threads"), key)) | {"ns_per_state": value}
@@ -59,13 +60,13 @@ def table(nanoseconds) -> list[dict]:
     ]
 
 
-def again(run, calls, count) -> tuple[Callable, int]:
+def again(run: Callable, calls: int, count: int) -> tuple[Callable, int]:
     """So many calls one after the other, at least one, that caches are as warm as in use; and the states in them."""
     calls = max(1, calls)
     return (lambda: [run() for _ in range(calls)]), calls * count
 
 
-def counted(loop) -> tuple[Callable, int]:
+def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
     """A call that does the same so often that it takes a millisecond, or very often, and how often."""
     loop(1)
     (once,) = timing.in_turns([lambda: loop(4)], 5)
@@ -73,7 +74,7 @@ def counted(loop) -> tuple[Callable, int]:
     return lambda: loop(count), count
 
 
-def of_one_state(tree, state):
+def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
     (q, qd, tau), n = state, len(tree.parent)
     floats = [a.tolist() for a in state]
@@ -104,7 +105,7 @@ def of_one_state(tree, state):
     yield RK4_STEP, EACH, steps
 
 
-def of_many_states(tree, states, pool) -> dict:
+def of_many_states(tree: tmt.Tree, states: np.ndarray, pool: ThreadPoolExecutor) -> dict:
     """{(quantity, implementation, states, threads): run} for many states of shape (3, N, n); memory is bounded by them."""
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
     count, n = q.shape
@@ -136,7 +137,7 @@ def of_many_states(tree, states, pool) -> dict:
 
 def simulate_overhead(case: Case) -> tuple[float, float, int]:
     """Seconds of tmt.simulate with the coarsest steps of RK4 of a scene, and of its compiled loop; how many steps."""
-    steps = coarsest(case)
+    steps = coarsest_steps(case)
     dt, path = case.duration / steps, np.zeros((2, 1, steps + 1, len(case.q)))
     path[:, 0, 0] = case.start
     run = kernels.stepper(case.tree, "rk4")
@@ -148,7 +149,7 @@ def simulate_overhead(case: Case) -> tuple[float, float, int]:
     return times["call"], times["loop"], steps
 
 
-def lanes_in_words(by_states) -> str:
+def lanes_in_words(by_states: dict[int, float]) -> str:
     """Times by the number of states in words, the least first."""
     (best, least), *others = sorted(by_states.items(), key=lambda pair: pair[1])
     return (
@@ -156,7 +157,7 @@ def lanes_in_words(by_states) -> str:
     )
 
 
-def costs_in_words(ns, overhead, operations, name, missing=None) -> list[str]:
+def costs_in_words(ns: dict, overhead: tuple, operations: list, name: str, missing: str | None = None) -> list[str]:
     """The ratios in words.
 
     overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form; name: of
@@ -197,7 +198,7 @@ def costs_in_words(ns, overhead, operations, name, missing=None) -> list[str]:
     return sentences
 
 
-def less(slow, fast) -> str:
+def less(slow: float, fast: float) -> str:
     """How many times less, or more, the second takes than the first, in words."""
     ratio, word = (slow / fast, "less") if slow >= fast else (fast / slow, "more")
     return f"{ratio:.{0 if ratio >= 10 else 1}f} times {word}"

@@ -2,11 +2,12 @@
 
 from matplotlib.figure import Figure
 
+from ...judge.check import Result
 from ...report.style import BLUE, ORANGE, WIDTH
 from .evaluations import WHOLE
 
 
-def cost_of_one(result, name):
+def draw_cost(result: Result, name: str) -> tuple[str, Figure, str]:
     """What one evaluation costs, way by way; name: of the robot."""
     rows = [row for row in result.tables["evaluations"] if row["quantity"] == "forward_dynamics"]
     fig = Figure(figsize=(WIDTH, 0.9 + 0.24 * len(rows)), layout="constrained")
@@ -34,6 +35,6 @@ def cost_of_one(result, name):
     return "speed_evaluation_cost", fig, caption
 
 
-def spelled(value) -> str:
+def spelled(value: float) -> str:
     """Nanoseconds in three digits or so."""
     return f"{value:,.0f}" if value >= 100 else f"{value:.1f}"

@@ -1,10 +1,15 @@
 """Figures of speed against accuracy."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from ...engines import LABELS
+from ...judge.check import Check, Result
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name
 
 COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
@@ -15,25 +20,25 @@ NO_RESULT = 1.0  # rad: a run that is farther off is none
 OF_DIVERGED = 30.0  # rad: where what has diverged is drawn
 
 
-def written(engine) -> str:
+def written(engine: str) -> str:
     """An engine's name in the figures: tmt's is that of its package here."""
     return "tmt" if engine == "tmt" else LABELS.get(engine, engine)
 
 
-def colour_of(engine) -> str:
+def colour_of(engine: str) -> str:
     return COLOURS.get(engine, GREY)
 
 
-def runs(result) -> list[dict]:
+def rows_of_runs(result: Result) -> list[dict]:
     """The rows that are runs, not those of an engine that is not there."""
     return [row for row in result.rows if row["why_not"] is None]
 
 
-def runs_of(result, scene) -> list[dict]:
-    return [row for row in runs(result) if row["scene"] == scene]
+def runs_of(result: Result, scene: str) -> list[dict]:
+    return [row for row in rows_of_runs(result) if row["scene"] == scene]
 
 
-def curves(result, scene) -> dict:
+def curves(result: Result, scene: str) -> dict:
     """The rows of a scene by (engine, method), in the order of their settings."""
     by_method = {}
     for row in runs_of(result, scene):
@@ -41,12 +46,12 @@ def curves(result, scene) -> dict:
     return by_method
 
 
-def scenes(result) -> list[str]:
+def scenes(result: Result) -> list[str]:
     """The scenes with all their methods, not those of smaller models."""
     return list(result.curves.get("floors", ()))
 
 
-def marker(method) -> str:
+def marker(method: str) -> str:
     """A mark that is the method's in every figure."""
     names = ("rk4", "dopri8", "dopri8_adaptive", "explicit_euler", "semi_implicit_euler", "implicit", "implicit_midpoint",
              "gauss_legendre_4")  # fmt: skip
@@ -57,7 +62,7 @@ def marker(method) -> str:
     return "o"
 
 
-def pareto(rows, of) -> list[dict]:
+def pareto(rows: list[dict], of: str) -> list[dict]:
     """The rows that nothing beats in both error and cost, from the cheapest to the most exact."""
     front, least = [], np.inf
     good = (r for r in rows if not r["diverged"] and r["worst_error_rad"] < NO_RESULT)
@@ -68,7 +73,7 @@ def pareto(rows, of) -> list[dict]:
     return front
 
 
-def times(result, scene):
+def draw_times(result: Result, scene: str) -> tuple[str, Figure, str]:
     """One scene: worst error against time, a curve for each method, the Pareto front marked."""
     fig = Figure(figsize=(WIDTH, 5.2), layout="constrained")
     ax = fig.subplots()
@@ -104,24 +109,24 @@ def times(result, scene):
     if lost:
         ax.plot([], [], "x", color="black", label="diverged (no error)")
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    caption = f"{scene[0].upper()}{scene[1:]}: {spoken(result, scene)}"
+    caption = f"{capital(scene)}: {spoken(result, scene)}"
     if lost:
         caption += f" {len(lost)} {'settings diverge' if len(lost) > 1 else 'setting diverges'} (crosses at the left)."
     return file_name("speed", scene), fig, caption
 
 
-def visible(rows) -> np.ndarray:
+def visible(rows: list[dict]) -> np.ndarray:
     """The worst errors of rows, as far as the axis goes, rad."""
     return np.clip([r["worst_error_rad"] for r in rows], FINE_END, COARSE_END)
 
 
-def motion(rows) -> str:
+def motion(rows: list[dict]) -> str:
     """How long the motion is that was timed."""
     times = {round(r["dt_s"] * r["steps"], 9) for r in rows if r["dt_s"]}
     return " or ".join(f"{t:g} s" for t in sorted(times)) or "the scene"
 
 
-def labelled(ax, ends) -> None:
+def labelled(ax: Axes, ends: list[list]) -> None:
     """The name of each curve beside its most exact point, none over another."""
     ends.sort(key=lambda end: end[1])
     placed = []
@@ -137,7 +142,7 @@ def labelled(ax, ends) -> None:
         )  # fmt: skip
 
 
-def spoken(result, scene) -> str:
+def spoken(result: Result, scene: str) -> str:
     """The message of a scene: how many times faster at the errors asked for."""
     lines = [line for line in result.tables["what_should_i_use"] if line["scene"] == scene and line["ratio"]]
     ratios = ", ".join(f"{line['ratio']:.0f} times as long for {line['target_rad']:.0e} rad" for line in lines)
@@ -148,7 +153,7 @@ def spoken(result, scene) -> str:
     )
 
 
-def evaluations(result):
+def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
     """Worst error against evaluations of the right-hand side: independent of the machine and of who wrote the kernel."""
     fig, axes = panels(result)
     for ax, scene in zip(axes, scenes(result)):
@@ -168,7 +173,7 @@ def evaluations(result):
     return "speed_evaluations", fig, caption
 
 
-def agreeing(checks) -> str:
+def agreeing(checks: Sequence[Check]) -> str:
     """For how many settings MuJoCo and the same scheme in tmt make the same error, in words."""
     alike = [check.passed for check in checks if check.quantity.startswith("the same error as tmt's")]
     if not alike:
@@ -179,7 +184,7 @@ def agreeing(checks) -> str:
     )
 
 
-def fewest(result, scene, target) -> str:
+def fewest(result: Result, scene: str, target: float) -> str:
     """How many evaluations RK4 and the 8th-order method need for an error, in words."""
     counts = {}
     for method in ("rk4", "dopri8"):
@@ -191,7 +196,7 @@ def fewest(result, scene, target) -> str:
     return f"For {target:.0e} rad ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
 
 
-def energy(result):
+def draw_energy(result: Result) -> tuple[str, Figure, str]:
     """Energy error against time."""
     fig, axes = panels(result)
     for ax, scene in zip(axes, scenes(result)):
@@ -201,7 +206,7 @@ def energy(result):
                 errors = np.clip([r["energy_error_J"] for r in good], 1e-15, 10)
                 line(ax, engine, method, errors, [1e3 * r["seconds"] for r in good])
         ax.set(xlim=(20, 3e-16))
-    fig.supylabel(f"time for {motion(runs(result))} of motion, ms", fontsize=9)
+    fig.supylabel(f"time for {motion(rows_of_runs(result))} of motion, ms", fontsize=9)
     finish(fig, axes, "largest energy error on the grid, J")
     least = []
     for engine, method in (("tmt", "semi_implicit_euler"), ("tmt", "rk4"), ("mujoco", "Euler"), ("mujoco", "RK4")):
@@ -213,7 +218,7 @@ def energy(result):
     return "speed_energy", fig, caption
 
 
-def panels(result):
+def panels(result: Result) -> tuple[Figure, list[Axes]]:
     """One panel for each scene."""
     names = scenes(result)
     columns = 2 if len(names) > 1 else 1
@@ -225,7 +230,7 @@ def panels(result):
     return fig, axes
 
 
-def line(ax, engine, method, errors, costs) -> None:
+def line(ax: Axes, engine: str, method: str, errors: np.ndarray, costs: Sequence[float]) -> None:
     name, colour = written(engine), colour_of(engine)
     dash = "-" if engine in ("mujoco", "tmt") else "--"
     wide = 2.5 if engine == "mujoco" else 0.9  # seen where the same scheme of tmt lies on it
@@ -234,6 +239,6 @@ def line(ax, engine, method, errors, costs) -> None:
     ax.plot(errors, costs, dash, marker=marker(method), markersize=size, linewidth=wide, color=colour, label=label)
 
 
-def finish(fig, axes, label) -> None:
+def finish(fig: Figure, axes: Sequence[Axes], label: str) -> None:
     fig.supxlabel(f"{label} (finer to the right)", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7)

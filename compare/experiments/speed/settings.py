@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from tmt.methods import method_named
 
 from ...case import Case
-from ...engines import GRID, Engine, Method, Setting, one_of_each_scheme
+from ...engines import COMPARED, GRID, Engine, Method, Setting, one_of_each_scheme
+from ...robots import Robot
 
-COMPARED = ("mujoco", "tmt")  # engines of a quick run
 FINEST = {"mujoco": 2**16, "tmt": 2**18}  # steps beyond which a run would take too long to be timed again and again
 FINEST_RK4, FINEST_IMPLICIT = 2**17, 2**15  # of MuJoCo's RK4; of methods that solve their stages, and of other engines
 EXPONENTS = {  # of the coarsest and of the finest tolerance, 10^-k
@@ -18,7 +18,7 @@ FEW, FEW_OTHERS = {"quick": 5, "small": 7}, 2  # settings of a run that is not f
 NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
 
 
-def scenes_of(robot) -> list[Case]:
+def scenes_of(robot: Robot) -> list[Case]:
     """The scenes that every method follows: those with the tag, and a user's own."""
     return [case for case in robot.cases if "speed" in case.scene.tags or is_own(case)]
 
@@ -28,13 +28,13 @@ def is_own(case: Case) -> bool:
     return case.scene.tags == ("own",)
 
 
-def regular_of(robot) -> Case:
+def regular_of(robot: Robot) -> Case:
     """Of these scenes the one in which errors fall regularly from coarse steps on; the first, if none is said to."""
     cases = scenes_of(robot)
     return next((case for case in cases if "regular" in case.scene.tags), cases[0])
 
 
-def followed(robot, size: str) -> list[Case]:
+def followed(robot: Robot, size: str) -> list[Case]:
     """The scenes of a run of this size: all; of a quick one the regular one and a user's own; of a small one two."""
     cases, regular = scenes_of(robot), regular_of(robot).name
     if size == "quick":
@@ -43,7 +43,7 @@ def followed(robot, size: str) -> list[Case]:
 
 
 def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
-    """The engines of a run of this size, unavailable ones too."""
+    """The engines of a run of this size, unavailable ones too; of a quick run the two that are compared."""
     return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
 
 
@@ -68,12 +68,12 @@ def settings_of(method: Method, case: Case, size: str = "full", which: str = "al
 
 def halvings(method: Method, case: Case) -> tuple[Setting, ...]:
     """Steps that are halved and halved again: first the scene's own, or a little finer, as the times of reading ask for."""
-    count, finest = coarsest(case), finest_steps(method)
+    count, finest = coarsest_steps(case), finest_steps(method)
     doublings = max(1, (finest // count).bit_length())
     return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
 
 
-def coarsest(case: Case) -> int:
+def coarsest_steps(case: Case) -> int:
     """The least multiple of 64 that is no less than the scene's own number of steps."""
     return -(-case.steps // GRID) * GRID
 

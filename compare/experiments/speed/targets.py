@@ -1,11 +1,15 @@
 """What was aimed at for speed, and what is reached: ratios of one run. They make no checks."""
 
+from collections.abc import Mapping
+
+from ...judge.check import Result
+from .accuracy import Floors
 from .evaluations import EACH, EQUAL, FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WAITING, WHOLE
 
 LANES_AIM = {"AVX-512": 300}  # over lanes, by the width of the vectors; 120 for AVX2
 
 
-def targets(result, floors, vectors, aims) -> list[dict]:
+def targets(result: Result, floors: Floors, vectors: str, aims: Mapping[tuple[str, float], float]) -> list[dict]:
     """A row for each aim: what is compared, the ratio that was aimed at, the ratio that is reached.
 
     aims: of the robot, {(scene, rad): MuJoCo's cheapest setting over tmt's}.
@@ -48,7 +52,7 @@ def targets(result, floors, vectors, aims) -> list[dict]:
     return rows
 
 
-def aims_in_words(rows) -> list[str]:
+def aims_in_words(rows: list[dict]) -> list[str]:
     """How many aims are met and which are missed, in words."""
     measured = [row for row in rows if row["met"] is not None]
     missed = [f"{row['what']}: {row['reached']:.3g} of {row['aim']:g}" for row in measured if not row["met"]]

@@ -1,5 +1,6 @@
 """Stability: where each method fails, predicted from one step of it and shown in runs, with all joints together."""
 
+from collections.abc import Iterator
 from functools import partial
 from itertools import product
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from ...engines import same_scheme
 from ...judge.check import Result
+from ...robots import Robot
+from ...setup import Setup
 from ...truth.linear import held
 from . import beyond, choice, claims, departure, failure, falling, limits, long_runs
 from .claims_judged import check_claims
@@ -19,7 +22,7 @@ MAP_STEPS = np.geomspace(0.03, 1.0, 100)  # s
 SMALL_RESONANCE = failure.RESONANCE + np.array([-0.01, -0.005, 0.0, 0.005])  # of a small run
 
 
-def claim(robot) -> str:
+def claim(robot: Robot) -> str:
     """What is examined."""
     return (
         "Every method fails somewhere, and where can be said beforehand. The equations of motion are linearised about "
@@ -30,7 +33,7 @@ def claim(robot) -> str:
     )
 
 
-def tolerance(robot) -> str:
+def tolerance(robot: Robot) -> str:
     """How far apart what is compared may be."""
     return (
         "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
@@ -43,16 +46,16 @@ def tolerance(robot) -> str:
     )
 
 
-def methods_of(setup) -> tuple:
+def methods_of(setup: Setup) -> tuple:
     """The methods that a run of this size takes."""
     few = choice.of_schemes(setup.engines, choice.FEW_SCHEMES)
     return setup.of(choice.all_methods(setup.engines), few, few + choice.of_schemes(setup.engines, ("implicit",)))
 
 
-def begin(setup) -> None:
+def begin(setup: Setup) -> None:
     """Set the runs going side by side. A quick run takes fewer methods and scenes, and no map, minute or fine step."""
     robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects_of(setup.robot)
-    methods, each, coarse = methods_of(setup), choice.of_schemes(engines), choice.coarsest(robot).scene.dt
+    methods, each, coarse = methods_of(setup), choice.of_schemes(engines), choice.coarsest_case(robot).scene.dt
     points = of(
         places(seen.centres, seen.saddles),
         places(seen.centres[:1], seen.saddles[:1], DAMPINGS[:1]),
@@ -88,9 +91,9 @@ def begin(setup) -> None:
     resonant, tongues = about(seen.swinging, of(near, near[:2], near)), about(seen.swinging, of(edges, (), edges))
     setup.background["stability"] = {
         "subjects": seen,
-        "limits": ask(limits.examine, [held(robot, *point) for point in points], methods=methods, steps=steps,
+        "limits": ask(limits.limits_and_growths, [held(robot, *point) for point in points], methods=methods, steps=steps,
                       growth_dts=tuple(dict.fromkeys((*FINE_DEPARTURES[::-1], coarse)))),
-        "departure": ask(departure.examine, about(seen.saddle, tuple(dict.fromkeys(leaving_dts))), at=seen.saddle,
+        "departure": ask(departure.departures, about(seen.saddle, tuple(dict.fromkeys(leaving_dts))), at=seen.saddle,
                          methods=leaving),
         "falls": ask(falling.fall, about(seen.marginal, of(rk4, rk4[:1], rk4)), at=seen.marginal,
                      sizes=of(falling.FALL_SIZES, falling.FALL_SIZES, (1e-2, *falling.FALL_SIZES[4:6]))),
@@ -102,9 +105,9 @@ def begin(setup) -> None:
         "gain": ask(failure.silent_gain, about(seen.free, (seen.free,))),
         "maps": maps,
         "map": (mapped, ask(limits.map_of_growth, mapped, at=seen.centre, dts=maps["map"]["x"], steps=steps)),
-        "near": (resonant, ask(failure.edge, resonant, at=seen.centre, swings=maps["near"]["x"],
+        "near": (resonant, ask(failure.edge_growth, resonant, at=seen.centre, swings=maps["near"]["x"],
                                sizes=[limits.LINEAR_DEVIATION, failure.LARGE_DEVIATION])),
-        "edge": (tongues, ask(failure.edge, tongues, at=seen.centre, sizes=maps["edge"]["y"], swings=maps["edge"]["x"],
+        "edge": (tongues, ask(failure.edge_growth, tongues, at=seen.centre, sizes=maps["edge"]["y"], swings=maps["edge"]["x"],
                               steps=steps)),
         "minutes": ask(long_runs.long_run, *([pair[k] for pair in minutes] for k in (0, 1)), case=seen.free,
                        duration=of(long_runs.MINUTE, long_runs.MINUTE, 10.0)),
@@ -114,7 +117,7 @@ def begin(setup) -> None:
     }  # fmt: skip
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Equilibria; step limits and growth per step; departures; what is claimed; failures beyond the linear ones."""
     result, robot = Result("stability"), setup.robot
     if "stability" not in setup.background:
@@ -146,7 +149,7 @@ def rows(setup) -> Result:
     return result
 
 
-def figures(result, robot):
+def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Limits, the map of growth, regions, the nonlinear edge; departures; the claims; silent failure; a minute."""
     # matplotlib is for the process that draws
     from . import figures_claims, figures_departure, figures_failure, figures_limits
@@ -154,17 +157,17 @@ def figures(result, robot):
     tables, curves, seen = result.tables, result.curves, subjects_of(robot)
     falls = [row for row in tables.get("departure", ()) if seen.marginal and row["scene"] == seen.marginal.name]
     drawn = {
-        figures_limits.limits: bool(seen.centre),
-        figures_limits.regions: True,
-        figures_departure.times: bool(seen.saddle),
-        figures_claims.torques: "stability_torques" in tables,
-        figures_failure.silent: "silent" in curves,
-        figures_limits.growth_map: curves["map"]["grown"],
-        figures_failure.edge: curves["edge"]["grown"],
-        figures_claims.finer_steps: "stability_finer_steps" in tables,
-        figures_claims.kept: "kept" in curves,
-        figures_departure.falls: len({row["engine"] for row in falls}) > 1,  # all but a quick run
-        figures_failure.minutes: curves["minutes"],
+        figures_limits.draw_limits: bool(seen.centre),
+        figures_limits.draw_regions: True,
+        figures_departure.draw_departure: bool(seen.saddle),
+        figures_claims.draw_torques: "stability_torques" in tables,
+        figures_failure.draw_silent: "silent" in curves,
+        figures_limits.draw_growth_map: curves["map"]["grown"],
+        figures_failure.draw_edge: curves["edge"]["grown"],
+        figures_claims.draw_finer_steps: "stability_finer_steps" in tables,
+        figures_claims.draw_kept: "kept" in curves,
+        figures_departure.draw_falls: len({row["engine"] for row in falls}) > 1,  # all but a quick run
+        figures_failure.draw_minutes: curves["minutes"],
     }
     for figure, has_data in drawn.items():
         if has_data:

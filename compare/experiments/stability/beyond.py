@@ -1,11 +1,13 @@
 """What is claimed of the robot held at the posture that it keeps: RK4 below and beyond its limit, and where a run can end."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...engines import LABELS, Engine
+from ...judge.check import Result
 from ...judge.run import LEFT, departure, deviation, number_or_none
+from ...robots import Robot
 from ...truth.linear import held
 from .choice import who
 from .claims import of_claims
@@ -23,7 +25,9 @@ AT_REST = 1e-9  # rad: so near the posture it rests there
 CURVE_STEPS = 200  # of a curve in the figure
 
 
-def kept(engines: Mapping[str, Engine], robot, steps: int = RUN_BEYOND, counts=COUNTS_WITHIN) -> dict:
+def kept(
+    engines: Mapping[str, Engine], robot: Robot, steps: int = RUN_BEYOND, counts: Sequence[int] = COUNTS_WITHIN
+) -> dict:
     """RK4 at the posture that is kept, below and beyond its limit, and what could end at the posture that is claimed.
 
     rows: dt, torque (one ulp off; to four decimals), growth per step, when it leaves, the fastest rate at the end or the
@@ -66,7 +70,7 @@ def kept(engines: Mapping[str, Engine], robot, steps: int = RUN_BEYOND, counts=C
     }  # fmt: skip
 
 
-def check_kept(result, robot, found) -> None:
+def check_kept(result: Result, robot: Robot, found: dict) -> None:
     """Claim 3: held beyond the limit of RK4."""
     claims, rows, limit, leaves = robot.claims, found["rows"], found["limit"], found["leaves"]
     result.tables["stability_bent"] = rows
@@ -105,7 +109,7 @@ def check_kept(result, robot, found) -> None:
     result.notes.append(end_in_words(robot, found))
 
 
-def above_in_words(rows) -> str:
+def above_in_words(rows: list[dict]) -> str:
     """What becomes of the robot at each step above the limit."""
     texts = []
     for dt in sorted({row["dt_s"] for row in rows}):
@@ -121,7 +125,7 @@ def above_in_words(rows) -> str:
     return f"Above it, {'; '.join(texts)}." if texts else "No step above it was taken."
 
 
-def within_in_words(robot, rows, leaves, tried) -> str:
+def within_in_words(robot: Robot, rows: list[dict], leaves: Mapping[tuple, list[int]], tried: int) -> str:
     """When the posture is left with each torque, and with how many steps in a run of the claims."""
     texts = []
     for torque in NEAR_TORQUES:
@@ -138,7 +142,7 @@ def within_in_words(robot, rows, leaves, tried) -> str:
     return " ".join(texts)
 
 
-def end_in_words(robot, found) -> str:
+def end_in_words(robot: Robot, found: dict) -> str:
     """Whether a run can end at the posture that is claimed, with the torque that holds and without."""
     claims, texts = robot.claims, []
     for engine, pushed in found["acceleration_at_end"].items():

@@ -1,6 +1,6 @@
 """What is looked at: a free motion of the robot, and which methods; and how these are called."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -9,6 +9,7 @@ import tmt
 from ...case import Case
 from ...engines import LABELS, Engine, Method, one_of_each_scheme
 from ...judge.scale import gravity_scale
+from ...robots import Robot
 from ...truth.linear import NEGLIGIBLE, all_of_kind, held
 
 FEW_SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit_midpoint")  # of a quick run, by tmt's names
@@ -19,7 +20,7 @@ def all_methods(engines: Mapping[str, Engine]) -> tuple[Method, ...]:
     return tuple(m for name in ("tmt", "mujoco") for m in engines[name].methods.values() if not m.adaptive)
 
 
-def of_schemes(engines: Mapping[str, Engine], schemes=None) -> tuple[Method, ...]:
+def of_schemes(engines: Mapping[str, Engine], schemes: Sequence[str] | None = None) -> tuple[Method, ...]:
     """tmt's methods of these names (none: each whose step is fixed), and MuJoCo's, one of each scheme that is among them."""
     known = {m.scheme: m for m in engines["tmt"].methods.values() if not m.adaptive}
     schemes = tuple(known) if schemes is None else schemes
@@ -32,7 +33,7 @@ def implicit_methods(engines: Mapping[str, Engine]) -> tuple[Method, ...]:
     return tuple(m for m in engines["tmt"].methods.values() if tmt.METHODS[m.name].solves_stages)
 
 
-def free_motion(robot) -> Case | None:
+def free_motion(robot: Robot) -> Case | None:
     """The robot let go at a centre, the first at which it moves: a scene of its own if it has one; None: no centre."""
     centres = all_of_kind(robot, "centre")
     if not centres:
@@ -49,7 +50,7 @@ def is_let_go(case: Case) -> bool:
     return case.is_free and scene.gravity and not (scene.damping or scene.locked or any(scene.speed))
 
 
-def coarsest(robot) -> Case:
+def coarsest_case(robot: Robot) -> Case:
     """The case whose step is the coarsest that is looked at: the free motion, or what a scene takes if nothing is said."""
     return free_motion(robot) or robot.case()
 
@@ -69,13 +70,8 @@ def who(row: dict) -> str:
     return f"{LABELS[row['engine']]} {row['method']}"
 
 
-def damped(robot, damping: float) -> str:
+def damped(robot: Robot, damping: float) -> str:
     """What damping is added, N m s/rad, in words."""
     if damping:
         return f"damping {damping:g}"
     return "with its own damping" if any(robot.tree.damping) else "undamped"
-
-
-def capital(text: str) -> str:
-    """A name as the first word of a sentence."""
-    return f"{text[0].upper()}{text[1:]}"

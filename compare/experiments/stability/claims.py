@@ -1,13 +1,12 @@
 """The runs that are claimed of a robot held at a posture that it leaves: torques in the last bit, finer steps, printed torque."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-import tmt
-
 from ...engines import Engine, Method, same_scheme
 from ...judge.run import departure, deviation, number_or_none
+from ...robots import Claims, Robot
 from ...truth.linear import Held, held
 from .departure import own_torque, predicted, residual, variants
 
@@ -24,17 +23,17 @@ def of_claims(engines: Mapping[str, Engine]) -> tuple[Method, Method]:
     return rk4, same_scheme(engines, rk4, "mujoco")
 
 
-def watched(claims) -> float:
+def watched(claims: Claims) -> float:
     """For how long a posture is looked at, s: twice a run of the claims."""
     return 2.0 * claims.duration
 
 
-def ulps_of(robot) -> list[str]:
+def ulps_of(robot: Robot) -> list[str]:
     """The columns of ulps, one for each joint."""
     return [f"ulps_{joint}" for joint in robot.joints]
 
 
-def holding_torques(engines: Mapping[str, Engine], robot) -> list[dict]:
+def holding_torques(engines: Mapping[str, Engine], robot: Robot) -> list[dict]:
     """All torques within one ulp of TMT's holding torque of the posture that is left, by RK4; then own biases; then 16 ulps.
 
     push_rad_per_s2: what the residual, the torque beyond the one that holds, does to the fastest unstable mode.
@@ -66,7 +65,7 @@ def holding_torques(engines: Mapping[str, Engine], robot) -> list[dict]:
     return rows
 
 
-def side(path, left, dt) -> int | None:
+def side(path: np.ndarray, left: float | None, dt: float) -> int | None:
     """To which side of its start the first joint is when the posture is left: 1 larger, -1 smaller; None: never, or NaN."""
     away = np.nan if left is None else path[round(left / dt), 0] - path[0, 0]
     return int(np.sign(away)) if np.isfinite(away) else None
@@ -79,16 +78,16 @@ def pushes(at: Held) -> np.ndarray:
     """
     n, vectors = len(at.q), at.modes[1]
     measure = np.linalg.inv(vectors)[0] * np.sign(vectors[0, 0].real)
-    return (measure[n:] / np.linalg.norm(measure[n:])).real @ np.linalg.inv(tmt.mass_matrix(at.q, at.tree))
+    return (measure[n:] / np.linalg.norm(measure[n:])).real @ np.linalg.inv(at.mass_matrix)
 
 
-def ulps(difference, tau) -> list[int | None]:
+def ulps(difference: np.ndarray, tau: np.ndarray) -> list[int | None]:
     """A difference of torques counted in units of the last place of the torque; None if it is no number."""
     counts = [float(d / np.spacing(abs(t))) for d, t in zip(difference, tau)]
     return [round(count) if np.isfinite(count) else None for count in counts]
 
 
-def finer_steps(engines: Mapping[str, Engine], robot, counts=STEP_COUNTS) -> list[dict]:
+def finer_steps(engines: Mapping[str, Engine], robot: Robot, counts: Sequence[int] = STEP_COUNTS) -> list[dict]:
     """Departure under RK4 against the step, the torque one ulp off to either side at the first joint.
 
     moved_rad: how far the robot has moved after a run of the claims; step_rad: the largest dt |qd| by then; half_ulp_rad: half
@@ -119,7 +118,7 @@ def finer_steps(engines: Mapping[str, Engine], robot, counts=STEP_COUNTS) -> lis
     return rows
 
 
-def printed_torque(engines: Mapping[str, Engine], robot, counts=PRINTED_COUNTS) -> list[dict]:
+def printed_torque(engines: Mapping[str, Engine], robot: Robot, counts: Sequence[int] = PRINTED_COUNTS) -> list[dict]:
     """Departure under the torque as it is printed against the step."""
     claims, at = robot.claims, held(robot, robot.claims.left)
     tau = np.array(next(printed.values for printed in robot.printed if printed.item == claims.printed_torque))

@@ -5,7 +5,9 @@ from itertools import pairwise
 import numpy as np
 
 from ...engines import LABELS
+from ...judge.check import Result
 from ...judge.run import LEFT, number_or_nan
+from ...robots import Robot
 from .choice import fraction, who
 from .claims import CLEAR_TORQUES, CLEAR_ULPS, NEAREST, VARIANT, ulps_of, watched
 from .departure import check_row, span
@@ -18,7 +20,9 @@ def sides(joint: str) -> dict:
     return {1: f"larger {joint}", -1: f"smaller {joint}", 0: "neither side", None: "no side"}
 
 
-def check_claims(result, robot, torques, finer, printed) -> None:
+def check_claims(
+    result: Result, robot: Robot, torques: list[dict], finer: list[dict] | None, printed: list[dict]
+) -> None:
     """Checks, tables and sentences about the posture that is left: in the last bit, with finer steps, as it is printed."""
     check_torques(result, robot, torques)
     if finer:
@@ -26,7 +30,7 @@ def check_claims(result, robot, torques, finer, printed) -> None:
     check_printed_torque(result, robot, printed)
 
 
-def check_torques(result, robot, torques) -> None:
+def check_torques(result: Result, robot: Robot, torques: list[dict]) -> None:
     """Claim 1: the posture is left after about so long, because of rounding."""
     result.tables["stability_torques"] = torques
     claims, first, texts, findings = robot.claims, len(result.checks), [], []
@@ -58,7 +62,7 @@ def check_torques(result, robot, torques) -> None:
     )
 
 
-def torques_in_words(robot, engine, rows, own, near_claim, off) -> str:
+def torques_in_words(robot: Robot, engine: str, rows: list[dict], own: dict, near_claim: int, off: float) -> str:
     """What the torques in the last bit do in one engine."""
     to = sides(robot.joints[0])
     gone = [row for row in rows if row["observed_s"] is not None]
@@ -83,7 +87,7 @@ def torques_in_words(robot, engine, rows, own, near_claim, off) -> str:
     )
 
 
-def check_finer_steps(result, robot, finer) -> None:
+def check_finer_steps(result: Result, robot: Robot, finer: list[dict]) -> None:
     """Claim 2: a smaller step reverses the side, and a very small one leaves the robot in place."""
     result.tables["stability_finer_steps"] = finer
     claims, joint, column = robot.claims, robot.joints[0], ulps_of(robot)[0]
@@ -128,7 +132,7 @@ def check_finer_steps(result, robot, finer) -> None:
     )
 
 
-def check_printed_torque(result, robot, printed) -> None:
+def check_printed_torque(result: Result, robot: Robot, printed: list[dict]) -> None:
     """The torque as it is printed: every departure is as predicted."""
     claims = robot.claims
     result.tables.setdefault("departure", []).extend(printed)

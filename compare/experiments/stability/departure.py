@@ -1,13 +1,12 @@
 """How long a held posture is kept: departure from a saddle, under a small push and a small torque, in runs and predicted."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import product
 
 import numpy as np
 
-import tmt
-
 from ...engines import Engine, Method
+from ...judge.check import Result
 from ...judge.run import LEFT, departure
 from ...truth.linear import NEGLIGIBLE, Held
 from .choice import who
@@ -41,14 +40,14 @@ def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.nd
     return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
 
 
-def residual(method, engines, at, tau) -> np.ndarray:
+def residual(method: Method, engines: Mapping[str, Engine], at: Held, tau: np.ndarray) -> np.ndarray:
     """The torque by which tau, (..., n) N m, fails to hold the posture in the arithmetic of an engine, to less than an ulp.
 
     Read from the first step of a method, which is so short that nothing moves: Mbar qd / dt.
     """
     start = at.q + np.zeros_like(tau)
     motion = engines[method.engine].of(at.case).run(start, np.zeros_like(tau), tau, INSTANT, 1, method.name)
-    return motion.v[..., 1, :] @ tmt.mass_matrix(at.q, at.tree) / INSTANT
+    return motion.v[..., 1, :] @ at.mass_matrix / INSTANT
 
 
 def variants(tau: np.ndarray, reach: int = 1) -> np.ndarray:
@@ -65,17 +64,25 @@ def variants(tau: np.ndarray, reach: int = 1) -> np.ndarray:
     return tau + away * np.spacing(np.abs(tau))
 
 
-def offset(at, off) -> np.ndarray:
+def offset(at: Held, off: np.ndarray) -> np.ndarray:
     """How far the posture is from the equilibrium of the held torque plus a small torque, rad and N m (k, n).
 
     A torque along a mode without stiffness has no equilibrium, and is too small to matter.
     """
     n = len(at.q)
-    accelerations = np.linalg.solve(tmt.mass_matrix(at.q, at.tree), np.transpose(off))
+    accelerations = np.linalg.solve(at.mass_matrix, np.transpose(off))
     return (np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2) @ accelerations).T
 
 
-def predicted(at, scheme, dt, moved, off, longest=LONGEST_DEPARTURE, rounded=True) -> list[float | None]:
+def predicted(
+    at: Held,
+    scheme: str,
+    dt: float,
+    moved: np.ndarray,
+    off: np.ndarray,
+    longest: float = LONGEST_DEPARTURE,
+    rounded: bool = True,
+) -> list[float | None]:
     """When the method's own linear map has a joint 0.1 rad away, s, for each of many starts; None: not within `longest`.
 
     moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (k, n) N m. The map
@@ -98,7 +105,7 @@ def predicted(at, scheme, dt, moved, off, longest=LONGEST_DEPARTURE, rounded=Tru
     return times
 
 
-def examine(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
+def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
     """Rows for tables/departure.csv: every method and perturbation at one dt, from one saddle."""
     values, vectors = at.modes
     n, steps = len(at.q), round(LONGEST_DEPARTURE / dt)
@@ -108,7 +115,7 @@ def examine(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[M
         own = own_torque(method, engines, at)
         sizes = [(size, size * shape, own) for size in PERTURBATIONS]
         # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
-        push = tmt.mass_matrix(at.q, at.tree) @ shape * values[0].real ** 2
+        push = at.mass_matrix @ shape * values[0].real ** 2
         sizes += [(size, np.zeros(n), own + size * push) for size in TORQUE_ERRORS]
         starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -125,7 +132,7 @@ def examine(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[M
     return rows
 
 
-def check_departures(result, rows) -> None:
+def check_departures(result: Result, rows: list[dict]) -> None:
     """The table of departures and a check for each."""
     if not rows:
         return
@@ -137,7 +144,7 @@ def check_departures(result, rows) -> None:
     result.notes.append(departures_in_words(rows))
 
 
-def late(row) -> float | None:
+def late(row: dict) -> float | None:
     """By how much a run leaves later than predicted, s: 0 where neither leaves, None where only one of them does."""
     times = row["observed_s"], row["predicted_s"]
     if None in times:
@@ -145,7 +152,7 @@ def late(row) -> float | None:
     return times[0] - times[1]
 
 
-def check_row(result, where, row) -> None:
+def check_row(result: Result, where: str, row: dict) -> None:
     """The check of one departure: as predicted to one step or 0.03 s; where the prediction stays, the run stays too."""
     off = late(row)
     missing = {"observed_s": "the run stays", "predicted_s": "the prediction stays"}
@@ -154,7 +161,7 @@ def check_row(result, where, row) -> None:
     result.check(where, quantity, None if off is None else abs(off), near(row["dt_s"]), "s", note)
 
 
-def departures_in_words(rows) -> str:
+def departures_in_words(rows: list[dict]) -> str:
     """How many departures are as predicted, and the farthest."""
     both = [row for row in rows if None not in (row["observed_s"], row["predicted_s"])]
     neither = sum(row["observed_s"] is row["predicted_s"] is None for row in rows)
@@ -176,7 +183,7 @@ def departures_in_words(rows) -> str:
     return text + (f"; staying in only one of the two: {lost}." if lost else ".")
 
 
-def span(times) -> str:
+def span(times: Iterable[float | None]) -> str:
     """The first and the last of some times in words; None among them stands for never."""
     times = [time for time in times if time is not None]
     if not times:
@@ -185,6 +192,6 @@ def span(times) -> str:
     return f"{low} s" if low == high else f"{low} to {high} s"
 
 
-def near(dt) -> float:
+def near(dt: float) -> float:
     """How near a prediction an observed departure is to be, s: one step or 0.03 s."""
     return max(DEPARTURE_TOLERANCE, dt) * (1.0 + 1e-9)

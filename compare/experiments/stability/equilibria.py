@@ -1,15 +1,20 @@
 """What each held posture is, what one step of each method does there, and where that is in the method's stability region."""
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 
 from ...engines import one_of_each_scheme
 from ...engines.mujoco.linear import NUDGE, transition
+from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
-from ...truth.linear import held, region
-from .choice import capital, coarsest
-from .subjects import DAMPINGS, places
+from ...judge.words import capital
+from ...robots import Robot
+from ...setup import Setup
+from ...truth.linear import Held, held, region
+from .choice import coarsest_case
+from .subjects import DAMPINGS, Subjects, places
 
 FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
     1e-2,
@@ -17,11 +22,11 @@ FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
 )  # s, of steps whose amplification is compared; the second with much damping
 
 
-def check_equilibria(result, setup) -> None:
+def check_equilibria(result: Result, setup: Setup) -> None:
     """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
     robot, mujoco, table = setup.robot, setup.engines["mujoco"], []
     least, some, much = DAMPINGS
-    usual = (FINE_AMPLIFICATION, coarsest(robot).scene.dt)
+    usual = (FINE_AMPLIFICATION, coarsest_case(robot).scene.dt)
     for name in robot.postures:
         at = held(robot, name)
         values = at.modes[0]
@@ -39,7 +44,7 @@ def check_equilibria(result, setup) -> None:
     result.tables["stability_modes"] = table
 
 
-def kind_in_words(at) -> str:
+def kind_in_words(at: Held) -> str:
     """What a held posture is, and its modes."""
     values = at.modes[0]
     swings = [f"{v.imag:.3f} rad/s" for v in values if v.imag > 1e-3]
@@ -49,14 +54,14 @@ def kind_in_words(at) -> str:
     return f"{capital(at.name)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
 
 
-def check_amplification(result, where, q, ours, theirs) -> None:
+def check_amplification(result: Result, where: str, q: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> None:
     """The check of one amplification: within what rounding does to a difference quotient."""
     allowed = FACTOR * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max() / NUDGE
     quantity = "amplification of one step, TMT to MuJoCo"
     result.check(where, quantity, np.abs(ours - theirs).max(), allowed, "", rounding=True)
 
 
-def planes(result, robot, subjects, schemes) -> None:
+def planes(result: Result, robot: Robot, subjects: Subjects, schemes: Sequence[str]) -> None:
     """The stability region of each method in the plane of eigenvalue times dt, and where the postures are in it."""
     x, y = np.linspace(-7.2, 1.8, 226), np.linspace(-0.6, 6.4, 176)
     z = x[None, :] + 1j * y[:, None]

@@ -1,18 +1,21 @@
 """Failures that a linear limit does not foresee, or that an engine does not report."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 import tmt
 
 from ...case import Case
-from ...engines import LABELS, Engine
+from ...engines import LABELS, Engine, Method
 from ...engines.mujoco.linear import left_to_itself
+from ...judge.check import Result
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
+from ...robots import Robot
+from ...truth.linear import Held
 from .choice import fraction
-from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth, stiffest
+from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth_in_run, stiffest
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
 RESONANT_SWINGS = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
@@ -23,11 +26,18 @@ LARGE_DEVIATION = 1e-3  # rad, with which a small one is compared at the resonan
 DIVERGED_GROWTH = 1e300  # stands for the growth of a run that has diverged
 
 
-def edge(method, at, engines: Mapping[str, Engine], sizes, swings, steps=GROWTH_STEPS) -> np.ndarray:
+def edge_growth(
+    method: Method,
+    at: Held,
+    engines: Mapping[str, Engine],
+    sizes: Sequence[float],
+    swings: Sequence[float],
+    steps: int = GROWTH_STEPS,
+) -> np.ndarray:
     """Growth in so many steps along the stiffest mode of a posture, (sizes, swings): size in rad, swing = omega dt."""
     omega, direction = stiffest(at)
     return np.array([
-        [growth(method, engines, at, direction, swing / omega, size, steps) for swing in swings] for size in sizes
+        [growth_in_run(method, engines, at, direction, swing / omega, size, steps) for swing in swings] for size in sizes
     ])  # fmt: skip
 
 
@@ -47,7 +57,7 @@ def own_reset(case: Case, engines: Mapping[str, Engine]) -> dict:
     }  # fmt: skip
 
 
-def observed(case, t, run) -> dict:
+def observed(case: Case, t: np.ndarray, run: dict) -> dict:
     """A run that MuJoCo is left to itself with: its energy, J, since when it is wrong, and when that is noticed, s.
 
     since_s: the first time at which it has gained more energy than the range of the potential, or its clock goes back.
@@ -84,7 +94,7 @@ def highest_potential(tree: tmt.Tree, q: np.ndarray, sign: float) -> float:
     return float(now.max())
 
 
-def caught(case, t, run) -> float | None:
+def caught(case: Case, t: np.ndarray, run: dict) -> float | None:
     """The first time at which MuJoCo's clock does not advance or the energy is beyond its physical bound, s."""
     back = np.append(False, np.diff(run["time"]) <= 0.0)
     times = [float(t[np.argmax(back)])] if back.any() else []
@@ -112,7 +122,7 @@ def silent_gain(case: Case, engines: Mapping[str, Engine]) -> dict:
     return coarsest | {"definite": definite}
 
 
-def check_near(result, robot, posture: str, found) -> None:
+def check_near(result: Result, robot: Robot, posture: str, found: dict) -> None:
     """The resonance. found: of each method the growth (2, swings) from a small and a large deviation, in `steps`.
 
     That a large one grows is a property of the robot: a check where it is known to.
@@ -135,14 +145,14 @@ def check_near(result, robot, posture: str, found) -> None:
     )
 
 
-def fold(grown) -> str:
+def fold(grown: float) -> str:
     """A growth in words."""
     if not grown < DIVERGED_GROWTH:
         return "diverges"
     return f"{grown:.2f}-fold" if grown < 1e3 else f"{grown:.1e}-fold"
 
 
-def check_silent(result, reset, gain) -> None:
+def check_silent(result: Result, reset: dict, gain: dict) -> None:
     """Failures that MuJoCo does not report: where one occurs, it must be caught at once."""
     for where, run in (("Euler, automatic reset on", reset), ("implicit", gain)):
         if run["since_s"] is not None:
@@ -156,7 +166,7 @@ def check_silent(result, reset, gain) -> None:
     result.curves["silent"] = {"reset": reset, "gain": gain}
 
 
-def reset_in_words(reset) -> str:
+def reset_in_words(reset: dict) -> str:
     """Whether MuJoCo starts a run again by itself, and what gives that away."""
     case = reset["case"]
     text = f"MuJoCo's default, {case.name}, by Euler at {fraction(case.duration, case.scene.dt)} s with its automatic reset "
@@ -181,7 +191,7 @@ def reset_in_words(reset) -> str:
     )
 
 
-def gain_in_words(gain) -> str:
+def gain_in_words(gain: dict) -> str:
     """Whether `implicit` gains energy that is not there, and whether its matrix is definite."""
     case, silent, coarse = gain["case"], gain["since_s"] is not None, gain["definite"][min(gain["definite"])]
     least = ", ".join(f"{'none' if v is None else f'{v:.4f} kg m2'} at {n} steps" for n, v in gain["definite"].items())
@@ -202,11 +212,11 @@ def gain_in_words(gain) -> str:
     )
 
 
-def how_often(count) -> str:
+def how_often(count: int) -> str:
     """How often, in words."""
     return "once" if count == 1 else f"{count} times"
 
 
-def at_time(seconds) -> str:
+def at_time(seconds: float | None) -> str:
     """A time in words."""
     return "no time" if seconds is None else f"{seconds:.2f} s"

@@ -1,6 +1,6 @@
 """How long a marginal posture is kept: along a mode without stiffness the potential is cubic, which gives a law."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.integrate import quad
@@ -9,9 +9,10 @@ import tmt
 from tmt.dual import seeded
 
 from ...engines import LABELS, Engine, Method
+from ...judge.check import Result
 from ...judge.run import LEFT, departure
+from ...judge.words import capital
 from ...truth.linear import NEGLIGIBLE, Held
-from .choice import capital
 from .departure import own_torque, span
 
 EXPONENT_TOLERANCE = 0.02  # how near -1/2 the exponent of the time to leave is to be
@@ -33,7 +34,7 @@ def without_law(at: Held) -> str | None:
     return None
 
 
-def fall(method: Method, at: Held, engines: Mapping[str, Engine], sizes=FALL_SIZES) -> list[dict]:
+def fall(method: Method, at: Held, engines: Mapping[str, Engine], sizes: Sequence[float] = FALL_SIZES) -> list[dict]:
     """Rows for tables/departure.csv at a marginal posture: predicted from its cubic potential, not from a limit.
 
     Along the mode without stiffness m q'' = c q^2 with c = -V'''/2, so t = sqrt(3 m/(2 c)) times the integral of
@@ -58,7 +59,7 @@ def cubic(at: Held) -> tuple[np.ndarray, float]:
 
     c by nested dual numbers: the second derivative of the torque dV/dq along the mode.
     """
-    n, inertia = len(at.q), tmt.mass_matrix(at.q, at.tree)
+    n, inertia = len(at.q), at.mass_matrix
     values, vectors = np.linalg.eigh(-inertia @ at.matrix[n:, :n])
     shape = vectors[:, np.argmin(np.abs(values))]
     shape = shape / np.abs(shape).max()
@@ -74,7 +75,7 @@ def cubic(at: Held) -> tuple[np.ndarray, float]:
     return (shape, ratio) if ratio > 0.0 else (-shape, -ratio)
 
 
-def fall_time(slope, start) -> float:
+def fall_time(slope: float, start: float) -> float:
     """Time from rest at `start` to 0.1 rad beyond it in q'' = slope q^2, s."""
     end = start + LEFT
     # q = start + u^2 takes the root out of the integrand at the start
@@ -84,7 +85,7 @@ def fall_time(slope, start) -> float:
     return float(np.sqrt(1.5 / slope) * value)
 
 
-def check_falls(result, falls) -> None:
+def check_falls(result: Result, falls: list[dict]) -> None:
     """The law of the time to leave: a check of its exponent for each engine and side."""
     exponents = {}
     for engine in dict.fromkeys(row["engine"] for row in falls):
@@ -98,7 +99,7 @@ def check_falls(result, falls) -> None:
         result.notes.append(falls_in_words(falls, list(exponents.values())))
 
 
-def exponent(rows) -> float | None:
+def exponent(rows: list[dict]) -> float | None:
     """The power of the perturbation with which the time to leave goes, from the rows up to 1e-4 rad; None: not known."""
     small = [row for row in rows if abs(row["perturbation_rad"]) <= 1e-4 * (1 + 1e-9)]
     if len(small) < 2 or any(row["observed_s"] is None for row in small):
@@ -107,7 +108,7 @@ def exponent(rows) -> float | None:
     return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
 
 
-def falls_in_words(falls, exponents) -> str:
+def falls_in_words(falls: list[dict], exponents: Sequence[float | None]) -> str:
     """The law of the time to leave a marginal posture, and what the runs make of it."""
     known = [found for found in exponents if found is not None]
     law = "no series of runs leaves, so they give no power"

@@ -4,8 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
+from ...judge.check import Result
 from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, WIDTH
+from ...robots import Robot
 from .beyond import NEAR_TORQUES, ONE_ULP, above_in_words, within_in_words
 from .choice import fraction
 from .claims import VARIANT, ulps_of
@@ -15,7 +17,7 @@ from .figures_departure import ENGINE_LOOKS
 NOTHING_MOVES = 1e-17  # rad, where no movement is drawn
 
 
-def torques(result, robot):
+def draw_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Departure under the torques that differ in the last bit: when, and to which side."""
     claims, symbol = robot.claims, robot.symbol(robot.joints[0])
     rows = [row for row in result.tables["stability_torques"] if row["torque"].startswith(VARIANT)]
@@ -69,7 +71,7 @@ def torques(result, robot):
     return "stability_torques", fig, caption
 
 
-def sides_in_words(rows, engine, symbol) -> str:
+def sides_in_words(rows: list[dict], engine: str, symbol: str) -> str:
     """When the posture is left in one engine, and to which side."""
     mine = [row for row in rows if row["engine"] == engine]
     gone = [row["observed_s"] for row in mine if row["observed_s"] is not None]
@@ -78,7 +80,7 @@ def sides_in_words(rows, engine, symbol) -> str:
     return f"{label} after {span(gone)}, {up} to larger {symbol}, {down} to smaller, {never} never"
 
 
-def finer_steps(result, robot):
+def draw_finer_steps(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """The torque one ulp off: time to leave and movement after a run of the claims against the number of steps."""
     rows, claims, joint = result.tables["stability_finer_steps"], robot.claims, robot.joints[0]
     column, symbol, run = ulps_of(robot)[0], robot.symbol(joint), f"{claims.duration:g} s"
@@ -119,7 +121,7 @@ def finer_steps(result, robot):
     return "stability_finer_steps", fig, caption
 
 
-def finest_in_words(robot, rows) -> str:
+def finest_in_words(robot: Robot, rows: list[dict]) -> str:
     """From how many steps on nothing moves in any series, and what a step adds at the finest."""
     duration = robot.claims.duration
     counts = sorted({round(duration / row["dt_s"]) for row in rows}, reverse=True)
@@ -141,7 +143,7 @@ def finest_in_words(robot, rows) -> str:
     )
 
 
-def kept(result, robot):
+def draw_kept(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """The posture that is kept, under RK4 below and beyond its limit: deviation against the number of steps."""
     data, claims = result.curves["kept"], robot.claims
     steps = [dt for engine, torque, dt in data["paths"] if (engine, torque) == ("tmt", ONE_ULP)][:5]

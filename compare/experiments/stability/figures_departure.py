@@ -4,10 +4,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
+from ...judge.check import Result
 from ...judge.run import LEFT, number_or_nan
+from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
+from ...robots import Robot
 from ...truth.linear import of_kind
-from .choice import capital, coarsest, step_text
+from .choice import coarsest_case, step_text
 from .departure import DEPARTURE_TOLERANCE, late, near
 from .figures_limits import look
 
@@ -17,9 +20,9 @@ INTEGRATOR_MARKS = "x+1234"  # of MuJoCo's, one after the other
 ENGINE_LOOKS = {"tmt": (BLUE, "o"), "mujoco": (ORANGE, "s")}
 
 
-def times(result, robot):
+def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Time to leave a saddle against the size of the perturbation, with the predicted slope."""
-    saddle, coarse = of_kind(robot, "saddle"), coarsest(robot)
+    saddle, coarse = of_kind(robot, "saddle"), coarsest_case(robot)
     rows = [row for row in result.tables["departure"] if row["scene"] in (saddle, f"{saddle}, torque off")]
     steps = sorted({row["dt_s"] for row in rows}, reverse=True)
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
@@ -61,7 +64,7 @@ def times(result, robot):
     return "stability_departure", fig, caption
 
 
-def falls(result, robot):
+def draw_falls(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Time to leave a marginal posture against the perturbation: the law of a cubic potential."""
     posture = of_kind(robot, "marginal")
     rows = [row for row in result.tables["departure"] if row["scene"] == posture]

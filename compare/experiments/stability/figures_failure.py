@@ -5,15 +5,18 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ...engines import LABELS
+from ...judge.check import Result
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH
+from ...robots import Robot
 from ...truth.linear import of_kind
-from .choice import capital, coarsest, fraction, step_text
+from .choice import coarsest_case, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
 from .figures_limits import look
 from .limits import LINEAR_DEVIATION
 
 
-def edge(result, robot):
+def draw_edge(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """The nonlinear edge: tongues of growth over omega dt and the size of the perturbation; the resonance close up."""
     drawn, close = result.curves["edge"], result.curves["near"]
     maps, near, swings = drawn["grown"], close["grown"], close["x"]
@@ -64,7 +67,7 @@ def edge(result, robot):
     return "stability_edge", fig, caption
 
 
-def silent(result, robot):
+def draw_silent(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Runs that fail without a word: reset by MuJoCo, and `implicit` gaining energy."""
     reset, gain = (result.curves["silent"][key] for key in ("reset", "gain"))
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
@@ -100,9 +103,9 @@ def silent(result, robot):
     return "stability_silent", fig, caption
 
 
-def minutes(result, robot):
+def draw_minutes(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Energy over a minute of free motion, method by method, at a coarse and a fine step."""
-    runs, coarse = result.curves["minutes"], coarsest(robot)
+    runs, coarse = result.curves["minutes"], coarsest_case(robot)
     steps = sorted({run["row"]["dt_s"] for run in runs}, reverse=True)
     seconds = runs[0]["seconds"]
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")

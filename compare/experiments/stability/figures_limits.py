@@ -4,10 +4,12 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ...engines import LABELS
+from ...engines import LABELS, Method
+from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
+from ...robots import Robot
 from ...truth.linear import all_of_kind, of_kind
-from .choice import coarsest, damped, fraction
+from .choice import coarsest_case, damped, fraction
 from .departure import span
 from .limits import LINEAR_DEVIATION, apart
 
@@ -22,17 +24,17 @@ SCHEME_LOOKS = {  # colour, dash, name
 }
 
 
-def look(name) -> tuple:
+def look(name: str) -> tuple:
     """Colour, dash and printed name of a method."""
     return SCHEME_LOOKS.get(name, ("black", "-", name))
 
 
-def in_print(method) -> str:
+def in_print(method: Method) -> str:
     """The engine and the printed name of a method."""
     return f"{LABELS[method.engine]} {look(method.name)[2]}"
 
 
-def limits(result, robot):
+def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Predicted and observed limits as paired bars, scene by scene and damping by damping."""
     rows = [row for row in result.rows if row["scene"] in all_of_kind(robot, "centre")]
     panels = list(dict.fromkeys((row["scene"], row["damping"]) for row in rows))
@@ -93,9 +95,9 @@ def limits(result, robot):
     return "stability_limits", fig, caption
 
 
-def regions(result, robot):
+def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Eigenvalues times dt inside each method's stability region."""
-    drawn, points, case = result.curves["regions"], result.curves["points"], coarsest(robot)
+    drawn, points, case = result.curves["regions"], result.curves["points"], coarsest_case(robot)
     centre, dt = of_kind(robot, "centre"), case.scene.dt
     columns = 2 if len(drawn) == 4 else 3
     lines = -(-len(drawn) // columns)
@@ -149,7 +151,7 @@ def regions(result, robot):
     return "stability_regions", fig, caption
 
 
-def growth_map(result, robot):
+def draw_growth_map(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Growth over dt, a row for each engine and method."""
     drawn, centre = result.curves["map"], of_kind(robot, "centre")
     by_method, dts, steps, allowed = (drawn[key] for key in ("grown", "x", "steps", "allowed"))
@@ -187,7 +189,7 @@ def growth_map(result, robot):
     return "stability_map", fig, caption
 
 
-def map_in_words(by_method, dts, allowed, limit) -> str:
+def map_in_words(by_method: dict, dts: np.ndarray, allowed: float, limit: dict) -> str:
     """At which dt growth begins, beside the predicted limit; which method grows at every step, and which at none."""
     first = {
         method: float(dts[np.argmax(~(row < allowed))]) if not (row < allowed).all() else None

@@ -1,11 +1,13 @@
 """Step limits: up to which dt a method keeps a small deviation small, predicted from one step and observed in runs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...engines import Engine, Method
+from ...judge.check import Result
 from ...judge.run import deviation, number_or_none
+from ...robots import Robot
 from ...truth.linear import Held
 from .choice import damped, who
 
@@ -25,12 +27,12 @@ TINY_DEVIATION, TOTAL_GROWTH, MOST_GROWTH_STEPS = 1e-8, 1e3, 200
 LIMIT_KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
 
 
-def examine(
+def limits_and_growths(
     at: Held,
     engines: Mapping[str, Engine],
     methods: tuple[Method, ...],
     steps: int = GROWTH_STEPS,
-    growth_dts=(1e-3, 1e-2),
+    growth_dts: Sequence[float] = (1e-3, 1e-2),
 ) -> dict:
     """Rows for tables/stability.csv and tables/stability_growth.csv of one posture.
 
@@ -39,7 +41,7 @@ def examine(
     rows, growths = [], []
     for method in methods:
         kind, predicted = at.limit(method.scheme)
-        tolerance = allowed(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
+        tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
         dt = 1e-2 if predicted is None else 1.001 * predicted  # just above the limit its mode grows fastest
         _, shape, _ = at.fastest_growing(method.scheme, dt)
         seen, observed = observed_limit(method, engines, at, steps)
@@ -50,13 +52,21 @@ def examine(
         rows.append({
             "scene": at.name, "engine": method.engine, "method": method.name, "damping": at.case.scene.damping,
             "mode_per_s": np.abs(at.modes[0]).max() if kind == "never_fails" else at.rate(shape),
-            "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION, "seen": seen,
-            "allowed": tolerance,
+            "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION,
+            "seen": seen, "allowed": tolerance,
         })  # fmt: skip
     return {"rows": rows, "growths": growths}
 
 
-def growth(method, engines, at, direction, dt, size=LINEAR_DEVIATION, steps=GROWTH_STEPS) -> float:
+def growth_in_run(
+    method: Method,
+    engines: Mapping[str, Engine],
+    at: Held,
+    direction: np.ndarray,
+    dt: float,
+    size: float = LINEAR_DEVIATION,
+    steps: int = GROWTH_STEPS,
+) -> float:
     """The largest deviation of a run over that at its start, which is size x direction, rad; inf if it diverged."""
     dynamics, start = engines[method.engine].of(at.case), at.q + size * direction
     with np.errstate(over="ignore", invalid="ignore"):
@@ -64,7 +74,9 @@ def growth(method, engines, at, direction, dt, size=LINEAR_DEVIATION, steps=GROW
         return deviation(motion.q, at.q) / size
 
 
-def observed_limit(method, engines, at, steps=GROWTH_STEPS) -> tuple[str, float | None]:
+def observed_limit(
+    method: Method, engines: Mapping[str, Engine], at: Held, steps: int = GROWTH_STEPS
+) -> tuple[str, float | None]:
     """The largest dt at which no mode of the equations of motion grows in a run, found without the prediction.
 
     Upwards through TRIED_STEPS to the first step that fails, then by bisection; ("never_fails", None) if none does,
@@ -85,7 +97,9 @@ def observed_limit(method, engines, at, steps=GROWTH_STEPS) -> tuple[str, float 
     return "finite", float(low)
 
 
-def shares(method, engines, at, dt, steps) -> tuple[np.ndarray, np.ndarray]:
+def shares(
+    method: Method, engines: Mapping[str, Engine], at: Held, dt: float, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Shares of the modes in the deviation, over those at the start, in the second and the last quarter of a run, (2n,).
 
     All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of motion, not of
@@ -108,13 +122,13 @@ def shares(method, engines, at, dt, steps) -> tuple[np.ndarray, np.ndarray]:
         return early, late
 
 
-def quarter_of(at, dt, steps) -> int:
+def quarter_of(at: Held, dt: float, steps: int) -> int:
     """A quarter of a run of at least so many steps: it holds a swing of the slowest mode."""
     swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
     return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))) if len(swings) else 0)
 
 
-def allowed(at, scheme, limit, steps) -> float:
+def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
     """How far an observed limit may be from the predicted one, relative: 0.1 %, or more where that makes too little difference.
 
     So it is if little damping alone keeps a mode from growing: then it hardly grows just above the limit. So far above it that
@@ -127,14 +141,14 @@ def allowed(at, scheme, limit, steps) -> float:
     return float(excess)
 
 
-def grows(early, late) -> bool:
+def grows(early: np.ndarray, late: np.ndarray) -> bool:
     """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run."""
     if not np.isfinite(late).all():
         return True
     return bool(((late > GROWTH_ALLOWED) | ((late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED))).any())
 
 
-def growth_per_step(method, engines, at, dt) -> dict:
+def growth_per_step(method: Method, engines: Mapping[str, Engine], at: Held, dt: float) -> dict:
     """How much the fastest-growing mode grows in one step: in a run, by its share in the deviation, and predicted."""
     predicted, shape, measure = at.fastest_growing(method.scheme, dt)
     steps = int(np.clip(np.log(TOTAL_GROWTH) / np.log(predicted), 2, MOST_GROWTH_STEPS))
@@ -150,10 +164,12 @@ def growth_per_step(method, engines, at, dt) -> dict:
     }  # fmt: skip
 
 
-def map_of_growth(method, engines, at, dts, steps=GROWTH_STEPS) -> np.ndarray:
+def map_of_growth(
+    method: Method, engines: Mapping[str, Engine], at: Held, dts: Sequence[float], steps: int = GROWTH_STEPS
+) -> np.ndarray:
     """Growth of the deviation in so many steps along the stiffest mode of a posture, for each dt."""
     direction = stiffest(at)[1]
-    return np.array([growth(method, engines, at, direction, dt, steps=steps) for dt in dts])
+    return np.array([growth_in_run(method, engines, at, direction, dt, steps=steps) for dt in dts])
 
 
 def stiffest(at: Held) -> tuple[float, np.ndarray]:
@@ -164,7 +180,7 @@ def stiffest(at: Held) -> tuple[float, np.ndarray]:
     return float(values[k].imag), angles / np.abs(angles).max()
 
 
-def check_limits(result, robot, parts) -> None:
+def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
     """The table of limits and that of growth per step, and a check for each row."""
     late = {}
     for row in (row for part in parts for row in part["rows"]):
@@ -185,16 +201,16 @@ def check_limits(result, robot, parts) -> None:
         result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
     result.tables["stability_growth"] = growths
     result.notes[:0] = limits_in_words(robot, result.rows) + late_in_words(late)
-    result.notes += growth_in_words(growths)
+    result.notes += growth_per_step_in_words(growths)
 
 
-def apart(row) -> float | None:
+def apart(row: dict) -> float | None:
     """How far an observed limit is from the predicted one, relative; None if one of them is missing."""
     known = row["observed_dt_s"] and row["predicted_dt_s"]
     return abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if known else None
 
 
-def limits_in_words(robot, rows) -> list[str]:
+def limits_in_words(robot: Robot, rows: list[dict]) -> list[str]:
     """How far observed limits are from the predicted ones, damping by damping."""
     expected = [row for row in rows if row["limit"] == "finite"]
     known = [row for row in expected if apart(row) is not None]
@@ -213,7 +229,7 @@ def limits_in_words(robot, rows) -> list[str]:
     ]
 
 
-def late_in_words(late) -> list[str]:
+def late_in_words(late: Mapping[str, float]) -> list[str]:
     """Where growth is seen only far above a limit, {where: how far, relative}."""
     if not late:
         return []
@@ -224,7 +240,7 @@ def late_in_words(late) -> list[str]:
     ]
 
 
-def growth_in_words(rows) -> list[str]:
+def growth_per_step_in_words(rows: list[dict]) -> list[str]:
     """How far the growth of one step is from the predicted one, where a method always fails."""
     if not rows:
         return ["No method fails at every step in these scenes."]

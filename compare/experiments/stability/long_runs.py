@@ -1,6 +1,6 @@
 """Long runs: a minute of energy, and how far Newton's method carries the implicit methods."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ import tmt
 
 from ...case import Case
 from ...engines import Engine, Method
+from ...judge.check import Result
 from ...judge.run import diverged_at, number_or_none
 from ...truth.linear import Held
 from .choice import who
@@ -41,7 +42,7 @@ def long_run(method: Method, dt: float, case: Case, engines: Mapping[str, Engine
     return {"row": row, "scheme": method.scheme, "t": t[::every], "off": off[::every], "seconds": duration}
 
 
-def behaviour(off) -> tuple[str, float]:
+def behaviour(off: np.ndarray) -> tuple[str, float]:
     """Whether an energy drifts or stays bounded, and its change, J, from the first fifth of a run to the last.
 
     It drifts if the means of the two are apart by more than three standard deviations of either.
@@ -52,7 +53,9 @@ def behaviour(off) -> tuple[str, float]:
     return "drifts" if abs(change) > DRIFT_DEVIATIONS * max(first.std(), last.std()) else "bounded", change
 
 
-def newton(method: Method, at: Held, engines: Mapping[str, Engine], dts=NEWTON_STEPS, steps: int = 2000) -> list[dict]:
+def newton(
+    method: Method, at: Held, engines: Mapping[str, Engine], dts: Sequence[float] = NEWTON_STEPS, steps: int = 2000
+) -> list[dict]:
     """Steps of an implicit method that Newton's method finds, of so many, against dt, in small and in large motion."""
     direction, rest, dynamics = stiffest(at)[1], np.zeros_like(at.q), engines[method.engine].of(at.case)
     rows = []
@@ -68,7 +71,7 @@ def newton(method: Method, at: Held, engines: Mapping[str, Engine], dts=NEWTON_S
     return rows
 
 
-def check_minutes(result, minutes) -> None:
+def check_minutes(result: Result, minutes: Sequence[dict]) -> None:
     """The energy of a minute: an integrator of MuJoCo does as the same scheme in tmt does."""
     table = [run["row"] for run in minutes]
     result.tables["stability_energy"] = table
@@ -91,7 +94,7 @@ def check_minutes(result, minutes) -> None:
         result.notes.append(f"Energy over {seconds:g} s of {scene}, at dt = {dt:.4g} s: {by_kind}.")
 
 
-def check_newton(result, posture, found) -> None:
+def check_newton(result: Result, posture: str, found: Sequence[list[dict]]) -> None:
     """The table of the steps that Newton's method finds, and what it says; nothing where none was taken."""
     table = [row for rows in found for row in rows]
     if table:
@@ -99,14 +102,14 @@ def check_newton(result, posture, found) -> None:
         result.notes.append(newton_in_words(posture, table))
 
 
-def how_far(row) -> str:
+def how_far(row: dict) -> str:
     """How the energy of a minute behaves, in words."""
     if row["energy"] == "diverges":
         return f"at {row['diverged_at_s']:.2f} s"
     return f"within {row['largest_j']:.2g} J" if row["energy"] == "bounded" else f"by {row['change_j']:+.2g} J"
 
 
-def newton_in_words(posture, table) -> str:
+def newton_in_words(posture: str, table: list[dict]) -> str:
     """Up to which step Newton's method finds all stages, method by method and motion by motion, and why it fails."""
     methods = []
     for name in dict.fromkeys(row["method"] for row in table):

@@ -1,11 +1,14 @@
 """Which postures and motions of a robot are looked at, and what is left out because it has none."""
 
+from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
 
 from ...case import Case
+from ...judge.words import capital
+from ...robots import Robot
 from ...truth.linear import Held, all_of_kind, held, of_kind
-from .choice import capital, free_motion
+from .choice import free_motion
 from .falling import without_law
 from .limits import stiffest
 
@@ -25,7 +28,7 @@ class Subjects(NamedTuple):
     left_out: tuple[str, ...]  # what is left out, and why, in sentences
 
 
-def subjects_of(robot) -> Subjects:
+def subjects_of(robot: Robot) -> Subjects:
     """What is looked at of a robot."""
     centres, saddles = all_of_kind(robot, "centre"), all_of_kind(robot, "saddle")
     centre, saddle = (held(robot, names[0]) if names else None for names in (centres, saddles))
@@ -52,6 +55,8 @@ def subjects_of(robot) -> Subjects:
     return Subjects(centres, saddles, centre, saddle, swinging, marginal, free_motion(robot), tuple(left_out))
 
 
-def places(centres, saddles, dampings=DAMPINGS) -> list[tuple[str, float]]:
+def places(
+    centres: Sequence[str], saddles: Sequence[str], dampings: Sequence[float] = DAMPINGS
+) -> list[tuple[str, float]]:
     """Postures with the damping that is added, N m s/rad: centres with each, saddles with none."""
     return [*product(centres, dampings), *((name, 0.0) for name in saddles)]

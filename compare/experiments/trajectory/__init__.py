@@ -8,6 +8,7 @@ from ...judge.check import Result
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES
 from ...robots import Robot
+from ...setup import Setup
 from . import drift, errors, horizon, sentences
 from .derivative import compare_derivatives
 from .runs import follow
@@ -41,7 +42,7 @@ def tolerance(robot: Robot) -> str:
     )
 
 
-def begin(setup) -> None:
+def begin(setup: Setup) -> None:
     """Set the long work going, side by side, while other experiments compute.
 
     A quick run takes fewer scenes, and leaves out many digits and the growth of errors.
@@ -53,14 +54,20 @@ def begin(setup) -> None:
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = setup.of(cases, [], cases)
     duration, steps = setup.of(horizon.GROWTH_RUN, horizon.GROWTH_RUN, horizon.SHORT_GROWTH_RUN)
+    of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
         "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer), cases),
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
-        "growth": (grown, setup.map(partial(horizon.grown, duration=duration, steps=steps), grown), duration, steps),
+        "growth": (
+            grown,
+            setup.map(of_growth, grown),
+            duration,
+            steps,
+        ),
     }
 
 
-def rows(setup) -> Result:
+def rows(setup: Setup) -> Result:
     """Each scene, integrator and step: three levels of agreement; then drift, growth of errors, many digits."""
     result = Result("trajectory", shown=[
         "scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
@@ -70,7 +77,7 @@ def rows(setup) -> Result:
         begin(setup)
     work = setup.background.pop("trajectory")
     compare_derivatives(result, setup.robot, setup.engines)
-    drift.drift(
+    drift.measure_drift(
         result, setup.robot, setup.engines, setup.of(drift.DRIFT_STEPS, drift.DRIFT_STEPS, drift.FEW_DRIFT_STEPS)
     )
     result.curves["runs"] = {}
@@ -85,26 +92,28 @@ def rows(setup) -> Result:
         )
     if work["growth"][0]:
         horizon.growth_of_errors(result, *work["growth"])
-    result.curves["errors"] = errors.held(result, setup.robot) | errors.free(result, setup.robot)
+    result.curves["errors"] = errors.errors_when_held(result, setup.robot) | errors.errors_when_free(
+        result, setup.robot
+    )
     result.notes = sentences.notes(result, setup.robot, setup.engines, setup.finer) + result.notes
     return result
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Those of the assignment that show a held posture, one for each scene, drift, and the growth of errors."""
-    from . import figures_runs as draw  # matplotlib is for the processes that draw; `figures` is this function
+    from . import figures_runs  # matplotlib is for the process that draws
 
     names = {name for name, *_ in result.curves["runs"]}
     cases = [case for case in robot.cases if case.name in names]
     numbers = robot.claims.figures if robot.claims else {}
     numbered = [case for case in cases if case.is_held and case.name in numbers]
     for case in numbered:
-        yield partial(draw.held, result, case, numbers[case.name])
+        yield partial(figures_runs.draw_held, result, case, numbers[case.name])
     grown = "growth" in result.curves
     for case in cases:
         if grown or case not in numbered:  # a quick run has nothing more to show of those
-            yield partial(draw.run, result, case)
+            yield partial(figures_runs.draw_run, result, case)
     if result.curves["drift"]["drifts"]:
-        yield partial(draw.drift, result)
+        yield partial(figures_runs.draw_drift, result)
     if grown:
-        yield partial(draw.growth, result)
+        yield partial(figures_runs.draw_growth, result)

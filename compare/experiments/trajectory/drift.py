@@ -1,6 +1,6 @@
 """Energy and momentum along runs: what should be constant drifts with the step at the method's order."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ...case import Case
-from ...engines import LABELS, Dynamics, Engine, Method, one_of_each_scheme, same_scheme
+from ...engines import LABELS, Dynamics, Engine, Method, compared, one_of_each_scheme, same_scheme
 from ...judge.check import Result
 from ...judge.run import ORDER_MARGIN
 from ...judge.scale import EPS, FACTOR, gravity_scale
@@ -18,26 +18,25 @@ DRIFT_DURATION = 1.0  # s: short enough for the order to show, long enough to mo
 DRIFT_STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method
 FEW_DRIFT_STEPS = DRIFT_STEPS | {1: (512, 1024, 2048)}
 OF_EULER = 1e-3  # of Euler's drift: RK4's is below, with fewer steps
-ROUNDED = 10 * FACTOR * EPS  # of the terms of a quantity: a drift below is not that of the method alone
+DRIFT_ROUNDED = 10 * FACTOR * EPS  # of the terms of a quantity: a drift below is not that of the method alone
 
 
-def drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
+def measure_drift(result: Result, robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> None:
     """Energy and, without gravity, momentum of the first joint along free, undamped runs; steps: so many, by the order."""
     drifts, rounding = {}, {}  # (scene, quantity, unit): method of MuJoCo: engine: a value for each of the steps
     methods = one_of_each_scheme(engines["mujoco"])
     # in a scene of a user's own the order need not show in a second
     cases = [case for case in robot.cases if case.is_free and "own" not in case.scene.tags]
     for case in (case for case in cases if not any(case.tree.damping)):
-        dynamics = {name: engines[name].of(case) for name in ("tmt", "mujoco")}
-        quantities = constants(case)
+        dynamics, quantities = compared(engines, case), constants(case)
         rounding |= {(case.name, *of): bound for of, bound in zip(quantities, roundings(case))}
         for method in methods:
             for name, of_case in dynamics.items():
                 own = same_scheme(engines, method, name) if name != method.engine else method
-                paths = [run(case, of_case, own, count) for count in steps[method.order]]
+                paths = [path_in(case, of_case, own, count) for count in steps[method.order]]
                 for quantity, value in quantities.items():
                     of_scene = drifts.setdefault((case.name, *quantity), {}).setdefault(method, {})
-                    of_scene[name] = [largest(value, path) for path in paths]
+                    of_scene[name] = [largest_drift(value, path) for path in paths]
     check_drifts(result, drifts, rounding)
     result.curves["drift"] = {"drifts": drifts, "steps": {method: steps[method.order] for method in methods}}
     if not drifts:
@@ -48,17 +47,17 @@ def constants(case: Case) -> dict[tuple, Callable]:
     """What stays constant in a free case without damping: (name, unit): a function of q and v along a run."""
     first, found = case.robot.joints[0], {("energy", "J"): partial(tmt.energy, model=case.tree)}
     if not any(case.tree.gravity) and first in case.joints:
-        found[f"{first}-momentum", "N m s"] = partial(first_momentum, case.tree)
+        found[f"{first}-momentum", "N m s"] = partial(momentum_along, case.tree)
     return found
 
 
 def roundings(case: Case) -> tuple[float, float]:
     """Up to where a drift of the energy, J, and of the momentum of the first joint, N m s, may be rounding."""
     momenta = np.abs(tmt.mass_matrix(case.q, case.tree)) @ np.abs(case.v)
-    return ROUNDED * (gravity_scale(case.tree) + momenta @ np.abs(case.v) / 2), ROUNDED * momenta[0]
+    return DRIFT_ROUNDED * (gravity_scale(case.tree) + momenta @ np.abs(case.v) / 2), DRIFT_ROUNDED * momenta[0]
 
 
-def run(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
+def path_in(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:
     """q and v of a second in so many steps."""
     return dynamics.run(*case.start, case.tau, DRIFT_DURATION / count, count, method.name)[1:3]
 
@@ -85,7 +84,7 @@ def check_drifts(result: Result, drifts: dict, rounding: Mapping[tuple, float]) 
                     off = abs(found[engine] - method.order)
                     result.check(where, f"order of the drift of {quantity}, from {method.order}", off, ORDER_MARGIN, "")
                 if method.scheme == "rk4" and not is_rounding(of_scene[euler], allowed):
-                    share = over(values[-1], of_scene[euler][engine][-1])
+                    share = drift_ratio(values[-1], of_scene[euler][engine][-1])
                     result.check(where, f"drift of {quantity} over that of Euler", share, OF_EULER, "")
 
 
@@ -104,7 +103,7 @@ def is_rounding(engines: dict, allowed: float | None) -> bool:
     return allowed is not None and all(values[-1] <= allowed for values in engines.values())
 
 
-def largest(quantity, path) -> float:
+def largest_drift(quantity: Callable, path: tuple) -> float:
     """How far a quantity of the state goes from its start along a run; NaN if the run has diverged."""
     if not np.isfinite(path).all():
         return np.nan
@@ -112,17 +111,17 @@ def largest(quantity, path) -> float:
     return float(np.abs(values - values[0]).max())
 
 
-def found_order(values) -> float:
+def found_order(values: Sequence[float]) -> float:
     """The order at which the last two drifts fall, the last with half the step; NaN where nothing drifts."""
-    ratio = over(values[-2], values[-1])
+    ratio = drift_ratio(values[-2], values[-1])
     return float(np.log2(ratio)) if ratio > 0.0 else np.nan
 
 
-def over(one, other) -> float:
+def drift_ratio(one: float, other: float) -> float:
     """One drift over another; NaN if that is zero, or a run has diverged."""
     return one / other if other > 0.0 else np.nan
 
 
-def first_momentum(tree, q, v) -> np.ndarray:
+def momentum_along(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Angular momentum about the first hinge, which hangs on the world, along a run, N m s."""
     return np.einsum("sj,sj->s", tmt.mass_matrix(q, tree)[:, 0], v)

@@ -9,22 +9,22 @@ from ...robots import Robot
 from ...truth import reference
 
 
-def held(result: Result, robot: Robot) -> dict[str, tuple]:
+def errors_when_held(result: Result, robot: Robot) -> dict[str, tuple]:
     """Of each held scene, whose true motion is rest: {scene: (TMT, MuJoCo)}, rad.
 
     The largest angle over the run; None of a run that has diverged.
     """
     return {
         case.name: tuple(number_or_none(deviation(curve[name][0], curve[name][0][0])) for name in ("tmt", "mujoco"))
-        for case, curve in coarsest(result, robot)
+        for case, curve in coarsest_runs(result, robot)
         if case.is_held
     }
 
 
-def free(result: Result, robot: Robot) -> dict[str, tuple]:
+def errors_when_free(result: Result, robot: Robot) -> dict[str, tuple]:
     """The same of the other scenes whose true motion stands in the table of runs with more than 20 digits."""
     errors = {}
-    for case, curve in coarsest(result, robot):
+    for case, curve in coarsest_runs(result, robot):
         true = reference.committed(case) if case.steps == reference.RECORDS and not case.is_held else None
         if true:
             joints = range(len(case.joints))
@@ -33,7 +33,7 @@ def free(result: Result, robot: Robot) -> dict[str, tuple]:
     return errors
 
 
-def coarsest(result: Result, robot: Robot) -> Iterator[tuple[Case, dict]]:
+def coarsest_runs(result: Result, robot: Robot) -> Iterator[tuple[Case, dict]]:
     """Each case that was run, with the curve of its coarsest step of RK4."""
     runs = result.curves["runs"]
     for case in robot.cases:

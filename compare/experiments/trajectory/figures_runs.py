@@ -1,13 +1,18 @@
 """Figures of runs: angles and rates against time, differences in their bands, drift, growth of errors."""
 
+from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ...case import Case
 from ...engines import LABELS
+from ...judge.check import Result
 from ...judge.run import step_in_words
+from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, joint_lines
 from .drift import DRIFT_DURATION, found_order
 from .horizon import GROWN_EARLY, power
@@ -19,7 +24,7 @@ DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEGEND_COLUMNS = 4  # of a legend
 
 
-def over_time(ax, t, ours, theirs, case):
+def over_time(ax: Axes, t: np.ndarray, ours: np.ndarray, theirs: np.ndarray, case: Case) -> None:
     """Joint angles or rates against time: lines for TMT, up to 65 marks for MuJoCo."""
     every = slice(None, None, max(1, len(t) // 64))
     marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
@@ -31,7 +36,7 @@ def over_time(ax, t, ours, theirs, case):
     ax.plot([], [], color="black", label="MuJoCo", **marks)
 
 
-def held(result, case, number):
+def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str]:
     """The assignment's figure of a held posture: joint angles against time."""
     curve = result.curves["runs"][(case.name, "rk4", case.steps)]
     fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
@@ -51,7 +56,7 @@ def held(result, case, number):
     return f"assignment_figure_{number}", fig, caption
 
 
-def run(result, case):
+def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     """One scene under each scheme: angles, rates, and the difference under its band; grey: not judged."""
     of_case = [key for key in result.curves["runs"] if key[0] == case.name]
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
@@ -92,7 +97,7 @@ def run(result, case):
     return file_name("trajectory", case.name), fig, run_caption(result, case, until)
 
 
-def run_caption(result, case, until) -> str:
+def run_caption(result: Result, case: Case, until: Sequence[str]) -> str:
     """How far the engines are apart in a scene, how far from the true motion, and what diverges."""
     rows = [row for row in result.rows if row["scene"] == case.name and row["level"] == "open loop"]
     diverged = [row for row in rows if row["diverged_at_s"] is not None]
@@ -101,7 +106,7 @@ def run_caption(result, case, until) -> str:
     most = f"at most {max(used):.1e}" if used else "no measured part"
     errors = result.curves["errors"].get(case.name)
     return (
-        f"{case.name[0].upper()}{case.name[1:]}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
+        f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
             f"With {case.steps} steps of RK4 TMT is {rad(errors[0])} and MuJoCo {rad(errors[1])} from the true motion. "
@@ -113,7 +118,7 @@ def run_caption(result, case, until) -> str:
     )
 
 
-def drift(result):
+def draw_drift(result: Result) -> tuple[str, Figure, str]:
     """Drift of energy and momentum against the step size, both engines."""
     drifts, steps = (result.curves["drift"][key] for key in ("drifts", "steps"))
     lines = -(-len(drifts) // 3)
@@ -136,13 +141,14 @@ def drift(result):
     return "trajectory_drift", fig, drift_caption(drifts, steps)
 
 
-def drift_caption(drifts, steps) -> str:
+def drift_caption(drifts: dict, steps: dict) -> str:
     """At which order the drift falls, how large that of the energy is, and how alike the engines are in it."""
     orders, largest = [], []
     for method in dict.fromkeys(method for of in drifts.values() for method in of):
         of_engine = {name: [of[method][name] for of in drifts.values()] for name in ("tmt", "mujoco")}
         spans = [
-            f"{LABELS[name]} {span([found_order(v) for v in values], '.2f')}" for name, values in of_engine.items()
+            f"{LABELS[name]} {range_in_words([found_order(v) for v in values], '.2f')}"
+            for name, values in of_engine.items()
         ]
         orders.append(f"{method.name}: {', '.join(spans)}")
         energy = {name: max(of[method][name][-1] for (_, what, _), of in drifts.items() if what == "energy")
@@ -155,17 +161,18 @@ def drift_caption(drifts, steps) -> str:
     ratios = [theirs / ours if ours else np.nan for ours, theirs in pairs]
     return (
         "Drift of what should be constant (lines: TMT; marks: MuJoCo). The order at which it falls at the finest step, "
-        f"{'; '.join(orders)}. Largest of energy, {'; '.join(largest)}. MuJoCo's drift over TMT's: {span(ratios, '.3g')}."
+        f"{'; '.join(orders)}. Largest of energy, {'; '.join(largest)}. MuJoCo's drift over TMT's: "
+        f"{range_in_words(ratios, '.3g')}."
     )
 
 
-def span(values, digits) -> str:
+def range_in_words(values: Sequence[float], digits: str) -> str:
     """The least and the largest of some numbers in words."""
     values = [value for value in values if np.isfinite(value)]
     return f"{min(values):{digits}} to {max(values):{digits}}" if values else "no number"
 
 
-def growth(result):
+def draw_growth(result: Result) -> tuple[str, Figure, str]:
     """Growth of a small difference over the whole time, scene by scene."""
     t, curves = (result.curves["growth"][key] for key in ("t", "curves"))
     fig = Figure(figsize=(WIDTH, 3.2), layout="constrained")

@@ -1,16 +1,16 @@
 """How far digits reach: the growth of a small difference, and runs of the same scheme with many digits."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mpmath
 import numpy as np
 
-import tmt
 from tmt.methods import METHODS, one_step
 from tmt.reference import DIGITS, distance
 
 from ...case import Case
-from ...judge.check import Result
+from ...engines import Engine
+from ...judge.check import Result, closest
 from ...judge.rounding import growth
 from ...judge.run import step_in_words
 
@@ -23,12 +23,12 @@ MOST_EXACT_STEPS = 64  # of a run with many digits
 TOO_FAST = 1e4  # rad/s: a run with many digits that is faster has diverged
 
 
-def grown(case: Case, duration: float, steps: int) -> np.ndarray:
+def grown(case: Case, engines: Mapping[str, Engine], duration: float, steps: int) -> np.ndarray:
     """log10 of the growth of a small difference over so many steps of RK4, every 16 steps; NaN where the run diverges."""
     dt = duration / steps
-    _, *path = tmt.simulate(*case.start, case.tau, dt, steps, "rk4", case.tree)
+    motion = engines["tmt"].of(case).run(*case.start, case.tau, dt, steps, "rk4")
     with np.errstate(over="ignore", invalid="ignore"):  # of a run that is about to end
-        return growth(METHODS["rk4"], case.tree, *path, case.tau, dt, GROWTH_EVERY)
+        return growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_EVERY)
 
 
 def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, duration: float, steps: int) -> None:
@@ -39,7 +39,7 @@ def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, du
     result.notes += growth_in_words(t, curves)
 
 
-def growth_in_words(t, curves) -> list[str]:
+def growth_in_words(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> list[str]:
     """How much small differences have grown after 5 s and at the end, and which scenes have a horizon."""
     early = int(np.searchsorted(t, GROWN_EARLY))
     each = "; ".join(f"{name}: {power(g[early], 1)} and {power(g[-1], 1)}" for name, g in curves.items())
@@ -58,23 +58,23 @@ def growth_in_words(t, curves) -> list[str]:
     ]
 
 
-def power(exponent, digits) -> str:
+def power(exponent: float, digits: int) -> str:
     """A growth in words."""
     return f"10^{exponent:.{digits}f}" if np.isfinite(exponent) else "no number (the run diverges)"
 
 
-def known_until(t, grown) -> float:
+def known_until(t: np.ndarray, grown: np.ndarray) -> float:
     """Until when a growth is known, s."""
     return float(t[np.isfinite(grown)][-1])
 
 
-def reach(t, grown, digits) -> float | None:
+def reach(t: np.ndarray, grown: np.ndarray, digits: int) -> float | None:
     """When a difference of 10^-digits has grown to 1 rad, s; None: not in this time."""
     beyond = grown > digits
     return float(t[beyond][0]) if beyond.any() else None
 
 
-def time_in_words(t, grown, time) -> str:
+def time_in_words(t: np.ndarray, grown: np.ndarray, time: float | None) -> str:
     """A horizon in words."""
     return f"more than {known_until(t, grown):.0f} s" if time is None else f"about {time:.0f} s"
 
@@ -98,8 +98,7 @@ def many_digits(result: Result, cases: Sequence[Case], runs: Iterable[dict]) -> 
 def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: float) -> None:
     """The state of each engine's run that comes closest to the band of rounding, {engine: distances in rad, (states,)}."""
     for label, apart in (("TMT", off["tmt"]), ("MuJoCo", off["mujoco"])):
-        ratio = np.divide(apart, band, out=np.zeros_like(apart), where=band > 0)
-        k = int(np.argmax(ratio))  # NaN counts as the largest
+        (k,) = closest(apart, band)
         at = f"t = {k * dt:.3f} s"
         result.check(where, f"{label} to many digits of its own scheme", apart[k], band[k], "rad", at, True)
     result.notes.append(

@@ -8,7 +8,7 @@ import tmt
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import LABELS, Engine
+from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT
 from ...truth.linear import stiffness
@@ -18,9 +18,9 @@ STEADY = 1e-3  # per second: a slower growth is none in these runs
 NEAR_PREDICTION = 2  # steps: so near the time that is predicted from rounding, rounding is the cause
 
 
-def pushes(case: Case, engines: Mapping[str, Engine]) -> dict[str, np.ndarray]:
+def accelerations_left(case: Case, engines: Mapping[str, Engine]) -> dict[str, np.ndarray]:
     """The acceleration that each engine finds at the start under the torque that is to hold, rad/s2, (n,)."""
-    ours, theirs = (engines[name].of(case) for name in ("tmt", "mujoco"))
+    ours, theirs = compared(engines, case).values()
     return {
         "tmt": ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
         "mujoco": theirs.acceleration(*case.start, case.tau),
@@ -48,7 +48,7 @@ def linear_map(case: Case) -> tuple[np.ndarray, np.ndarray]:
     return np.eye(2 * n) + A @ pushed, pushed[:, n:]
 
 
-def predicted(case: Case, push: np.ndarray) -> float | None:
+def predicted_leaving(case: Case, push: np.ndarray) -> float | None:
     """When the linear map has the robot 0.1 rad away under a constant push, rad/s2: s; None: not in this scene."""
     J, G = linear_map(case)
     state = np.zeros(len(J))
@@ -66,17 +66,18 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
     may = allowed(case)
     grows = f"small deviations grow by up to e^{rate:.1f} per second" if rate > STEADY else "no small deviation grow"
     sentences = [f"The linear map of RK4 lets {grows}."]
-    for name, push in pushes(case, engines).items():
+    for name, push in accelerations_left(case, engines).items():
         if not np.isfinite(push).all():
             sentences.append(f"{LABELS[name]} gives no acceleration there.")
             continue
-        size, at = float(np.abs(push).max()), predicted(case, push)
+        size, at = float(np.abs(push).max()), predicted_leaving(case, push)
         away = (
             f"be {LEFT} rad away at {at:.2f} s" if at is not None else f"stay within {LEFT} rad for {case.duration:g} s"
         )
+        why = cause_in_words(case, size, may, at, left[name])
         sentences.append(
             f"{LABELS[name]}: the torque leaves an acceleration of {size:.1e} rad/s2 (rounding allows {may:.1e}); by that map "
-            f"alone the {case.robot.name} would {away}; it {left_in_words(left[name])}{cause(case, size, may, at, left[name])}."
+            f"alone the {case.robot.name} would {away}; it {left_in_words(left[name])}{why}."
         )
     return sentences
 
@@ -86,7 +87,7 @@ def left_in_words(left: float | None) -> str:
     return f"stays within {LEFT} rad" if left is None else f"is {LEFT} rad away at {left:.2f} s"
 
 
-def cause(case: Case, size: float, may: float, at: float | None, left: float | None) -> str:
+def cause_in_words(case: Case, size: float, may: float, at: float | None, left: float | None) -> str:
     """The cause of leaving, in words; nothing where the robot stays."""
     if left is None:
         return ""

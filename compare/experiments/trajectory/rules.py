@@ -1,12 +1,12 @@
 """The rules of a run: until when it is judged, how close the engines must be, how they end."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...judge.check import Result
+from ...judge.check import Result, closest
 from ...judge.rounding import NARROW
-from ...judge.run import MOVES
 
 
 def ends_first(ends: Mapping[str, float | None]) -> float:
@@ -34,18 +34,22 @@ def check_divergence(
         result.check(where, "step of divergence, MuJoCo's, is TMT's", theirs, ours, "", note, rule="equal")
 
 
-def check_movement(result: Result, where: str, moved: float) -> None:
-    """A free run moves: one that stays shows nothing."""
-    result.check(where, "movement", moved, MOVES, "rad", rule="at least")
-
-
 def check_same_bits(result: Result, where: str, integrator: str, first: list, other: list) -> None:
     """Integrators that are one scheme here give the same bits: q and v of both."""
     differ = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(first, other))
     result.check(where, f"the same bits as {integrator}", differ, 0.0, "arrays that differ", rule="equal")
 
 
-def check_level(result: Result, where: str, about: dict, joints, difference, tolerance, times, ending: dict) -> None:
+def check_level(
+    result: Result,
+    where: str,
+    about: dict,
+    joints: Sequence[str],
+    difference: np.ndarray,
+    tolerance: ArrayLike,
+    times: np.ndarray,
+    ending: dict,
+) -> None:
     """A row and a check: the component and state of the recorded ones that come closest to their tolerance.
 
     about, ending: the first and the last columns of the row; difference: (states, n) rad/s2, or (states, 2n) rad and rad/s;
@@ -54,8 +58,7 @@ def check_level(result: Result, where: str, about: dict, joints, difference, tol
     level, n = about["level"], len(joints)
     difference = np.abs(difference)
     tolerance = np.broadcast_to(tolerance, difference.shape)
-    ratio = np.divide(difference, tolerance, out=np.where(difference == 0.0, 0.0, np.inf), where=tolerance > 0)
-    k, i = np.unravel_index(np.argmax(ratio), ratio.shape)  # NaN counts as the largest
+    k, i = closest(difference, tolerance)
     unit, largest_unit = ("rad/s2",) * 2 if level == "derivative" else (("rad", "rad/s")[i // n], "rad")
     place = f"{joints[i % n]} at t = {times[k]:.3f} s"
     check = result.check(where, f"{level}, TMT to MuJoCo", difference[k, i], tolerance[k, i], unit, place, True)

@@ -8,12 +8,12 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import Dynamics, Engine, Method
+from ...engines import Dynamics, Engine, Method, compared
 from ...judge.check import Result
 from ...judge.rounding import band, slope_rounding, step_rounding
-from ...judge.run import departure, deviation_alive, diverged_at, step_in_words
+from ...judge.run import check_movement, departure, deviation_alive, diverged_at, required_time, step_in_words
 from ...truth.smallest import reduced
-from .rules import check_divergence, check_level, check_movement, check_same_bits, ends_first, judged
+from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
 STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
 
@@ -54,12 +54,12 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
     runs = [(case, steps, *item) for steps in counts(case, finer) for item in schemes.items()]
     if smaller := known[case]:
         runs.append((smaller, smaller.steps, "rk4", schemes["rk4"]))
-    dynamics = {each: {name: engines[name].of(each) for name in ("tmt", "mujoco")} for each in {run[0] for run in runs}}
+    dynamics = {each: compared(engines, each) for each in {run[0] for run in runs}}
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for each, steps, scheme, methods in runs:
             if (each, steps, scheme) not in known:
                 known[each, steps, scheme] = tmt_side(each, dynamics[each]["tmt"], steps, scheme)
-            compare(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
+            compare_runs(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
     return result
 
 
@@ -85,7 +85,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     )  # fmt: skip
 
 
-def compare(
+def compare_runs(
     result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
 ) -> None:
     """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step."""
@@ -98,14 +98,14 @@ def compare(
         ends = {"tmt": mine.ended, "mujoco": diverged_at(case, t, *theirs)}
         count = judged(times, angle_band, ends)
         where = f"{case.name}, {method.name}, {step_in_words(case, steps)}"
-        until, required = float(times[count - 1]), case.required(method.scheme, dt)
+        until, required = float(times[count - 1]), required_time(case, method.scheme, dt)
         about = {"scene": case.name, "engine_integrator": method.name, "twin": method.scheme, "dt_s": dt}
         ending = {
             "judged_until_s": until, "required_s": required, "diverged_at_s": ends["mujoco"],
             "twin_diverged_at_s": ends["tmt"],
         }  # fmt: skip
         one = one_step(dynamics, mine.states, tau, dt, method.name)
-        apart = beside(*(a[::every][:count] - b[::every][:count] for a, b in zip((mine.q, mine.v), theirs)))
+        apart = np.hstack([a[::every][:count] - b[::every][:count] for a, b in zip((mine.q, mine.v), theirs)])
         alive = times[: len(mine.states[0])]
         for level, difference, tolerance, at in (
             ("derivative", mine.derivative - accelerations, mine.derivative_tolerance[:, None], alive),
@@ -130,12 +130,6 @@ def compare(
             check_same_bits(result, where, first[0].name, first[1], theirs)
 
 
-def one_step(dynamics: Dynamics, states, tau, dt: float, method: str) -> np.ndarray:
+def one_step(dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str) -> np.ndarray:
     """Angles and rates one step after each of the states, (states, 2n)."""
-    motion = dynamics.run(*states, tau, dt, 1, method)
-    return beside(motion.q[:, 1], motion.v[:, 1])
-
-
-def beside(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Angles and rates side by side, (..., 2n)."""
-    return np.concatenate([q, v], axis=-1)
+    return dynamics.run(*states, tau, dt, 1, method).states[:, 1]

@@ -1,6 +1,6 @@
 """What a trajectory's runs say: claims about held postures, errors beside agreement, the methods of order 1."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from ...case import Case
 from ...engines import LABELS, Engine
 from ...judge.check import Result
 from ...judge.run import deviation, number_or_none
+from ...judge.words import capital
 from ...robots import Robot
 from .leaving import causes_in_words, left_in_words
 from .runs import STEPS_AT_MOST, counts
@@ -33,7 +34,7 @@ def notes(result: Result, robot: Robot, engines: Mapping[str, Engine], finer: Se
 def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     """What a run of a held posture says, of what is claimed of it if it is."""
     claims = case.robot.claims.of_scenes if case.robot.claims else {}
-    about = f"Claim: {claims[case.name]}. Here" if case.name in claims else f"{case.name[0].upper()}{case.name[1:]}"
+    about = f"Claim: {claims[case.name]}. Here" if case.name in claims else capital(case.name)
     moved = {name: number_or_none(deviation(curve[name][0], curve[name][0][0])) for name in ("tmt", "mujoco")}
     by = " and ".join(f"{LABELS[name]}'s {rad(value)}" for name, value in moved.items())
     return (
@@ -108,7 +109,7 @@ def of_first_order(runs: dict, cases: Mapping[str, Case]) -> list[str]:
     ]
 
 
-def ends_in_words(ended) -> str:
+def ends_in_words(ended: Mapping[str, float | None]) -> str:
     """When the runs of both engines diverge."""
     if not any(ended.values()):
         return "nothing diverges"
@@ -126,7 +127,7 @@ def of_left_out(cases: Sequence[Case], finer: Sequence[int]) -> list[str]:
     )
 
 
-def the_same(values):
+def the_same(values: Iterable) -> object:
     """The value that all are, or None."""
     values = set(values)
     return values.pop() if len(values) == 1 else None

@@ -8,6 +8,7 @@ from compare.engines.mujoco import additions, parse
 from compare.experiments import reduction
 from compare.experiments.reduction import cost, exact_motion, needs, sub_blocks
 from compare.judge.check import Result
+from compare.judge.run import check_movement, deviation
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
 
@@ -34,7 +35,7 @@ def test_sub_blocks_agree_within_64_eps(apart, passes):
 def test_a_free_run_moves(moved, passes):
     q = np.array([[0.3, 1.0], [0.3, 1.0 - moved], [0.35, 1.0]]) if np.isfinite(moved) else np.full((3, 2), np.nan)
     with np.errstate(invalid="ignore"):
-        assert verdicts(needs.check_movement, "zero, free", q) == {"movement": passes}
+        assert verdicts(check_movement, "zero, free", deviation(q, q[0])) == {"movement": passes}
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ def costs_of_two():
     seconds = {
         (name, i): 128e-9 * (k + 2) * (4 if i == "RK4" else 1) for k, name in enumerate(names) for i in ("RK4", "Euler")
     }
-    return cost.table(seconds, paths, dict.fromkeys(paths, 0.0))
+    return cost.cost_rows(seconds, paths, dict.fromkeys(paths, 0.0))
 
 
 def test_the_cost_of_an_addition_is_the_ratio_of_its_times():
@@ -40,7 +40,7 @@ def test_the_cost_of_an_addition_is_the_ratio_of_its_times():
 
 def test_the_costs_are_drawn_as_they_are():
     result = Result("reduction", tables={"cost_in_mujoco": costs_of_two()})
-    _, fig, caption = figures_needs.costs(result)
+    _, fig, caption = figures_needs.draw_costs(result)
     bars = [(to_hex(bar.get_facecolor()), bar.get_width(), bar.get_hatch()) for bar in fig.axes[0].patches]
     assert sorted(width for _, width, _ in bars) == pytest.approx(sorted(2 * [0.5, 1.0, 1.5]))
     assert {colour for colour, *_ in bars} == {BLUE, GREEN} and sum(hatch is not None for *_, hatch in bars) == 2
@@ -63,7 +63,7 @@ def needed_rows(engines):
                 seconds[name, JOINTS, engine, integrator] = whole * factor
             seconds[case.name, planar.joints, engine, integrator] = small * factor
     models = [(case.name, case), (case.name, planar), (held.name, held), (held.name, None)]
-    return times.table(models, Setup.small(ARM, engines), seconds, {(case.name, "tmt", "RK4"): 1e-12})
+    return times.time_rows(models, Setup.small(ARM, engines), seconds, {(case.name, "tmt", "RK4"): 1e-12})
 
 
 def test_the_table_has_nanoseconds_of_a_step(engines):
@@ -85,7 +85,7 @@ def test_the_figure_of_needs_draws_the_times_of_each_engine(engines):
         "needs": {"zero, free": {"locked": (), "stays": ("beta",)}, "bent, held": {"locked": (), "stays": JOINTS}}
     }
     result = Result("reduction", rows=needed_rows(engines), curves=curves)
-    _, fig, caption = figures_needs.needs(result, ARM)
+    _, fig, caption = figures_needs.draw_needs(result, ARM)
     points = [(to_hex(line.get_color()), line.get_xdata()[0], line.get_ydata()[0]) for line in fig.axes[1].get_lines()
               if len(line.get_xdata()) == 1]  # fmt: skip
     for colour, drawn_times in ((GREEN, (300.0, 100.0)), (ORANGE, (6000.0, 4000.0))):
@@ -101,7 +101,7 @@ def test_the_figure_of_needs_draws_the_times_of_each_engine(engines):
 
 def test_the_figure_of_needs_shows_which_joints_stay():
     curves = {"needs": {"swing": {"locked": ("alpha",), "stays": ("beta",)}}}
-    _, fig, caption = figures_needs.needs(Result("reduction", curves=curves), ARM)
+    _, fig, caption = figures_needs.draw_needs(Result("reduction", curves=curves), ARM)
     marks = {line.get_xdata()[0]: (line.get_marker(), line.get_markerfacecolor()) for line in fig.axes[0].get_lines()}
     assert marks[0][0] == "x" and marks[1] == ("o", "none") and marks[2][1].lower() == BLUE
     assert [text.get_text() for text in fig.axes[0].get_xticklabels()] == ["α", "β", "γ"]
@@ -118,36 +118,37 @@ def test_the_figures_of_known_motions_say_what_was_measured():
     dt = 0.02 / 2.0 ** np.arange(6)
     swings = {"elbow swing": {"dt": dt, "errors": errors, "orders": orders, "stated": {"RK4": 4, "Euler": 1}}}
     result = Result("reduction", curves={"swings": swings, "small": small})
-    _, fig, caption = figures_motion.swing(result, "elbow swing")
+    _, fig, caption = figures_motion.draw_swing(result, "elbow swing")
     lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].get_lines()}
     assert lines["RK4, TMT"] == 1e-3 and lines["RK4, MuJoCo"] == 3e-3
     assert [text.get_text() for text in fig.axes[0].texts] == ["order 4", "order 1"]
     assert "RK4: order 4.01 and 3.97, down to 9.5e-10 and 2.9e-09 rad" in caption
     assert "Euler: order 1.02 and not measured, down to" in caption
-    _, fig, caption = figures_motion.small_oscillations(result, ARM)
+    _, fig, caption = figures_motion.draw_small_oscillations(result, ARM)
     lines = {line.get_label(): line.get_ydata()[-1] for line in fig.axes[0].get_lines()}
     assert lines["TMT"] == 1e-4 and lines["MuJoCo"] == 3e-4
     assert "about hanging" in caption and "half the difference" not in caption
     assert "power 2.000 (TMT) and 0.000 (MuJoCo)" in caption and "1.0e-04 (TMT) and 3.0e-04 (MuJoCo) at 0.01" in caption
     small["sides"] = 2
-    assert "half the difference" in figures_motion.small_oscillations(result, ARM)[2]
+    assert "half the difference" in figures_motion.draw_small_oscillations(result, ARM)[2]
 
 
 def test_any_name_of_a_scene_is_drawn_as_it_is_and_gives_a_plain_file_name(tmp_path):
     scene = "to / $5 and $6_x^"
-    _, fig, caption = figures_needs.needs(
+    _, fig, caption = figures_needs.draw_needs(
         Result("reduction", curves={"needs": {scene: {"locked": (), "stays": JOINTS[:1]}}}), ARM
     )
     fig.savefig(tmp_path / "needs.png")
     assert f"proved, for {scene}." in caption
     errors = {(engine, i): [1e-3] * 6 for engine in ("tmt", "mujoco") for i in ("RK4", "Euler")}
     swing = {"dt": 0.02 / 2.0 ** np.arange(6), "errors": errors, "orders": {}, "stated": {"RK4": 4, "Euler": 1}}
-    name, fig, _ = figures_motion.swing(Result("reduction", curves={"swings": {scene: swing}}), scene)
-    assert len(figures_motion.swing(Result("reduction", curves={"swings": {300 * "x": swing}}), 300 * "x")[0]) == 60
+    name, fig, _ = figures_motion.draw_swing(Result("reduction", curves={"swings": {scene: swing}}), scene)
+    long = 300 * "x"
+    assert len(figures_motion.draw_swing(Result("reduction", curves={"swings": {long: swing}}), long)[0]) == 60
     assert name == "reduction_to_5_and_6_x_" and not fig.axes[0].texts  # no order is measured
 
 
 def test_an_empty_section_has_no_figures_and_none_raises():
     empty = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}}, tables={"cost_in_mujoco": []})
     assert len(list(reduction.figures(Result("reduction", curves={"swings": {}}), ARM))) == 0
-    assert len(figures_needs.needs(empty, ARM)) == len(figures_needs.costs(empty)) == 3
+    assert len(figures_needs.draw_needs(empty, ARM)) == len(figures_needs.draw_costs(empty)) == 3

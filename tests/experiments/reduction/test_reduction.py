@@ -38,7 +38,7 @@ def test_a_small_run_takes_every_path(small):
 def test_the_scene_of_the_readme_runs(engines, tmp_path):
     readme = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
     (tmp_path / "my.toml").write_text(re.search(r"^```toml\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL).group(1))
-    scenes = scene_file.read(tmp_path / "my.toml", ARM)
+    scenes = scene_file.read_scenes(tmp_path / "my.toml", ARM)
     (case,) = dataclasses.replace(ARM, scenes=scenes).cases
     assert (case.duration, case.steps) == (2.0, 64)
     result = reduction.rows(experiment.Setup.small(ARM, engines), [case], timed=False)

@@ -48,19 +48,19 @@ def test_sizes_follow_the_robot_and_its_base():
 
 
 def test_the_fall_is_the_regular_scene_else_a_free_one_else_a_posture():
-    assert cost.fall(ARM).name == "bent, free"
+    assert cost.fall_case(ARM).name == "bent, free"
     scenes = (
         Scene("weightless", gravity=False),
         Scene("held", torque="hold"),
         Scene("locked", locked=("beta",)),
         Scene("free"),
     )
-    assert cost.fall(dataclasses.replace(ARM, scenes=scenes)).name == "free"
-    let_go = cost.fall(dataclasses.replace(ARM, scenes=scenes[:-1]))
+    assert cost.fall_case(dataclasses.replace(ARM, scenes=scenes)).name == "free"
+    let_go = cost.fall_case(dataclasses.replace(ARM, scenes=scenes[:-1]))
     assert let_go.scene.posture == "zero" and let_go.is_free
     short = Scene("short", "bent", duration=0.25, dt=0.25 / 64, judged=0.1)
-    assert cost.fall(dataclasses.replace(ARM, scenes=(short,))).duration == 5.0  # time enough to come to rest
-    assert cost.fall(dataclasses.replace(ARM, scenes=(), postures={})).posture.tolist() == [0.0] * 3
+    assert cost.fall_case(dataclasses.replace(ARM, scenes=(short,))).duration == 5.0  # time enough to come to rest
+    assert cost.fall_case(dataclasses.replace(ARM, scenes=(), postures={})).posture.tolist() == [0.0] * 3
 
 
 def test_a_body_whose_centre_of_mass_is_at_its_joint_gets_a_ball(mujoco):

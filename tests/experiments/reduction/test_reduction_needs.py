@@ -26,7 +26,7 @@ def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
     results = []
     for engine in (mujoco, wrong):
         results.append(Result("reduction"))
-        sub_blocks.compare(results[-1], experiment.Setup.small(ARM, experiment.engines(engine)), angles=2)
+        sub_blocks.compare_blocks(results[-1], experiment.Setup.small(ARM, experiment.engines(engine)), angles=2)
     right, deleted = (result.checks for result in results)
     assert len(right) == 6 * 2 * 3 and all(check.passed for check in right)
     failed = {check.scene for check in deleted if not check.passed}
@@ -52,10 +52,10 @@ def test_the_planar_arm_moves_as_the_whole_one(engines):
     result = Result("reduction", curves={"apart": {}})
     smaller = reduced(case)
     assert smaller.joints == ("alpha", "gamma")
-    needs.runs(result, case, smaller, setup, "RK4")
+    needs.compare_smaller(result, case, smaller, setup, "RK4")
     assert len(result.checks) == 6 and all(check.passed for check in result.checks)
     # a planar arm that starts elsewhere is another motion
-    needs.runs(result, case, smaller.changed(posture=(0, 0, 1e-6)), setup, "RK4")
+    needs.compare_smaller(result, case, smaller.changed(posture=(0, 0, 1e-6)), setup, "RK4")
     assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
 
 

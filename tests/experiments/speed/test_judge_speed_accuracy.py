@@ -115,9 +115,12 @@ def test_the_true_error_in_words(ours, theirs, says):
 def test_only_the_arms_own_step_is_the_assignments():
     rows = [row("tmt", "rk4", 1e-3), row("mujoco", "RK4", 1e-3)]
     rows += [row("tmt", "rk4", 1e-6, 128, scene="mine"), row("mujoco", "RK4", 1e-6, 128, scene="mine")]
-    own, mine = accuracy.true_errors_in_words(rows, BENT | {"mine": 128}, ARM)
+    rows += [row("heyoka", "Taylor", 1e-6, 64, dt_s=None)]  # it chose as many steps by itself
+    rows += [row(*of, 1e-6, dt_s=1 / 64, scene="short") for of in (("tmt", "rk4"), ("mujoco", "RK4"))]
+    own, mine, short = accuracy.true_errors_in_words(rows, BENT | {"mine": 128, "short": 64}, ARM)
     assert own.startswith("At the assignment's step, 64 steps of RK4, ") and "mine" not in own
     assert mine.startswith("At the coarsest step, 128 steps of RK4, ") and "bent" not in mine
+    assert short.startswith("At the coarsest step, 64 steps of RK4, ") and "bent" not in short
 
 
 def test_sentences_of_first_order_and_smaller_models():

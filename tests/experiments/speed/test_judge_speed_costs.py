@@ -24,7 +24,7 @@ def test_a_row_gets_the_least_of_its_times():
 def test_nanoseconds_of_a_state():
     found = evaluations.per_state({(FORWARD, WHOLE, 1, 1): 100, (RK4_STEP, MJ_STEP, 1, 1): 10}, [[3e-4, 2e-4], [1e-4]])
     assert found == {(FORWARD, WHOLE, 1, 1): pytest.approx(2000.0), (RK4_STEP, MJ_STEP, 1, 1): pytest.approx(10_000.0)}
-    assert [(r["quantity"], r["implementation"], r["ns_per_state"]) for r in evaluations.table({
+    assert [(r["quantity"], r["implementation"], r["ns_per_state"]) for r in evaluations.evaluation_rows({
         (FORWARD, EACH, 1000, 1): 30.0, (FORWARD, WHOLE, 1, 1): 1400.0})] == [
         (FORWARD, WHOLE, 1400.0), (FORWARD, EACH, 30.0)]  # fmt: skip
 
@@ -66,7 +66,7 @@ def aims(ratio, lanes=300.0, vectors="some processor, AVX-512"):
     ns = {(FORWARD, WHOLE, 1, 1): 4000.0, (FORWARD, EQUAL, 1, 1): 1200.0, (RK4_STEP, MJ_STEP, 1, 1): 2000.0,
           (FORWARD, WAITING, 1, 1): 100.0 * ratio, (FORWARD, EACH, 1000, 1): 100.0 * ratio,
           (RK4_STEP, EACH, 1, 1): 100.0 * ratio, (FORWARD, IN_LANES, 1000, 1): 4000.0 / lanes}  # fmt: skip
-    result.tables["evaluations"] = evaluations.table(ns)
+    result.tables["evaluations"] = evaluations.evaluation_rows(ns)
     result.tables["what_should_i_use"] = [{"scene": s, "target_rad": t, "ratio": r / ratio} for s, t, r in (
         ("bent, free", 1e-6, 50), ("zero, free", 1e-9, 200), ("zero, free", 1e-12, 500), ("bent, damped", 1e-6, 1))]  # fmt: skip
     result.rows = [row("heyoka", "Taylor", 1e-10, seconds=1e-3), row("tmt", "dopri8", 1e-10, seconds=1e-3 * ratio)]

@@ -17,7 +17,7 @@ def drawn_result(*more):
     curves = {"floors": {"bent, free": 1e-15}, "regular": "bent, free"}
     result = Result("speed", rows=known_rows(), curves=curves)
     result.tables["what_should_i_use"] = advice.advice(result.rows, ["bent, free"], {"bent, free": 1e-15})
-    result.tables["evaluations"] = evaluations.table(NS)
+    result.tables["evaluations"] = evaluations.evaluation_rows(NS)
     result.check("bent, free", "the same error as tmt's rk4", 0.0, 1.0, "rad")
     result.check("bent, free", "the same error as tmt's implicit", 2.0, 1.0, "rad")
     result.rows += more
@@ -32,7 +32,7 @@ def test_the_fewest_evaluations_are_those_of_the_coarsest_step_that_is_near_enou
 
 def test_the_figures_draw_the_numbers_of_each_engine():
     result = drawn_result()
-    name, fig, caption = draw.times(result, "bent, free")
+    name, fig, caption = draw.draw_times(result, "bent, free")
     ax = fig.axes[0]
     lines = {(to_hex(line.get_color()), tuple(np.round(line.get_ydata(), 9))) for line in ax.get_lines()}
     assert (MUJOCOS, (20.0, 40.0, 80.0, 160.0, 320.0)) in lines and (OURS, (1.0, 2.0, 4.0, 8.0, 16.0)) in lines
@@ -40,15 +40,15 @@ def test_the_figures_draw_the_numbers_of_each_engine():
     assert name == "speed_bent_free" and (labels["MuJoCo"], labels["tmt"]) == (MUJOCOS, OURS)
     assert caption.startswith("Bent, free: MuJoCo's cheapest setting takes 20 times as long for 1e-02")
     assert "40 times as long for 1e-03 rad" in caption and "1 setting diverges" in caption
-    _, fig, caption = draw.evaluations(result)
+    _, fig, caption = draw.draw_evaluations(result)
     assert "Of 2 settings of MuJoCo near the reference 1 have the error" in caption
     assert "For 1e-09 rad (bent, free) rk4 needs" not in caption  # rk4 does not come so near
-    for figure in (fig, draw.energy(result)[1]):
+    for figure in (fig, draw.draw_energy(result)[1]):
         data = {line.get_label(): line for line in figure.axes[0].get_lines()}
         assert to_hex(data["MuJoCo: RK4"].get_color()) == MUJOCOS and to_hex(data["tmt: rk4"].get_color()) == OURS
         assert np.allclose(data["tmt: dopri8"].get_xdata(), [(2e-2 / 16**k) ** 2 for k in range(5)])
     assert np.allclose(data["MuJoCo: RK4"].get_ydata(), [20.0, 40.0, 80.0, 160.0, 320.0])
-    assert "MuJoCo RK4 3.1e-07 J" in draw.energy(result)[2] and "time for 5 s" in figure.get_supylabel()
+    assert "MuJoCo RK4 3.1e-07 J" in draw.draw_energy(result)[2] and "time for 5 s" in figure.get_supylabel()
 
 
 def test_an_engine_that_is_not_there_is_not_drawn():
@@ -60,7 +60,7 @@ def test_an_engine_that_is_not_there_is_not_drawn():
 
 
 def test_the_bars_are_nanoseconds_of_each_way():
-    _, fig, caption = figures_evaluations.cost_of_one(drawn_result(), "arm")
+    _, fig, caption = figures_evaluations.draw_cost(drawn_result(), "arm")
     ax = fig.axes[0]
     names = [label.get_text() for label in ax.get_yticklabels()]
     bars = {name: (bar.get_width(), to_hex(bar.get_facecolor())) for name, bar in zip(names, ax.patches)}
@@ -72,5 +72,5 @@ def test_the_bars_are_nanoseconds_of_each_way():
 def test_an_empty_section_has_no_figures_and_none_raises():
     empty = Result("speed", tables={"evaluations": []})
     assert list(speed.figures(empty, ARM)) == []
-    for draws in (draw.evaluations, draw.energy, lambda result: figures_evaluations.cost_of_one(result, "arm")):
+    for draws in (draw.draw_evaluations, draw.draw_energy, lambda result: figures_evaluations.draw_cost(result, "arm")):
         assert len(draws(empty)) == 3

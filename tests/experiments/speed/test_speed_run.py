@@ -20,7 +20,7 @@ def test_every_method_follows_the_scene(engines, bent, known_reference):
     for method in settings.methods(engines, "full"):
         steps = None if method.adaptive else 2**14 if method.order == 1 else 1024
         setting = Setting(5.0, steps, 1e-7 if method.adaptive else None)
-        row = speed.follow(bent, bent, engines, method, setting, known_reference)
+        row = speed.row_of_run(bent, bent, engines, method, setting, known_reference)
         tolerance = {1: 0.3, 2: 0.03}.get(method.order, 1e-4)
         assert 0.0 < row["worst_error_rad"] < tolerance, method
         assert row["error_rad"] <= row["worst_error_rad"] and not row["diverged"]
@@ -32,7 +32,9 @@ def test_every_method_follows_the_scene(engines, bent, known_reference):
 
 
 def test_a_run_that_diverges_has_no_error(engines, bent, known_reference):
-    row = speed.follow(bent, bent, engines, engines["tmt"].methods["explicit_euler"], Setting(5.0, 64), known_reference)
+    row = speed.row_of_run(
+        bent, bent, engines, engines["tmt"].methods["explicit_euler"], Setting(5.0, 64), known_reference
+    )
     assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
 
 
@@ -42,25 +44,28 @@ def test_the_smaller_model_has_the_error_of_the_whole_one(engines, known_referen
     smaller = speed.reduced(zero)
     assert smaller.locked == {"beta": 0.0}
     method, setting = engines["tmt"].methods["rk4"], Setting(5.0, 1024)
-    whole, small = (speed.follow(case, zero, engines, method, setting, known) for case in (zero, smaller))
+    whole, small = (speed.row_of_run(case, zero, engines, method, setting, known) for case in (zero, smaller))
     assert small["worst_error_rad"] == pytest.approx(whole["worst_error_rad"], rel=1e-3)
     assert small["energy_error_J"] == pytest.approx(whole["energy_error_J"], rel=1e-3)
     assert (whole["whole"], small["whole"], small["scene"]) == (None, "zero, free", "zero, free, beta locked")
 
 
-def test_rounding_leaves_eps_times_the_growth(bent):
+def test_rounding_leaves_eps_times_the_growth(bent, engines):
+    def floor(case):
+        return speed.floor(case, engines["tmt"].of(case))
+
     slow = bent.changed(posture=(), gravity=False, duration=1.0, dt=1 / 64)
-    assert 1.0 <= speed.floor(slow) / np.finfo(float).eps < 3.0  # nothing grows, at rest
-    assert speed.floor(bent) > 10 * speed.floor(slow)
+    assert 1.0 <= floor(slow) / np.finfo(float).eps < 3.0  # nothing grows, at rest
+    assert floor(bent) > 10 * floor(slow)
     fast = bent.changed(speed=(1e7, 1e7, 1e7))
     with pytest.raises(ValueError, match="scene 'bent, free': RK4 with 16384 steps does not reach its end"):
-        speed.floor(fast)
+        floor(fast)
 
 
 def test_where_the_reference_is_not_known_nothing_is_judged(engines, bent, known_reference):
-    for halving, left in ((1e-30, speed.floor(bent)), (1e-6, 1e-6)):
+    for halving, left in ((1e-30, speed.floor(bent, engines["tmt"].of(bent))), (1e-6, 1e-6)):
         known = {"bent, free": known_reference._replace(halving=halving)}
-        assert speed.errors(bent, engines, known, "small", "same schemes")[1] == left
+        assert speed.rows_of_scene(bent, engines, known, "small", "same schemes")[1] == left
 
 
 def test_a_small_run_takes_every_path(engines, small):
@@ -114,9 +119,8 @@ class Elsewhere:
 
 def test_an_engine_that_cannot_take_part_says_why_in_its_cells_and_is_nowhere_else(engines, bent):
     robot = dataclasses.replace(ARM, scenes=(bent.scene,))
-    with_it, without = (
-        speed.rows(experiment.Setup.small(robot, some)) for some in (engines | {"own": Elsewhere()}, engines)
-    )
+    two = {name: engines[name] for name in ("mujoco", "tmt")}
+    with_it, without = (speed.rows(experiment.Setup.small(robot, some)) for some in (two | {"own": Elsewhere()}, two))
     rows = [row for row in with_it.rows if row["why_not"] is not None]
     assert rows == [
         dict.fromkeys(speed.COLUMNS)

@@ -68,7 +68,7 @@ def test_steps_are_halved_from_the_scenes_own_to_the_finest(bent, engine, name, 
 def test_steps_of_any_scene_are_multiples_of_the_grid(duration, dt, coarsest, last):
     case = Case(ARM, Scene("mine", duration=duration, dt=dt))
     found = settings.settings_of(RK4, case)
-    assert settings.coarsest(case) == found[0].steps == coarsest and found[-1].steps == last
+    assert settings.coarsest_steps(case) == found[0].steps == coarsest and found[-1].steps == last
     assert all(s.steps % 64 == 0 and s.duration == duration for s in found)
     assert settings.settings_of(RK4, case, "full", "same schemes")
 

@@ -6,16 +6,10 @@ import pytest
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import beyond, claims, claims_judged, departure, figures_claims
-from compare.judge.check import Result
 from compare.robots.arm import ARM
 
 RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])
 NAMES = (*(f"{claims.VARIANT} {k}" for k in range(1, 28)), claims.NEAREST, *claims.CLEAR_TORQUES)
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
 
 
 def torque_rows(times=(4.7, 4.7), ulps=2.0, moved=0.0, sides=(1, 1), clear=(1, 1)):
@@ -74,7 +68,7 @@ def test_what_each_engine_does_is_said_of_that_engine(result):
     assert "TMT: 27 leave, after 4.11 s" in tmt_part and "27 to larger alpha and 0 to smaller" in tmt_part
     assert mujoco_part.startswith("27 leave, after 5.22 s") and "0 to larger alpha and 27 to smaller" in mujoco_part
     result.tables["stability_torques"] = rows
-    caption = figures_claims.torques(result, ARM)[2]
+    caption = figures_claims.draw_torques(result, ARM)[2]
     assert "TMT after 4.11 s, 27 to larger α, 0 to smaller" in caption
     assert "MuJoCo after 5.22 s, 0 to larger α, 27 to smaller" in caption
 
@@ -110,7 +104,7 @@ def test_claim_2(result, changed, word, passes):
     claims_judged.check_finer_steps(result, ARM, finer_rows(**changed))
     assert result.notes[-1].startswith(f"Claim 2, {word}:")
     assert [check.passed for check in result.checks] == 4 * [passes]
-    figures_claims.finer_steps(result, ARM)
+    figures_claims.draw_finer_steps(result, ARM)
 
 
 def test_the_printed_torque_is_judged_as_every_departure(result):
@@ -170,7 +164,7 @@ def test_claim_3(result, changed, word, failing):
 
 def test_torques_figure_has_each_engine_on_its_own_axis(result):
     result.tables["stability_torques"] = torque_rows(times=(4.0, 5.0))
-    _, fig, _ = figures_claims.torques(result, ARM)
+    _, fig, _ = figures_claims.draw_torques(result, ARM)
     for ax, engine, time in zip(fig.axes, ("TMT", "MuJoCo"), (4.0, 5.0)):
         assert ax.get_ylabel() == f"runs, {engine}" and {line.get_xdata()[0] for line in ax.lines} == {time}
     fills = {(line.get_ydata()[0], line.get_fillstyle()) for line in fig.axes[2].lines if line.get_marker() == "^"
@@ -182,7 +176,7 @@ def test_figure_of_what_is_kept_dots_mujoco(result):
     paths = {(method.engine, torque, 0.3): np.full(3, size)
              for method, size in zip(RK4, (1e-3, 1e-6)) for torque in beyond.NEAR_TORQUES}  # fmt: skip
     result.curves["kept"] = kept_runs() | {"paths": paths}
-    _, fig, _ = figures_claims.kept(result, ARM)
+    _, fig, _ = figures_claims.draw_kept(result, ARM)
     lines = [(line.get_linestyle(), line.get_ydata()) for line in fig.axes[0].lines]
     drawn = {(dash, y[0]) for dash, y in lines if len(y) and y[0] in (1e-3, 1e-6)}
     assert drawn == {("-", 1e-3), (":", 1e-6)}

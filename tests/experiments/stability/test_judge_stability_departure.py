@@ -4,25 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from judged import BOTH, only
 
 from compare.experiments.stability import departure, falling, figures_departure
 from compare.judge import run
-from compare.judge.check import Result
 from compare.robots.arm import ARM
 from compare.truth.linear import held
-
-BOTH = pytest.mark.parametrize("share, passes", [(0.999, True), (1.001, False)])
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
-
-
-def only(result) -> bool:
-    """Whether the one check of a result passes."""
-    (check,) = result.checks
-    return check.passed
 
 
 def departure_row(observed, predicted, dt=0.01, size=1e-6, engine="tmt", scene="ball catch"):
@@ -112,7 +99,7 @@ def test_departure_figure_marks_each_engine_at_its_times(result):
         departure_row(None, None),
         departure_row(1.0, 1.0, scene="ball catch, printed torque"),
     ]
-    _, fig, caption = figures_departure.times(result, ARM)
+    _, fig, caption = figures_departure.draw_departure(result, ARM)
     lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].lines}
     assert lines["MuJoCo RK4"] == 3.0 and lines["RK4"] == 2.0
     assert "Marks: 3 runs. 2 leave as the map does, 2 of them" in caption

@@ -4,30 +4,17 @@ import dataclasses
 
 import numpy as np
 import pytest
+from judged import BOTH, INSIDE, only
 
 import tmt
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import choice, failure, figures_failure, long_runs
-from compare.judge.check import Result
 from compare.judge.scale import gravity_scale
 from compare.robots.arm import ARM
 
-INSIDE, OUTSIDE = 0.999, 1.001  # of a tolerance
-BOTH = pytest.mark.parametrize("share, passes", [(INSIDE, True), (OUTSIDE, False)])
 IMPLICIT = Tmt().methods["implicit"]
 FREE = choice.free_motion(ARM)
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
-
-
-def only(result) -> bool:
-    """Whether the one check of a result passes."""
-    (check,) = result.checks
-    return check.passed
 
 
 @pytest.mark.parametrize(
@@ -180,7 +167,7 @@ def test_edge_names_each_engine_with_its_growth(result):
     }
     result.curves["edge"] = {"x": np.array([1.0, 2.0]), "y": np.array([1e-3, 1e-2]), "steps": 2000,
                              "grown": {IMPLICIT: np.ones((2, 2))}}  # fmt: skip
-    caption = figures_failure.edge(result, ARM)[2]
+    caption = figures_failure.draw_edge(result, ARM)[2]
     assert "TMT implicit 1.50-fold and 200.00-fold; MuJoCo implicit 2.50-fold and diverges" in caption
 
 
@@ -189,7 +176,7 @@ def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
     for run, size in zip(runs, (0.1, 0.2)):
         run["t"], run["off"] = np.arange(60.0), np.full(60, size)
     result.curves |= {"minutes": runs, "silent": {"gain": {"range": 18.8}}}
-    _, fig, caption = figures_failure.minutes(result, ARM)
+    _, fig, caption = figures_failure.draw_minutes(result, ARM)
     drawn = {line.get_label(): (line.get_marker(), line.get_ydata()[0]) for line in fig.axes[0].lines}
     assert drawn == {"RK4": ("None", 0.1), "MuJoCo, same scheme": ("o", 0.2)}
     assert "drifts: RK4" in caption

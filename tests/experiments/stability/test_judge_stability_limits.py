@@ -2,28 +2,15 @@
 
 import numpy as np
 import pytest
+from judged import BOTH, only
 
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import equilibria, figures_limits, limits
-from compare.judge.check import Result
 from compare.robots.arm import ARM
 
 EPS = 2.0**-52
-INSIDE, OUTSIDE = 0.999, 1.001  # of a tolerance
-BOTH = pytest.mark.parametrize("share, passes", [(INSIDE, True), (OUTSIDE, False)])
 RK4 = Tmt().methods["rk4"]
-
-
-@pytest.fixture
-def result():
-    return Result("stability")
-
-
-def only(result) -> bool:
-    """Whether the one check of a result passes."""
-    (check,) = result.checks
-    return check.passed
 
 
 @BOTH
@@ -115,7 +102,7 @@ def test_limits_figure_marks_mujoco_where_mujoco_is(result):
     )
     names = ("rk4", "implicit_midpoint", "implicit")
     result.curves["schemes"] = {("tmt", name): name for name in names} | {("mujoco", "RK4"): "rk4"}
-    _, fig, caption = figures_limits.limits(result, ARM)
+    _, fig, caption = figures_limits.draw_limits(result, ARM)
     marks = [line.get_xdata() for line in fig.axes[0].lines if line.get_marker() == "|" and len(line.get_xdata())]
     assert [float(*x) for x in marks] == [0.0999]
     ends = sorted(bar.get_x() + bar.get_width() for bar in fig.axes[0].patches if bar.get_y() >= -1)

@@ -28,7 +28,7 @@ def method(engines):
 def test_predicted_and_observed_limits_agree(name, engines, method):
     ours = [method("tmt", scheme) for scheme in ("rk4", "semi_implicit_euler", "implicit_midpoint")]
     theirs = [method("mujoco", integrator) for integrator in ("RK4", "Euler")]
-    rows = limits.examine(held(ARM, name), engines, (*ours, *theirs))["rows"]
+    rows = limits.limits_and_growths(held(ARM, name), engines, (*ours, *theirs))["rows"]
     assert [row["seen"] for row in rows] == [row["limit"] for row in rows]
     assert sum(row["limit"] == "finite" for row in rows) == 4
     for row in rows:
@@ -40,7 +40,7 @@ def test_predicted_and_observed_limits_agree(name, engines, method):
 
 def test_the_limit_of_explicit_euler_with_little_damping_is_seen(engines, method):
     """Growth beyond it is slow: 100-fold in 2000 steps comes 6 % later."""
-    row = limits.examine(held(ARM, "bent", 0.5), engines, (method("tmt", "explicit_euler"),))["rows"][0]
+    row = limits.limits_and_growths(held(ARM, "bent", 0.5), engines, (method("tmt", "explicit_euler"),))["rows"][0]
     assert row["seen"] == "finite" and row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=5e-4)
 
 
@@ -53,7 +53,7 @@ def test_amplification_is_mujocos_and_sees_damping(mujoco, integrator):
 
 
 def test_departure_is_predicted_and_the_prediction_can_miss(engines, method):
-    rows = departure.examine(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
+    rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
     assert len({row["observed_s"] for row in rows}) > 8  # the arm left, at other times from other starts
     result = Result("stability")
     departure.check_departures(result, rows)
@@ -94,7 +94,7 @@ def test_departure_is_predicted_beside_a_mode_without_stiffness(engines, method)
     tree = dataclasses.replace(tmt.ARM, axis=((0.0, 0.0, 1.0), *tmt.ARM.axis[1:]))
     at = held(dataclasses.replace(ARM, tree=tree, postures={"inverted": (0, 180, 90)}), "inverted")
     assert at.kind == "saddle" and np.abs(at.modes[0]).min() < 1e-6
-    rows = departure.examine(0.01, at, engines, (method("tmt", "rk4"),))
+    rows = departure.departures(0.01, at, engines, (method("tmt", "rk4"),))
     result = Result("stability")
     departure.check_departures(result, rows)
     assert all(row["observed_s"] for row in rows) and all(check.passed for check in result.checks)
@@ -113,7 +113,7 @@ def test_own_bias_holds_for_ever(engines, method):
 
 def test_resonance_needs_a_large_perturbation(engines, method):
     sizes = [limits.LINEAR_DEVIATION, failure.LARGE_DEVIATION]
-    near = failure.edge(method("tmt", "implicit"), BENT, engines, sizes, failure.RESONANT_SWINGS)
+    near = failure.edge_growth(method("tmt", "implicit"), BENT, engines, sizes, failure.RESONANT_SWINGS)
     assert near[0].max() < 3.0 and near[1].max() > limits.GROWTH_ALLOWED
 
 
@@ -141,7 +141,7 @@ def test_a_wrong_method_is_seen(mujoco, engines, monkeypatch):
     right = METHODS["rk4"]
     wrong = RungeKutta(right.order, right.A, (1 / 6 + 0.01, 1 / 3 - 0.01, 1 / 3, 1 / 6), right.c)
     monkeypatch.setitem(METHODS, "rk4", wrong)
-    row = limits.examine(BENT, engines, (mujoco.methods["RK4"],))["rows"][0]
+    row = limits.limits_and_growths(BENT, engines, (mujoco.methods["RK4"],))["rows"][0]
     tolerance = limits.LIMIT_TOLERANCE
     assert row["limit"] != "finite" or abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) > tolerance
     assert np.abs(BENT.step("rk4", 0.1) - transition(mujoco.of(BENT.case), BENT.q, BENT.tau, 0.1, "RK4")).max() > 1e-4

@@ -2,7 +2,8 @@
 
 import dataclasses
 
-from compare.engines.mujoco import load
+from small_runs import on_the_moon
+
 from compare.experiment import Setup, engines
 from compare.experiments import stability
 from compare.robots import Robot
@@ -21,13 +22,11 @@ def test_a_small_run_fills_every_table(small):
     assert "left out" not in text
 
 
-def test_on_the_moon_no_sentence_speaks_of_the_stated_arm(tmp_path):
+def test_on_the_moon_no_sentence_speaks_of_the_stated_arm(beside):
     """Gravity 1.62: many checks fail, nothing raises, and the sentences say what happened there."""
-    path = tmp_path / "moon.xml"
-    path.write_text(ARM.mjcf.read_text().replace("0 0 -9.81", "0 0 -1.62"))
-    result = stability.rows(Setup.small(ARM, engines(load(path, ARM.tree))))
+    result, captions = beside.result(on_the_moon, "stability")
     assert sum(not check.passed for check in result.checks) > 100
-    text = " ".join(result.notes + [figure()[2] for figure in stability.figures(result, ARM)])
+    text = " ".join(result.notes + captions)
     for words in (
         "it never starts again",
         "stays definite",

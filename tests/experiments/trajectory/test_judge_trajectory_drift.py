@@ -10,7 +10,7 @@ import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.experiments.trajectory import drift
-from compare.experiments.trajectory.figures_runs import drift as draw
+from compare.experiments.trajectory.figures_runs import draw_drift as draw
 from compare.experiments.trajectory.figures_runs import drift_caption
 from compare.judge.check import Result
 from compare.robots.arm import ARM
@@ -45,7 +45,7 @@ def test_an_engine_that_does_not_drift_is_named(engines):
     """Without gravity MuJoCo's arm stays where it is let go, and TMT's falls."""
     rests = parse(ARM.mjcf.read_text().replace("0 0 -9.81", "0 0 0"), tmt.ARM)
     result = Result("trajectory")
-    drift.drift(result, ARM, engines | {"mujoco": rests}, {1: (32, 64), 4: (32, 64)})
+    drift.measure_drift(result, ARM, engines | {"mujoco": rests}, {1: (32, 64), 4: (32, 64)})
     for name in ("Euler", "RK4"):
         of = result.curves["drift"]["drifts"]["bent, free", "energy", "J"][METHODS[name]]
         assert of["mujoco"] == [0.0, 0.0] and min(of["tmt"]) > 0.0
@@ -64,7 +64,7 @@ def test_momentum_about_the_first_hinge_is_constant_where_nothing_turns_the_arm(
 
 def test_a_robot_without_a_free_scene_has_no_drift_and_the_notes_say_so(engines):
     still, result = dataclasses.replace(ARM, scenes=(CASES["bent, held"].scene,)), Result("trajectory")
-    drift.drift(result, still, engines, drift.FEW_DRIFT_STEPS)
+    drift.measure_drift(result, still, engines, drift.FEW_DRIFT_STEPS)
     assert result.checks == [] and result.curves["drift"]["drifts"] == {}
     assert result.notes == ["No scene of this arm is free and without damping: there is no drift to measure."]
 

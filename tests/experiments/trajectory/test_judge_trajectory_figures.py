@@ -16,7 +16,7 @@ def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
     curve = run_of(HELD, 0.1, 0.2, until=2.5, left=(None, 4.0))
     curves = {"runs": {("ball catch, held", s, 64): curve for s in ("rk4", "implicit", "semi_implicit_euler")}}
     result = Result("trajectory", curves=curves | {"errors": {"ball catch, held": (0.1, 0.2)}})
-    name, fig, caption = figures_runs.held(result, HELD, 2)
+    name, fig, caption = figures_runs.draw_held(result, HELD, 2)
     (ax,) = fig.axes
     lines = [line for line in ax.lines if len(line.get_xdata())]
     for i in range(3):
@@ -34,7 +34,7 @@ def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
     about = {"scene": "ball catch, held", "level": "open loop", "engine_integrator": "RK4", "dt_s": 5 / 64}
     ends = ((None, 0.25), (0.0, None), (None, 0.125))
     result.rows = [about | {"diverged_at_s": at, "difference_over_band": used} for at, used in ends]
-    name, fig, caption = figures_runs.run(result, HELD)
+    name, fig, caption = figures_runs.draw_run(result, HELD)
     assert name == "trajectory_ball_catch_held" and "difference is at most 2.5e-01 of the band" in caption
     assert "With 64 steps of RK4 TMT is 1.0e-01 rad and MuJoCo 2.0e-01 rad from the true motion." in caption
     assert "MuJoCo's run diverged: RK4 at dt = 0.0781 s." in caption and "RK4 to 2.50 s" in caption

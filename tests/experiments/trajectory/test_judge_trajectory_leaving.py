@@ -16,8 +16,8 @@ def test_the_linear_map_says_when_a_torque_that_is_off_makes_the_arm_leave():
         push = size * np.array([1.0, 0.5, -1.0])
         tau = HELD.tau + tmt.mass_matrix(HELD.q) @ push
         t, q, _ = tmt.simulate(*HELD.start, tau, 5 / 64, 64, "rk4")
-        assert leaving.predicted(HELD, push) == pytest.approx(departure(t, q), abs=5 / 64)
-    assert leaving.predicted(CASES["bent, held"], 1e-9 * np.ones(3)) is None
+        assert leaving.predicted_leaving(HELD, push) == pytest.approx(departure(t, q), abs=5 / 64)
+    assert leaving.predicted_leaving(CASES["bent, held"], 1e-9 * np.ones(3)) is None
 
 
 def test_rounding_is_the_cause_only_of_what_rounding_can_do():
@@ -31,7 +31,7 @@ def test_rounding_is_the_cause_only_of_what_rounding_can_do():
         (0.5 * may, None, 4.69, ": rounding of the torque alone does not explain it"),
         (9.0 * may, 0.1, None, ""),
     ):
-        assert leaving.cause(HELD, size, may, at, left) == said
+        assert leaving.cause_in_words(HELD, size, may, at, left) == said
 
 
 def test_what_is_said_of_a_held_arm_follows_its_numbers(engines):

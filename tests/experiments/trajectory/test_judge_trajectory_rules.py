@@ -7,6 +7,7 @@ from trajectory_curves import FREE, HELD
 
 from compare.experiments.trajectory import rules
 from compare.judge.check import Result
+from compare.judge.run import check_movement, required_time
 
 
 def test_a_run_is_judged_while_its_band_is_below_a_thousandth_of_a_radian_and_nothing_has_diverged():
@@ -43,10 +44,10 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
 
 
 def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
-    assert FREE.required("rk4", 5 / 64) == 5.0 and HELD.required("rk4", 5 / 64) == 2.5
+    assert required_time(FREE, "rk4", 5 / 64) == 5.0 and required_time(HELD, "rk4", 5 / 64) == 2.5
     for scheme in ("semi_implicit_euler", "implicit"):
-        assert (FREE.required(scheme, 0.0099), FREE.required(scheme, 0.0101)) == (5.0, 0.3)
-    assert FREE.changed(judged=0.2).required("implicit", 5 / 64) == 0.2
+        assert (required_time(FREE, scheme, 0.0099), required_time(FREE, scheme, 0.0101)) == (5.0, 0.3)
+    assert required_time(FREE.changed(judged=0.2), "implicit", 5 / 64) == 0.2
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, wi
 def test_a_free_run_moves_by_a_tenth_of_a_radian():
     for moved, passes in ((0.1001, True), (0.0999, False)):
         result = Result("trajectory")
-        rules.check_movement(result, "x", moved)
+        check_movement(result, "x", moved)
         assert verdicts(result) == {"movement": passes}
 
 

@@ -34,7 +34,7 @@ def damped():
 def judged_with(mujoco, mine, case=DAMPED) -> dict:
     """The checks of a run whose TMT side may be edited, by quantity."""
     result = Result("trajectory")
-    runs.compare(result, case, mujoco.of(case), 64, [METHODS["RK4"]], mine)
+    runs.compare_runs(result, case, mujoco.of(case), 64, [METHODS["RK4"]], mine)
     return {check.quantity: check for check in result.checks}
 
 
@@ -65,14 +65,14 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco, engines)
     assert judged_with(mujoco, side(case), case).keys() == levels
     assert judged_with(mujoco, side(FREE), FREE).keys() == levels | {"time judged", "movement"}
     result, robot = Result("trajectory"), dataclasses.replace(ARM, scenes=(case.scene,))
-    drift.drift(result, robot, engines, drift.FEW_DRIFT_STEPS)
+    drift.measure_drift(result, robot, engines, drift.FEW_DRIFT_STEPS)
     assert result.checks == []
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():
     moon = parse(XML.replace("0 0 -9.81", "0 0 -1.62"), tmt.ARM).of(HELD)
     mine, result = side(HELD), Result("trajectory")
-    runs.compare(result, HELD, moon, 64, [METHODS["RK4"]], mine)
+    runs.compare_runs(result, HELD, moon, 64, [METHODS["RK4"]], mine)
     (kept,) = result.curves.values()
     t, *theirs = moon.run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")[:3]
     assert all(np.array_equal(a, b) for a, b in zip(kept["tmt"], (mine.q, mine.v)))

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from edited import MODELS, XML
 from trajectory_curves import CASES
 
 import tmt
@@ -12,19 +13,6 @@ from compare.experiments.trajectory import drift, errors, horizon, sentences
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 
-XML = ARM.mjcf.read_text()
-MODELS = {
-    "the arm": ("", ""),
-    "on the moon": ("0 0 -9.81", "0 0 -1.62"),
-    "gravity off by its flag": ("<flag ", '<flag gravity="disable" '),
-    "ten times the gravity": ("-9.81", "-98.1"),
-    "damped by 5": ('axis="1 0 0"/>', 'axis="1 0 0" damping="5"/>'),
-    "with a spring": ('axis="1 0 0"/>', 'axis="1 0 0" stiffness="30"/>'),
-    "a muscle's activation": ("</mujoco>", '<actuator><position joint="beta" kp="3" timeconst="0.1"/></actuator></mujoco>'),
-    "a feather": (
-        'pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"', 'pos="1e-5 0 0" mass="1.5" diaginertia="1e-9 1e-9 1e-9"',
-    ),
-}  # fmt: skip
 STEPS = {1: (16, 32, 64), 4: (16, 32, 64)}
 FREE = CASES["bent, free"]
 
@@ -45,9 +33,9 @@ def other(request, known, engines):
         part = trajectory.follow(case, engines, (1,), known[0])
         result.rows += part.rows
         result.curves["runs"] |= part.curves
-    drift.drift(result, ARM, engines, STEPS)
+    drift.measure_drift(result, ARM, engines, STEPS)
     horizon.many_digits(result, [FREE], known[1])
-    result.curves["errors"] = errors.held(result, ARM) | errors.free(result, ARM)
+    result.curves["errors"] = errors.errors_when_held(result, ARM) | errors.errors_when_free(result, ARM)
     result.notes = sentences.notes(result, ARM, engines, (1,)) + result.notes
     return request.param, result
 

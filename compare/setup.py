@@ -1,0 +1,74 @@
+"""What an experiment is given: the robot, the engines, and how much is to be done."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeVar
+
+from . import states as samples
+from .case import Case
+from .engines import Dynamics, Engine, compared
+from .engines.heyoka import Heyoka
+from .engines.scipy import Scipy
+from .engines.tmt import Tmt
+from .robots import Robot
+
+T = TypeVar("T")
+
+
+def engines(mujoco: Engine) -> dict[str, Engine]:
+    """All engines by their names; some may be unavailable."""
+    return {engine.name: engine for engine in (mujoco, Tmt(), Scipy(), Heyoka())}
+
+
+def nothing(*_: object) -> None:
+    """Do nothing."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What an experiment needs: the robot, the engines, and how much is to be done."""
+
+    robot: Robot
+    engines: Mapping[str, Engine]
+    states: int = 10_000  # random states
+    exact_states: int = 200  # of these, how many are compared with the exact values too
+    map: Callable = map  # where the scenes of an experiment may run side by side
+    quiet: Callable = nothing  # waits until nothing runs beside: for timings
+    progress: Callable = nothing  # says how far long work has come
+    background: dict = field(default_factory=dict)  # work under way, by its name
+    finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
+    size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether some paths are left out."""
+        return self.size == "quick"
+
+    def of(self, full: T, quick: T, small: T) -> T:
+        """What a run of this size takes."""
+        return {"full": full, "quick": quick, "small": small}[self.size]
+
+    @classmethod
+    def quick(cls, robot: Robot, engines: Mapping[str, Engine], **more) -> "Setup":
+        """Fewer of everything, for a first answer in seconds."""
+        return cls(robot, engines, states=1000, exact_states=20, finer=(1,), size="quick", **more)
+
+    @classmethod
+    def small(cls, robot: Robot, engines: Mapping[str, Engine], **more) -> "Setup":
+        """Every path of a full run with few states and steps: for tests."""
+        return cls(robot, engines, states=50, exact_states=2, finer=(1, 2), size="small", **more)
+
+    def compared(self, case: Case | None = None) -> dict[str, Dynamics]:
+        """The dynamics of a case (of the robot as it is) in the two engines that are compared, tmt and mujoco."""
+        return compared(self.engines, case or self.robot.case())
+
+    @cached_property
+    def named(self) -> samples.Sample:
+        """The named postures."""
+        return samples.named(self.robot)
+
+    @cached_property
+    def random(self) -> samples.Sample:
+        """Random states."""
+        return samples.random(self.robot, self.states, self.exact_states)
