@@ -9,7 +9,7 @@ import tmt
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import GRID, Dynamics, Engine, Method, Setting
+from ...engines import COMPARED, GRID, LABELS, Dynamics, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.rounding import growth
@@ -91,9 +91,10 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     names = [case.name for case in cases]
     floors = dict(zip(names, lefts))
     result.curves |= {"floors": floors, "regular": regular.name}
-    fixed = [method for method in methods(setup.engines, setup.size, which) if not method.adaptive]
-    # with coarse steps errors are regular in this scene only, and not all methods come near
+    # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
+    taking = [m for m in methods(setup.engines, setup.size, which) if whole or m.engine in COMPARED]
+    fixed = [method for method in taking if not method.adaptive]
     falling = names if whole else [regular.name]
     result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete=whole or not timed)
     schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
@@ -107,7 +108,11 @@ def rows(setup: Setup, timed: bool = True) -> Result:
         add_times(result, setup, names, of_scenes)
     result.notes += accuracy.first_order_in_words(result.rows, floors)
     if timed:
-        result.rows += unavailable(setup, names)
+        absent = unavailable(setup, names)
+        result.rows += absent
+        result.notes += dict.fromkeys(
+            f"{LABELS.get(row['engine'], row['engine'])} takes no part: {row['why_not']}." for row in absent
+        )
     result.rows = [{name: row.get(name) for name in COLUMNS} for row in result.rows]
     return result
 
