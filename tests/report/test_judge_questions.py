@@ -1,5 +1,6 @@
 """The answers to the assignment's questions: which number is whose, what broke off, what is far from the truth."""
 
+import pytest
 from sections import section
 
 from compare.report.questions import answers
@@ -36,6 +37,21 @@ def test_the_answer_on_motion_names_the_true_errors_of_held_and_of_free_scenes(s
     answer = answer_of([Section("trajectory", "", "", "", small("trajectory"))])["i"]
     for scene in ("ball catch, held: ", "bent, held: ", "zero, free: 1.6 and 1.6", "bent, free: 0.27 and 0.27"):
         assert scene in answer
+
+
+@pytest.mark.parametrize(
+    "steps, words",
+    [((64, 64), "with its 64 steps the runs"), ((64, 20), "with the coarsest steps of each scene the runs")],
+)
+def test_the_answer_on_motion_says_of_how_many_steps_the_errors_are(steps, words):
+    of_trajectory = section("trajectory")
+    runs = {(name, "rk4", count * finer): {} for name, count in zip("ab", steps) for finer in (16, 1)}
+    of_trajectory.result.curves = {"errors": {"a": (1.0, 2.0), "b": (None, 3.0)}, "runs": runs}
+    answer = answer_of([of_trajectory])["i"]
+    assert (
+        f"{words} of TMT and MuJoCo are at most so many rad from the true motion: a: 1 and 2; b: diverged and 3"
+        in answer
+    )
 
 
 def test_what_to_use_gives_each_engine_its_own_time():

@@ -43,7 +43,7 @@ def parameters(dynamics: MujocoDynamics) -> dict:
         "gravcomp": m.body_gravcomp[dynamics.bodies],
         "gravity": m.opt.gravity.copy(),
         "tendon armature": m.tendon_armature.sum(),
-        "other mass": m.body_subtreemass[0] - m.body_mass[sorted(set(dynamics.bodies))].sum(),
+        "other mass": np.delete(m.body_mass, dynamics.bodies).sum(),
         "density": m.opt.density,
         "viscosity": m.opt.viscosity,
     }

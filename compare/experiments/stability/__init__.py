@@ -62,7 +62,7 @@ def begin(setup: Setup) -> None:
         places(seen.centres[:1], seen.saddles[:1], DAMPINGS[:2]),
     )
     leaving = of(choice.of_schemes(engines, departure.DEPARTURE_SCHEMES), methods, methods)
-    leaving_dts = of((coarse, *FINE_DEPARTURES), (coarse,), (coarse, *FINE_DEPARTURES[:1]))
+    leaving_dts = tuple(dict.fromkeys(of((coarse, *FINE_DEPARTURES), (coarse,), (coarse, *FINE_DEPARTURES[:1]))))
     rk4, edges = claims.of_claims(engines), tuple(engines["tmt"].methods[name] for name in failure.EDGE_SCHEMES)
     near = edges + tuple(same_scheme(engines, method, "mujoco") for method in edges)
     implicit = choice.implicit_methods(engines)
@@ -93,8 +93,8 @@ def begin(setup: Setup) -> None:
         "subjects": seen,
         "limits": ask(limits.limits_and_growths, [held(robot, *point) for point in points], methods=methods, steps=steps,
                       growth_dts=tuple(dict.fromkeys((*FINE_DEPARTURES[::-1], coarse)))),
-        "departure": ask(departure.departures, about(seen.saddle, tuple(dict.fromkeys(leaving_dts))), at=seen.saddle,
-                         methods=leaving),
+        "departure": ask(departure.departures, about(seen.saddle, leaving_dts), at=seen.saddle, methods=leaving),
+        "not led": departure.not_led_in_words(seen.saddle, leaving, leaving_dts) if seen.saddle else [],
         "falls": ask(falling.fall, about(seen.marginal, of(rk4, rk4[:1], rk4)), at=seen.marginal,
                      sizes=of(falling.FALL_SIZES, falling.FALL_SIZES, (1e-2, *falling.FALL_SIZES[4:6]))),
         "torques": claimed(claims.holding_torques),
@@ -144,7 +144,7 @@ def rows(setup: Setup) -> Result:
     if seen.centre:
         long_runs.check_newton(result, seen.centre.name, list(work["newton"]))
     result.tables = {name: table for name, table in result.tables.items() if table}
-    result.notes += seen.left_out
+    result.notes += [*work["not led"], *seen.left_out]
     planes(result, robot, seen, tuple(dict.fromkeys(method.scheme for method in methods)))
     return result
 

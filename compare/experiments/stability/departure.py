@@ -105,13 +105,23 @@ def predicted(
     return times
 
 
+def is_led(at: Held, scheme: str, dt: float) -> bool:
+    """Whether a method's step lets no mode grow faster than the one along which a saddle is left.
+
+    If it does, that mode outgrows the other from what rounding and squares of the deviation put into it, and the linear map
+    cannot say when the posture is left.
+    """
+    shape = at.fastest_growing(scheme, dt)[1]
+    return bool(np.isclose(at.rate(shape), at.modes[0][0].real, rtol=NEGLIGIBLE))
+
+
 def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
-    """Rows for tables/departure.csv: every method and perturbation at one dt, from one saddle."""
+    """Rows for tables/departure.csv: every method that is led and every perturbation at one dt, from one saddle."""
     values, vectors = at.modes
     n, steps = len(at.q), round(LONGEST_DEPARTURE / dt)
     shape = vectors[:n, 0].real / np.abs(vectors[:n, 0]).max()
     rows = []
-    for method in methods:
+    for method in (method for method in methods if is_led(at, method.scheme, dt)):
         own = own_torque(method, engines, at)
         sizes = [(size, size * shape, own) for size in PERTURBATIONS]
         # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
@@ -142,6 +152,17 @@ def check_departures(result: Result, rows: list[dict]) -> None:
             result, f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s, {row['perturbation_rad']:.0e} rad", row
         )
     result.notes.append(departures_in_words(rows))
+
+
+def not_led_in_words(at: Held, methods: tuple[Method, ...], dts: Iterable[float]) -> list[str]:
+    """Which methods are left out with which steps, because another mode grows faster than that of the saddle."""
+    found = [f"{method.label} at {dt:.4g} s" for method in methods for dt in dts if not is_led(at, method.scheme, dt)]
+    if not found:
+        return []
+    return [
+        f"Departures from {at.name} are not compared where a step lets another mode grow faster than that of the saddle, for "
+        f"then rounding decides: {'; '.join(found)}."
+    ]
 
 
 def late(row: dict) -> float | None:

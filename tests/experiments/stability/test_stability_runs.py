@@ -52,6 +52,16 @@ def test_amplification_is_mujocos_and_sees_damping(mujoco, integrator):
     assert np.abs(BENT.step(scheme, 0.01) - theirs).max() > 1e-2
 
 
+def test_a_departure_is_predicted_where_no_other_mode_grows_faster_than_that_of_the_saddle(engines, method):
+    """By the explicit Euler method with steps of 1 s a swing of ball catch grows 9.5-fold in each, what leaves 8.5-fold."""
+    ours = (method("tmt", "explicit_euler"),)
+    assert departure.is_led(BALL, "explicit_euler", 5 / 64) and not departure.is_led(BALL, "explicit_euler", 1.0)
+    assert departure.departures(1.0, BALL, engines, ours) == []
+    (text,) = departure.not_led_in_words(BALL, ours, (5 / 64, 1.0))
+    assert text.endswith("rounding decides: TMT explicit_euler at 1 s.")
+    assert departure.not_led_in_words(BALL, ours, (5 / 64,)) == []
+
+
 def test_departure_is_predicted_and_the_prediction_can_miss(engines, method):
     rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
     assert len({row["observed_s"] for row in rows}) > 8  # the arm left, at other times from other starts
