@@ -84,6 +84,7 @@ def rows(setup: Setup) -> Result:
     for part in work["runs"]:
         result.rows += part.rows
         result.checks += part.checks
+        result.notes += part.notes
         result.curves["runs"] |= part.curves
     horizon.many_digits(result, *work["exact"])
     if not work["exact"][0] and not setup.is_quick:

@@ -13,6 +13,7 @@ from ...engines import Engine
 from ...judge.check import Result, closest
 from ...judge.rounding import growth
 from ...judge.run import step_in_words
+from ...judge.words import listed
 
 GROWTH_EVERY = 16  # steps between two recorded values of a growth
 GROWTH_RUN = (60.0, 6144)  # s and steps of RK4, for the growth of errors
@@ -49,12 +50,16 @@ def growth_in_words(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> list[str
         for name, at in horizons.items()
         if any(time is not None for time in at.values())
     ]
-    least = min(known_until(t, g) for g in curves.values())
+    known = {name: known_until(t, g) for name, g in curves.items()}
+    at_once = [name for name, until in known.items() if not until]  # nothing is known of its growth
+    least = min((until for until in known.values() if until), default=0.0)
+    none = f"No scene has a horizon within {least:g} s: nowhere does a difference of the last digit grow to 1 rad"
+    none += f"; but of {listed(at_once)} nothing is known, for the run diverges at once." if at_once else "."
     return [
         f"Growth of a small difference of the state over {t[early]:g} s and {t[-1]:g} s (RK4, exact Jacobians): {each}.",
         f"These have a horizon, beyond which a run depends on its last digits and on the step: {'; '.join(found)}."
         if found
-        else f"No scene has a horizon within {least:g} s: nowhere does a difference of the last digit grow to 1 rad.",
+        else none,
     ]
 
 

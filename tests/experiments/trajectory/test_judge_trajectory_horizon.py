@@ -56,6 +56,11 @@ def test_a_horizon_of_a_run_that_diverges_is_known_until_there():
     assert horizon.growth_in_words(t, {"calm": 0.1 * t, "ends": ends / 9})[1].startswith(
         "No scene has a horizon within 50 s"
     )
+    at_once = np.where(t < 1.0, 0.0, np.nan)
+    assert horizon.growth_in_words(t, {"calm": 0.1 * t, "a": at_once, "b": at_once})[1].endswith(
+        "within 60 s: nowhere does a difference of the last digit grow to 1 rad; but of a and b nothing is known, for the run "
+        "diverges at once."
+    )
     _, fig, caption = draw(Result("trajectory", curves={"growth": {"t": t, "curves": {"calm": 0.1 * t, "ends": ends}}}))
     assert "ends: 10^2.0 and no number (the run diverges); calm: 10^0.5 and 10^6." in caption
     assert [text.get_position()[1] for text in fig.axes[0].texts[:2]] == [6.0, 20.0]

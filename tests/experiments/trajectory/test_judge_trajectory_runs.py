@@ -52,6 +52,21 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco, damped
         assert {quantity for quantity, check in tight.items() if not check.passed} == (set() if passes else {name})
 
 
+@pytest.mark.parametrize("rate", [100.0, 202.0, 5e4])
+def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
+    """Half a turn in 1/64 s is 201 rad/s."""
+    case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
+    result, mine = Result("trajectory"), side(case)
+    runs.compare_runs(result, case, mujoco.of(case), 64, [METHODS["RK4"]], mine)
+    one = [check for check in result.checks if check.quantity == "one step, TMT to MuJoCo"]
+    count, fast = len(mine.states[0]), int((np.abs(mine.states[1]).max(axis=1) / 64 > np.pi).sum())
+    assert all(check.passed for check in one) and len(one) == (fast < count) and bool(fast) == (rate > 201.1)
+    says = (
+        f"from {fast} of {count} recorded states a step turns a hinge by more than half a turn; these are not compared"
+    )
+    assert [says in note for note in result.notes] == [True] * bool(fast)
+
+
 @pytest.mark.parametrize("judged, passes", [(3.12, True), (3.13, False)])
 def test_the_time_that_is_judged_is_at_least_what_the_scene_asks_for(judged, passes, mujoco):
     case = HELD.changed(judged=judged)
