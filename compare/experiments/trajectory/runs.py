@@ -63,6 +63,11 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
             if (each, steps, scheme) not in known:
                 known[each, steps, scheme] = tmt_side(each, dynamics[each]["tmt"], steps, scheme)
             compare_runs(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
+    if fast := result.notes:
+        result.notes = [
+            "Recorded states from which a step turns a hinge by more than half a turn are not compared in one step: "
+            f"{'; '.join(fast)}."
+        ]
     return result
 
 
@@ -91,7 +96,10 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
 def compare_runs(
     result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
 ) -> None:
-    """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step."""
+    """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step.
+
+    Noted is from how many of the recorded states a step is too long to be compared alone.
+    """
     tau, dt, every, n = case.tau, case.duration / steps, steps // case.steps, len(case.joints)
     t, times, first = mine.t, mine.t[::every], None
     angle_band = mine.width[:, :n].max(axis=1)
@@ -120,10 +128,7 @@ def compare_runs(
                 continue
             check_level(result, where, about | {"level": level}, case.joints, difference, tolerance, at, ending)
         if not slow.all():
-            result.notes.append(
-                f"{where}: from {np.sum(~slow)} of {len(slow)} recorded states a step turns a hinge by more than half a turn; these "
-                "are not compared in one step."
-            )
+            result.notes.append(f"{where}: {np.sum(~slow)} of {len(slow)}")
         if required:  # a scene may leave it open
             result.check(where, "time judged", until, required, "s", rule="at least")
         check_divergence(result, where, ends, dt, steps, angle_band)
