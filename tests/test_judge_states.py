@@ -1,5 +1,7 @@
 """The states at which engines are compared, and how many of them a run of each size takes."""
 
+import dataclasses
+
 import numpy as np
 
 from compare.experiment import Setup
@@ -14,6 +16,7 @@ def test_the_states_are_spread_and_the_same_in_every_run(engines):
     assert not np.array_equal(first.qd, first.tau)
     named = Setup(ARM, engines).named
     assert named.exact_states == len(named.q) == 5 and np.abs(named.qd).min() > 0.0
+    assert [named.describe(k) for k in range(5)] == list(ARM.postures) == [single.name for single in named.each()]
 
 
 def test_sizes_of_a_run(engines):
@@ -21,3 +24,9 @@ def test_sizes_of_a_run(engines):
     assert [s.of("f", "q", "s") for s in (full, quick, small)] == ["f", "q", "s"]
     assert (full.states, full.exact_states, full.finer) == (10_000, 200, (1, 16, 128))
     assert full.is_quick is small.is_quick is False and quick.is_quick is True
+
+
+def test_a_robot_without_postures_is_looked_at_where_all_its_joints_are_at_zero(engines):
+    bare = dataclasses.replace(ARM, postures={}, scenes=())
+    named = Setup(bare, engines).named
+    assert (named.name, named.states, named.q.tolist()) == ("a posture", ("all joints at zero",), [[0.0, 0.0, 0.0]])

@@ -37,6 +37,8 @@ def test_a_difference_is_allowed_64_eps_of_its_own_states_scale(eps, passes, sig
     assert (check.value, check.tolerance, check.rule) == (abs(theirs[place]), 64 * EPS * scale[place], "at most")
     assert row["difference_over_bar"] == eps / 64 and row["bar"] == check.tolerance
     assert row["worst_q"] == " ".join(map(repr, sample().q[place].tolist()))
+    assert row["scale"] == scale[place] and check.note.startswith(f"state {place}: q = ({3.0 * place:.4f}, ")
+    assert row["worst_qd"] == " ".join(map(repr, sample().qd[place].tolist()))
     assert row["worst_tau"] == " ".join(map(repr, sample().tau[place].tolist()))
 
 
