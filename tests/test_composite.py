@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from trees import random_tree
+from trees import random_state, random_tree, tree_of_kinds
 
 import tmt
 from tmt import composite, kernels, method
+from tmt.exact import exact_tree
 from tmt.sine import LIMIT, sincos
 
 EPS = np.finfo(float).eps
@@ -21,8 +22,8 @@ def along_axes(rng, tree):
 
 
 def differences(tree, q, qd, number):
-    parts = method.bodies(tree, q, qd)
-    expected = [v for row in method.mass_matrix(parts) for v in row] + method.bias(parts, tree.gravity)
+    M, h = method.mass_matrix_and_bias(tree if number is float else exact_tree(tree, number), q, qd)
+    expected = [v for row in M for v in row] + h
     M, h = composite.mass_matrix_and_bias(tree, q, qd, number)
     assert max(map(abs, expected)) > 0.1
     return [abs(a - b) for a, b in zip([v for row in M for v in row] + h, expected)]
@@ -37,6 +38,19 @@ def test_composite_form_is_the_method_in_50_digits(rng, bodies):
             assert max(differences(tree, q, qd, mpmath.mpf)) < mpmath.mpf(10) ** -46
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_composite_form_is_the_method_for_every_kind_of_joint(seed):
+    rng = np.random.default_rng(seed)
+    tree = tree_of_kinds(rng, bodies=4, along_axes=True)
+    assert set(tree.kind) >= {"slide", "ball"}
+    with mpmath.workdps(50):
+        q, qd, _ = ([mpmath.mpf(v) for v in values.tolist()] for values in random_state(rng, tree))
+        assert max(differences(tree, q, qd, mpmath.mpf)) < mpmath.mpf(10) ** -46
+    tree = tree_of_kinds(rng, bodies=5)
+    q, qd, _ = (values.tolist() for values in random_state(rng, tree))
+    assert max(differences(tree, q, qd, float)) < 1e-12
+
+
 def test_composite_form_about_any_axes(rng):
     for bodies in (2, 5):
         tree = random_tree(rng, bodies=bodies)
@@ -45,11 +59,11 @@ def test_composite_form_about_any_axes(rng):
 
 
 def test_mass_on_a_hinge_axis_belongs_to_the_parent():
-    outer = composite.carried_by_hinge(tmt.ARM)[2]
+    outer = composite.carried_by_joint(tmt.ARM)[2]
     assert outer.mass == 0 and list(outer.moment)[1:] == [0, 0]
     assert [float(row.y) for row in outer.second] == [0.0, 0.0, 0.0]
     assert float(outer.moment.x) == pytest.approx(1.5 * 0.15)
-    inner = composite.carried_by_hinge(tmt.ARM)[0]
+    inner = composite.carried_by_joint(tmt.ARM)[0]
     assert inner.mass == 0 and list(inner.moment) == [0, 0, 0]
 
 

@@ -47,10 +47,10 @@ def test_T_is_the_derivative_of_the_position(model, state):
 def test_B_is_the_derivative_of_the_rotation(model, state):
     q, *_ = state
     _, B = tmt.jacobians(q, model)
-    turns = np.array([[list(row) for row in method.hinge_frames(model, list(q))[h].turn] for h in model.body_hinge])
+    turns = np.array([[list(row) for row in method.joint_frames(model, list(q))[h].turn] for h in model.body_hinge])
     for j, direction in enumerate(np.eye(len(q))):
         rates = complex_step(
-            lambda q: [[list(row) for row in method.hinge_frames(model, q)[h].turn] for h in model.body_hinge],
+            lambda q: [[list(row) for row in method.joint_frames(model, q)[h].turn] for h in model.body_hinge],
             q,
             direction,
         )

@@ -64,7 +64,7 @@ def test_tree_refuses_what_cannot_be(changes, says):
 
 
 def test_tree_needs_a_hinge_and_a_body():
-    with pytest.raises(ValueError, match="at least one hinge"):
+    with pytest.raises(ValueError, match="at least one joint"):
         tmt.Tree(
             (), (), np.zeros((0, 3)), np.zeros((0, 3)), (), (), (), (), np.zeros((0, 3)), np.zeros((0, 3, 3)), [0] * 3
         )

@@ -34,6 +34,73 @@ def random_tree(rng, bodies=4, damping=0.0) -> Tree:
     )
 
 
+def tree_of_kinds(rng, bodies=4, along_axes=False, kinds=("hinge", "slide", "ball", "free")) -> Tree:
+    """Bodies on joints of all these kinds, branched, off-axis, with armature, springs, damping, references away from zero.
+
+    along_axes: the axes are coordinate axes, which have length 1 exactly in any number of digits. The first body has the first
+    joint that is asked for at random, the others one or two; "free" (three slides and a ball) is only the first body's.
+    """
+
+    def frame():
+        if along_axes:  # in a body not twice the same
+            return np.eye(3)[np.roll([0, 1, 2], len(axis))]
+        turned, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        return turned * np.linalg.det(turned)
+
+    parent, offset, axis, kind, body_hinge, inertias = [], [], [], [], [], []
+    for b in range(bodies):
+        before = -1 if b == 0 else int(rng.choice([-1, *body_hinge]))
+        others = [name for name in kinds if name != "free"]
+        chosen = ["free"] if "free" in kinds and b == 0 else list(rng.choice(others, rng.integers(1, 3)))
+        for name in ["slide", "slide", "slide", "ball"] if chosen == ["free"] else chosen:
+            parent.append(before)
+            before = len(parent) - 1
+            offset.append(rng.uniform(-0.4, 0.4, 3) * (chosen != ["free"]))
+            kind.append(str(name))
+            axis += list(frame() if name == "ball" else frame()[:1])
+            if chosen == ["free"] and name == "slide":
+                axis[-1] = np.eye(3)[len(axis) - 1]
+        body_hinge.append(before)
+        spread = rng.uniform(-0.1, 0.1, (6, 3))  # six point masses: a tensor that a body can have
+        inertias.append(sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in spread))
+    n, nv = len(parent), len(axis)
+    rest = [x for name in kind for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-0.5, 0.5)])]
+    return Tree(
+        hinge_names=[f"{name}{i}" for i, name in enumerate(kind)],
+        parent=parent,
+        offset=offset,
+        axis=axis,
+        damping=rng.uniform(0.0, 0.5, nv),
+        body_names=[f"body{b}" for b in range(bodies)],
+        body_hinge=body_hinge,
+        mass=rng.uniform(0.5, 2.0, bodies),
+        com=rng.uniform(-0.3, 0.3, (bodies, 3)),
+        inertia=inertias,
+        gravity=rng.normal(size=3) * 5.0,
+        kind=kind,
+        armature=rng.uniform(0.0, 0.1, nv) * rng.integers(0, 2, nv),
+        stiffness=rng.uniform(0.0, 3.0, n) * rng.integers(0, 2, n),
+        rest=rest,
+        reference=[0.0 if name == "ball" else rng.uniform(-0.5, 0.5) for name in kind],
+    )
+
+
+def unit_quaternion(rng) -> np.ndarray:
+    """A random turn, w first."""
+    p = rng.normal(size=4)
+    return p / np.linalg.norm(p)
+
+
+def random_state(rng, tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A random q (nq,), and qd and tau (nv,)."""
+    q = [
+        x
+        for name in tree.kind
+        for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-3.0, 3.0) if name == "hinge" else rng.uniform(-1, 1)])
+    ]
+    return np.array(q), *rng.uniform(-3.0, 3.0, (2, len(tree.axis)))
+
+
 def mjcf(tree) -> str:
     """The same tree as MJCF text: one body for each body, its hinges in it."""
 

@@ -5,7 +5,7 @@ upper arm points along -z and the forearm along +x. The same numbers stand in mj
 the two models share nothing, and a test ties them.
 """
 
-from .method import hinge_frames
+from .method import joint_frames
 from .space import Vector
 from .tree import Tree
 
@@ -42,6 +42,6 @@ ARM = Tree(
 
 def points(q) -> list:
     """Shoulder, elbow and finger tips in the world, three Vectors in m, at hinge angles q (3 scalars, rad)."""
-    frames = hinge_frames(ARM, q)
+    frames = joint_frames(ARM, q)
     elbow, turn = frames[2].origin, frames[2].turn
     return [frames[0].origin, elbow, elbow + turn @ Vector(E, 0.0, 0.0)]

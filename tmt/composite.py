@@ -1,20 +1,20 @@
-"""The sums of method.py regrouped for speed: in the frames of the hinges, from the tips of the tree inward.
+"""The sums of method.py regrouped for speed: in the frames of the joints, from the tips of the tree inward.
 
-All that a hinge carries is one mass distribution: mass m, first moment s and second moment S = integral of x x' dm about
+All that a joint carries is one mass distribution: mass m, first moment s and second moment S = integral of x x' dm about
 the origin of its frame. Where that origin accelerates by a and the frame turns with P = [omegad]x + [omega]x[omega]x, the
 point x accelerates by a + P x, and force and moment of the distribution are
 
     f = m a + P s        n = integral of x cross (a + P x) dm = vee(P S) + s cross a.
 
-Virtual power asks for the component of n along each axis only: h_i = axis_i . n_i, with f and n summed over all that hinge
-i carries, gravity as an acceleration -g of the world. Column i of Mbar is the same for omegad = axis_i, a = 0, omega = 0
-and the distribution of the whole subtree. These are the sums of the assignment's part e in another order.
+Virtual power asks for the component of n along each axis only: h_i = axis_i . n_i, with f and n summed over all that joint
+i carries, gravity as an acceleration -g of the world; along a slide for that of f. Column i of Mbar is the same for
+omegad = axis_i (of a slide a = axis_i), all else 0, and the distribution of the whole subtree. These are the sums of the assignment's part e in another order.
 """
 
 from fractions import Fraction
 from typing import NamedTuple
 
-from .space import ZERO, Matrix, Vector, rotation
+from .space import IDENTITY, ZERO, Matrix, Vector, rotation, total_vector, turn_of
 
 
 class Distribution(NamedTuple):
@@ -78,27 +78,34 @@ def outer(a, b) -> Matrix:
     return Matrix([b * component for component in a])
 
 
-def carried_by_hinge(tree) -> list[Distribution]:
-    """The distribution that each hinge carries itself, in exact fractions, as far inward as it can be handed.
+def carried_by_joint(tree) -> list[Distribution]:
+    """The distribution that each joint carries itself, in exact fractions, as far inward as it can be handed.
 
     What lies on a hinge's axis (its mass, first moment and second moment along it) acts the same if it belongs to the
-    parent, so it is handed over: many numbers of the outer bodies become zeros, and what reaches the world drops out.
+    parent, and so does the mass at a ball's centre, or the second moment alone of what slides. So it is handed over: many
+    numbers of the outer bodies become zeros, and what reaches the world drops out.
     """
-    exact = [[Fraction(x) for x in v] for v in tree.axis]
-    axes = [Vector(*v) for v in exact]
+    joints = tree.coordinates.joints
+    axes = [Vector(*map(Fraction, tree.axis[by.start])) for _, _, by in joints]
     offsets = [Vector(*(Fraction(x) for x in v)) for v in tree.offset]
     own = [NOTHING] * len(axes)
-    for b, hinge in enumerate(tree.body_hinge):
-        if hinge >= 0:
+    for b, joint in enumerate(tree.body_hinge):
+        if joint >= 0:
             mass, com = Fraction(tree.mass[b]), Vector(*(Fraction(x) for x in tree.com[b]))
             inertia = [[Fraction(x) for x in row] for row in tree.inertia[b]]
             half = sum(inertia[i][i] for i in range(3)) / 2
             second = [
                 [(half if i == j else 0) - (inertia[i][j] + inertia[j][i]) / 2 for j in range(3)] for i in range(3)
             ]
-            own[hinge] = own[hinge].plus(Distribution(mass, Vector(0, 0, 0), Matrix(second)).moved(com))
+            own[joint] = own[joint].plus(Distribution(mass, Vector(0, 0, 0), Matrix(second)).moved(com))
     for i in reversed(range(len(axes))):
-        handed = own[i].on_line(axes[i])
+        none = Vector(0, 0, 0)
+        if tree.kind[i] == "hinge":
+            handed = own[i].on_line(axes[i])
+        elif tree.kind[i] == "ball":
+            handed = Distribution(own[i].mass, none, NOTHING.second)
+        else:
+            handed = Distribution(0, none, own[i].second)
         own[i] = own[i].less(handed)
         if tree.parent[i] >= 0:
             own[tree.parent[i]] = own[tree.parent[i]].plus(handed.moved(offsets[i]))
@@ -106,55 +113,82 @@ def carried_by_hinge(tree) -> list[Distribution]:
 
 
 def mass_matrix_and_bias(tree, q, qd, number=float) -> tuple[list, list]:
-    """Mbar (n rows of n, kg m2) and h (n, N m), as in method.py; over any scalar.
+    """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py; over any scalar.
 
-    q, qd: sequences of n scalars, rad and rad/s. number: the type of the model's numbers, float or mpmath.mpf; each is
-    the exact value, rounded once.
+    q (nq), qd (nv): sequences of scalars, rad and rad/s. number: the type of the model's numbers, float or mpmath.mpf; each
+    is the exact value, rounded once.
     """
-    n = len(tree.parent)
-    axes, offsets = [Vector(*v) for v in tree.axis], [Vector(*v) for v in tree.offset]
-    turns = [rotation(axis, angle) for axis, angle in zip(tree.axis, q)]
-    exact = carried_by_hinge(tree)
-    even = [d.even_about(Vector(*map(Fraction, axis))) for d, axis in zip(exact, tree.axis)]
+    n, joints = len(tree.axis), tree.coordinates.joints
+    axes = [Vector(*v) for v in tree.axis]
+    offsets, turns = zip(*(placed(tree, i, q) for i in range(len(joints))))
+    exact = carried_by_joint(tree)
+    even = [
+        d.even_about(Vector(*map(Fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
+        for d, (kind, _, by) in zip(exact, joints)
+    ]
     own, uneven, even = (
         [d.rounded(number) for d in ds] for ds in (exact, [d.less(e) for d, e in zip(exact, even)], even)
     )
 
     # outward: each frame's motion at qdd = 0, in its own axes
     motions = []
-    for i, parent in enumerate(tree.parent):
+    for i, (kind, _, by) in enumerate(joints):
         to_child = turns[i].transposed
-        if parent >= 0:
-            a, omega, omegad, P = motions[parent]
+        if tree.parent[i] >= 0:
+            a, omega, omegad, P = motions[tree.parent[i]]
             a, omega, omegad = a + P @ offsets[i], to_child @ omega, to_child @ omegad
         else:
             a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
-        spin = axes[i] * qd[i]
-        a, omegad, omega = to_child @ a, omegad + omega.cross(spin), omega + spin
+        moving = total_vector(axis * rate for axis, rate in zip(axes[by], qd[by]))
+        if kind == "slide":
+            motions.append((a + omega.cross(moving * 2.0), omega, omegad, turning(omega, omegad)))
+            continue
+        a, omegad, omega = to_child @ a, omegad + omega.cross(moving), omega + moving
         motions.append((a, omega, omegad, turning(omega, omegad)))
 
-    # inward: force and moment on all that a hinge carries, and its mass; what is even about the hinge is not turned
+    # inward: force and moment on all that a joint carries, and its mass; what is even about a hinge is not turned
     h, M = [None] * n, [[0.0] * n for _ in range(n)]
-    forces, moments = [ZERO] * n, [ZERO] * n
-    for i in reversed(range(n)):
+    forces, moments = [ZERO] * len(joints), [ZERO] * len(joints)
+    for i in reversed(range(len(joints))):
         a, _, _, P = motions[i]
         forces[i] = forces[i] + own[i].mass * a + P @ own[i].moment
         moments[i] = moments[i] + vee(P @ own[i].second) + own[i].moment.cross(a)
-        h[i] = axes[i].dot(moments[i])
-        carried = uneven[i].plus(even[i])
-        force, moment = axes[i].cross(carried.moment), carried.inertia @ axes[i]
-        M[i][i] = axes[i].dot(moment)
-        j = i
-        while tree.parent[j] >= 0:
-            force, moment = handed_down(turns[j], offsets[j], force, moment)
-            j = tree.parent[j]
-            M[i][j] = M[j][i] = axes[j].dot(moment)
-        parent = tree.parent[i]
+        carried, parent = uneven[i].plus(even[i]), tree.parent[i]
+        for k in range(*joints[i].qd.indices(n)):
+            slides = tree.kind[i] == "slide"
+            h[k] = axes[k].dot(forces[i] if slides else moments[i])
+            if slides:
+                force, moment = carried.mass * axes[k], carried.moment.cross(axes[k])
+            else:
+                force, moment = axes[k].cross(carried.moment), carried.inertia @ axes[k]
+            M[k][k] = axes[k].dot(force if slides else moment)
+            M[k][k] = M[k][k] + tree.armature[k] if tree.armature[k] else M[k][k]
+            for other in range(joints[i].qd.start, k):  # of the same ball
+                M[k][other] = M[other][k] = axes[other].dot(moment)
+            j = i
+            while tree.parent[j] >= 0:
+                force, moment = handed_down(turns[j], offsets[j], force, moment)
+                j = tree.parent[j]
+                for other in range(*joints[j].qd.indices(n)):
+                    M[k][other] = M[other][k] = axes[other].dot(force if tree.kind[j] == "slide" else moment)
         if parent >= 0:
             force, moment = handed_down(turns[i], offsets[i], forces[i], moments[i])
             forces[parent], moments[parent] = forces[parent] + force, moments[parent] + moment
             uneven[parent] = uneven[parent].plus(uneven[i].turned(turns[i]).plus(even[i]).moved(offsets[i]))
     return M, h
+
+
+def placed(tree, i, q) -> tuple[Vector, Matrix]:
+    """Origin and turn of joint i's frame in its parent's."""
+    kind, at, by = tree.coordinates.joints[i]
+    offset = Vector(*tree.offset[i])
+    if kind == "ball":
+        frame = Matrix(tree.axis[by])
+        return offset, frame.transposed @ turn_of(q[at]) @ frame
+    off = q[at.start] - tree.reference[i]
+    if kind == "slide":
+        return offset + Vector(*tree.axis[by.start]) * off, IDENTITY
+    return offset, rotation(tree.axis[by.start], off)
 
 
 def handed_down(turn, offset, force, moment):

@@ -7,7 +7,7 @@ a number of another level is a constant to it.
 
 from itertools import count
 
-from .space import cos, sin
+from .space import arctan, cos, sin, sqrt
 
 levels = count()
 
@@ -98,3 +98,9 @@ def jacobian(function, x) -> list:
 
 sin.register(Dual, lambda angle: angle.new(sin(angle.value), cos(angle.value) * angle.slope))
 cos.register(Dual, lambda angle: angle.new(cos(angle.value), sin(angle.value) * angle.slope * -1.0))
+sqrt.register(Dual, lambda x: _root(x, sqrt(x.value)))
+arctan.register(Dual, lambda x: x.new(arctan(x.value), x.slope / (1.0 + x.value * x.value)))
+
+
+def _root(x, root):
+    return x.new(root, x.slope / (root * 2.0))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .composite import carried_by_hinge
+from .composite import carried_by_joint
 
 
 class Arrays(NamedTuple):
@@ -29,7 +29,7 @@ class Arrays(NamedTuple):
 @lru_cache(maxsize=64)
 def arrays(tree) -> Arrays:
     """The Tree as arrays."""
-    carried = [d.rounded(float) for d in carried_by_hinge(tree)]
+    carried = [d.rounded(float) for d in carried_by_joint(tree)]
     return Arrays(
         np.array(tree.parent),
         np.array(tree.offset),

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .tree import Tree, real_numbers, shown
+from .tree import CLOSE_TO_ONE, Tree, real_numbers, shown
 
 
 def quantity(function: Callable) -> Callable:
@@ -29,26 +29,38 @@ def quantity(function: Callable) -> Callable:
 
 
 def states(model, **arrays) -> list:
-    """Each array as n scalars of one batch shape, after a check of type, shape and values."""
+    """Each array as nq scalars (q) or nv of one batch shape, after a check of type, shape and values."""
     checked_model(model)
-    n = len(model.hinge_names)
-    checked = []
+    coordinates, checked = model.coordinates, []
     for name, values in arrays.items():
+        n = coordinates.nq if name == "q" else coordinates.nv
         array = real_numbers(values)
         if array is None:
             raise ValueError(f"{name} is {shown(values)}; real numbers of shape (..., {n}) are expected")
         if array.ndim == 0 or array.shape[-1] != n:
-            hinges = ", ".join(model.hinge_names)
-            raise ValueError(f"{name} has shape {array.shape}; (..., {n}) is expected, one number per hinge ({hinges})")
+            kinds = dict.fromkeys(model.kind)
+            each = " or ".join(kind for kind in kinds if kind != "ball")
+            one = [f"one number per {each}"] * bool(each) + [f"{'four' if name == 'q' else 'three'} per ball"] * ("ball" in kinds)
+            names = ", ".join(model.hinge_names)
+            raise ValueError(f"{name} has shape {array.shape}; (..., {n}) is expected, {', '.join(one)} ({names})")
         if not np.isfinite(array).all():
             raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
+        if name == "q":
+            for joint in coordinates.balls:
+                off = np.abs(np.linalg.norm(array[..., joint.q], axis=-1) - 1.0)
+                if off.size and off.max() > CLOSE_TO_ONE:
+                    ball = model.hinge_names[coordinates.joints.index(joint)]
+                    found = array[..., joint.q].reshape(-1, 4)[np.argmax(off)]
+                    raise ValueError(f"q of {ball!r} is {found.tolist()}; a quaternion w, x, y, z of length 1 is expected")
         checked.append(array)
+    batches = [array.shape[:-1] for array in checked]
     try:
-        checked = np.broadcast_arrays(*checked)
+        batch = np.broadcast_shapes(*batches)
     except ValueError:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(arrays, checked))
         raise ValueError(f"the batch shapes do not fit together: {shapes}") from None
-    return [[array[..., i] for i in range(n)] for array in checked]
+    checked = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in checked]
+    return [[array[..., i] for i in range(array.shape[-1])] for array in checked]
 
 
 def checked_model(model) -> None:
@@ -75,17 +87,17 @@ def whole(name, value) -> int:
     return int(value)
 
 
-def paths(runs, steps, n) -> np.ndarray:
-    """NaN for the q and qd of so many runs, (2, runs, steps + 1, n); ValueError if there is no memory for it."""
-    size = 2 * runs * (steps + 1) * n * 8
+def paths(runs, steps, nq, nv) -> tuple[np.ndarray, np.ndarray]:
+    """NaN for the q and qd of so many runs, (runs, steps + 1, nq or nv); ValueError if there is no memory for it."""
+    size = runs * (steps + 1) * (nq + nv) * 8
     try:
         if size > memory():
             raise MemoryError
-        return np.full((2, runs, steps + 1, n), np.nan)
+        return np.full((runs, steps + 1, nq), np.nan), np.full((runs, steps + 1, nv), np.nan)
     except MemoryError:
         size = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
         raise ValueError(
-            f"steps is {shown(steps)}: with {n} hinges the states of {runs} runs would take {size} of memory, more than there is"
+            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would take {size} of memory, more than there is"
         ) from None
 
 

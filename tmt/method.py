@@ -9,27 +9,29 @@ in body axes). With xdd_b = T_b qdd + v_conv and omegad_b = B_b qdd + w_conv, vi
 Mbar qdd = Qbar with
 
     Mbar = sum_b T_b' m_b T_b + B_b' I_b B_b
-    Qbar = tau - D qd - h
+    Qbar = tau - D qd - k (q - rest) - h
     h    = sum_b T_b' (m_b v_conv - f_b) + B_b' (I_b w_conv + omega_b x I_b omega_b),  f_b = m_b gravity
 
 (assignment, part e; its h_b and g_b are v_conv and w_conv here). h is MuJoCo's qfrc_bias, D the joint
-damping. Scalars may be floats, NumPy arrays (one element per state), complex numbers, mpmath numbers,
-traced or symbolic expressions; q, qd and tau are sequences of n of them. Vectors are in the inertial
-frame unless they are said to be in body axes.
+damping, k the stiffness of springs at the joints; armature is added to Mbar's diagonal. The arm has neither
+springs nor armature. Scalars may be floats, NumPy arrays (one element per state), complex numbers, mpmath numbers,
+traced or symbolic expressions; q is a sequence of nq of them, qd and tau of nv. Vectors are in the
+inertial frame unless they are said to be in body axes.
 """
 
 from typing import NamedTuple
 
 from .dual import jacobian
-from .space import IDENTITY, ZERO, Matrix, Vector, rotation, solve, total
+from .space import IDENTITY, ZERO, Matrix, Vector, rotation, solve, total, total_vector, turn_of
 
 
 class Frame(NamedTuple):
-    """A hinge's frame and its motion, as if qdd were zero."""
+    """A joint's frame and its motion, as if qdd were zero."""
 
     origin: Vector  # m
     turn: Matrix  # body axes -> inertial axes
-    axis: Vector  # of the hinge, inertial axes
+    axes: list  # of its speeds, inertial axes
+    slides: bool  # along its axis; else it turns about its axes
     omega: Vector  # rad/s
     origin_conv: Vector  # acceleration of the origin at qdd = 0, m/s2
     omega_conv: Vector  # angular acceleration at qdd = 0, rad/s2
@@ -39,8 +41,8 @@ class Body(NamedTuple):
     """What TMT needs of one body."""
 
     x: Vector  # CoM, m
-    T: list  # n columns, dx/dq, m/rad
-    B: list  # n columns, body axes
+    T: list  # nv columns, dx/dq, m/rad
+    B: list  # nv columns, body axes
     omega: Vector  # body axes, rad/s
     v_conv: Vector  # d(T qd)/dq qd, m/s2
     w_conv: Vector  # d(B qd)/dq qd, body axes, rad/s2
@@ -48,27 +50,33 @@ class Body(NamedTuple):
     inertia: Matrix  # body axes
 
 
-WORLD = Frame(ZERO, IDENTITY, ZERO, ZERO, ZERO, ZERO)
+WORLD = Frame(ZERO, IDENTITY, [], False, ZERO, ZERO, ZERO)
 
 
-def hinge_frames(tree, q, qd=None) -> list[Frame]:
-    """The n hinge frames at angles q (rad) and rates qd (rad/s, default at rest), walked outward."""
-    qd = [0.0] * len(q) if qd is None else qd
+def joint_frames(tree, q, qd=None) -> list[Frame]:
+    """The n joints' frames at positions q (rad, m) and speeds qd (per s, default at rest), walked outward."""
+    qd = [0.0] * len(tree.axis) if qd is None else qd
     frames = []
-    for i, parent in enumerate(tree.parent):
-        p = frames[parent] if parent >= 0 else WORLD
+    for i, (kind, at, by) in enumerate(tree.coordinates.joints):
+        p = frames[tree.parent[i]] if tree.parent[i] >= 0 else WORLD
+        own = [Vector(*axis) for axis in tree.axis[by]]
+        if kind == "slide":
+            axis = p.turn @ own[0]
+            origin, origin_conv = carried(p, Vector(*tree.offset[i]) + own[0] * (q[at.start] - tree.reference[i]))
+            origin_conv = origin_conv + p.omega.cross(axis * (qd[by.start] * 2.0))  # Coriolis
+            frames.append(Frame(origin, p.turn, [axis], True, p.omega, origin_conv, p.omega_conv))
+            continue
         origin, origin_conv = carried(p, Vector(*tree.offset[i]))
-        axis = p.turn @ Vector(*tree.axis[i])
-        spin = axis * qd[i]
+        if kind == "ball":  # its axes turn with it
+            frame = Matrix(own)
+            turn = p.turn @ (frame.transposed @ turn_of(q[at]) @ frame)
+            axes = [turn @ axis for axis in own]
+        else:
+            turn = p.turn @ rotation(tree.axis[by.start], q[at.start] - tree.reference[i])
+            axes = [p.turn @ own[0]]
+        spin = total_vector(axis * rate for axis, rate in zip(axes, qd[by]))
         frames.append(
-            Frame(
-                origin,
-                p.turn @ rotation(tree.axis[i], q[i]),
-                axis,
-                p.omega + spin,
-                origin_conv,
-                p.omega_conv + p.omega.cross(spin),
-            )
+            Frame(origin, turn, axes, False, p.omega + spin, origin_conv, p.omega_conv + p.omega.cross(spin))
         )
     return frames
 
@@ -81,19 +89,23 @@ def carried(frame, point):
 
 
 def bodies(tree, q, qd=None) -> list[Body]:
-    """T_b, B_b and the convective terms of every body, at angles q and rates qd (default at rest)."""
-    frames = hinge_frames(tree, q, qd)
+    """T_b, B_b and the convective terms of every body, at positions q and speeds qd (default at rest)."""
+    frames = joint_frames(tree, q, qd)
     result = []
-    for b, hinge in enumerate(tree.body_hinge):
-        frame = frames[hinge] if hinge >= 0 else WORLD
+    for b, joint in enumerate(tree.body_hinge):
+        frame = frames[joint] if joint >= 0 else WORLD
         x, v_conv = carried(frame, Vector(*tree.com[b]))
         to_body = frame.turn.transposed
-        moved_by = list(zip(frames, tree.moves(b)))
+        T, B = [], []
+        for f, moved in zip(frames, tree.moves(b)):
+            for axis in f.axes:
+                T.append(ZERO if not moved else axis if f.slides else axis.cross(x - f.origin))
+                B.append(ZERO if not moved or f.slides else to_body @ axis)
         result.append(
             Body(
                 x,
-                [f.axis.cross(x - f.origin) if moved else ZERO for f, moved in moved_by],
-                [to_body @ f.axis if moved else ZERO for f, moved in moved_by],
+                T,
+                B,
                 to_body @ frame.omega,
                 v_conv,
                 to_body @ frame.omega_conv,
@@ -104,17 +116,20 @@ def bodies(tree, q, qd=None) -> list[Body]:
     return result
 
 
-def mass_matrix(parts) -> list:
-    """Mbar (n rows of n, kg m2) of the bodies: sum_b T' m T + B' I B."""
+def mass_matrix(parts, armature=()) -> list:
+    """Mbar (nv rows of nv, kg m2) of the bodies: sum_b T' m T + B' I B, and the armature on its diagonal."""
     n = len(parts[0].T)
-    return [
+    M = [
         [total(b.T[i].dot(b.mass * b.T[j]) + b.B[i].dot(b.inertia @ b.B[j]) for b in parts) for j in range(n)]
         for i in range(n)
     ]
+    for i, rotor in enumerate(armature):
+        M[i][i] = M[i][i] + rotor if rotor else M[i][i]
+    return M
 
 
 def bias(parts, gravity) -> list:
-    """h (n, N m) of the bodies: Mbar qdd + h = tau - D qd; at rest the torque that holds them."""
+    """h (nv, N m) of the bodies: Mbar qdd + h = tau - D qd; at rest the torque that holds them."""
     g = Vector(*gravity)
     n = len(parts[0].T)
     newton = [b.mass * (b.v_conv - g) for b in parts]
@@ -123,25 +138,32 @@ def bias(parts, gravity) -> list:
 
 
 def mass_matrix_and_bias(tree, q, qd) -> tuple[list, list]:
-    """Mbar and h at angles q and rates qd."""
+    """Mbar and h at positions q and speeds qd."""
     parts = bodies(tree, q, qd)
-    return mass_matrix(parts), bias(parts, tree.gravity)
+    return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
 
 
 def bias_rates(tree, q, qd, terms=mass_matrix_and_bias) -> list:
-    """dh/dqd (n rows of n, N m s/rad): the exact derivative of the bias by the rates, by dual numbers."""
+    """dh/dqd (nv rows of nv, N m s/rad): the exact derivative of the bias by the speeds, by dual numbers."""
     return jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 
 
-def reduced_force(tree, h, qd, tau) -> list:
-    """Qbar = tau - D qd - h (n, N m)."""
-    return [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
+def spring_torque(tree, q) -> list:
+    """k (q - rest) (nv, N m or N), which springs take off the force; of a ball k times the movement from its rest."""
+    off = tree.coordinates.difference(q, tree.rest) if tree.has_springs else [0.0] * len(tree.axis)
+    return [k * x for k, (_, by) in zip(tree.stiffness, tree.coordinates.places) for x in off[by]]
+
+
+def reduced_force(tree, h, q, qd, tau) -> list:
+    """Qbar = tau - D qd - k (q - rest) - h (nv, N m)."""
+    Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
+    return [Q - s for Q, s in zip(Qbar, spring_torque(tree, q))] if tree.has_springs else Qbar
 
 
 def acceleration(tree, q, qd, tau, terms=mass_matrix_and_bias) -> list:
-    """qdd (n, rad/s2) from Mbar qdd = Qbar = tau - D qd - h."""
+    """qdd (nv, rad/s2) from Mbar qdd = Qbar = tau - D qd - k (q - rest) - h."""
     M, h = terms(tree, q, qd)
-    return solve(M, reduced_force(tree, h, qd, tau))
+    return solve(M, reduced_force(tree, h, q, qd, tau))
 
 
 def potential(parts, gravity):
@@ -149,9 +171,17 @@ def potential(parts, gravity):
     return total(b.mass * (Vector(*gravity) * -1.0).dot(b.x) for b in parts)
 
 
-def kinetic(parts, qd):
-    """Kinetic energy in J: of translation with v = T qd, of rotation with omega in body axes."""
-    result = 0.0
+def spring_energy(tree, q):
+    """Energy of the springs in J."""
+    if not tree.has_springs:
+        return 0.0
+    off = tree.coordinates.difference(q, tree.rest)
+    return total(0.5 * k * (x * x) for k, (_, by) in zip(tree.stiffness, tree.coordinates.places) for x in off[by] if k)
+
+
+def kinetic(parts, qd, armature=()):
+    """Kinetic energy in J: of translation with v = T qd, of rotation with omega in body axes, of rotors."""
+    result = total(0.5 * rotor * (rate * rate) for rotor, rate in zip(armature, qd) if rotor)
     for b in parts:
         v = sum((column * rate for column, rate in zip(b.T, qd)), ZERO)
         result = result + 0.5 * (b.mass * v.dot(v) + b.omega.dot(b.inertia @ b.omega))

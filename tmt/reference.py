@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 
 from . import method
+from .exact import exact_tree
 from .space import ZERO, solve
 
 DIGITS = 50
@@ -16,14 +17,14 @@ class Truth(NamedTuple):
 
     com_positions: np.ndarray  # (m, 3)
     angular_velocities: np.ndarray  # (m, 3)
-    T: np.ndarray  # (m, 3, n)
-    B: np.ndarray  # (m, 3, n)
+    T: np.ndarray  # (m, 3, nv)
+    B: np.ndarray  # (m, 3, nv)
     v_conv: np.ndarray  # (m, 3)
     w_conv: np.ndarray  # (m, 3)
-    mass_matrix: np.ndarray  # (n, n)
-    bias: np.ndarray  # (n,)
-    gravity_balance: np.ndarray  # (n,)
-    acceleration: np.ndarray  # (n,)
+    mass_matrix: np.ndarray  # (nv, nv)
+    bias: np.ndarray  # (nv,)
+    gravity_balance: np.ndarray  # (nv,)
+    acceleration: np.ndarray  # (nv,)
     potential_energy: np.ndarray  # ()
     energy: np.ndarray  # ()
 
@@ -31,15 +32,16 @@ class Truth(NamedTuple):
 def exact(tree, q, qd, tau) -> Truth:
     """Every TMT quantity at one state, from the same source as the floats, with 50 digits.
 
-    q, qd, tau: (n,) rad, rad/s, N m. The numbers of the tree and of the state are taken as what their
+    q (nq,), qd, tau (nv,): rad, rad/s, N m. The numbers of the tree and of the state are taken as what their
     doubles are exactly; 0.1 means 0.1000000000000000055511151231257827...
     """
     with mpmath.workdps(DIGITS):
         q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd, tau))
+        tree = exact_tree(tree, mpmath.mpf)
         parts = method.bodies(tree, q, qd)
         at_rest = [b._replace(omega=ZERO, v_conv=ZERO, w_conv=ZERO) for b in parts]
-        mass_matrix, h = method.mass_matrix(parts), method.bias(parts, tree.gravity)
-        potential = method.potential(parts, tree.gravity)
+        mass_matrix, h = method.mass_matrix(parts, tree.armature), method.bias(parts, tree.gravity)
+        potential = method.potential(parts, tree.gravity) + method.spring_energy(tree, q)
         return Truth(
             com_positions=_array(b.x for b in parts),
             angular_velocities=_array(b.omega for b in parts),
@@ -50,9 +52,9 @@ def exact(tree, q, qd, tau) -> Truth:
             mass_matrix=_array(mass_matrix),
             bias=_array(h),
             gravity_balance=_array(method.bias(at_rest, tree.gravity)),
-            acceleration=_array(solve(mass_matrix, method.reduced_force(tree, h, qd, tau))),
+            acceleration=_array(solve(mass_matrix, method.reduced_force(tree, h, q, qd, tau))),
             potential_energy=_array(potential),
-            energy=_array(potential + method.kinetic(parts, qd)),
+            energy=_array(potential + method.kinetic(parts, qd, tree.armature)),
         )
 
 

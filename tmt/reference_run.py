@@ -3,14 +3,16 @@
 Python's decimal numbers are one more scalar: in C, and several times faster than mpmath's at this length.
 """
 
+import math
 from collections.abc import Callable
 from decimal import Decimal, localcontext
 
 import mpmath
 import numpy as np
 
+from .exact import exact_tree
 from .method import acceleration
-from .space import cos, sin
+from .space import arctan, cos, sin, sqrt
 from .trace import Tape
 
 DIGITS = 36
@@ -34,23 +36,36 @@ def sincos(x: Decimal) -> tuple[Decimal, Decimal]:
 
 sin.register(Decimal, lambda x: sincos(x)[0])
 cos.register(Decimal, lambda x: sincos(x)[1])
+sqrt.register(Decimal, Decimal.sqrt)
+
+
+@arctan.register
+def decimal_arctan(x: Decimal) -> Decimal:
+    """From the double on: sin y - x cos y is sin(y - arctan x) / cos(arctan x), so that each turn triples the digits."""
+    y = Decimal(math.atan(x))
+    for _ in range(2):
+        s, c = sincos(y)
+        y -= (s - x * c) / (c + x * s)
+    return y
 
 
 def slope(tree) -> Callable:
-    """slope(q, qd, tau) -> qdd, sequences of n decimal numbers: the method as it stands, traced, with exact numbers."""
-    n = len(tree.parent)
-    tape = Tape(Decimal)
-    q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau"))
-    code = tape.function("slope", [*q, *qd, *tau], acceleration(tree, q, qd, tau))
-    scope = {"sincos": sincos, "fma": lambda a, b, c: a * b + c, **code.constants}
+    """slope(q, qd, tau) -> d(q, qd)/dt, sequences of decimal numbers: the method as it stands, traced, with exact numbers."""
+    tape, coordinates = Tape(Decimal), tree.coordinates
+    sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
+    q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(count))) for name, count in sizes.items())
+    tree = exact_tree(tree, Decimal)
+    slopes = [*coordinates.component_rates(q, qd), *acceleration(tree, q, qd, tau)]
+    code = tape.function("slope", [*q, *qd, *tau], slopes)
+    scope = {"sincos": sincos, "sqrt": sqrt, "arctan": arctan, "fma": lambda a, b, c: a * b + c, **code.constants}
     exec(code.text, scope)
     return lambda q, qd, tau: scope["slope"](*q, *qd, *tau)
 
 
 def trajectory(tree, q, qd, tau, duration: float, records: int, steps: int) -> np.ndarray:
-    """The motion under constant torque at records + 1 equal times: (records + 1, 2 n) decimal numbers, q and qd.
+    """The motion under constant torque at records + 1 equal times: (records + 1, nq + nv) decimal numbers, q and qd.
 
-    q, qd, tau: (n,) rad, rad/s, N m, taken as what their doubles are exactly; duration in s; steps: a multiple of records.
+    q (nq,), qd, tau (nv,): rad, rad/s, N m, taken as what their doubles are exactly; duration in s; steps: a multiple of records.
     Gragg's modified midpoint rule, extrapolated (Bulirsch and Stoer) to order 20 in every step, in 36 digits. How many of
     them are right is seen from a second run with half the step.
     """
@@ -58,11 +73,11 @@ def trajectory(tree, q, qd, tau, duration: float, records: int, steps: int) -> n
         raise ValueError(f"steps is {steps}; a multiple of {records} is expected")
     with localcontext() as context:
         context.prec = DIGITS
-        torque, n = [Decimal(float(v)) for v in tau], len(q)
+        torque, nq = [Decimal(float(v)) for v in tau], len(q)
         traced = slope(tree)
 
         def rate(state):
-            return np.array([*state[n:], *traced(state[:n], state[n:], torque)])
+            return np.array(traced(state[:nq], state[nq:], torque))
 
         state = np.array([Decimal(float(v)) for v in (*q, *qd)])
         path, dt = [state], Decimal(duration) / steps

@@ -1,4 +1,4 @@
-"""Where Mbar is singular: hinges that turn without moving any mass, alone or against each other.
+"""Where Mbar is singular: joints that move without moving any mass, alone or against each other.
 
 What counts is Mbar in units of the largest value that each of its diagonal entries can have: an eigenvalue of that which is
 no larger than its rounding is zero.
@@ -17,14 +17,15 @@ APART = 1e-3  # sine of the angle between two axes that are clearly not parallel
 
 
 def scales(tree) -> np.ndarray:
-    """The largest value that each Mbar_ii can have at any q, kg m2, (n,): with all that the hinge carries stretched out."""
-    sums = np.zeros(len(tree.parent))
-    for mass, com, inertia, hinge in zip(tree.mass, tree.com, tree.inertia, tree.body_hinge):
+    """The largest value that each Mbar_ii can have, kg m2, (nv,): with all that the joint carries stretched out, slides by 1 m."""
+    sums, joints = np.array(tree.armature), tree.coordinates.joints
+    for mass, com, inertia, joint in zip(tree.mass, tree.com, tree.inertia, tree.body_hinge):
         reach = math.hypot(*com)
-        while hinge >= 0:
-            sums[hinge] += mass * reach * reach + sum(abs(inertia[i][i]) for i in range(3))
-            reach += math.hypot(*tree.offset[hinge])
-            hinge = tree.parent[hinge]
+        while joint >= 0:
+            slides = tree.kind[joint] == "slide"
+            sums[joints[joint].qd] += mass if slides else mass * reach * reach + sum(abs(inertia[i][i]) for i in range(3))
+            reach += math.hypot(*tree.offset[joint]) + slides
+            joint = tree.parent[joint]
     return sums
 
 
@@ -32,29 +33,51 @@ def scales(tree) -> np.ndarray:
 def never(tree) -> bool:
     """Whether Mbar is regular at every q, by an argument from the tips inward: False may also mean unknown.
 
-    A body with inertia about every axis is at rest only if it does not turn; and it does not turn only if none of the
-    hinges does that move it and not yet another such body, if that is one, or are two in a row that are not parallel.
+    A joint whose own rotor has inertia is at rest if nothing moves. A body with inertia about every axis is at rest only if
+    it does not turn; and it does not turn only if none of the hinges and balls does that move it and not yet another such
+    body, if those are one joint, or two hinges in a row that are not parallel. If it does not turn, its mass is at rest only
+    if none of the slides moves that move it, if those are in a row and none of their directions follows from the others.
     """
-    resting, size = set(), scales(tree)
-    for hinge, inertia in sorted(zip(tree.body_hinge, tree.inertia), key=lambda body: body[0]):
+    size, joints, resting = scales(tree), tree.coordinates.joints, set()
+    for i, joint in enumerate(joints):
+        if min(np.divide(tree.armature[joint.qd], size[joint.qd])) > CLEAR:
+            resting.add(i)
+    for joint, mass, inertia in sorted(zip(tree.body_hinge, tree.mass, tree.inertia), key=lambda body: body[0]):
         chain = []
-        while hinge >= 0:
-            chain.append(hinge)
-            hinge = tree.parent[hinge]
-        still = [hinge for hinge in chain if hinge not in resting]
-        if not still or np.linalg.eigvalsh(inertia)[0] < CLEAR * size[still].max():
-            continue
-        one = len(still) == 1
-        two = len(still) == 2 and tree.parent[still[0]] == still[1]
-        if one or (two and np.linalg.norm(np.cross(*(tree.axis[hinge] for hinge in still))) > APART):
-            resting.update(still)
-    return len(resting) == len(tree.parent)
+        while joint >= 0:
+            chain.append(joint)
+            joint = tree.parent[joint]
+        still = [joint for joint in chain if joint not in resting]
+        turning = [joint for joint in still if tree.kind[joint] != "slide"]
+        sliding = [joint for joint in still if tree.kind[joint] == "slide"]
+        if turning:
+            largest = max(size[k] for joint in turning for k in range(*joints[joint].qd.indices(len(size))))
+            if np.linalg.eigvalsh(inertia)[0] < CLEAR * largest or not _turn_alone(tree, turning):
+                continue
+        if sliding:
+            axes = np.array([tree.axis[joints[joint].qd.start] for joint in sliding])
+            in_a_row = all(tree.parent[outer] == inner for outer, inner in zip(sliding, sliding[1:]))
+            clear = mass > CLEAR * max(size[joints[joint].qd.start] for joint in sliding)
+            if not (clear and in_a_row and np.linalg.svd(axes)[1].min() > APART and len(sliding) <= 3):
+                continue
+        resting.update(still)
+    return len(resting) == len(joints)
+
+
+def _turn_alone(tree, turning) -> bool:
+    """Whether a body that does not turn has these joints at rest, from the tip inward."""
+    if len(turning) == 1:
+        return True
+    outer, *inner = turning
+    axes = [tree.axis[tree.coordinates.joints[joint].qd.start] for joint in turning]
+    hinges = "ball" not in (tree.kind[joint] for joint in turning)
+    return len(inner) == 1 and hinges and tree.parent[outer] == inner[0] and np.linalg.norm(np.cross(*axes)) > APART
 
 
 def mass_matrices(tree, q) -> np.ndarray:
-    """Mbar at angles q (N, n): (N, n, n), in time that grows less with n than that of the method's own sums."""
-    count, n = q.shape
-    total = np.zeros((count, n, n))
+    """Mbar at positions q (N, nq): (N, nv, nv), in time that grows less with n than that of the method's own sums."""
+    count, n = len(q), len(tree.axis)
+    total = np.zeros((count, n, n)) + np.diag(tree.armature)
     for body in method.bodies(tree, list(q.T)):
         T, B = (
             np.array([[np.broadcast_to(x, count) for x in column] for column in columns]).transpose(2, 1, 0)
@@ -66,20 +89,24 @@ def mass_matrices(tree, q) -> np.ndarray:
 
 
 def found(tree, M) -> np.ndarray:
-    """Which hinges turn without moving mass at each state of Mbar (..., n, n): (..., n) of bool, none where it is regular."""
+    """Which joints move without moving mass at each state of Mbar (..., nv, nv): (..., n) of bool, none where it is regular."""
     root = np.sqrt(scales(tree))
     values, vectors = np.linalg.eigh(M / np.multiply.outer(root, root))
-    turning = np.abs(vectors[..., 0]) / root
-    turning /= turning.max(axis=-1, keepdims=True)
-    return (values[..., :1] <= ZERO_BELOW * len(root)) & (turning > CLEAR)
+    moving = np.abs(vectors[..., 0]) / root
+    moving /= moving.max(axis=-1, keepdims=True)
+    speeds = (values[..., :1] <= ZERO_BELOW * len(root)) & (moving > CLEAR)
+    return np.stack([speeds[..., joint.qd].any(axis=-1) for joint in tree.coordinates.joints], axis=-1)
 
 
-def reason(tree, turning) -> str:
-    """Which hinges, as given by `found`, turn without moving mass, in words."""
-    names = [repr(name) for name, turns in zip(tree.hinge_names, turning) if turns]
+def reason(tree, moving) -> str:
+    """Which joints, as given by `found`, move without moving mass, in words."""
+    chosen = [i for i, moves in enumerate(moving) if moves]
+    names = [repr(tree.hinge_names[i]) for i in chosen]
+    kinds = {tree.kind[i] for i in chosen}
+    kind = kinds.pop() if len(kinds) == 1 else "joint"
     if len(names) == 1:
-        return f"hinge {names[0]} turns without moving any mass"
-    return f"hinges {', '.join(names)} turn together without moving any mass"
+        return f"{kind} {names[0]} {'moves' if kind == 'slide' else 'turns'} without moving any mass"
+    return f"{kind}s {', '.join(names)} {'turn' if kind in ('hinge', 'ball') else 'move'} together without moving any mass"
 
 
 def check_tree(tree) -> None:
@@ -87,7 +114,8 @@ def check_tree(tree) -> None:
     with np.errstate(all="ignore"):
         size = scales(tree)
         if not size.all():
-            raise ValueError(f"{reason(tree, size == 0.0)}; Mbar is singular at every q")
+            none = [not size[joint.qd].all() for joint in tree.coordinates.joints]
+            raise ValueError(f"{reason(tree, none)}; Mbar is singular at every q")
         if not np.isfinite(size).all() or size.min() < np.finfo(float).tiny / CLEAR:
             raise ValueError(
                 f"Mbar of the Tree has sizes from {size.min():.3g} to {size.max():.3g} kg m2; doubles cannot hold that"
@@ -95,14 +123,18 @@ def check_tree(tree) -> None:
         if tree.never_singular:
             return
         # two states with nothing special about them: singular at both is singular everywhere
-        q = 2 * np.pi * np.outer((0.7548776662466927, 0.5698402909980532), 1 + np.arange(len(size)))
+        places = 1 + np.arange(tree.coordinates.nq)
+        q = 2 * np.pi * np.outer((0.7548776662466927, 0.5698402909980532), places)
+        for joint in tree.coordinates.joints:
+            if joint.kind != "hinge":
+                q[:, joint.q] = np.sin(q[:, joint.q])
         turning = found(tree, mass_matrices(tree, q))
     if turning.any(axis=-1).all():
         raise ValueError(f"{reason(tree, turning[0])}; Mbar is singular at every q")
 
 
 def first(tree, q, M=None) -> tuple[int, str] | None:
-    """The first of the states q (N, n) at which Mbar is singular, and why; None if there is none."""
+    """The first of the states q (N, nq) at which Mbar is singular, and why; None if there is none."""
     if tree.never_singular or not len(q):
         return None
     turning = found(tree, mass_matrices(tree, q) if M is None else M)

@@ -1,7 +1,7 @@
 """Vectors and rotations over any scalar: float, array, mpf, traced or symbolic.
 
-A scalar is anything with + - * / that `sin` and `cos` know. A new scalar type registers itself with
-`sin.register` and `cos.register`; nothing else has to change.
+A scalar is anything with + - * / that `sin` and `cos` know, and for ball joints `sqrt` and `arctan`. A new scalar type
+registers itself with `sin.register` and so on; nothing else has to change.
 """
 
 from functools import singledispatch
@@ -22,8 +22,22 @@ def cos(angle):
     return np.cos(angle)
 
 
+@singledispatch
+def sqrt(value):
+    """Square root of a scalar of any registered type."""
+    return np.sqrt(value)
+
+
+@singledispatch
+def arctan(value):
+    """Arc tangent of a scalar of any registered type, in rad."""
+    return np.arctan(value)
+
+
 sin.register(mpmath.mpf, mpmath.sin)
 cos.register(mpmath.mpf, mpmath.cos)
+sqrt.register(mpmath.mpf, mpmath.sqrt)
+arctan.register(mpmath.mpf, mpmath.atan)
 
 
 class Vector:
@@ -110,6 +124,22 @@ def rotation(axis, angle):
     )
 
 
+def turn_of(quaternion):
+    """Matrix that turns as a quaternion (w, x, y, z) of any length: R = 1 + 2 (w [v]x + [v]x [v]x) / (p . p)."""
+    w, x, y, z = quaternion
+    scale = 2.0 / (w * w + x * x + y * y + z * z)
+    a, b, c = x * scale, y * scale, z * scale
+    xx, yy, zz, xy, xz, yz = x * a, y * b, z * c, x * b, x * c, y * c
+    wx, wy, wz = w * a, w * b, w * c
+    return Matrix(
+        [
+            [1.0 - (yy + zz), xy - wz, xz + wy],
+            [xy + wz, 1.0 - (xx + zz), yz - wx],
+            [xz - wy, yz + wx, 1.0 - (xx + yy)],
+        ]
+    )
+
+
 def solve(matrix, right):
     """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows.
 
@@ -155,3 +185,9 @@ def solve_any(matrix, right):
 def total(terms):
     """Sum of scalars of any type, 0.0 if there are none."""
     return sum(terms, 0.0)
+
+
+def total_vector(vectors):
+    """Sum of vectors: a single one is itself."""
+    first, *more = vectors
+    return sum(more, first)

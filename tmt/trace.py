@@ -13,7 +13,7 @@ from decimal import Decimal
 from numbers import Real
 from typing import NamedTuple
 
-from .space import cos, sin
+from .space import arctan, cos, sin, sqrt
 
 FOLD = {
     "+": operator.add,
@@ -23,14 +23,17 @@ FOLD = {
     "neg": operator.neg,
     "sin": lambda x: math.sin(x) if isinstance(x, float) else sin(x),
     "cos": lambda x: math.cos(x) if isinstance(x, float) else cos(x),
+    "sqrt": lambda x: math.sqrt(x) if isinstance(x, float) else sqrt(x),
+    "arctan": lambda x: math.atan(x) if isinstance(x, float) else arctan(x),
 }
+FUNCTIONS = ("sqrt", "arctan")  # called by these names
 
 
 class Code(NamedTuple):
     """Straight-line Python source of one function."""
 
     text: str
-    operations: int  # + - * / and changes of sign; a sine and a cosine count as one each
+    operations: int  # + - * / and changes of sign; a sine, a cosine, a root count as one each
     constants: dict  # numbers by the names that stand for them in the text, where they are no floats
 
 
@@ -135,13 +138,15 @@ class Tape:
             return self.lift(FOLD[operation](*numbers))
         if operation in ("sin", "cos"):
             return self.node("item", self.node("sincos", values[0].i).i, ("sin", "cos").index(operation))
+        if operation in FUNCTIONS:
+            return self.node(operation, values[0].i)
         rule = {"+": self.add, "-": self.subtract, "*": self.multiply, "/": self.divide, "neg": self.negative}
         return rule[operation](*values)
 
     def function(self, name, inputs, outputs) -> Code:
         """Source of `name(inputs) -> outputs`.
 
-        It takes sines from sincos(x) -> (sin x, cos x), and a product that only goes into a sum from fma(a, b, c) = a b + c,
+        It takes sines from sincos(x) -> (sin x, cos x), roots from sqrt, arc tangents from arctan, and a product that only goes into a sum from fma(a, b, c) = a b + c,
         rounded once: so every compiler does the same arithmetic.
         """
         outputs = [self.lift(o) for o in outputs]
@@ -178,6 +183,8 @@ class Tape:
         """The right-hand side for one operation; product: the operand that is fused into it, or None."""
         if product is None:
             operands = [text[a] for a in arguments]
+            if operation in FUNCTIONS:
+                return f"{operation}({operands[0]})"
             return f"-{operands[0]}" if operation == "neg" else f" {operation} ".join(operands)
         x, y = (text[a] for a in self.nodes[product][1])
         (other,) = (text[a] for a in arguments if a != product)
@@ -275,3 +282,5 @@ class Expression:
 
 sin.register(Expression, lambda angle: angle.tape.apply("sin", angle))
 cos.register(Expression, lambda angle: angle.tape.apply("cos", angle))
+sqrt.register(Expression, lambda value: value.tape.apply("sqrt", value))
+arctan.register(Expression, lambda value: value.tape.apply("arctan", value))

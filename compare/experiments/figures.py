@@ -78,7 +78,7 @@ def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
     if robot.landmarks:
         return [np.array(list(robot.landmarks(q).values()))]
     tree = robot.tree
-    origins = np.array([list(frame.origin) for frame in method.hinge_frames(tree, q.tolist())], dtype=float)
+    origins = np.array([list(frame.origin) for frame in method.joint_frames(tree, q.tolist())], dtype=float)
     links = [np.stack([origins[parent], origins[joint]]) for joint, parent in enumerate(tree.parent) if parent >= 0]
     ends = [
         np.stack([origins[joint], com])
@@ -90,8 +90,8 @@ def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
 
 def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:
     """Origin and axis of each hinge at joint angles q, rad: (n, 2, 3), m, the axes of this length."""
-    frames = method.hinge_frames(robot.tree, q.tolist())
-    return np.array([[list(frame.origin), [length * c for c in frame.axis]] for frame in frames], dtype=float)
+    frames = method.joint_frames(robot.tree, q.tolist())
+    return np.array([[list(frame.origin), [length * c for c in frame.axes[0]]] for frame in frames], dtype=float)
 
 
 def label_directions(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
@@ -115,8 +115,8 @@ def hinges(robot: Robot) -> list[str]:
     rest = robot.posture()
     landmarks = robot.landmarks(rest) if robot.landmarks else {"origin": np.zeros(3)}
     words = []
-    for joint, frame in zip(robot.joints, method.hinge_frames(robot.tree, rest.tolist())):
-        axis, origin = ([float(v) + 0.0 for v in vector] for vector in (frame.axis, frame.origin))
+    for joint, frame in zip(robot.joints, method.joint_frames(robot.tree, rest.tolist())):
+        axis, origin = ([float(v) + 0.0 for v in vector] for vector in (frame.axes[0], frame.origin))
         about = "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else triple(axis)
         near = (f"at the {name}" for name, point in landmarks.items() if np.allclose(point, origin))
         words.append(f"{robot.symbol(joint)} about {about} {next(near, f'at {triple(origin)} m')}")
