@@ -5,14 +5,17 @@ hide what a file says: "no gravity", "so much damping more", "these joints locke
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import tmt
+from tmt import coordinates
+from tmt.tree import CLOSE_TO_ONE
 
 SEED = 10  # of every random number in a report
 MOST_STEPS = 10_000_000  # of a run
@@ -20,34 +23,94 @@ TORQUES = ("free", "hold")
 
 
 class Coordinates(NamedTuple):
-    """The coordinates of a model's joints: hinges, whose positions are angles and whose speeds are their rates."""
+    """The coordinates of a model's joints: positions q, nq numbers, and movements and speeds, nv numbers.
 
-    names: tuple[str, ...]
+    A hinge has an angle in rad, a slide a length in m, a ball a quaternion (w, x, y, z) and three speeds in its own axes.
+    """
+
+    names: tuple[str, ...]  # of the joints
+    kinds: tuple[str, ...] = ()  # of each "hinge", "slide" or "ball"; (): all are hinges
+
+    @property
+    def places(self) -> coordinates.Coordinates:
+        """Where each joint stands in q and v, as tmt has it."""
+        return coordinates.coordinates_of(self.all_kinds)
+
+    @property
+    def all_kinds(self) -> tuple[str, ...]:
+        return self.kinds or ("hinge",) * len(self.names)
 
     @property
     def nq(self) -> int:
-        return len(self.names)
+        return self.places.nq
 
     @property
     def nv(self) -> int:
-        return len(self.names)
+        return self.places.nv
+
+    @property
+    def has_balls(self) -> bool:
+        return self.nq > self.nv
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Of the positions; those of the speeds are the same per s."""
-        return ("rad",) * self.nq
+        """Of the movements, (nv,); those of the speeds are the same per s."""
+        return tuple(unit for kind in self.all_kinds for unit in {"slide": ("m",), "ball": ("rad",) * 3}.get(kind, ("rad",)))
+
+    @property
+    def speeds(self) -> tuple[str, ...]:
+        """A name for each movement and speed: that of the joint, of a ball with its axis."""
+        return self._named("xyz")
+
+    @property
+    def positions(self) -> tuple[str, ...]:
+        """A name for each number of a position: that of the joint, of a ball with the part of its quaternion."""
+        return self._named("wxyz")
+
+    def _named(self, parts):
+        pairs = zip(self.names, self.all_kinds)
+        return tuple(name + part for name, kind in pairs for part in ([f" {p}" for p in parts] if kind == "ball" else [""]))
 
     def difference(self, q1: np.ndarray, q0: np.ndarray) -> np.ndarray:
-        """From q0 to q1 as a movement, (..., nq) -> (..., nv)."""
-        return np.subtract(q1, q0)
+        """From q0 to q1 as a movement, (..., nq) -> (..., nv); of a ball the shortest, in its own axes."""
+        if not self.has_balls:
+            return np.subtract(q1, q0)
+        q1, q0 = np.broadcast_arrays(q1, q0)
+        return np.stack(self.places.difference(*([q[..., i] for i in range(self.nq)] for q in (q1, q0))), axis=-1)
 
     def move(self, q: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """The position after a movement, (..., nq)."""
-        return np.add(q, dv)
+        if not self.has_balls:
+            return np.add(q, dv)
+        batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(dv)[:-1])
+        q, dv = np.broadcast_to(q, (*batch, self.nq)), np.broadcast_to(dv, (*batch, self.nv))
+        moved = self.places.move([q[..., i] for i in range(self.nq)], [dv[..., i] for i in range(self.nv)])
+        return np.stack(moved, axis=-1)
 
-    def random(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Random positions, (count, nq): a whole turn of each hinge."""
-        return rng.uniform(-np.pi, np.pi, (count, self.nq))
+    def random(self, rng: np.random.Generator, count: int, ranges: Sequence = ()) -> np.ndarray:
+        """Random positions, (count, nq): within the range of each joint, (low, high) or None.
+
+        Without a range a whole turn of a hinge, 1 m of a slide; of a ball any turn.
+        """
+        if not ranges and set(self.all_kinds) == {"hinge"}:
+            return rng.uniform(-np.pi, np.pi, (count, self.nq))
+        q = np.empty((count, self.nq))
+        for (kind, at, _), known in zip(self.places.joints, ranges or (None,) * len(self.names)):
+            if kind == "ball":
+                turns = rng.normal(size=(count, 4))
+                q[:, at] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+            else:
+                q[:, at.start] = rng.uniform(*(known or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[kind]), count)
+        return q
+
+    def from_degrees(self, values: ArrayLike, positions: bool) -> np.ndarray:
+        """Positions (nq,) or speeds (nv,) with angles in deg, as they are given in scenes, in rad; else as they are."""
+        values = np.array(values, dtype=float)
+        for kind, at, by in self.places.joints:
+            if kind == "hinge" or (kind == "ball" and not positions):
+                place = at if positions else by
+                values[place] = np.radians(values[place])
+        return values
 
 
 @dataclass(frozen=True)
@@ -55,9 +118,9 @@ class Scene:
     """A motion under constant torque. Raises ValueError, in one line, for what cannot be a scene of any robot."""
 
     name: str
-    posture: str | tuple = ()  # a posture's name, or an angle in deg for each joint; (): all joints at zero
-    torque: str | tuple = "free"  # "free": none; "hold": TMT's gravity balance at the start, for all engines; or N m
-    speed: tuple = ()  # deg/s at the start; (): at rest
+    posture: str | tuple = ()  # a posture's name, or an angle in deg for each joint (m, a quaternion); (): the reference
+    torque: str | tuple = "free"  # "free": none; "hold": what balances gravity and springs at the start, by TMT; or N m
+    speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
     damping: float = 0.0  # N m s/rad, added to that of every joint
     gravity: bool = True  # the robot's own, or none
     locked: tuple = ()  # names of the joints that stay at the start
@@ -122,21 +185,33 @@ class Case:
     scene: Scene
 
     def __post_init__(self):
-        names, scene = self.robot.joints, self.scene
-        count = f"{len(names)} numbers, one per joint ({', '.join(names)})"
+        names, scene, whole = self.robot.joints, self.scene, self.robot.coordinates
+        sizes = {"posture": whole.nq, "torque": whole.nv, "speed": whole.nv}
+        of_kinds = {"hinge": "deg", "slide": "m", "ball": "a quaternion"}
+        units = ", ".join(of_kinds[kind] for kind in dict.fromkeys(whole.all_kinds))
         if isinstance(scene.posture, str):
-            postures = [name for name, angles in self.robot.postures.items() if len(angles) == len(names)]
-            accepted = f"{', '.join(postures)} or {count}, in deg" if postures else f"{count}, in deg"
+            count = f"{whole.nq} numbers, one per joint ({', '.join(whole.positions)})"
+            postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and self.robot.postures]
+            accepted = f"{', '.join(postures)} or {count}, in {units}" if postures else f"{count}, in {units}"
             scene.refuse("posture", scene.posture not in postures, accepted)
-        for name, unit in (("posture", "deg"), ("torque", "N m"), ("speed", "deg/s")):
+        for name, unit in (("posture", units), ("torque", "N m"), ("speed", "deg/s")):
             value = getattr(scene, name)
             left_out = name != "torque" and value == ()
-            known = isinstance(value, str) or len(value) == len(names) or left_out
-            scene.refuse(name, not known, f"{count}, in {unit}")
+            known = isinstance(value, str) or len(value) == sizes[name] or left_out
+            each = whole.positions if name == "posture" else whole.speeds
+            scene.refuse(name, not known, f"{sizes[name]} numbers, one per joint ({', '.join(each)}), in {unit}")
+        if not isinstance(scene.posture, str) and scene.posture:
+            for joint in whole.places.balls:
+                wrong = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) > CLOSE_TO_ONE
+                scene.refuse("posture", wrong, "a quaternion w, x, y, z of length 1 for each ball")
         unknown = [name for name in scene.locked if name not in names]
         most = f"a tuple of at most {len(names) - 1} of {', '.join(names)}"
         scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)
-        moving = [name for name, rate in zip(names, scene.speed) if rate and name in scene.locked]
+        moving = [
+            name
+            for name, joint in zip(names, whole.places.joints)
+            if name in scene.locked and any(scene.speed[joint.qd])
+        ]
         scene.refuse("speed", moving, f"no speed of a locked joint ({', '.join(scene.locked)})")
 
     @property
@@ -169,7 +244,8 @@ class Case:
 
     @property
     def coordinates(self) -> Coordinates:
-        return Coordinates(self.joints)
+        kinds = tuple(kind for name, kind in zip(self.robot.joints, self.robot.tree.kind) if name not in self.scene.locked)
+        return Coordinates(self.joints, kinds)
 
     @cached_property
     def whole(self) -> tmt.Tree:
@@ -179,9 +255,14 @@ class Case:
         return dataclasses.replace(tree, damping=tuple(d + scene.damping for d in tree.damping), gravity=gravity)
 
     @property
-    def locked(self) -> Mapping[str, float]:
-        """The angles of the locked joints, rad, by their names."""
-        return {name: float(q) for name, q in zip(self.robot.joints, self.posture) if name in self.scene.locked}
+    def locked(self) -> Mapping[str, float | tuple]:
+        """The positions of the locked joints, rad or m, of a ball its quaternion, by their names."""
+        held = {}
+        for name, (kind, at, _) in zip(self.robot.joints, self.robot.coordinates.places.joints):
+            if name in self.scene.locked:
+                values = tuple(map(float, self.posture[at]))
+                held[name] = values if kind == "ball" else values[0]
+        return held
 
     @cached_property
     def tree(self) -> tmt.Tree:
@@ -190,18 +271,19 @@ class Case:
 
     @property
     def posture(self) -> np.ndarray:
-        """Angles of all joints at t = 0, rad."""
+        """Positions of all joints at t = 0, rad, (nq,)."""
         return self.robot.posture(self.scene.posture)
 
     @cached_property
     def q(self) -> np.ndarray:
-        """Angles of the free joints at t = 0, rad, (n,)."""
-        return self.free(self.posture)
+        """Positions of the free joints at t = 0, rad, (nq,)."""
+        return self.posture[self._free("q")]
 
     @cached_property
     def v(self) -> np.ndarray:
-        """Rates of the free joints at t = 0, rad/s, (n,)."""
-        return self.free(np.radians(np.array(self.scene.speed or (0.0,) * len(self.robot.joints))))
+        """Speeds of the free joints at t = 0, rad/s, (nv,)."""
+        whole = self.robot.coordinates
+        return whole.from_degrees(self.scene.speed or (0.0,) * whole.nv, positions=False)[self._free("qd")]
 
     @property
     def start(self) -> tuple[np.ndarray, np.ndarray]:
@@ -210,15 +292,25 @@ class Case:
 
     @cached_property
     def tau(self) -> np.ndarray:
-        """Torque at the free joints, N m, (n,)."""
+        """Torque at the free joints, N m, (nv,)."""
         torque = self.scene.torque
         if torque == "hold":
-            return self.free(tmt.gravity_balance(self.posture, self.whole))
-        return self.free(np.array((0.0,) * len(self.robot.joints) if torque == "free" else torque))
+            torque = tmt.gravity_balance(self.posture, self.whole)
+            if self.whole.has_springs:
+                torque = torque + tmt.spring_torque(self.posture, self.whole)
+        elif torque == "free":
+            torque = (0.0,) * self.robot.coordinates.nv
+        return np.array(torque)[self._free("qd")]
 
     def free(self, values: np.ndarray) -> np.ndarray:
-        """Of values for all joints those of the free ones."""
-        return values[[self.robot.joints.index(name) for name in self.joints]]
+        """Of one value for each speed of all joints, (nv,), those of the free ones."""
+        return values[self._free("qd")]
+
+    def _free(self, which):
+        """The places of the free joints in q or qd of all."""
+        whole = self.robot.coordinates.places
+        places = [getattr(joint, which) for name, joint in zip(self.robot.joints, whole.joints) if name in self.joints]
+        return [i for place in places for i in range(place.start, place.stop)]
 
     def changed(self, **changes) -> "Case":
         """The same robot in a scene with other values."""

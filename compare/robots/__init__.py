@@ -9,7 +9,7 @@ import numpy as np
 
 import tmt
 
-from ..case import Case, Scene
+from ..case import Case, Coordinates, Scene
 
 
 class Printed(NamedTuple):
@@ -70,8 +70,10 @@ class Robot:
     name: str
     mjcf: Path  # the file that MuJoCo runs
     tree: tmt.Tree  # the stated numbers
-    postures: Mapping[str, tuple]  # deg, by name; the joints in the order of the Tree
+    postures: Mapping[str, tuple]  # deg (of a slide m, of a ball a quaternion), by name; the joints in the order of the Tree
     scenes: tuple[Scene, ...]
+    positions: Mapping[str, tuple] = field(default_factory=dict)  # further postures, as q of the Tree (rad, m), by name
+    ranges: tuple = ()  # of each joint (low, high), rad or m, or None; (): none has one
     described: str = ""  # in a sentence: "a human arm"
     symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
     # centre, saddle, marginal: the posture that stands for it; resonant: a centre at which a swing of three steps grows
@@ -92,15 +94,22 @@ class Robot:
     def joints(self) -> tuple[str, ...]:
         return self.tree.hinge_names
 
+    @property
+    def coordinates(self) -> Coordinates:
+        return Coordinates(self.joints, self.tree.kind)
+
     def posture(self, posture: str | tuple = ()) -> np.ndarray:
-        """Joint angles of a posture by its name, or of angles in deg (none: zero): rad, shape (n,)."""
-        angles = self.postures[posture] if isinstance(posture, str) else posture
-        return np.radians(np.array(angles or (0.0,) * len(self.joints), dtype=float))
+        """A posture by its name, or of angles in deg, lengths in m and quaternions (none: the reference): rad, (nq,)."""
+        if isinstance(posture, str) and posture in self.positions:
+            return np.array(self.positions[posture], dtype=float)
+        posture = self.postures[posture] if isinstance(posture, str) else posture
+        return self.coordinates.from_degrees(posture, positions=True) if posture else np.array(self.tree.zero)
 
     @property
     def poses(self) -> dict[str, np.ndarray]:
-        """The named postures, rad, (n,) each; all joints at zero if there are none."""
-        return {name: self.posture(name) for name in self.postures} or {"all joints at zero": self.posture()}
+        """The named postures, rad, (nq,) each; all joints at zero if there are none."""
+        named = {name: self.posture(name) for name in (*self.postures, *self.positions)}
+        return named or {"all joints at zero": self.posture()}
 
     def case(self, name: str = "as it is", **changes) -> Case:
         """The robot with changes, the fields of a Scene."""
