@@ -1,0 +1,19 @@
+"""Robots in MJCF: files written for this project, files that gymnasium ships, and texts made from a seed."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from .seeded import KINDS, chain, random_tree
+
+__all__ = ["KINDS", "PATHS", "chain", "gymnasium_files", "random_tree"]
+
+# the files of this folder by name; `parts` holds what some of them include
+PATHS = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.xml"))}
+
+
+def gymnasium_files() -> list[Path]:
+    """The MJCF files in the installed gymnasium, by name; none if it is not installed. Nothing of it is imported."""
+    found = find_spec("gymnasium")
+    if found is None or found.origin is None:
+        return []
+    return sorted(Path(found.origin).parent.glob("envs/mujoco/assets/*.xml"))
