@@ -8,7 +8,7 @@ import numpy as np
 from tmt.reference import DIGITS
 
 GUARD = 10  # digits more in the calculation
-NEAREST = 1e-20  # to the separatrix, L2 - 2 E I2 over the sum of its terms: nearer, too few digits are left
+BESIDE_SEPARATRIX = 1e-20  # L2 - 2 E I2 over the sum of its terms: nearer, too few digits are left
 
 
 def free_turning(
@@ -47,7 +47,7 @@ def tumbling(t: list, moments: list, omega: list) -> list[tuple[list, list]]:
     order = sorted(range(3), key=lambda axis: moments[axis])
     terms = [I * (I - moments[order[1]]) * w**2 for I, w in zip(moments, omega)]
     excess = mpmath.fsum(terms)  # L2 - 2 E I2
-    if abs(excess) <= NEAREST * mpmath.fsum(terms, absolute=True):
+    if abs(excess) <= BESIDE_SEPARATRIX * mpmath.fsum(terms, absolute=True):
         raise ValueError(
             "the body turns about its middle axis or ends there (2 E I2 = L2): no elliptic function is left"
         )
