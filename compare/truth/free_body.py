@@ -20,7 +20,7 @@ def free_turning(
     and quaternion: (4,) w first, body to world, both at t = 0. No torque. The quaternion is scaled to length 1 and
     moves without a change of sign. omega: Landau and Lifshitz, Mechanics, section 37; the precession about the
     angular momentum: an elliptic integral of the third kind (van Zon and Schofield, J. Comput. Phys. 225, 2007).
-    Raises ValueError if a moment is not positive, or where no elliptic function is left: on the separatrix.
+    Raises ValueError if a moment is not positive, or on the separatrix, where there is no elliptic function.
     """
     with mpmath.workdps(DIGITS + GUARD):
         t, moments, omega, start = ([mpmath.mpmathify(v) for v in values] for values in (t, moments, omega, quaternion))
@@ -35,7 +35,7 @@ def free_turning(
             turns = [(list(omega), turned_about(omega, time)) for time in t]
         else:
             turns = tumbling(t, moments, omega)
-        speeds, quaternions = zip(*((speed, product(start, turn)) for speed, turn in turns)) if t else ((), ())
+        speeds, quaternions = zip(*((speed, composed(start, turn)) for speed, turn in turns)) if t else ((), ())
         return np.array(speeds, dtype=object).reshape(-1, 3), np.array(quaternions, dtype=object).reshape(-1, 4)
 
 
@@ -49,7 +49,7 @@ def tumbling(t: list, moments: list, omega: list) -> list[tuple[list, list]]:
     excess = mpmath.fsum(terms)  # L2 - 2 E I2
     if abs(excess) <= BESIDE_SEPARATRIX * mpmath.fsum(terms, absolute=True):
         raise ValueError(
-            "the body turns about its middle axis or ends there (2 E I2 = L2): no elliptic function is left"
+            "the body starts on the separatrix (2 E I2 = L2), towards its middle axis: it has no elliptic function"
         )
     order = order if excess > 0 else order[::-1]
     i, j, k = order
@@ -78,16 +78,16 @@ def tumbling(t: list, moments: list, omega: list) -> list[tuple[list, list]]:
         precession = L / I3 * (time + (I3 - I1) / (I1 * p) * third)
         nutation = mpmath.atan2(mpmath.hypot(I1 * a * cn, I2 * b * sn), I3 * c * dn)
         spin = mpmath.atan2(I2 * b * sn, I1 * a * cn) + mpmath.pi * halves * mpmath.sign(b)
-        turn = product(turned_about((0, -1, 0), nutation), turned_about((0, 0, -1), spin))
+        turn = composed(turned_about((0, -1, 0), nutation), turned_about((0, 0, -1), spin))
         side = -1 if halves % 2 else 1
-        return (side * a * cn, side * b * sn, c * dn), product(turned_about((0, 0, 1), precession), turn)
+        return (side * a * cn, side * b * sn, c * dn), composed(turned_about((0, 0, 1), precession), turn)
 
     def as_given(vector):
         return [vector[order.index(axis)] * signs[order.index(axis)] for axis in range(3)]
 
     w, *vector = state(mpmath.mpf(0))[1]
     back = [w, *(-v for v in vector)]
-    states = [(speed, product(back, turn)) for speed, turn in map(state, t)]
+    states = [(speed, composed(back, turn)) for speed, turn in map(state, t)]
     return [(as_given(speed), [w, *as_given(vector)]) for speed, (w, *vector) in states]
 
 
@@ -97,7 +97,7 @@ def turned_about(omega: Sequence, time: mpmath.mpf) -> list:
     return [mpmath.cos(half), *(mpmath.sinc(half) * time / 2 * v for v in omega)]
 
 
-def product(p: Sequence, q: Sequence) -> list:
+def composed(p: Sequence, q: Sequence) -> list:
     """The quaternion p o q, w first."""
     (a, b, c, d), (e, f, g, h) = p, q
     return [
