@@ -55,7 +55,9 @@ class Coordinates(NamedTuple):
     @property
     def units(self) -> tuple[str, ...]:
         """Of the movements, (nv,); those of the speeds are the same per s."""
-        return tuple(unit for kind in self.all_kinds for unit in {"slide": ("m",), "ball": ("rad",) * 3}.get(kind, ("rad",)))
+        return tuple(
+            unit for kind in self.all_kinds for unit in {"slide": ("m",), "ball": ("rad",) * 3}.get(kind, ("rad",))
+        )
 
     @property
     def speeds(self) -> tuple[str, ...]:
@@ -69,7 +71,9 @@ class Coordinates(NamedTuple):
 
     def _named(self, parts):
         pairs = zip(self.names, self.all_kinds)
-        return tuple(name + part for name, kind in pairs for part in ([f" {p}" for p in parts] if kind == "ball" else [""]))
+        return tuple(
+            name + part for name, kind in pairs for part in ([f" {p}" for p in parts] if kind == "ball" else [""])
+        )
 
     def difference(self, q1: np.ndarray, q0: np.ndarray) -> np.ndarray:
         """From q0 to q1 as a movement, (..., nq) -> (..., nv); of a ball the shortest, in its own axes."""
@@ -118,7 +122,9 @@ class Scene:
     """A motion under constant torque. Raises ValueError, in one line, for what cannot be a scene of any robot."""
 
     name: str
-    posture: str | tuple = ()  # a posture's name, or an angle in deg for each joint (m, a quaternion); (): the reference
+    posture: (
+        str | tuple
+    ) = ()  # a posture's name, or an angle in deg for each joint (m, a quaternion); (): the reference
     torque: str | tuple = "free"  # "free": none; "hold": what balances gravity and springs at the start, by TMT; or N m
     speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
     damping: float = 0.0  # N m s/rad, added to that of every joint
@@ -244,7 +250,9 @@ class Case:
 
     @property
     def coordinates(self) -> Coordinates:
-        kinds = tuple(kind for name, kind in zip(self.robot.joints, self.robot.tree.kind) if name not in self.scene.locked)
+        kinds = tuple(
+            kind for name, kind in zip(self.robot.joints, self.robot.tree.kind) if name not in self.scene.locked
+        )
         return Coordinates(self.joints, kinds)
 
     @cached_property

@@ -4,6 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
+import tmt
 from tmt.reference import exact
 
 from .case import SEED
@@ -47,16 +48,33 @@ class Sample:
 
 
 def named(robot: Robot) -> Sample:
-    """The named postures, or all joints at zero if there are none; with random rates and torques where those are asked for."""
+    """The named postures, or the reference if there are none; with random speeds and torques where those are asked for."""
     rng, q = np.random.default_rng([SEED, 1]), np.array(list(robot.poses.values()))
-    rates, torques = rng.uniform(-10.0, 10.0, (2, *q.shape))
-    name = "named postures" if robot.postures else "a posture"
-    return Sample(robot.tree, name, q, rates, torques, len(q), tuple(robot.poses))
+    most = sizes(robot)[:, None]
+    speeds, torques = rng.uniform(-most, most, (2, len(q), robot.coordinates.nv))
+    name = "named postures" if robot.postures or robot.positions else "a posture"
+    return Sample(robot.tree, name, q, speeds, torques, len(q), tuple(robot.poses))
 
 
 def random(robot: Robot, states: int, exact_states: int) -> Sample:
-    """Random states: angles within a turn, rates in [-10, 10] rad/s, torques in [-10, 10] N m."""
+    """Random states: positions within the joints' ranges, speeds and torques within `sizes`."""
     rng = np.random.default_rng(SEED)
-    q = robot.case().coordinates.random(rng, states)
-    rates, torques = rng.uniform(-10.0, 10.0, (2, states, len(robot.joints)))
-    return Sample(robot.tree, "random states", q, rates, torques, exact_states)
+    q = robot.coordinates.random(rng, states, robot.ranges)
+    most = sizes(robot)[:, None]
+    speeds, torques = rng.uniform(-most, most, (2, states, robot.coordinates.nv))
+    return Sample(robot.tree, "random states", q, speeds, torques, exact_states)
+
+
+def sizes(robot: Robot) -> np.ndarray:
+    """The largest random speeds, rad/s, and torques, N m, (2, nv).
+
+    Without stated ranges 10 of each. Else a speed goes through the joint's range in 1 s (a turn, 1 m without one), and a torque
+    gives the joint 10 rad/s2 at the reference, if the others are held.
+    """
+    if not robot.ranges:
+        return np.full((2, robot.coordinates.nv), 10.0)
+    speeds = []
+    for (kind, _, by), known in zip(robot.coordinates.places.joints, robot.ranges):
+        low, high = known if known and kind != "ball" else (0.0, 1.0 if kind == "slide" else 2.0 * np.pi)
+        speeds += [high - low] * (by.stop - by.start)
+    return np.array([speeds, 10.0 * np.diag(tmt.mass_matrix(robot.tree.zero, robot.tree))])

@@ -96,7 +96,11 @@ def random_state(rng, tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     q = [
         x
         for name in tree.kind
-        for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-3.0, 3.0) if name == "hinge" else rng.uniform(-1, 1)])
+        for x in (
+            unit_quaternion(rng)
+            if name == "ball"
+            else [rng.uniform(-3.0, 3.0) if name == "hinge" else rng.uniform(-1, 1)]
+        )
     ]
     return np.array(q), *rng.uniform(-3.0, 3.0, (2, len(tree.axis)))
 

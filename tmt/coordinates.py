@@ -82,9 +82,7 @@ class Coordinates(NamedTuple):
         return [
             value
             for kind, at, by in self.joints
-            for value in (
-                [0.5 * x for x in product(q[at], [0.0, *qd[by]])] if kind == "ball" else [qd[by.start]]
-            )
+            for value in ([0.5 * x for x in product(q[at], [0.0, *qd[by]])] if kind == "ball" else [qd[by.start]])
         ]
 
     def rates(self, u, qd) -> list:

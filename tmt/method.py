@@ -75,9 +75,7 @@ def joint_frames(tree, q, qd=None) -> list[Frame]:
             turn = p.turn @ rotation(tree.axis[by.start], q[at.start] - tree.reference[i])
             axes = [p.turn @ own[0]]
         spin = total_vector(axis * rate for axis, rate in zip(axes, qd[by]))
-        frames.append(
-            Frame(origin, turn, axes, False, p.omega + spin, origin_conv, p.omega_conv + p.omega.cross(spin))
-        )
+        frames.append(Frame(origin, turn, axes, False, p.omega + spin, origin_conv, p.omega_conv + p.omega.cross(spin)))
     return frames
 
 

@@ -23,7 +23,9 @@ def scales(tree) -> np.ndarray:
         reach = math.hypot(*com)
         while joint >= 0:
             slides = tree.kind[joint] == "slide"
-            sums[joints[joint].qd] += mass if slides else mass * reach * reach + sum(abs(inertia[i][i]) for i in range(3))
+            sums[joints[joint].qd] += (
+                mass if slides else mass * reach * reach + sum(abs(inertia[i][i]) for i in range(3))
+            )
             reach += math.hypot(*tree.offset[joint]) + slides
             joint = tree.parent[joint]
     return sums
@@ -106,7 +108,9 @@ def reason(tree, moving) -> str:
     kind = kinds.pop() if len(kinds) == 1 else "joint"
     if len(names) == 1:
         return f"{kind} {names[0]} {'moves' if kind == 'slide' else 'turns'} without moving any mass"
-    return f"{kind}s {', '.join(names)} {'turn' if kind in ('hinge', 'ball') else 'move'} together without moving any mass"
+    return (
+        f"{kind}s {', '.join(names)} {'turn' if kind in ('hinge', 'ball') else 'move'} together without moving any mass"
+    )
 
 
 def check_tree(tree) -> None:

@@ -70,7 +70,9 @@ class Robot:
     name: str
     mjcf: Path  # the file that MuJoCo runs
     tree: tmt.Tree  # the stated numbers
-    postures: Mapping[str, tuple]  # deg (of a slide m, of a ball a quaternion), by name; the joints in the order of the Tree
+    postures: Mapping[
+        str, tuple
+    ]  # deg (of a slide m, of a ball a quaternion), by name; the joints in the order of the Tree
     scenes: tuple[Scene, ...]
     positions: Mapping[str, tuple] = field(default_factory=dict)  # further postures, as q of the Tree (rad, m), by name
     ranges: tuple = ()  # of each joint (low, high), rad or m, or None; (): none has one
