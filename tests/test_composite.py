@@ -130,9 +130,9 @@ def test_every_quantity_of_every_tree_falls_back_beyond_the_limit(rng):
 
 def test_wrong_shapes_are_refused_by_compiled_code():
     compiled, three = kernels.evaluator(tmt.ARM, "forward_dynamics"), np.zeros((3, 40))
-    with pytest.raises(ValueError, match="out of shape"):
+    with pytest.raises(ValueError, match=r"and out \("):
         compiled.lanes(three, three, three, np.zeros((3, 39)))
-    with pytest.raises(ValueError, match="out of shape"):
+    with pytest.raises(ValueError, match=r"and out \("):
         compiled.each(three, three, three, three)
 
 

@@ -33,10 +33,14 @@ class Evaluator(NamedTuple):
     rate: Callable | None  # of forward dynamics
 
 
-def checked_run(compiled, n, adaptive) -> Callable:
+def checked_run(compiled, nq, n, adaptive) -> Callable:
     """The run of kernels.stepper."""
-    path = f"(runs, steps + 1, {n})"
-    shapes = {"q": path, "qd": path, "tau": f"(runs, {n})", "ended": "(runs,)"}
+    shapes = {
+        "q": f"(runs, steps + 1, {nq})",
+        "qd": f"(runs, steps + 1, {n})",
+        "tau": f"(runs, {n})",
+        "ended": "(runs,)",
+    }
 
     def run(q, qd, tau, dt, ended=NOT_ASKED):
         if not type(q) is type(qd) is type(tau) is type(ended) is ndarray:
@@ -60,12 +64,13 @@ def checked_run(compiled, n, adaptive) -> Callable:
     return run_adaptive if adaptive else run
 
 
-def checked_evaluator(module, n, m) -> Evaluator:
-    """The calls of kernels.evaluator, of n hinges and m results."""
-    rows = dict.fromkeys(("q", "qd", "tau"), f"(N, {n})") | {"out": f"(N, {m})"}
-    columns = dict.fromkeys(("q", "qd", "tau"), f"({n}, N)") | {"out": f"({m}, N)"}
-    ends = dict.fromkeys(("q", "qd", "tau"), f"({n},)")
-    halves = {"y": f"({2 * n},)", "tau": f"({n},)"}
+def checked_evaluator(module, nq, n, m) -> Evaluator:
+    """The calls of kernels.evaluator, of nq numbers in q, n speeds and m results."""
+    sizes = {"q": nq, "qd": n, "tau": n}
+    rows = {name: f"(N, {size})" for name, size in (sizes | {"out": m}).items()}
+    columns = {name: f"({size}, N)" for name, size in (sizes | {"out": m}).items()}
+    ends = {name: f"({size},)" for name, size in sizes.items()}
+    halves = {"y": f"({nq + n},)", "tau": f"({n},)"}
     compiled_chain, compiled_rate = module.chain, getattr(module, "rate", None)
 
     def of_many(compiled, shapes):

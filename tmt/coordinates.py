@@ -94,6 +94,27 @@ class Coordinates(NamedTuple):
         ]
 
 
+class Flat:
+    """Coordinates of any number of joints none of which is a ball: positions move like numbers, and speeds are their rates."""
+
+    balls = ()
+
+    def move(self, q, u) -> list:
+        return [x + y for x, y in zip(q, u)]
+
+    def tangent(self, q, dq) -> list:
+        return dq
+
+    def component_rates(self, q, qd) -> list:
+        return list(qd)
+
+    def rates(self, u, qd) -> list:
+        return qd
+
+
+FLAT = Flat()
+
+
 @lru_cache(maxsize=256)
 def coordinates_of(kinds: tuple) -> Coordinates:
     """The coordinates of joints of these kinds."""

@@ -87,13 +87,20 @@ def seeded(values, slopes) -> list[Dual]:
     return [Dual(value, slope, level) for value, slope in zip(values, slopes)]
 
 
-def jacobian(function, x) -> list:
-    """d function_i / d x_j (rows i, columns j) of a function from a list of scalars to a list of scalars."""
+def jacobian(function, x, directions=None) -> list:
+    """d function_i / d x_j (rows i, columns j) of a function from a list of scalars to a list of scalars.
+
+    directions: lists as long as x, along which it is differentiated in place of along each x_j.
+    """
     columns = []
-    for j in range(len(x)):
-        nudged = seeded(x, [1.0 if i == j else 0.0 for i in range(len(x))])
+    for direction in directions or unit_vectors(len(x)):
+        nudged = seeded(x, direction)
         columns.append([nudged[0].parts(result)[1] for result in function(nudged)])
     return [list(row) for row in zip(*columns)]
+
+
+def unit_vectors(n) -> list:
+    return [[1.0 if i == j else 0.0 for i in range(n)] for j in range(n)]
 
 
 sin.register(Dual, lambda angle: angle.new(sin(angle.value), cos(angle.value) * angle.slope))

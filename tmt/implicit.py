@@ -2,14 +2,16 @@
 
 The unknowns are the accelerations a_i of the stages, a_i = qdd(q_i, qd_i), at
 q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. Newton's method starts from the a_i that
-the equations linearised at (q, qd) have.
+the equations linearised at (q, qd) have. A ball's quaternions p_i follow from the speeds of the stages by linear equations,
+p_i = p + dt sum_j A_ij p_j o (0, omega_j) / 2.
 """
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from .dual import Dual, jacobian
+from .coordinates import FLAT, normalized, product
+from .dual import Dual, jacobian, seeded, unit_vectors
 from .space import solve_any
 from .stepping import Method, checked_sums, checked_tableau
 from .trace import Tape
@@ -59,37 +61,50 @@ class ImplicitRungeKutta(Method):
         """Evaluations of the dynamics in one iteration of Newton's method."""
         return len(self.b)
 
-    def step(self, slope, q, qd, dt):
+    def step(self, slope, q, qd, dt, joints=FLAT):
         """The state (q, qd) one dt later, on floats, arrays and dual numbers of them.
 
         Raises ArithmeticError where Newton's method does not find the stages (the compiled loop gives NaN there).
         """
-        n = len(q)
+        nq, n = len(q), len(qd)
 
         def evaluate(q, qd):
-            rows = jacobian(lambda x: slope(x[:n], x[n:]), [*q, *qd])
+            rows = jacobian(lambda x: slope(x[:nq], x[nq:]), [*q, *qd], directions(joints, q, n))
             return slope(q, qd), [row[:n] for row in rows], [row[n:] for row in rows]
 
-        a, last = self.start(evaluate, q, qd, dt), False
+        a, last = self.start(evaluate, q, qd, dt, joints), False
         for _ in range(ITERATIONS):
-            change = self.newton(evaluate, q, qd, dt, a)
+            change = self.newton(evaluate, q, qd, dt, a, joints)
             a = [old + new for old, new in zip(a, change)]
             if last:  # once more after the values are found: only then are their derivatives exact
-                return self.finish(q, qd, dt, a)
+                return self.finish(q, qd, dt, a, joints)
             last = largest(change) <= CLOSE * (1.0 + largest(a))
         raise ArithmeticError(f"Newton's method does not find the stages at dt = {dt} s")
 
-    def stage_states(self, q, qd, dt, a):
+    def stage_states(self, q, qd, dt, a, joints):
         """The states (q_i, qd_i) of the stages with accelerations a, all of them in one list."""
-        n, s = len(q), range(self.stages)
+        n, s = len(qd), range(self.stages)
+        speeds = [[qd[k] + dt * weighted(self.A[i], a[k::n]) for k in range(n)] for i in s]
+        balls = [self.ball_stages(q[joint.q], [of[joint.qd] for of in speeds], dt) for joint in joints.balls]
         for i in s:
             twice = [sum(self.A[i][k] * self.A[k][j] for k in s) for j in s]
-            yield (
-                [q[k] + dt * (self.c[i] * qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
-                [qd[k] + dt * weighted(self.A[i], a[k::n]) for k in range(n)],
-            )
+            moved = [dt * (self.c[i] * qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)]
+            yield placed(joints, q, moved, [of[i] for of in balls]), speeds[i]
 
-    def start(self, evaluate, q, qd, dt):
+    def ball_stages(self, p, omegas, dt):
+        """The quaternions p_i of a ball that starts at p and has these speeds in the stages."""
+        s = range(self.stages)
+        matrix = [[1.0 if i == j else 0.0 for j in range(4 * len(s))] for i in range(4 * len(s))]
+        for j in s:
+            for c, unit in enumerate(unit_vectors(4)):
+                for r, value in enumerate(product(unit, [0.0, *omegas[j]])):
+                    for i in s:
+                        entry = matrix[4 * i + r][4 * j + c]
+                        matrix[4 * i + r][4 * j + c] = entry - dt * (0.5 * self.A[i][j] * value)
+        found = solve_any(matrix, [*p] * len(s))
+        return [found[4 * i : 4 * i + 4] for i in s]
+
+    def start(self, evaluate, q, qd, dt, joints):
         """The accelerations of the stages from which Newton's method starts: exact if the equations were linear.
 
         They take one evaluation, at (q, qd). The acceleration there would be a start too, but with a large step the stages of
@@ -98,39 +113,92 @@ class ImplicitRungeKutta(Method):
         f, by_q, by_qd = evaluate(q, qd)
 
         def linear(q_i, qd_i):
-            off, faster = [x - y for x, y in zip(q_i, q)], [x - y for x, y in zip(qd_i, qd)]
-            changes = [weighted(by_q[k], off) + weighted(by_qd[k], faster) for k in range(len(q))]
+            off = joints.tangent(q, [x - y for x, y in zip(q_i, q)])
+            faster = [x - y for x, y in zip(qd_i, qd)]
+            changes = [weighted(by_q[k], off) + weighted(by_qd[k], faster) for k in range(len(qd))]
             return [value + change for value, change in zip(f, changes)], by_q, by_qd
 
-        return self.newton(linear, q, qd, dt, [0.0] * (len(q) * self.stages))
+        return self.newton(linear, q, qd, dt, [0.0] * (len(qd) * self.stages), joints)
 
-    def newton(self, evaluate, q, qd, dt, a):
+    def newton(self, evaluate, q, qd, dt, a, joints):
         """The change of the accelerations a by one step of Newton's method.
 
-        evaluate(q, qd): qdd and its exact derivatives by q and by qd, n rows of n each.
+        evaluate(q, qd): qdd and its exact derivatives by q and by qd, nv rows of nv each.
         """
-        n, s = len(q), range(self.stages)
+        n, s = len(qd), range(self.stages)
         matrix, right = [], []
-        for i, (q_i, qd_i) in zip(s, self.stage_states(q, qd, dt, a)):
+        turned = self.turned(q, qd, dt, a, joints) if joints.balls else [{}] * len(s)
+        for i, (q_i, qd_i) in zip(s, self.stage_states(q, qd, dt, a, joints)):
             f, by_q, by_qd = evaluate(q_i, qd_i)
             for k in range(n):
                 row = []
                 for j in s:
                     twice = sum(self.A[i][m] * self.A[m][j] for m in s)
                     own = [1.0 if (j, l) == (i, k) else 0.0 for l in range(n)]
-                    row += [own[l] - dt * (self.A[i][j] * by_qd[k][l] + dt * (twice * by_q[k][l])) for l in range(n)]
+                    row += [
+                        own[l] - dt * (self.A[i][j] * by_qd[k][l] + dt * (twice * by_q[k][l]))
+                        if l not in turned[i]
+                        else own[l] - dt * (self.A[i][j] * by_qd[k][l]) - weighted(*across(by_q[k], turned[i][l][j]))
+                        for l in range(n)
+                    ]
                 matrix.append(row)
                 right.append(f[k] - a[i * n + k])
         return solve_any(matrix, right)
 
-    def finish(self, q, qd, dt, a):
+    def turned(self, q, qd, dt, a, joints):
+        """Of each stage {l: [for each stage j: {m: d theta_m / d a_jl}]}: how balls turn with the accelerations of their speeds l."""
+        n, s = len(qd), range(self.stages)
+        values = [state for state, _ in self.stage_states(q, qd, dt, a, joints)]
+        result = [{} for _ in s]
+        for joint in joints.balls:
+            by = range(joint.qd.start, joint.qd.stop)
+            for l in by:
+                columns = []
+                for j in s:
+                    nudged = seeded(a, [1.0 if k == j * n + l else 0.0 for k in range(len(a))])
+                    states = self.stage_states(q, qd, dt, nudged, joints)
+                    slopes = [[nudged[0].parts(x)[1] for x in state] for state, _ in states]
+                    moved = [joints.tangent(value, slope) for value, slope in zip(values, slopes)]
+                    columns.append([{m: of[m] for m in by} for of in moved])
+                for i in s:
+                    result[i][l] = [columns[j][i] for j in s]
+        return result
+
+    def finish(self, q, qd, dt, a, joints):
         """The state (q, qd) one dt later, from the accelerations of the stages."""
-        n, s = len(q), range(self.stages)
+        n, s = len(qd), range(self.stages)
         twice = [sum(self.b[k] * self.A[k][j] for k in s) for j in s]
-        return (
-            [q[k] + dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)],
-            [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)],
-        )
+        moved, balls = [dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)], []
+        if joints.balls:
+            stages = list(self.stage_states(q, qd, dt, a, joints))
+            for joint in joints.balls:
+                rates = [product(q_i[joint.q], [0.0, *qd_i[joint.qd]]) for q_i, qd_i in stages]
+                balls.append(
+                    normalized([p + dt * (0.5 * weighted(self.b, of)) for p, of in zip(q[joint.q], zip(*rates))])
+                )
+        return placed(joints, q, moved, balls), [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)]
+
+
+def placed(joints, q, moved, balls) -> list:
+    """The position after a movement from q, (nv,), of all but the balls, and these quaternions."""
+    if not balls:
+        return [x + y for x, y in zip(q, moved)]
+    balls, result = iter(balls), []
+    for kind, at, by in joints.joints:
+        result += next(balls) if kind == "ball" else [q[at.start] + moved[by.start]]
+    return result
+
+
+def across(row, chosen):
+    """The entries of a row at the keys of a dict, and its values."""
+    return [row[m] for m in chosen], list(chosen.values())
+
+
+def directions(joints, q, n):
+    """The 2 nv directions of a state (q, qd): a movement along each speed, then each speed."""
+    still = [0.0] * n
+    along = [[*joints.component_rates(q, unit), *still] for unit in unit_vectors(n)]
+    return along + [[*[0.0] * len(q), *unit] for unit in unit_vectors(n)]
 
 
 def weighted(weights, values):
@@ -153,17 +221,18 @@ def step_source(tree, stepping, terms) -> str:
 
     terms: the form of the dynamics that is traced.
     """
-    n = len(tree.parent)
+    joints, nq, n = tree.coordinates, tree.coordinates.nq, tree.coordinates.nv
+    place = joints if joints.balls else FLAT
 
     def fresh():
         tape = Tape()
-        q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau"))
-        a = tape.inputs(*(f"a{i}" for i in range(n * stepping.stages)))
+        sizes = {"q": nq, "qd": n, "tau": n, "a": n * stepping.stages}
+        q, qd, tau, a = (tape.inputs(*(f"{name}{i}" for i in range(size))) for name, size in sizes.items())
         return tape, q, qd, tau, tape.inputs("dt")[0], a
 
     tape, q, qd, tau, dt, _ = fresh()
     value = stepping.slope(tree, q, qd, tau, dt, terms)
-    rows = jacobian(lambda x: stepping.slope(tree, x[:n], x[n:], tau, dt, terms), [*q, *qd])
+    rows = jacobian(lambda x: stepping.slope(tree, x[:nq], x[nq:], tau, dt, terms), [*q, *qd], directions(place, q, n))
     outputs = [*value, *(entry for row in rows for entry in row)]
     functions = [tape.function("slope_and_jacobian", [*q, *qd, *tau, dt], outputs)]
 
@@ -174,12 +243,12 @@ def step_source(tree, stepping, terms) -> str:
         rows = [found[n + 2 * n * k : n + 2 * n * (k + 1)] for k in range(n)]
         return found[:n], [row[:n] for row in rows], [row[n:] for row in rows]
 
-    change = stepping.newton(called, q, qd, dt, a)
+    change = stepping.newton(called, q, qd, dt, a, place)
     functions.append(tape.function("newton", [*q, *qd, *tau, dt, *a], change))
     tape, q, qd, tau, dt, _ = fresh()
-    functions.append(tape.function("start", [*q, *qd, *tau, dt], stepping.start(called, q, qd, dt)))
+    functions.append(tape.function("start", [*q, *qd, *tau, dt], stepping.start(called, q, qd, dt, place)))
     tape, q, qd, tau, dt, a = fresh()
-    new_q, new_qd = stepping.finish(q, qd, dt, a)
+    new_q, new_qd = stepping.finish(q, qd, dt, a, place)
     functions.append(tape.function("finish", [*q, *qd, dt, *a], [*new_q, *new_qd]))
 
     count = len(a)
@@ -188,7 +257,7 @@ def step_source(tree, stepping, terms) -> str:
         return ", ".join(pattern.format(i=i) for i in range(count))
 
     step = STEP.format(
-        state=", ".join([list_of("q{i}", n), list_of("qd{i}", n)]),
+        state=", ".join([list_of("q{i}", nq), list_of("qd{i}", n)]),
         torque=list_of("tau{i}", n),
         unknown=list_of("a{i}"),
         iterations=ITERATIONS,
@@ -197,7 +266,7 @@ def step_source(tree, stepping, terms) -> str:
         unknown_sizes=list_of("abs(a{i})"),
         change_sizes=list_of("abs(d{i})"),
         close=CLOSE,
-        nothing=list_of("np.nan", 2 * n),
+        nothing=list_of("np.nan", nq + n),
     )
     texts = [*(function.text for function in functions), step]
     return "\n\n".join('@njit(error_model="numpy")\n' + text.lstrip("\n") for text in texts)

@@ -25,20 +25,24 @@ WORTH = 10_000_000  # steps of all runs together from which lanes are worth thei
 def stepper(tree: Tree, method_name: str) -> Callable:
     """Compiled `run(q, qd, tau, dt)` of a Tree and one of METHODS: fills the paths q and qd from their first states.
 
-    q, qd: (runs, steps + 1, n), of which [:, 0] is given; tau (runs, n); all contiguous, float64; rad, s, N m. It returns how
+    q, qd: (runs, steps + 1, nq and nv), of which [:, 0] is given; tau (runs, nv); all contiguous, float64; rad, s, N m. It returns how
     often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its tolerance too:
     `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is filled with why each run ended, see templates.
     For many hinges a method that has `loop` takes the generic loop, which needs no compilation.
     """
     checked_model(tree)
     stepping = method_named(method_name)
-    return _stepper(tree, stepping, len(tree.parent) > TRACED and stepping.loop)
+    return _stepper(tree, stepping, stepping.loop and not is_traced(tree, stepping))
+
+
+def is_traced(tree: Tree, stepping) -> bool:
+    return len(tree.axis) <= TRACED
 
 
 @lru_cache(maxsize=64)
 def _stepper(tree, stepping, large):
     compiled = generic.stepper(tree, stepping) if large else load(run_source(tree, stepping)).run
-    return checked_run(compiled, len(tree.parent), stepping.adaptive)
+    return checked_run(compiled, tree.coordinates.nq, tree.coordinates.nv, stepping.adaptive)
 
 
 def lane_stepper(tree: Tree, method_name: str) -> Callable:
@@ -52,7 +56,8 @@ def lane_stepper(tree: Tree, method_name: str) -> Callable:
 
 @lru_cache(maxsize=64)
 def _lane_stepper(tree, stepping):
-    return checked_run(load(lanes_source(tree, stepping)).run, len(tree.parent), adaptive=False)
+    run = load(lanes_source(tree, stepping)).run
+    return checked_run(run, tree.coordinates.nq, tree.coordinates.nv, adaptive=False)
 
 
 def evaluator(
@@ -60,9 +65,9 @@ def evaluator(
 ) -> Evaluator:
     """Compiled evaluation of many states: `each(q, qd, tau, out)`, `lanes(q, qd, tau, out)` and `chain`.
 
-    quantity: "forward_dynamics", the n of qdd, and besides `rate(y, tau)` for solvers; or "mass_matrix_and_bias", the rows of
-    the upper triangle of Mbar, then h. Arrays are contiguous: for each of shape (N, n), out (N, m); for lanes, component by
-    component as registers want them, (n, N) and (m, N). rad, s, kg, m, N m.
+    quantity: "forward_dynamics", the nv of qdd, and besides `rate(y, tau)` for solvers; or "mass_matrix_and_bias", the rows of
+    the upper triangle of Mbar, then h. Arrays are contiguous: for each of shape (N, nq or nv), out (N, m); for lanes,
+    component by component as registers want them, (nq or nv, N) and (m, N). rad, s, kg, m, N m.
     terms: the form of the dynamics that is traced; sine: "sincos" or "library_sincos".
     """
     checked_model(tree)
@@ -76,9 +81,9 @@ def evaluator(
 
 @lru_cache(maxsize=64)
 def _evaluator(tree, quantity, terms, sine):
-    n = len(tree.parent)
+    nq, n = tree.coordinates.nq, tree.coordinates.nv
     m = n if quantity == "forward_dynamics" else n * (n + 3) // 2
-    return checked_evaluator(load(evaluator_source(tree, quantity, terms, sine)), n, m)
+    return checked_evaluator(load(evaluator_source(tree, quantity, terms, sine)), nq, n, m)
 
 
 def slope_source(tree: Tree, method_name: str, terms: Callable = composite.mass_matrix_and_bias) -> Code:

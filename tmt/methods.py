@@ -5,15 +5,17 @@ loop of kernels.py). METHODS may be given further ones, and objects of a user's 
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
 from . import dop853
+from .coordinates import FLAT
 from .dual import seeded
 from .implicit import ImplicitRungeKutta
 from .method import bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
-from .stepping import Method, checked_sums, checked_tableau, completed
+from .stepping import Method, checked_sums, checked_tableau, completed, stepped
 from .tree import shown
 
 
@@ -21,14 +23,18 @@ from .tree import shown
 class RungeKutta(Method):
     """An explicit Runge-Kutta method, given by its Butcher tableau.
 
-    Applied to (q, qd) as one first-order system, like MuJoCo's RK4. Raises ValueError if the tableau
-    is not explicit, a row of A does not sum to c, or b does not sum to 1.
+    Applied to (q, qd) as one first-order system, like MuJoCo's RK4; to balls as Munthe-Kaas does, who keeps the order: what is
+    integrated is the movement from the start of the step. Raises ValueError if the tableau is not explicit, a row of A does not
+    sum to c, or b does not sum to 1.
     """
 
     order: int = field()  # it must be given, though Method has a default
     A: tuple  # row i: the weights of stages 0 .. i-1 in stage i
     b: tuple  # the weights of the stages in the step
     c: tuple  # the time of each stage in units of dt
+    mean_speed: bool = (
+        False  # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
+    )
 
     loop = True
 
@@ -45,23 +51,23 @@ class RungeKutta(Method):
         """The matrix of the linear system for the slope: Mbar."""
         return terms(tree, q, [0.0] * len(q))[0]
 
-    def step(self, slope, q, qd, dt):
+    def step(self, slope, q, qd, dt, joints=FLAT):
         """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
-        return self.combined(self.stage_slopes(slope, q, qd, dt), q, qd, dt)
+        return self.combined(self.stage_slopes(slope, q, qd, dt, joints), q, qd, dt, joints)
 
-    def stage_slopes(self, slope, q, qd, dt):
-        """The rates and the accelerations of all stages."""
+    def stage_slopes(self, slope, q, qd, dt, joints):
+        """The rates and the accelerations of all stages; the rates are those of the movement from q, see coordinates.py."""
         rates, changes = [], []
         for row in self.A:
-            q_i, qd_i = advance(q, dt, row, rates), advance(qd, dt, row, changes)
-            rates.append(qd_i)
-            changes.append(slope(q_i, qd_i))
+            u, qd_i = increments(dt, row, rates, len(qd)), advance(qd, dt, row, changes)
+            rates.append(qd_i if self.mean_speed else joints.rates(u, qd_i))
+            changes.append(slope(joints.move(q, u), qd_i))
         return rates, changes
 
-    def combined(self, slopes, q, qd, dt):
+    def combined(self, slopes, q, qd, dt, joints):
         """The state one dt later, from the rates and accelerations of all stages."""
         rates, changes = slopes
-        return advance(q, dt, self.b, rates), advance(qd, dt, self.b, changes)
+        return joints.move(q, increments(dt, self.b, rates, len(qd))), advance(qd, dt, self.b, changes)
 
 
 @dataclass(frozen=True)
@@ -72,7 +78,7 @@ class AdaptiveRungeKutta(RungeKutta):
     the estimates e5 and e3 combine to e5^2 / sqrt(e5^2 + 0.01 e3^2) (Hairer, Norsett, Wanner, section II.10).
     """
 
-    errors: tuple = ()  # weights of the stages in the two estimates
+    errors: tuple = ()  # weights of the stages in the two estimates, of the movement and of the speeds
 
     adaptive = True
 
@@ -82,44 +88,81 @@ class AdaptiveRungeKutta(RungeKutta):
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 
-    def attempt(self, slope, q, qd, dt):
-        """A step, and the two estimates of its error, each for q and qd."""
-        slopes = self.stage_slopes(slope, q, qd, dt)
-        estimates = [[*advance([0.0] * len(q), dt, e, part)] for e in self.errors for part in slopes]
-        return *self.combined(slopes, q, qd, dt), *estimates
+    def attempt(self, slope, q, qd, dt, joints=FLAT):
+        """A step, and the two estimates of its error, each for the movement and qd."""
+        slopes = self.stage_slopes(slope, q, qd, dt, joints)
+        estimates = [[*advance([0.0] * len(qd), dt, e, part)] for e in self.errors for part in slopes]
+        return *self.combined(slopes, q, qd, dt, joints), *estimates
 
 
 @dataclass(frozen=True)
 class SemiImplicitEuler(Method):
-    """qd+ = qd + dt a, then q+ = q + dt qd+, with (Mbar + dt D [+ dt dh/dqd]) a = tau - D qd - h.
+    """qd+ = qd + dt a, then q+ = q moved by dt qd+, with (Mbar + dt D [+ dt dh/dqd] [+ dt^2 k]) a = tau - D qd - k (q - rest) - h [- dt k qd].
 
-    Joint damping is implicit in the rates, and so is the bias if `implicit_bias`: what MuJoCo calls Euler,
-    implicitfast and discrete (without), and implicit (with). MuJoCo documentation, numerical integration.
+    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `lone_bodies`, which have no other
+    body on them or under them; `implicit_springs`: so are springs. What MuJoCo calls Euler (none of these), implicit (the bias),
+    implicitfast (lone bodies) and discrete (lone bodies and springs). MuJoCo documentation, numerical integration.
     """
 
     implicit_bias: bool
+    lone_bodies: bool = False
+    implicit_springs: bool = False
 
     damps_implicitly = True
 
     def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
-        """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd]."""
-        n = len(q)
+        """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd] [+ dt^2 k]."""
+        n = len(qd)
         matrix = terms(tree, q, [0.0] * n)[0]
-        matrix = [[matrix[i][j] + (dt * tree.damping[i] if i == j else 0.0) for j in range(n)] for i in range(n)]
-        if self.implicit_bias:
+        held = [dt * d for d in tree.damping]
+        if self.implicit_springs and tree.has_springs:
+            held = [x + dt * dt * k for x, k in zip(held, by_speed(tree, tree.stiffness))]
+        matrix = [[matrix[i][j] + (held[i] if i == j else 0.0) for j in range(n)] for i in range(n)]
+        lone = lone_speeds(tree) if self.lone_bodies else set()
+        if self.implicit_bias or lone:
             rates = bias_rates(tree, q, qd, terms)
-            matrix = [[matrix[i][j] + dt * rates[i][j] for j in range(n)] for i in range(n)]
+            own = range(n) if self.implicit_bias else lone
+            matrix = [
+                [matrix[i][j] + dt * rates[i][j] if i in own else matrix[i][j] for j in range(n)] for i in range(n)
+            ]
         return matrix
 
     def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
         """a from the linear system above."""
-        force = reduced_force(tree, terms(tree, q, qd)[1], qd, tau)
+        force = reduced_force(tree, terms(tree, q, qd)[1], q, qd, tau)
+        if self.implicit_springs and tree.has_springs:
+            force = [f - dt * k * v for f, k, v in zip(force, by_speed(tree, tree.stiffness), qd)]
         return solve_any(self.matrix(tree, q, qd, dt, terms), force)
 
-    def step(self, slope, q, qd, dt):
+    def step(self, slope, q, qd, dt, joints=FLAT):
         """The state (q, qd) one dt later."""
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
-        return advance(q, dt, (1.0,), [qd]), qd
+        return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
+
+
+def by_speed(tree, of_joints) -> list:
+    """For each speed the value of its joint."""
+    return [
+        value for value, joint in zip(of_joints, tree.coordinates.joints) for _ in range(joint.qd.start, joint.qd.stop)
+    ]
+
+
+@lru_cache(maxsize=64)
+def lone_speeds(tree) -> set:
+    """The speeds of free bodies that stand alone: three slides and a ball from the world, and nothing on them."""
+    lone = set()
+    for i, kind in enumerate(tree.kind):
+        chain = [i - 3, i - 2, i - 1, i]
+        free = kind == "ball" and i >= 3 and [tree.kind[j] for j in chain] == ["slide"] * 3 + ["ball"]
+        alone = i not in tree.parent and tree.body_hinge.count(i) == 1 and not {*chain[:3]} & {*tree.body_hinge}
+        if free and alone and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
+            lone |= set(range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop))
+    return lone
+
+
+def increments(dt, weights, slopes, n) -> list:
+    """dt * sum of weights * slopes, (n,); 0.0 where there are none."""
+    return advance([0.0] * n, dt, weights, slopes)
 
 
 def advance(start, dt, weights, slopes):
@@ -133,39 +176,44 @@ def advance(start, dt, weights, slopes):
 
 def one_step(stepping, tree, q, qd, tau, dt):
     """The state (q, qd) of a tree one dt later by a method, over any scalar."""
-    return stepping.step(lambda q, qd: stepping.slope(tree, q, qd, tau, dt), q, qd, dt)
+    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt), q, qd, dt)
 
 
 def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
-    """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2n, 2n).
+    """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
 
-    q, qd: states (..., n), rad and rad/s; tau: torque (n,), N m; dt: step in s, one for all or (...). At an equilibrium
-    it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual numbers,
-    all directions at once; so it holds for partitioned and implicit methods too.
+    q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or (...). At an
+    equilibrium it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual
+    numbers, all directions at once; so it holds for partitioned and implicit methods too.
     """
-    n = len(tree.parent)
+    joints, nq, nv = tree.coordinates, tree.coordinates.nq, tree.coordinates.nv
     batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
-    start = [np.broadcast_to(values, (*batch, n))[..., i] for values in (q, qd) for i in range(n)]
-    directions = np.eye(2 * n).reshape(2 * n, 2 * n, *(1 for _ in batch))  # component, direction, state
-    state = seeded(start, directions)
-    new_q, new_qd = one_step(stepping, tree, state[:n], state[n:], [float(t) for t in tau], dt)
-    slopes = [np.broadcast_to(component.slope, (2 * n, *batch)) for component in (*new_q, *new_qd)]
+    start = [np.broadcast_to(values, (*batch, np.shape(values)[-1])) for values in (q, qd)]
+    start = [values[..., i] for values in start for i in range(values.shape[-1])]
+    directions = np.eye(2 * nv).reshape(2 * nv, 2 * nv, *(1 for _ in batch))  # component, direction, state
+    state = seeded(start, [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]])
+    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq:], [float(t) for t in tau], dt)
+    moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
+    slopes = [np.broadcast_to(slope, (2 * nv, *batch)) for slope in (*moved, *(x.slope for x in new_qd))]
     return np.moveaxis(np.array(slopes), (0, 1), (-2, -1)).copy()
 
 
+CLASSICAL = (  # Kutta (1901): A, b, c
+    ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
+    (1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    (0.0, 0.5, 0.5, 1.0),
+)
 ROOT = 3**0.5 / 6
 METHODS = {
-    "rk4": RungeKutta(  # the classical method of Kutta (1901), the assignment's part i
-        order=4,
-        A=((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
-        b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
-        c=(0.0, 0.5, 0.5, 1.0),
-    ),
+    "rk4": RungeKutta(4, *CLASSICAL),  # the assignment's part i
+    "rk4_mean_speed": RungeKutta(4, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles
     "dopri8": RungeKutta(order=8, A=dop853.A, b=dop853.B, c=dop853.C),  # Dormand and Prince, fixed step
-    "dopri8_adaptive": AdaptiveRungeKutta(8, dop853.A, dop853.B, dop853.C, (dop853.ERROR_5, dop853.ERROR_3)),
+    "dopri8_adaptive": AdaptiveRungeKutta(8, dop853.A, dop853.B, dop853.C, errors=(dop853.ERROR_5, dop853.ERROR_3)),
     "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),
     "semi_implicit_euler": SemiImplicitEuler(implicit_bias=False),
     "implicit": SemiImplicitEuler(implicit_bias=True),
+    "implicitfast": SemiImplicitEuler(implicit_bias=False, lone_bodies=True),
+    "discrete": SemiImplicitEuler(implicit_bias=False, lone_bodies=True, implicit_springs=True),
     "implicit_midpoint": ImplicitRungeKutta(order=2, A=((0.5,),), b=(1.0,), c=(0.5,)),
     "gauss_legendre_4": ImplicitRungeKutta(  # Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.7
         order=4,

@@ -15,8 +15,8 @@ from .tree import Tree
 
 class _Path(NamedTuple):
     t: np.ndarray  # (steps + 1,) s
-    q: np.ndarray  # (..., steps + 1, n) rad
-    qd: np.ndarray  # (..., steps + 1, n) rad/s
+    q: np.ndarray  # (..., steps + 1, nq) rad
+    qd: np.ndarray  # (..., steps + 1, nv) rad/s
 
 
 class Motion(_Path):
@@ -43,9 +43,9 @@ def simulate(
     q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
     tolerance: float | None = None,
 ) -> Motion:  # fmt: skip
-    """Motion under constant torque: t (steps+1,) s, q and qd (..., steps+1, n), rad and rad/s.
+    """Motion under constant torque: t (steps+1,) s, q (..., steps+1, nq) and qd (..., steps+1, nv), rad and rad/s.
 
-    q, qd: state at t = 0; tau: torque; each (..., n). dt: step in s, above 0; steps: how many, at least 1; method: a key of
+    q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1; method: a key of
     METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units
     of 1 + |value|. A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad,
     Mbar is singular, Newton's method does not find the stages of an implicit method, or an adaptive method would need
@@ -57,12 +57,12 @@ def simulate(
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     tolerance = 1e-9 if tolerance is None else given.positive("tolerance", tolerance, "a number")
     state = given.states(model, q=q, qd=qd, tau=tau)
-    batch, n = state[0][0].shape, len(model.parent)
+    batch, nq, nv = state[0][0].shape, model.coordinates.nq, model.coordinates.nv
     runs = math.prod(batch)
-    path_q, path_qd = given.paths(runs, steps, n)
+    path_q, path_qd = given.paths(runs, steps, nq, nv)
     if steps * dt == np.inf:
         raise ValueError(f"dt is {dt:g} and steps is {given.shown(steps)}; their product is beyond the largest double")
-    path_q[:, 0], path_qd[:, 0], tau = (np.stack(part, axis=-1).reshape(-1, n) for part in state)
+    path_q[:, 0], path_qd[:, 0], tau = (np.stack(part, axis=-1).reshape(runs, len(part)) for part in state)
     arguments = path_q, path_qd, np.ascontiguousarray(tau)
 
     from . import kernels  # here, so that `import tmt` need not wait for numba
@@ -71,7 +71,7 @@ def simulate(
     if stepping.adaptive:
         evaluations = kernels.stepper(model, method)(*arguments, dt, tolerance, codes)
     else:
-        worth = runs * steps >= kernels.WORTH and n <= kernels.TRACED and stepping.lanes
+        worth = runs * steps >= kernels.WORTH and stepping.lanes and kernels.is_traced(model, stepping)
         in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
         if in_lanes:
             part = [array[:in_lanes] for array in arguments]
@@ -79,15 +79,15 @@ def simulate(
         rest = [array[in_lanes:] for array in arguments]
         evaluations += kernels.stepper(model, method)(*rest, dt, codes[in_lanes:])
     ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
-    shape = *batch, steps + 1, n
-    t, q, qd = dt * np.arange(steps + 1), path_q.reshape(shape), path_qd.reshape(shape)
+    t = dt * np.arange(steps + 1)
+    q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))
     return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
 
 
 def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
-    q, qd: the paths (runs, steps + 1, n); codes: why the compiled loop ended each, 0: it did not.
+    q, qd: the paths (runs, steps + 1, nq and nv); codes: why the compiled loop ended each, 0: it did not.
     """
     why = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
@@ -106,7 +106,10 @@ def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
     for run in (run for run in range(len(codes)) if codes[run] or why[run]):
         last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
         code = int(codes[run])
-        reach = max(np.abs(q[run, last]).max(), dt * float(np.abs(qd[run, last]).max()))
+        hinges = [joint for joint in tree.coordinates.joints if joint.kind == "hinge"]
+        reach = max(
+            (max(abs(q[run, last, at][0]), dt * abs(qd[run, last, by][0])) for _, at, by in hinges), default=0.0
+        )
         if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages
         why[run] = f"at t = {last * dt:g} s: {why[run] or words[code]}"

@@ -33,9 +33,9 @@ def slope_code(tree, stepping, terms=composite.mass_matrix_and_bias) -> Code:
 
 def run_source(tree, stepping) -> str:
     """The module that follows one state at a time: slope, step, and the loop over both."""
-    n = len(tree.parent)
+    nq, n = tree.coordinates.nq, tree.coordinates.nv
     if stepping.solves_stages:
-        words = _words(n) | {"why": f"{NEWTON} if math.isnan({_sum('q', n)}) else {_why(n)}"}
+        words = _words(tree) | {"why": f"{NEWTON} if math.isnan({_sum('q', nq)}) else {_why(tree)}"}
         loop = RUN.format(**words, used=", used", cost=f"1 + used * {stepping.stages}")
         return HEADER + step_source(tree, stepping, composite.mass_matrix_and_bias) + loop
     tape = Tape()
@@ -44,45 +44,54 @@ def run_source(tree, stepping) -> str:
     def slope(q, qd):
         return tape.call("slope", [*q, *qd, *tau, dt], n)
 
-    name = "attempt" if stepping.adaptive else "step"
-    results = getattr(stepping, name)(slope, q, qd, dt)
+    name, joints = "attempt" if stepping.adaptive else "step", tree.coordinates
+    results = getattr(stepping, name)(slope, q, qd, dt, *([joints] if joints.balls else []))
     step = tape.function(name, [*q, *qd, *tau, dt], [value for part in results for value in part])
     inline = '@njit(forceinline=True, error_model="numpy")\n'
     return "\n\n".join(
         [
             HEADER + inline + slope_code(tree, stepping).text,
             f'@njit(error_model="numpy")\n{step.text}',
-            _loop(stepping, n),
+            _loop(stepping, tree),
         ]
     )
 
 
-def _loop(stepping, n) -> str:
-    """The loop of `run_source` over the states of n hinges."""
-    words = _words(n)
+def _loop(stepping, tree) -> str:
+    """The loop of `run_source` over the states of a tree."""
+    words, coordinates = _words(tree), tree.coordinates
     if not stepping.adaptive:
         return RUN.format(**words, used="", cost=stepping.stages)
-    states = [f"{name}{i}" for name in ("q", "qd") for i in range(n)]
+    states = [f"{name}{i}" for name, count in (("q", coordinates.nq), ("qd", coordinates.nv)) for i in range(count)]
+    # each component of an error, and the state in whose units it is: a ball's movement is an angle, of a turn of about 1
+    errors = {}
+    for kind, at, by in coordinates.joints:
+        for k in range(by.start, by.stop):
+            errors[f"q{k}"] = None if kind == "ball" else f"q{at.start}"
+    errors |= {f"qd{k}": f"qd{k}" for k in range(coordinates.nv)}
 
     def squares(error):
         scale = "(tolerance * (1.0 + max(abs({s}), abs(new_{s}))))"
-        return " + ".join(f"({error}_{s} / {scale.format(s=s)}) ** 2" for s in states)
+        return " + ".join(
+            f"({error}_{e} / {scale.format(s=s) if s else '(tolerance * 2.0)'}) ** 2" for e, s in errors.items()
+        )
 
     return ADAPTIVE.format(
         **words,
-        **{name: ", ".join(f"{name}_{s}" for s in states) for name in ("new", "errors5", "errors3")},
+        new=", ".join(f"new_{s}" for s in states),
+        **{name: ", ".join(f"{name}_{e}" for e in errors) for name in ("errors5", "errors3")},
         squares5=squares("errors5"),
         squares3=squares("errors3"),
         stages=stepping.stages,
         small=SMALL,
-        components=2 * n,
+        components=len(errors),
         exponent=-1.0 / stepping.order,
     )
 
 
 def lanes_source(tree, stepping) -> str:
     """The module that follows LANES states side by side, stage by stage."""
-    n = len(tree.parent)
+    nq, n, joints = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates
     tape = Tape()
     q, qd, _, dt = _inputs(tape, tree)
     asked, answers = [], []
@@ -92,9 +101,9 @@ def lanes_source(tree, stepping) -> str:
         answers.append(tape.inputs(*(f"k{len(answers)}_{i}" for i in range(n))))
         return answers[-1]
 
-    results = stepping.step(slope, q, qd, dt)
+    results = stepping.step(slope, q, qd, dt, *([joints] if joints.balls else []))
     functions, stages = [slope_code(tree, stepping).text], []
-    own = [_lane("y", i) for i in range(2 * n)] + ["dt"]
+    own = [_lane("y", i) for i in range(nq + n)] + ["dt"]
     for j in range(len(asked) + 1):
         inputs = [*q, *qd, dt, *(value for answer in answers[:j] for value in answer)]
         known = ", ".join(own + [_lane("k", i) for i in range(j * n)])
@@ -102,25 +111,26 @@ def lanes_source(tree, stepping) -> str:
             functions.append(tape.function("combined", inputs, [*results[0], *results[1]]).text)
         else:
             functions.append(tape.function(f"stage_{j}", inputs, asked[j]).text)
-            arguments = ", ".join(_lane("x", i) for i in range(2 * n))
+            arguments = ", ".join(_lane("x", i) for i in range(nq + n))
             stages.append(STAGE.format(W=LANES, j=j, arguments=arguments, known=known, offset=j * n * LANES))
-    words = _words(n) | {
+    places = [("q", i) for i in range(nq)] + [("qd", i) for i in range(n)]
+    words = _words(tree) | {
         "W": LANES,
         "cost": stepping.stages,
-        "size_x": 3 * n * LANES,
-        "size_y": 2 * n * LANES,
+        "size_x": (nq + 2 * n) * LANES,
+        "size_y": (nq + n) * LANES,
         "size_k": len(asked) * n * LANES,
-        "first": ", ".join(f"{name}[b + l, 0, {i}]" for name in ("q", "qd") for i in range(n)),
+        "first": ", ".join(f"{name}[b + l, 0, {i}]" for name, i in places),
         "given": ", ".join(f"tau[b + l, {i}]" for i in range(n)),
-        "store": ", ".join(f"{name}[b + l, s, {i}]" for name in ("q", "qd") for i in range(n)),
-        "rows_x": ", ".join(_row("x", i) for i in range(2 * n)),
-        "rows_y": ", ".join(_row("y", i) for i in range(2 * n)),
-        "rows_tau": ", ".join(_row("x", i) for i in range(2 * n, 3 * n)),
-        "lane_new": ", ".join(_lane("x", i) for i in range(2 * n)),
+        "store": ", ".join(f"{name}[b + l, s, {i}]" for name, i in places),
+        "rows_x": ", ".join(_row("x", i) for i in range(nq + n)),
+        "rows_y": ", ".join(_row("y", i) for i in range(nq + n)),
+        "rows_tau": ", ".join(_row("x", nq + n + i) for i in range(n)),
+        "lane_new": ", ".join(_lane("x", i) for i in range(nq + n)),
         "known": known,
         "stages": "".join(stages).rstrip(),
     }
-    arguments = ", ".join([_lane("x", i) for i in range(3 * n)] + ["dt"])
+    arguments = ", ".join([_lane("x", i) for i in range(nq + 2 * n)] + ["dt"])
     slopes = SLOPES.format(W=LANES, arguments=arguments, results=_sequence(lambda i: _lane("k", i, "o + "), n))
     inline = '@njit(forceinline=True, error_model="numpy")\n'
     return "\n\n".join([HEADER + inline + functions[0], *(inline + text for text in functions[1:]), slopes,
@@ -129,7 +139,7 @@ def lanes_source(tree, stepping) -> str:
 
 def evaluator_source(tree, quantity, terms, sine) -> str:
     """The module of kernels.evaluator."""
-    n = len(tree.parent)
+    nq, n = tree.coordinates.nq, tree.coordinates.nv
     tape = Tape()
     q, qd, tau, _ = _inputs(tape, tree)
     try:
@@ -145,15 +155,16 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
         outputs = [*(M[i][j] for i in range(n) for j in range(i, n)), *h]
     m = len(outputs)
     text = tape.function("quantity", [*q, *qd, *tau], outputs).text
-    inputs = [(name, i) for name in ("q", "qd", "tau") for i in range(n)]
+    inputs = [(name, i) for name, count in (("q", nq), ("qd", n), ("tau", n)) for i in range(count)]
     places = ", ".join(f"{name}[i, {k}]" for name, k in inputs)
 
     words = {
         "W": LANES,
-        "size_x": 3 * n * LANES,
+        "size_x": (nq + 2 * n) * LANES,
         "size_y": m * LANES,
         "row_in": places,
         "row_out": _sequence(lambda k: f"out[i, {k}]", m),
+        "nq": nq,
         "n": n,
         "m": m,
         "sound_row": " + ".join(f"abs(out[i, {k}])" for k in range(m)) + " < np.inf",
@@ -163,11 +174,11 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
         "last": " + ".join(f"results[{k}]" for k in range(m)),
         "gather": "; ".join(f"{_lane('x', r)} = flat_{a}[b{k} + l]" for r, (a, k) in enumerate(inputs)),
         "results": _sequence(lambda k: _lane("y", k), m),
-        "arguments": _sequence(lambda k: _lane("x", k), 3 * n),
+        "arguments": _sequence(lambda k: _lane("x", k), nq + 2 * n),
         "scatter": "; ".join(f"flat_out[b{k} + l] = {_lane('y', k)}" for k in range(m)),
         "lane_in": ", ".join(f"{name}[{k}, b + l]" for name, k in inputs),
         "lane_out": _sequence(lambda k: f"out[{k}, b + l]", m),
-        "begins": "; ".join(f"b{k} = np.uint64({k} * count + b)" for k in range(max(m, n))),
+        "begins": "; ".join(f"b{k} = np.uint64({k} * count + b)" for k in range(max(m, nq))),
         "column_in": ", ".join(f"{name}[{k}, i]" for name, k in inputs),
         "column_out": _sequence(lambda k: f"out[{k}, i]", m),
     }
@@ -178,33 +189,48 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     text = "\n\n".join([HEADER + fast, sure, EVALUATE.format(**words)])
     if quantity != "forward_dynamics":
         return text
-    given = _sequence(lambda k: f"y[{k}]", 2 * n) + ", " + _sequence(lambda k: f"tau[{k}]", n)
-    rates = _sequence(lambda k: f"result[{n + k}]", n)
-    sound = " + ".join(f"abs(result[{n + k}])" for k in range(n)) + " < np.inf"
-    return text + RATE.format(n=n, twice=2 * n, rates=rates, given=given, sound_rates=sound)
+    given = _sequence(lambda k: f"y[{k}]", nq + n) + ", " + _sequence(lambda k: f"tau[{k}]", n)
+    rates = _sequence(lambda k: f"result[{nq + k}]", n)
+    sound = " + ".join(f"abs(result[{nq + k}])" for k in range(n)) + " < np.inf"
+    moving = f"result[:{nq}] = y[{nq}:]"
+    if tree.coordinates.balls:
+        turns = tape.function("moving", [*q, *qd], tree.coordinates.component_rates(q, qd)).text
+        text += f'\n\n@njit(error_model="numpy")\n{turns}'
+        moving = f"{_sequence(lambda k: f'result[{k}]', nq)} = moving({_sequence(lambda k: f'y[{k}]', nq + n)})"
+    words = {"n": n, "all": nq + n, "moving": moving, "rates": rates, "given": given, "sound_rates": sound}
+    return text + RATE.format(**words)
 
 
 def _inputs(tape, tree):
-    n = len(tree.parent)
-    return *(tape.inputs(*(f"{name}{i}" for i in range(n))) for name in ("q", "qd", "tau")), tape.inputs("dt")[0]
+    sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv, "tau": tree.coordinates.nv}
+    return *(tape.inputs(*(f"{name}{i}" for i in range(n))) for name, n in sizes.items()), tape.inputs("dt")[0]
 
 
-def _words(n) -> dict:
-    """What the templates say of the states of n hinges, one scalar after the other."""
+def _words(tree) -> dict:
+    """What the templates say of the states of a tree, one scalar after the other."""
+    sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv, "tau": tree.coordinates.nv}
 
-    def sequence(pattern, names=("q", "qd"), glue=", "):
-        return glue.join(pattern.format(name=name, i=i) for name in names for i in range(n))
+    def sequence(pattern, names=("q", "qd")):
+        return ", ".join(pattern.format(name=name, i=i) for name in names for i in range(sizes[name]))
 
-    angles = sequence("abs({name}{i})", ["q"], " + ")
+    angles = [f"abs(q{joint.q.start})" for joint in tree.coordinates.joints if joint.kind == "hinge"]
+    rest = [
+        f"q{k}"
+        for joint in tree.coordinates.joints
+        if joint.kind != "hinge"
+        for k in range(joint.q.start, joint.q.stop)
+    ]
+    finite = " + ".join([*rest, _sum("qd", sizes["qd"])])
+    limited = f"{' + '.join(angles)} < LIMIT and " if angles else ""
     return {
         "state": sequence("{name}{i}"),
         "torque": sequence("{name}{i}", ["tau"]),
         "first": sequence("{name}[b, 0, {i}]"),
         "given": sequence("{name}[b, {i}]", ["tau"]),
         "store": sequence("{name}[b, k, {i}]"),
-        "sound": f"({angles} < LIMIT and math.isfinite({_sum('qd', n)}))",
-        "why": _why(n),
-        "check": CHECK.format(n=n),
+        "sound": f"({limited}math.isfinite({finite}))",
+        "why": _why(tree),
+        "check": CHECK.format(nq=sizes["q"], n=sizes["qd"]),
     }
 
 
@@ -217,9 +243,10 @@ def _sum(name, n) -> str:
     return " + ".join(f"{name}{i}" for i in range(n))
 
 
-def _why(n) -> str:
+def _why(tree) -> str:
     """Why a state is not sound."""
-    return f"({TURNED} if math.isfinite({_sum('q', n)} + {_sum('qd', n)}) else {OVERFLOW})"
+    sums = f"{_sum('q', tree.coordinates.nq)} + {_sum('qd', tree.coordinates.nv)}"
+    return f"({TURNED} if math.isfinite({sums}) else {OVERFLOW})"
 
 
 def _row(name, i) -> str:

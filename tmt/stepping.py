@@ -16,7 +16,8 @@ class Method:
     """A method of integration. Another one is a subclass with a `step`; it must be hashable, as a frozen dataclass is.
 
     `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it asks
-    `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's own `slope`.
+    `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's own `slope`. For a tree
+    with balls it is given their coordinates too (see coordinates.py), `step(slope, q, qd, dt, joints)`: q has more numbers than qd.
     """
 
     order = 1  # the error of a run falls with dt to this power
@@ -53,6 +54,12 @@ class Method:
     def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
         """qdd from Mbar qdd = tau - D qd - h; terms: the function that gives Mbar and h."""
         return acceleration(tree, q, qd, tau, terms)
+
+
+def stepped(stepping, tree, slope, q, qd, dt) -> tuple[list, list]:
+    """The state (q, qd) of a tree one dt later by a method that asks `slope(q, qd)`."""
+    joints = tree.coordinates
+    return stepping.step(slope, q, qd, dt, joints) if joints.balls else stepping.step(slope, q, qd, dt)
 
 
 FIELDS = dict.fromkeys(("adaptive", "solves_stages", "damps_implicitly", "loop", "lanes"), bool) | {

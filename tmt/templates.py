@@ -23,8 +23,9 @@ def library_sincos(x):
 '''
 
 CHECK = """\
-if not (q.shape == qd.shape == (len(tau), q.shape[1], {n}) and tau.shape[1] == {n} and len(ended) in (0, len(q))):
-        raise ValueError("q and qd of shape (runs, steps + 1, {n}) and tau of shape (runs, {n}) are expected")"""
+if not (q.shape == (len(tau), q.shape[1], {nq}) and qd.shape == (len(tau), q.shape[1], {n}) and tau.shape[1] == {n}
+            and len(ended) in (0, len(q))):
+        raise ValueError("q of shape (runs, steps + 1, {nq}), qd (runs, steps + 1, {n}) and tau (runs, {n}) are expected")"""
 
 RUN = '''
 @njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, int8[::1])", cache=CACHE, error_model="numpy")
@@ -145,9 +146,9 @@ def apart(q, qd, tau, out):
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])", cache=CACHE, nogil=True, error_model="numpy")
 def each(q, qd, tau, out):
-    """One state at a time: rows of q, qd, tau (N, {n}) to rows of out (N, {m})."""
-    if not (q.shape == qd.shape == tau.shape == (len(q), {n}) and out.shape == (len(q), {m})):
-        raise ValueError("q, qd and tau of shape (N, {n}) and out of shape (N, {m}) are expected")
+    """One state at a time: rows of q (N, {nq}), qd, tau (N, {n}) to rows of out (N, {m})."""
+    if not (q.shape == (len(q), {nq}) and qd.shape == tau.shape == (len(q), {n}) and out.shape == (len(q), {m})):
+        raise ValueError("q of shape (N, {nq}), qd and tau (N, {n}) and out (N, {m}) are expected")
     apart(q, qd, tau, out)
     for i in range(q.shape[0]):
         {row_out} = quantity({row_in})
@@ -158,8 +159,8 @@ def each(q, qd, tau, out):
 @njit("float64(float64[::1], float64[::1], float64[::1], int64)", cache=CACHE, error_model="numpy")
 def chain(q, qd, tau, count):
     """The same state count times, each waiting for the one before: what one evaluation takes from start to end."""
-    if not len(q) == len(qd) == len(tau) == {n}:
-        raise ValueError("q, qd and tau of shape ({n},) are expected")
+    if not (len(q) == {nq} and len(qd) == len(tau) == {n}):
+        raise ValueError("q of shape ({nq},), qd and tau ({n},) are expected")
     last = 0.0
     for i in range(count):
         results = quantity({chained})
@@ -169,9 +170,9 @@ def chain(q, qd, tau, count):
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1])", cache=CACHE, nogil=True, error_model="numpy")
 def lanes(q, qd, tau, out):
-    """{W} states side by side, the rest one at a time: columns of q, qd, tau ({n}, N) to columns of out ({m}, N)."""
-    if not (q.shape == qd.shape == tau.shape == ({n}, q.shape[1]) and out.shape == ({m}, q.shape[1])):
-        raise ValueError("q, qd and tau of shape ({n}, N) and out of shape ({m}, N) are expected")
+    """{W} states side by side, the rest one at a time: columns of q ({nq}, N), qd, tau ({n}, N) to columns of out ({m}, N)."""
+    if not (q.shape == ({nq}, q.shape[1]) and qd.shape == tau.shape == ({n}, q.shape[1]) and out.shape == ({m}, q.shape[1])):
+        raise ValueError("q of shape ({nq}, N), qd and tau ({n}, N) and out ({m}, N) are expected")
     apart(q, qd, tau, out)
     x, y = np.empty({size_x}), np.empty({size_y})
     flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
@@ -198,10 +199,10 @@ RATE = '''
 @njit("float64[::1](float64[:], float64[::1])", cache=CACHE, error_model="numpy")
 def rate(y, tau):
     """dy/dt of y = (q, qd): the first-order system that solvers of differential equations ask for."""
-    if not (len(y) == {twice} and len(tau) == {n}):
-        raise ValueError("y of shape ({twice},) and tau of shape ({n},) are expected")
-    result = np.empty({twice})
-    result[:{n}] = y[{n}:]
+    if not (len(y) == {all} and len(tau) == {n}):
+        raise ValueError("y of shape ({all},) and tau of shape ({n},) are expected")
+    result = np.empty({all})
+    {moving}
     {rates} = quantity({given})
     if not {sound_rates}:
         {rates} = by_library({given})
