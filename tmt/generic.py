@@ -11,34 +11,52 @@ from typing import NamedTuple
 import numpy as np
 
 from .composite import carried_by_joint
+from .coordinates import KINDS
 
 
 class Arrays(NamedTuple):
     """A Tree as contiguous arrays, its masses handed inward."""
 
+    kind: np.ndarray  # (n,) 0 hinge, 1 slide, 2 ball
     parent: np.ndarray  # (n,) int
+    at: np.ndarray  # (n + 1,) where each joint begins in q
+    by: np.ndarray  # (n + 1,) where each joint begins in qd
+    before: np.ndarray  # (nv,) the speed before each on its path to the world, or -1
     offset: np.ndarray  # (n, 3)
-    axis: np.ndarray  # (n, 3)
+    axis: np.ndarray  # (nv, 3)
     mass: np.ndarray  # (n,)
     moment: np.ndarray  # (n, 3)
     second: np.ndarray  # (n, 3, 3)
-    damping: np.ndarray  # (n,)
+    damping: np.ndarray  # (nv,)
+    armature: np.ndarray  # (nv,)
+    stiffness: np.ndarray  # (n,)
+    rest: np.ndarray  # (nq,)
+    reference: np.ndarray  # (n,)
     gravity: np.ndarray  # (3,)
 
 
 @lru_cache(maxsize=64)
 def arrays(tree) -> Arrays:
     """The Tree as arrays."""
-    carried = [d.rounded(float) for d in carried_by_joint(tree)]
+    carried, joints = [d.rounded(float) for d in carried_by_joint(tree)], tree.coordinates.joints
+    before = [v - 1 for v in range(len(tree.axis))]
+    for parent, joint in zip(tree.parent, joints):
+        before[joint.qd.start] = joints[parent].qd.stop - 1 if parent >= 0 else -1
     return Arrays(
+        np.array([tuple(KINDS).index(kind) for kind in tree.kind]),
         np.array(tree.parent),
+        np.array([*(joint.q.start for joint in joints), tree.coordinates.nq]),
+        np.array([*(joint.qd.start for joint in joints), tree.coordinates.nv]),
+        np.array(before),
         np.array(tree.offset),
         np.array(tree.axis),
         np.array([d.mass for d in carried], dtype=float),
         np.array([list(d.moment) for d in carried]),
         np.array([[list(row) for row in d.second] for d in carried]),
-        np.array(tree.damping),
-        np.array(tree.gravity),
+        *(
+            np.array(getattr(tree, name))
+            for name in ("damping", "armature", "stiffness", "rest", "reference", "gravity")
+        ),
     )
 
 
@@ -51,11 +69,16 @@ def compiled():
 
 def stepper(tree, stepping) -> Callable:
     """run(q, qd, tau, dt, ended) of a Tree and a method that has `loop`, as in kernels.stepper."""
-    stages = len(stepping.b)
-    A = np.array([[*row, *[0.0] * (stages - len(row))] for row in stepping.A])
-    loop = compiled().run_tableau
-    run = partial(loop, arrays(tree), A, np.array(stepping.b))
+    from . import loop_runs, loop_stages
+
+    loop = getattr(loop_stages if stepping.solves_stages else loop_runs, stepping.loop)
+    run = partial(loop, arrays(tree), *stepping.looped(tree))
     # of no run: compiled for these types and then for no others, which it would take as they are (whole numbers, say)
-    run(*np.empty((2, 0, 1, len(tree.parent))), np.empty((0, len(tree.parent))), 0.0, np.empty(0, np.int8))
+    nothing = (
+        np.empty((0, 1, tree.coordinates.nq)),
+        np.empty((0, 1, tree.coordinates.nv)),
+        np.empty((0, len(tree.axis))),
+    )
+    run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty(0, np.int8))
     loop.disable_compile()
     return run

@@ -49,6 +49,11 @@ class ImplicitRungeKutta(Method):
     c: tuple  # the time of each stage in units of dt
 
     solves_stages = True
+    loop = "run_implicit"
+
+    def looped(self, tree):
+        """A and b for the compiled loop."""
+        return np.array(self.A), np.array(self.b)
 
     def __post_init__(self):
         checked_tableau(self, "A")

@@ -32,7 +32,7 @@ def stepper(tree: Tree, method_name: str) -> Callable:
     """
     checked_model(tree)
     stepping = method_named(method_name)
-    return _stepper(tree, stepping, stepping.loop and not is_traced(tree, stepping))
+    return _stepper(tree, stepping, bool(stepping.loop) and not is_traced(tree, stepping))
 
 
 def is_traced(tree: Tree, stepping) -> bool:

@@ -1,50 +1,88 @@
-"""The compiled loops of generic.py. `tree` is a generic.Arrays; vectors are rows of arrays."""
+"""The composite form as compiled loops over any tree, see generic.py. `tree` is a generic.Arrays; vectors are rows of arrays.
 
-import math
+Positions and speeds may be complex: an imaginary part of 1e-100 carries an exact derivative along (see slope_and_jacobian).
+"""
 
 import numpy as np
 
 from .machine_code import compiled
-from .templates import OVERFLOW
+
+HINGE, SLIDE, BALL = 0, 1, 2
+TINY = 1e-300  # as in coordinates.py
+
+
+@compiled
+def rotate(tree, i, q, R):
+    """The turn of joint i's frame in its parent's, from q (nq,)."""
+    k, v = tree.at[i], tree.by[i]
+    if tree.kind[i] == BALL:
+        w, x, y, z = q[k], q[k + 1], q[k + 2], q[k + 3]
+        scale = 2.0 / (w * w + x * x + y * y + z * z)
+        own = np.empty((3, 3), q.dtype)
+        own[0, 0], own[0, 1], own[0, 2] = 1 - scale * (y * y + z * z), scale * (x * y - w * z), scale * (x * z + w * y)
+        own[1, 0], own[1, 1], own[1, 2] = scale * (x * y + w * z), 1 - scale * (x * x + z * z), scale * (y * z - w * x)
+        own[2, 0], own[2, 1], own[2, 2] = scale * (x * z - w * y), scale * (y * z + w * x), 1 - scale * (x * x + y * y)
+        for j in range(3):
+            for l in range(3):
+                R[j, l] = 0.0
+                for a in range(3):
+                    for b in range(3):
+                        R[j, l] += tree.axis[v + a, j] * own[a, b] * tree.axis[v + b, l]
+        return
+    angle = q[k] - tree.reference[i] if tree.kind[i] == HINGE else 0.0 * q[k]
+    x, y, z = tree.axis[v]
+    s, c = np.sin(angle), np.cos(angle)
+    R[0, 0], R[0, 1], R[0, 2] = x * x + c * (1 - x * x), (1 - c) * x * y - s * z, (1 - c) * x * z + s * y
+    R[1, 0], R[1, 1], R[1, 2] = (1 - c) * x * y + s * z, y * y + c * (1 - y * y), (1 - c) * y * z - s * x
+    R[2, 0], R[2, 1], R[2, 2] = (1 - c) * x * z - s * y, (1 - c) * y * z + s * x, z * z + c * (1 - z * z)
 
 
 @compiled
 def mass_matrix_and_bias(tree, q, qd, M, h):
-    """Mbar (n, n) and h (n,) of one state; of Mbar the entries between a hinge and its ancestors, below the diagonal."""
+    """Mbar (nv, nv) and h (nv,) of one state; of Mbar the entries between a speed and those inward of it, below the diagonal."""
     n = len(tree.parent)
-    matrices, vectors, scratch = np.empty((2, n, 3, 3)), np.zeros((5, n, 3)), np.empty((7, 3))
+    matrices, vectors, scratch = (
+        np.empty((2, n, 3, 3), q.dtype),
+        np.zeros((6, n, 3), q.dtype),
+        np.empty((7, 3), q.dtype),
+    )
     R, P = matrices[0], matrices[1]
-    a, omega, omegad, forces, moments = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
+    a, omega, omegad, forces, moments, at = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
     spin, force, torque, carried, product = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4:]
     for i in range(n):
-        x, y, z = tree.axis[i]
-        s, c = math.sin(q[i]), math.cos(q[i])
-        R[i, 0, 0], R[i, 0, 1], R[i, 0, 2] = x * x + c * (1 - x * x), (1 - c) * x * y - s * z, (1 - c) * x * z + s * y
-        R[i, 1, 0], R[i, 1, 1], R[i, 1, 2] = (1 - c) * x * y + s * z, y * y + c * (1 - y * y), (1 - c) * y * z - s * x
-        R[i, 2, 0], R[i, 2, 1], R[i, 2, 2] = (1 - c) * x * z - s * y, (1 - c) * y * z + s * x, z * z + c * (1 - z * z)
-        p = tree.parent[i]
+        rotate(tree, i, q, R[i])
+        p, v, slides = tree.parent[i], tree.by[i], tree.kind[i] == SLIDE
+        off = q[tree.at[i]] - tree.reference[i] if slides else 0.0 * q[tree.at[i]]
         for k in range(3):
-            spin[k] = tree.axis[i, k] * qd[i]
+            at[i, k] = tree.offset[i, k] + tree.axis[v, k] * off
+            spin[k] = tree.axis[v, k] * qd[v]
+            if tree.kind[i] == BALL:
+                spin[k] += tree.axis[v + 1, k] * qd[v + 1] + tree.axis[v + 2, k] * qd[v + 2]
         for j in range(3):
-            moved = -tree.gravity[j]
+            moved = -tree.gravity[j] + 0.0 * spin[0]
             if p >= 0:
                 moved = a[p, j]
                 for k in range(3):
-                    moved += P[p, j, k] * tree.offset[i, k]
+                    moved += P[p, j, k] * at[i, k]
             for k in range(3):
                 a[i, k] += R[i, j, k] * moved
                 if p >= 0:
                     omega[i, k] += R[i, j, k] * omega[p, j]
                     omegad[i, k] += R[i, j, k] * omegad[p, j]
-        add_cross(omegad[i], omega[i], spin)
-        for k in range(3):
-            omega[i, k] += spin[k]
+        if slides:
+            for k in range(3):
+                spin[k] *= 2.0
+            add_cross(a[i], omega[i], spin)
+        else:
+            add_cross(omegad[i], omega[i], spin)
+            for k in range(3):
+                omega[i, k] += spin[k]
         u, v, w = omega[i]
         P[i, 0, 0], P[i, 0, 1], P[i, 0, 2] = -(v * v + w * w), u * v - omegad[i, 2], u * w + omegad[i, 1]
         P[i, 1, 0], P[i, 1, 1], P[i, 1, 2] = u * v + omegad[i, 2], -(u * u + w * w), v * w - omegad[i, 0]
         P[i, 2, 0], P[i, 2, 1], P[i, 2, 2] = u * w - omegad[i, 1], v * w + omegad[i, 0], -(u * u + v * v)
 
-    mass, moment, second = tree.mass.copy(), tree.moment.copy(), tree.second.copy()
+    mass, moment, second = tree.mass.copy(), tree.moment + 0.0 * a, tree.second + 0.0 * R
     for i in range(n - 1, -1, -1):
         for j in range(3):
             forces[i, j] += tree.mass[i] * a[i, j]
@@ -58,22 +96,31 @@ def mass_matrix_and_bias(tree, q, qd, M, h):
         moments[i, 2] += product[1, 0] - product[0, 1]
         add_cross(moments[i], tree.moment[i], a[i])
         trace = second[i, 0, 0] + second[i, 1, 1] + second[i, 2, 2]
-        h[i] = M[i, i] = 0.0
-        for j in range(3):
-            h[i] += tree.axis[i, j] * moments[i, j]
-            force[j], torque[j] = 0.0, trace * tree.axis[i, j]
-            for k in range(3):
-                torque[j] -= second[i, j, k] * tree.axis[i, k]
-            M[i, i] += tree.axis[i, j] * torque[j]
-        add_cross(force, tree.axis[i], moment[i])
-        j = i
-        while tree.parent[j] >= 0:
-            hand_down(R[j], tree.offset[j], force, torque)
-            j = tree.parent[j]
-            M[i, j] = tree.axis[j, 0] * torque[0] + tree.axis[j, 1] * torque[1] + tree.axis[j, 2] * torque[2]
+        slides = tree.kind[i] == SLIDE
+        for v in range(tree.by[i], tree.by[i + 1]):
+            h[v] = 0.0
+            for j in range(3):
+                h[v] += tree.axis[v, j] * (forces[i, j] if slides else moments[i, j])
+                force[j] = mass[i] * tree.axis[v, j] if slides else 0.0
+                torque[j] = 0.0 if slides else trace * tree.axis[v, j]
+                for k in range(3):
+                    torque[j] -= 0.0 if slides else second[i, j, k] * tree.axis[v, k]
+            if slides:
+                add_cross(torque, moment[i], tree.axis[v])
+            else:
+                add_cross(force, tree.axis[v], moment[i])
+            for w in range(tree.by[i], v + 1):
+                M[v, w] = along(tree, w, i, force, torque)
+            M[v, v] += tree.armature[v]
+            j = i
+            while tree.parent[j] >= 0:
+                hand_down(R[j], at[j], force, torque)
+                j = tree.parent[j]
+                for w in range(tree.by[j], tree.by[j + 1]):
+                    M[v, w] = along(tree, w, j, force, torque)
         p = tree.parent[i]
         if p >= 0:
-            hand_down(R[i], tree.offset[i], forces[i], moments[i])
+            hand_down(R[i], at[i], forces[i], moments[i])
             for j in range(3):
                 forces[p, j] += forces[i, j]
                 moments[p, j] += moments[i, j]
@@ -83,7 +130,7 @@ def mass_matrix_and_bias(tree, q, qd, M, h):
                     product[j, k] = 0.0
                     for m in range(3):
                         product[j, k] += R[i, j, m] * second[i, m, k]
-            r = tree.offset[i]
+            r = at[i]
             mass[p] += mass[i]
             for j in range(3):
                 moment[p, j] += carried[j] + mass[i] * r[j]
@@ -91,6 +138,13 @@ def mass_matrix_and_bias(tree, q, qd, M, h):
                     second[p, j, k] += r[j] * carried[k] + (carried[j] + mass[i] * r[j]) * r[k]
                     for m in range(3):
                         second[p, j, k] += product[j, m] * R[i, k, m]
+
+
+@compiled
+def along(tree, v, i, force, torque):
+    """What force and torque do along speed v of joint i."""
+    chosen = force if tree.kind[i] == SLIDE else torque
+    return tree.axis[v, 0] * chosen[0] + tree.axis[v, 1] * chosen[1] + tree.axis[v, 2] * chosen[2]
 
 
 @compiled
@@ -112,64 +166,61 @@ def hand_down(R, offset, force, moment):
 
 
 @compiled
+def take_springs(tree, q, force):
+    """force (nv,) less k (q - rest)."""
+    for i in range(len(tree.parent)):
+        stiffness, k, v = tree.stiffness[i], tree.at[i], tree.by[i]
+        if stiffness == 0.0:
+            continue
+        if tree.kind[i] != BALL:
+            force[v] -= stiffness * (q[k] - tree.rest[k])
+            continue
+        a, x, y, z = tree.rest[k], -tree.rest[k + 1], -tree.rest[k + 2], -tree.rest[k + 3]
+        b, u, s, t = q[k], q[k + 1], q[k + 2], q[k + 3]
+        w, x, y, z = (
+            a * b - x * u - y * s - z * t,
+            a * u + x * b + y * t - z * s,
+            a * s + y * b + z * u - x * t,
+            a * t + z * b + x * s - y * u,
+        )
+        size, length = np.sqrt(w * w + TINY), np.sqrt(x * x + y * y + z * z + TINY)
+        share = stiffness * np.arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
+        force[v] -= x * share
+        force[v + 1] -= y * share
+        force[v + 2] -= z * share
+
+
+@compiled
+def reduced_force(tree, h, q, qd, tau, force):
+    """Qbar = tau - D qd - k (q - rest) - h, (nv,)."""
+    for v in range(len(force)):
+        force[v] = tau[v] - tree.damping[v] * qd[v] - h[v]
+    take_springs(tree, q, force)
+
+
+@compiled
 def forward_dynamics(tree, q, qd, tau, qdd):
-    """qdd (n,) of one state, from Mbar qdd = tau - D qd - h, factorised from the tips inward along the ancestors."""
-    n = len(q)
-    M, h = np.empty((n, n)), np.empty(n)
+    """qdd (nv,) of one state, from Mbar qdd = Qbar, factorised from the tips inward along the ancestors."""
+    n = len(qd)
+    M, h = np.empty((n, n), q.dtype), np.empty(n, q.dtype)
     mass_matrix_and_bias(tree, q, qd, M, h)
-    for i in range(n):
-        qdd[i] = tau[i] - tree.damping[i] * qd[i] - h[i]
+    reduced_force(tree, h, q, qd, tau, qdd)
     for k in range(n - 1, -1, -1):
-        i = tree.parent[k]
+        i = tree.before[k]
         while i >= 0:
             factor = M[k, i] / M[k, k]
             j = i
             while j >= 0:
                 M[i, j] -= factor * M[k, j]
-                j = tree.parent[j]
+                j = tree.before[j]
             qdd[i] -= factor * qdd[k]
-            i = tree.parent[i]
+            i = tree.before[i]
     for k in range(n):
-        i = tree.parent[k]
+        i = tree.before[k]
         while i >= 0:
             qdd[k] -= M[k, i] * qdd[i]
-            i = tree.parent[i]
+            i = tree.before[i]
         qdd[k] /= M[k, k]
-
-
-@compiled
-def run_tableau(tree, A, b, q, qd, tau, dt, ended):
-    """Fill q and qd (batch, steps + 1, n) by an explicit Runge-Kutta method, while finite; evaluations of the dynamics."""
-    n = len(tree.parent)
-    if not (q.shape == qd.shape == (len(tau), q.shape[1], n) and tau.shape[1] == n and len(ended) in (0, len(q))):
-        raise ValueError("q and qd of shape (runs, steps + 1, n) and tau of shape (runs, n) are expected")
-    evaluations = 0
-    stages = len(b)
-    rates, changes = np.empty((stages, n)), np.empty((stages, n))
-    angles = np.empty(n)
-    for i in range(q.shape[0]):
-        for k in range(1, q.shape[1]):
-            for s in range(stages):
-                for j in range(n):
-                    angles[j], rates[s, j] = q[i, k - 1, j], qd[i, k - 1, j]
-                    for r in range(s):
-                        angles[j] += dt * A[s, r] * rates[r, j]
-                        rates[s, j] += dt * A[s, r] * changes[r, j]
-                forward_dynamics(tree, angles, rates[s], tau[i], changes[s])
-            evaluations += stages
-            size = 0.0
-            for j in range(n):
-                q[i, k, j], qd[i, k, j] = q[i, k - 1, j], qd[i, k - 1, j]
-                for s in range(stages):
-                    q[i, k, j] += dt * b[s] * rates[s, j]
-                    qd[i, k, j] += dt * b[s] * changes[s, j]
-                size += abs(q[i, k, j]) + abs(qd[i, k, j])
-            if not size < np.inf:
-                q[i, k], qd[i, k] = np.nan, np.nan
-                if len(ended):
-                    ended[i] = OVERFLOW
-                break
-    return evaluations
 
 
 @compiled

@@ -36,7 +36,11 @@ class RungeKutta(Method):
         False  # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
     )
 
-    loop = True
+    loop = "run_tableau"
+
+    def looped(self, tree):
+        """A, b and `mean_speed` for the compiled loop."""
+        return square(self.A), np.array(self.b), self.mean_speed
 
     def __post_init__(self):
         checked_tableau(self, "A")
@@ -81,6 +85,11 @@ class AdaptiveRungeKutta(RungeKutta):
     errors: tuple = ()  # weights of the stages in the two estimates, of the movement and of the speeds
 
     adaptive = True
+    loop = "run_adaptive"
+
+    def looped(self, tree):
+        """A, b, the weights of the errors and the order for the compiled loop."""
+        return square(self.A), np.array(self.b), np.array(self.errors), float(self.order)
 
     def __post_init__(self):
         super().__post_init__()
@@ -109,6 +118,13 @@ class SemiImplicitEuler(Method):
     implicit_springs: bool = False
 
     damps_implicitly = True
+    loop = "run_semi_implicit"
+
+    def looped(self, tree):
+        """For the compiled loop: whose bias is implicit, (nv,), and whether springs are."""
+        lone = lone_speeds(tree) if self.lone_bodies else set()
+        own = np.array([self.implicit_bias or v in lone for v in range(len(tree.axis))])
+        return own, self.implicit_springs and tree.has_springs
 
     def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
         """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd] [+ dt^2 k]."""
@@ -158,6 +174,11 @@ def lone_speeds(tree) -> set:
         if free and alone and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
             lone |= set(range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop))
     return lone
+
+
+def square(A) -> np.ndarray:
+    """The rows of an explicit tableau with zeros on and above its diagonal."""
+    return np.array([[*row, *[0.0] * (len(A) - len(row))] for row in A])
 
 
 def increments(dt, weights, slopes, n) -> list:

@@ -24,10 +24,12 @@ class Method:
     adaptive = False  # chooses its own steps, takes a tolerance and has an `attempt`, as AdaptiveRungeKutta does
     solves_stages = False  # its stages solve an equation: it has `start`, `newton` and `finish`, as in implicit.py
     damps_implicitly = False  # its slope takes the joint damping at the rates one dt later
-    loop = False  # can be followed by the loop for any tree, from its A and b; not inherited, as `step` may be another
+    # the compiled loop for any tree that follows it, in loop_runs.py or loop_stages.py: it is given looped(tree) first; "": none.
+    # not inherited, as `step` may be another
+    loop = ""
 
     def __init_subclass__(cls):
-        cls.loop = vars(cls).get("loop", False)
+        cls.loop = vars(cls).get("loop", "")
 
     @cached_property
     def lanes(self) -> bool:
@@ -62,12 +64,13 @@ def stepped(stepping, tree, slope, q, qd, dt) -> tuple[list, list]:
     return stepping.step(slope, q, qd, dt, joints) if joints.balls else stepping.step(slope, q, qd, dt)
 
 
-FIELDS = dict.fromkeys(("adaptive", "solves_stages", "damps_implicitly", "loop", "lanes"), bool) | {
+FIELDS = dict.fromkeys(("adaptive", "solves_stages", "damps_implicitly", "lanes"), bool) | {
+    "loop": str,
     "order": int,
     "stages": int,
 }
 EXPECTED = "a hashable method with a slope and a step is expected"
-NEEDS = {"adaptive": ("attempt",), "solves_stages": ("start", "newton", "finish"), "loop": ("A", "b")}
+NEEDS = {"adaptive": ("attempt",), "solves_stages": ("start", "newton", "finish"), "loop": ("looped",)}
 
 
 @dataclass(frozen=True)
@@ -99,11 +102,11 @@ def _completed(stepping):
     for name, kind in FIELDS.items():
         value = getattr(stepping, name)
         if type(value) is not kind or (kind is int and value < 1):
-            accepted = "True or False" if kind is bool else "a whole number of at least 1"
+            accepted = {bool: "True or False", int: "a whole number of at least 1", str: "a name"}[kind]
             raise ValueError(f"its {name} is {shown(value)}, where {accepted} is expected")
     for name, parts in NEEDS.items():
         if lacking := [part for part in parts if getattr(stepping, name) and not hasattr(stepping, part)]:
-            raise ValueError(f"its {name} is True, but it has no {lacking[0]}")
+            raise ValueError(f"its {name} is {getattr(stepping, name)}, but it has no {lacking[0]}")
     return stepping
 
 

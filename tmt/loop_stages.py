@@ -1,0 +1,201 @@
+"""Implicit Runge-Kutta methods as compiled loops over any tree: implicit.py over arrays."""
+
+import numpy as np
+
+from .implicit import CLOSE, ITERATIONS
+from .loop_runs import NUDGE, check, end, normalize, solve, turned, unsound
+from .loops import BALL, forward_dynamics
+from .machine_code import compiled
+from .templates import NEWTON
+
+
+@compiled
+def slope_and_jacobian(tree, q, qd, tau, value, by_q, by_qd):
+    """qdd (nv,) and its derivatives by a movement of q and by qd, (nv, nv)."""
+    n = len(qd)
+    place, speeds, torque, found = q + 0j, qd + 0j, tau + 0j, np.empty(n, np.complex128)
+    forward_dynamics(tree, q, qd, tau, value)
+    for i in range(len(tree.parent)):
+        k = tree.at[i]
+        for v in range(tree.by[i], tree.by[i + 1]):
+            half = 0.5j * NUDGE
+            if tree.kind[i] == BALL:
+                j = v - tree.by[i]
+                turned(q + 0j, k, 1.0 + 0j, half * (j == 0), half * (j == 1), half * (j == 2), place)
+            else:
+                place[k] += NUDGE * 1j
+            forward_dynamics(tree, place, speeds, torque, found)
+            by_q[:, v] = found.imag / NUDGE
+            place[:] = q
+            speeds[v] += NUDGE * 1j
+            forward_dynamics(tree, place, speeds, torque, found)
+            by_qd[:, v] = found.imag / NUDGE
+            speeds[v] = qd[v]
+
+
+@compiled
+def stage_states(tree, A, q, qd, dt, a, places, speeds):
+    """The positions (stages, nq) and speeds (stages, nv) of stages with accelerations a (stages, nv)."""
+    count, n = a.shape
+    for i in range(count):
+        for v in range(n):
+            speeds[i, v] = qd[v]
+            for j in range(count):
+                speeds[i, v] += dt * A[i, j] * a[j, v]
+    matrix, right = np.empty((4 * count, 4 * count), a.dtype), np.empty(4 * count, a.dtype)
+    for joint in range(len(tree.parent)):
+        k, v = tree.at[joint], tree.by[joint]
+        if tree.kind[joint] != BALL:
+            for i in range(count):
+                places[i, k] = q[k]
+                for j in range(count):
+                    places[i, k] += dt * A[i, j] * speeds[j, v]
+            continue
+        for i in range(count):
+            for j in range(count):
+                x, y, z = speeds[j, v], speeds[j, v + 1], speeds[j, v + 2]
+                f, one = -0.5 * dt * A[i, j], 1.0 if i == j else 0.0
+                r, c = 4 * i, 4 * j  # of the product p o (0, omega)
+                matrix[r, c], matrix[r, c + 1], matrix[r, c + 2], matrix[r, c + 3] = one, -f * x, -f * y, -f * z
+                r += 1
+                matrix[r, c], matrix[r, c + 1], matrix[r, c + 2], matrix[r, c + 3] = f * x, one, f * z, -f * y
+                r += 1
+                matrix[r, c], matrix[r, c + 1], matrix[r, c + 2], matrix[r, c + 3] = f * y, -f * z, one, f * x
+                r += 1
+                matrix[r, c], matrix[r, c + 1], matrix[r, c + 2], matrix[r, c + 3] = f * z, f * y, -f * x, one
+            for j in range(4):
+                right[4 * i + j] = q[k + j]
+        solve(matrix, right)
+        for i in range(count):
+            for j in range(4):
+                places[i, k + j] = right[4 * i + j]
+
+
+@compiled
+def turns(tree, A, q, qd, dt, a, places):
+    """d theta_i / d a_j of the balls' stages, (stages i, stages j, nv, nv), theta a movement at the stage."""
+    count, n = a.shape
+    result = np.zeros((count, count, n, n))
+    nudged, moved, speeds = a + 0j, np.empty((count, len(q)), np.complex128), np.empty((count, n), np.complex128)
+    start, rates = q + 0j, qd + 0j
+    for joint in range(len(tree.parent)):
+        if tree.kind[joint] != BALL:
+            continue
+        k, first = tree.at[joint], tree.by[joint]
+        for j in range(count):
+            for v in range(first, first + 3):
+                nudged[j, v] += NUDGE * 1j
+                stage_states(tree, A, start, rates, dt, nudged, moved, speeds)
+                nudged[j, v] = a[j, v]
+                for i in range(count):
+                    p, dp = places[i], moved[i].imag / NUDGE
+                    w, x, y, z, u = p[k], p[k + 1], p[k + 2], p[k + 3], dp[k : k + 4]
+                    result[i, j, first, v] = 2.0 * (w * u[1] - x * u[0] - y * u[3] + z * u[2])
+                    result[i, j, first + 1, v] = 2.0 * (w * u[2] - y * u[0] - z * u[1] + x * u[3])
+                    result[i, j, first + 2, v] = 2.0 * (w * u[3] - z * u[0] - x * u[2] + y * u[1])
+    return result
+
+
+@compiled
+def newton(tree, A, q, qd, tau, dt, a, linear, base, by_q, by_qd, change):
+    """The change of the accelerations a (stages, nv) by one step of Newton's method; linear: about (q, qd) with these rates."""
+    count, n = a.shape
+    places, speeds = np.empty((count, len(q))), np.empty((count, n))
+    stage_states(tree, A, q, qd, dt, a, places, speeds)
+    turn, has_balls = np.zeros((1, 1, 1, 1)), (tree.kind == BALL).any()
+    if has_balls:
+        turn = turns(tree, A, q, qd, dt, a, places)
+    is_ball = np.zeros(n, np.bool_)
+    for joint in range(len(tree.parent)):
+        is_ball[tree.by[joint] : tree.by[joint + 1]] = tree.kind[joint] == BALL
+    twice = A @ A
+    matrix, right, value, off = np.zeros((count * n, count * n)), np.empty(count * n), base.copy(), np.empty(n)
+    for i in range(count):
+        if linear:
+            for joint in range(len(tree.parent)):
+                k, v = tree.at[joint], tree.by[joint]
+                if tree.kind[joint] != BALL:
+                    off[v] = places[i, k] - q[k]
+                    continue
+                w, x, y, z, p = q[k], q[k + 1], q[k + 2], q[k + 3], places[i, k : k + 4]
+                off[v] = 2.0 * (w * p[1] - x * p[0] - y * p[3] + z * p[2])
+                off[v + 1] = 2.0 * (w * p[2] - y * p[0] - z * p[1] + x * p[3])
+                off[v + 2] = 2.0 * (w * p[3] - z * p[0] - x * p[2] + y * p[1])
+            for v in range(n):
+                value[v] = base[v]
+                for w in range(n):
+                    value[v] += by_q[v, w] * off[w] + by_qd[v, w] * (speeds[i, w] - qd[w])
+        else:
+            slope_and_jacobian(tree, places[i], speeds[i], tau, value, by_q, by_qd)
+        for v in range(n):
+            right[i * n + v] = value[v] - a[i, v]
+            for j in range(count):
+                for w in range(n):
+                    entry = dt * A[i, j] * by_qd[v, w]
+                    if is_ball[w]:
+                        for m in range(n):
+                            entry += by_q[v, m] * turn[i, j, m, w]
+                    else:
+                        entry += dt * dt * twice[i, j] * by_q[v, w]
+                    matrix[i * n + v, j * n + w] = (1.0 if i == j and v == w else 0.0) - entry
+    solve(matrix, right)
+    for i in range(count):
+        change[i] = right[i * n : (i + 1) * n]
+
+
+@compiled
+def finish(tree, A, b, q, qd, dt, a, new_q, new_qd):
+    """The state one dt later, from the accelerations of the stages."""
+    count, n = a.shape
+    places, speeds, rates = np.empty((count, len(q))), np.empty((count, n)), np.empty(len(q))
+    stage_states(tree, A, q, qd, dt, a, places, speeds)
+    new_q[:], new_qd[:] = q, qd
+    for i in range(count):
+        for v in range(n):
+            new_qd[v] += dt * b[i] * a[i, v]
+        for joint in range(len(tree.parent)):
+            k, v = tree.at[joint], tree.by[joint]
+            if tree.kind[joint] != BALL:
+                new_q[k] += dt * b[i] * speeds[i, v]
+                continue
+            turned(places[i], k, 0.0, speeds[i, v], speeds[i, v + 1], speeds[i, v + 2], rates)
+            for j in range(k, k + 4):
+                new_q[j] += dt * b[i] * 0.5 * rates[j]
+    for joint in range(len(tree.parent)):
+        if tree.kind[joint] == BALL:
+            normalize(new_q, tree.at[joint])
+
+
+@compiled
+def run_implicit(tree, A, b, q, qd, tau, dt, ended):
+    """Fill q and qd (runs, steps + 1, nq or nv) by an implicit Runge-Kutta method; evaluations of the dynamics."""
+    check(tree, q, qd, tau, ended)
+    evaluations, n, count = 0, len(tree.before), len(b)
+    a, change, base = np.empty((count, n)), np.empty((count, n)), np.empty(n)
+    by_q, by_qd = np.empty((n, n)), np.empty((n, n))
+    for i in range(q.shape[0]):
+        for k in range(1, q.shape[1]):
+            state, speeds = q[i, k - 1], qd[i, k - 1]
+            slope_and_jacobian(tree, state, speeds, tau[i], base, by_q, by_qd)
+            a[:] = 0.0
+            newton(tree, A, state, speeds, tau[i], dt, a, True, base, by_q, by_qd, change)
+            a[:] = change
+            evaluations += 1
+            why = NEWTON
+            for _ in range(ITERATIONS):
+                newton(tree, A, state, speeds, tau[i], dt, a, False, base, by_q, by_qd, change)
+                evaluations += count
+                a += change
+                size = np.abs(a).max()
+                if np.abs(change).max() <= CLOSE * (1.0 + size):
+                    why = 0
+                    break
+                if not np.isfinite(size):
+                    break
+            if why == 0:
+                finish(tree, A, b, state, speeds, dt, a, q[i, k], qd[i, k])
+                why = unsound(tree, q[i, k], qd[i, k])
+            if why:
+                end(q, qd, k, ended, i, why)
+                break
+    return evaluations
