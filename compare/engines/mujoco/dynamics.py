@@ -14,7 +14,7 @@ import numpy as np
 from mujoco.rollout import rollout
 
 from .. import GRID, Motion, Prepared, Setting, rows_of_states
-from .joints import places
+from .joints import moved, places
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
@@ -237,9 +237,9 @@ class MujocoDynamics:
         return d
 
     def weight_of_resting(self) -> float:
-        """Potential energy of the bodies that never move, J: a constant that MuJoCo counts."""
+        """Potential energy of the bodies that the Tree leaves out as they never move, J: a constant that MuJoCo counts."""
         m = self.model
-        resting = np.flatnonzero(m.body_weldid == 0)
+        resting = np.setdiff1d(np.flatnonzero(~moved(m)), self.bodies)
         return -float(m.body_mass[resting] @ self.data.xipos[resting] @ m.opt.gravity)
 
     def _energies(self, d):

@@ -130,7 +130,8 @@ def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
 def refused(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for what a Tree has not and cannot be switched off, and for what this reader does not know."""
     if m.nflex:
-        raise ValueError(f"flex {m.flex(0).name!r} is a body that deforms; only rigid bodies are compared")
+        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
+        raise ValueError(f"flex {name!r} is a body that deforms; only rigid bodies are compared")
     for body in np.flatnonzero(m.body_plugin >= 0):
         name = own_name(m.body(int(body)).name, "body", int(body))
         raise ValueError(f"a plugin in the passive force acts on {name!r}; its forces are not known")

@@ -72,3 +72,11 @@ def reference(model: mujoco.MjModel) -> np.ndarray:
             start = model.jnt_qposadr[number]
             qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
     return qpos
+
+
+def moved(model: mujoco.MjModel) -> np.ndarray:
+    """Of each body whether a joint moves it, (nbody,)."""
+    found = np.zeros(model.nbody, bool)
+    for body in range(1, model.nbody):
+        found[body] = found[model.body_parentid[body]] or model.body_jntnum[body] > 0
+    return found

@@ -13,7 +13,7 @@ from .dynamics import NAMES
 from .engine import Mujoco
 from .file import compiled
 from .inventory import Feature, features, open_equalities, refused
-from .joints import kind_of, own_name, places, reference
+from .joints import kind_of, moved, own_name, places, reference
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
 
@@ -82,14 +82,6 @@ def moving_bodies(model: mujoco.MjModel) -> list[int]:
     """The numbers of the bodies that move and have mass or inertia."""
     massive = (model.body_mass > 0.0) | (model.body_inertia > 0.0).any(axis=1)
     return [int(body) for body in np.flatnonzero(massive & moved(model))]
-
-
-def moved(model: mujoco.MjModel) -> np.ndarray:
-    """Of each body whether a joint moves it, (nbody,)."""
-    found = np.zeros(model.nbody, bool)
-    for body in range(1, model.nbody):
-        found[body] = found[model.body_parentid[body]] or model.body_jntnum[body] > 0
-    return found
 
 
 def tree_of(model: mujoco.MjModel, joints: Mapping, bodies: list[int]) -> tmt.Tree:
