@@ -14,7 +14,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from .joints import joint_name, kind_of, own_name, parts_of
+from .joints import joint_name, kind_of, parts_of
+from .rotors import rotors
+
+ALIGNED, BY_COMPILER = mujoco.mjtAlignFree.mjALIGNFREE_TRUE, mujoco.mjtAlignFree.mjALIGNFREE_AUTO
 
 
 class ModelError(ValueError):
@@ -60,10 +63,8 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     whole = spec.compile()  # anchors, axes and frames as they are after defaults, degrees and nested frames
     locked = [name for name in positions if name not in {joint.name for joint in spec.joints}]
     if locked or bare:
-        for number, joint in enumerate(spec.joints):
-            joint.name = joint_name(whole, number)
-        for number, body in enumerate(spec.bodies):
-            body.name = body.name or own_name("", "body", number)
+        for joint in spec.joints:
+            joint.name = joint_name(whole, joint.id)
     parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
     clear(spec, {*positions, *parted}, bare)
     rests = {}
@@ -114,7 +115,7 @@ def clear(spec: mujoco.MjSpec, locked: set, bare: bool) -> None:
     gone = [*spec.keys, *spec.sensors]  # sensors measure, and change nothing
     gone += [e for e in spec.equalities if bare or {e.name1, e.name2} & locked]
     gone += [a for a in spec.actuators if a.target in locked or (bare and not a.armature)]
-    gone += list(spec.tendons) if bare else []
+    gone += [*spec.tendons, *spec.tuples] if bare else []
     for element in gone:
         spec.delete(element)
 
@@ -127,14 +128,13 @@ def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, name: str, parts: list[str]
     """Put three slides and a ball in the place of a free joint; where their springs rest, by their names."""
     free, old = spec.joint(name), whole.joint(name)
     body, start = free.parent, old.qposadr[0]
-    align = mujoco.mjtAlignFree(free.align)
-    by_compiler = align == mujoco.mjtAlignFree.mjALIGNFREE_AUTO and spec.compiler.alignfree
-    if align == mujoco.mjtAlignFree.mjALIGNFREE_TRUE or by_compiler:
+    if aligns(free):
         raise ValueError(
             f"free joint {name!r} is aligned with the inertia of its body; none of its parts can be locked"
         )
     values = {field: getattr(free, field) for field in ("damping", "armature", "stiffness")}
     values = {field: np.array(value) if np.ndim(value) else value for field, value in values.items()}
+    values["armature"] += rotors(whole)[old.dofadr[0]]  # of actuators, which are gone
     if body.frame is not None:
         body.set_frame(body.parent.add_frame())
     body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
@@ -185,3 +185,11 @@ def conjugate(quat: np.ndarray) -> np.ndarray:
     result = np.zeros(4)
     mujoco.mju_negQuat(result, quat)
     return result
+
+
+def aligns(joint) -> bool:
+    """Whether the compiler turns the frame of a free joint's body into its inertial frame."""
+    if mujoco.mjtJoint(joint.type) != mujoco.mjtJoint.mjJNT_FREE:
+        return False
+    align = mujoco.mjtAlignFree(joint.align)
+    return align == ALIGNED or (align == BY_COMPILER and bool(joint.compiler.alignfree))

@@ -40,7 +40,7 @@ class Reading:
 
 def read(source: Path | str) -> Reading:
     """The reading of an MJCF file (a Path) or of MJCF text; ModelError, in one line, where it cannot be compared."""
-    model, warnings = compiled(source, lambda: without_fusing(source))
+    model, warnings = compiled(source, lambda: without_fusing(editable(source)))
     try:
         refused(model)
         if not model.njnt:
@@ -71,9 +71,8 @@ def engine(reading: Reading) -> Mujoco:
     return Mujoco(reading.model, reading.tree.hinge_names, reading.bodies, reading.source, bare=True)
 
 
-def without_fusing(source: Path | str) -> mujoco.MjModel:
+def without_fusing(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The compiled model with every body of the file: fusing changes nothing that moves, and renumbers bodies."""
-    spec = editable(source)
     spec.compiler.fusestatic = False
     return spec.compile()
 
