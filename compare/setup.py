@@ -18,7 +18,8 @@ T = TypeVar("T")
 
 def engines(mujoco: Engine) -> dict[str, Engine]:
     """All engines by their names; some may be unavailable."""
-    return {engine.name: engine for engine in (mujoco, Tmt(), Scipy(), Heyoka())}
+    schemes = [method.scheme for method in mujoco.methods.values()]
+    return {engine.name: engine for engine in (mujoco, Tmt(schemes), Scipy(), Heyoka())}
 
 
 def nothing(*_: object) -> None:

@@ -227,7 +227,7 @@ CLASSICAL = (  # Kutta (1901): A, b, c
 ROOT = 3**0.5 / 6
 METHODS = {
     "rk4": RungeKutta(4, *CLASSICAL),  # the assignment's part i
-    "rk4_mean_speed": RungeKutta(4, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles
+    "rk4_mean_speed": RungeKutta(2, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles
     "dopri8": RungeKutta(order=8, A=dop853.A, b=dop853.B, c=dop853.C),  # Dormand and Prince, fixed step
     "dopri8_adaptive": AdaptiveRungeKutta(8, dop853.A, dop853.B, dop853.C, errors=(dop853.ERROR_5, dop853.ERROR_3)),
     "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),

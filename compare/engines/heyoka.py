@@ -9,7 +9,7 @@ import numpy as np
 
 from tmt import Tree, composite
 from tmt.method import acceleration
-from tmt.space import cos, sin
+from tmt.space import arctan, cos, sin, sqrt
 
 from ..case import Case
 from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
@@ -76,8 +76,8 @@ class HeyokaDynamics(TmtDynamics):
 
         def read(outcome):
             why, *_, steps, _, path = outcome
-            q, v, ended = as_far_as_it_goes(t, path, start, f"heyoka stops: {why}")
-            return Motion(t, q, v, None, ended, int(steps))
+            path, ended = as_far_as_it_goes(t, path, start, f"heyoka stops: {why}")
+            return Motion(t, *np.split(path, [self.coordinates.nq], axis=1), None, ended, int(steps))
 
         return run, read
 
@@ -89,7 +89,8 @@ def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float):
 
     q, qd = variables(tree, "q", "qd")
     qdd = acceleration(tree, q, qd, list(tau), composite.mass_matrix_and_bias)
-    return heyoka.taylor_adaptive([*zip(q, qd), *zip(qd, qdd)], [0.0] * (2 * len(q)), tol=tolerance)
+    rates = tree.coordinates.component_rates(q, qd)
+    return heyoka.taylor_adaptive([*zip(q, rates), *zip(qd, qdd)], [0.0] * (len(q) + len(qd)), tol=tolerance)
 
 
 @lru_cache(maxsize=32)
@@ -99,7 +100,7 @@ def dynamics(tree: Tree):
 
     q, qd, tau = variables(tree, "q", "qd", "tau")
     M, h = composite.mass_matrix_and_bias(tree, q, qd)
-    n = len(q)
+    n = len(qd)
     rows = [M[min(i, j)][max(i, j)] for i in range(n) for j in range(n)]
     qdd = acceleration(tree, q, qd, tau, composite.mass_matrix_and_bias)
     values = [heyoka.expression(value) if isinstance(value, float) else value for value in (*rows, *h, *qdd)]
@@ -107,9 +108,10 @@ def dynamics(tree: Tree):
 
 
 def variables(tree: Tree, *names: str) -> list:
-    """heyoka's variables for each hinge: one list for each name."""
+    """heyoka's variables for a state: one list for each name."""
     import heyoka
 
-    sin.register(heyoka.expression, heyoka.sin)
-    cos.register(heyoka.expression, heyoka.cos)
-    return [[heyoka.make_vars(f"{name}{i}") for i in range(len(tree.parent))] for name in names]
+    for function, own in ((sin, heyoka.sin), (cos, heyoka.cos), (sqrt, heyoka.sqrt), (arctan, heyoka.atan)):
+        function.register(heyoka.expression, own)
+    sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv, "tau": tree.coordinates.nv}
+    return [[heyoka.make_vars(f"{name}{i}") for i in range(sizes[name])] for name in names]

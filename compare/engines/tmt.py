@@ -1,6 +1,6 @@
 """tmt's own equations, integrated by its compiled loops."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 
 import numpy as np
@@ -14,16 +14,27 @@ from ..case import Case
 from . import GRID, Method, Motion, Prepared, Setting
 
 
+# schemes of MuJoCo that differ from others for some robots alone, which have balls, lone bodies or springs
+FOR_SOME = ("rk4_mean_speed", "implicitfast", "discrete")
+
+
 class Tmt:
-    """The engine of the stated equations."""
+    """The engine of the stated equations.
+
+    schemes: of those that differ from others for some robots alone, the ones that this robot needs.
+    """
 
     name = "tmt"
+
+    def __init__(self, schemes: Iterable[str] = ()):
+        self.left_out = tuple(name for name in FOR_SOME if name not in set(schemes))
 
     @property
     def methods(self) -> Mapping[str, Method]:
         return {
             name: Method(self.name, name, None if method.adaptive else method.order, name, method.adaptive)
             for name, method in tmt.METHODS.items()
+            if name not in self.left_out
         }
 
     def unavailable(self) -> str | None:
@@ -80,8 +91,9 @@ class TmtDynamics:
         if stepping.adaptive and not setting.steps:
             setting = setting._replace(steps=GRID)  # between which it takes its own
         every, dt = setting.every, setting.duration / setting.steps
-        paths, codes = np.full((2, 1, setting.steps + 1, len(q)), np.nan), np.zeros(1, np.int8)
-        paths[:, 0, 0] = q, v
+        paths = [np.full((1, setting.steps + 1, len(start)), np.nan) for start in (q, v)]
+        paths[0][0, 0], paths[1][0, 0] = q, v
+        codes = np.zeros(1, np.int8)
         tolerance = () if setting.tolerance is None else (setting.tolerance,)
         run = partial(kernels.stepper(self.tree, method), *paths, np.array(tau, float)[None], dt, *tolerance, codes)
         t = np.linspace(0.0, setting.duration, GRID + 1)

@@ -10,7 +10,7 @@ import numpy as np
 import tmt
 
 from .dynamics import NAMES
-from .engine import Mujoco
+from .engine import Mujoco, methods_for
 from .file import compiled
 from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks
 from .joints import kind_of, moved, own_name, places, reference
@@ -71,7 +71,14 @@ def read(source: Path | str) -> Reading:
 
 def engine(reading: Reading) -> Mujoco:
     """MuJoCo with all of it switched off that the Tree has not."""
-    return Mujoco(reading.model, reading.tree.hinge_names, reading.bodies, reading.source, bare=True)
+    return Mujoco(
+        reading.model,
+        reading.tree.hinge_names,
+        reading.bodies,
+        reading.source,
+        bare=True,
+        methods=methods_for(reading.tree),
+    )
 
 
 def without_fusing(spec: mujoco.MjSpec) -> mujoco.MjModel:
