@@ -93,6 +93,10 @@ def test_a_change_of_the_case_reaches_mujoco(rng):
     assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng)
 
 
+def test_a_heavy_body_that_never_moves_takes_no_digits(rng):
+    compared(mjcf('<body pos="1 2 1e6"><geom size="1" mass="1e9"/></body>' + TWO), rng)
+
+
 def test_a_flag_of_the_file_counts(rng):
     text = '<joint name="j" damping="1" stiffness="3"/>'
     for flag, field in (("gravity", "gravity"), ("damper", "damping"), ("spring", "stiffness")):
@@ -218,8 +222,12 @@ REFUSED = {
     "no joint": (mjcf('<body><geom size="0.1"/></body>'), "it has no joint; at least one is expected"),
     "empty": ("<mujoco/>", "it has no joint; at least one is expected"),
     "no mass": (mjcf('<body><joint/></body>'), "mass and inertia of moving bodies must be larger"),
-    "not a number": (mjcf(PLAIN.replace('name="j"', 'damping="nan"')), "finite numbers are expected"),
-    "negative damping": (mjcf(PLAIN.replace('name="j"', 'damping="-1"')), "values of at least 0 N m s/rad are expected"),
+    "not a number": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="nan"')), "the damping of joint 'j' is nan; a finite"),
+    "no axis": (mjcf(PLAIN.replace('name="j"', 'axis="nan 0 1"')), "the axis of joint 'joint 0' is nan"),
+    "infinite": (mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN), "the pos of body 'far' is inf 0 0"),
+    "negative damping": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')), "the damping of joint 'j' is -1; a finite"),
+    "gravity": (mjcf(before='<option gravity="0 nan 0"/>'), "its gravity has a number that is not finite"),
+    "posture": (mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'), "its keyframe 'up' has a number that is not"),
     "same axis twice": (mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "turn together"),
     "a name taken": (
         mjcf('<body><freejoint name="r"/><geom size="0.1"/><body><joint name="r x"/><geom size="0.1"/></body></body>'),

@@ -57,7 +57,10 @@ class MujocoDynamics:
         self.qpos = np.array([i for place in joints for i in place.qpos])
         self.dofs = np.array([i for place in joints for i in place.dofs])
         self.forward(zero)
-        self.resting = self.weight_of_resting() if bare else 0.0
+        resting = np.setdiff1d(np.flatnonzero(~moved(model)), self.bodies)
+        self.left_out = (
+            resting[model.body_mass[resting] > 0.0] if bare else resting[:0]
+        )  # of the Tree, as they never move
         self.zero_axes = self.turns(self.data.xmat)
 
     def enabled(self, flag: str) -> bool:
@@ -236,16 +239,14 @@ class MujocoDynamics:
         mujoco.mj_forward(self.model, d)
         return d
 
-    def weight_of_resting(self) -> float:
-        """Potential energy of the bodies that the Tree leaves out as they never move, J: a constant that MuJoCo counts."""
-        m = self.model
-        resting = np.setdiff1d(np.flatnonzero(~moved(m)), self.bodies)
-        return -float(m.body_mass[resting] @ self.data.xipos[resting] @ m.opt.gravity)
-
     def _energies(self, d):
+        mass, out = self.model.body_mass, self.left_out
+        weighed = mass[out]
+        mass[out] = 0.0
         mujoco.mj_energyPos(self.model, d)
+        mass[out] = weighed
         mujoco.mj_energyVel(self.model, d)
-        return d.energy - [self.resting, 0.0] if self.resting else d.energy
+        return d.energy
 
     def turns(self, xmat) -> np.ndarray:
         """The orientations of the bodies, (m, 3, 3), of xmat or ximat."""

@@ -16,6 +16,7 @@ from .inventory import Feature, features, open_equalities, refuse, refuse_callba
 from .joints import kind_of, moved, own_name, places, reference
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
+from .values import refuse_values
 
 
 @dataclass(frozen=True)
@@ -43,9 +44,10 @@ def read(source: Path | str) -> Reading:
     try:
         refuse_callbacks()
         model, warnings = compiled(source, lambda: without_fusing(editable(source)))
-        refuse(model)
         if not model.njnt:
             raise ValueError("it has no joint; at least one is expected")
+        refuse(model)
+        refuse_values(model)
         joints = places(model)
         bodies = moving_bodies(model)
         tree = tree_of(model, joints, bodies)
