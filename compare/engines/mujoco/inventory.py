@@ -150,7 +150,15 @@ def refuse(m: mujoco.MjModel) -> None:
 
 
 def switch_off(m: mujoco.MjModel) -> None:
-    """Switch off in a compiled model all that a Tree has not; what a flag of the file disables is set to zero instead.
+    """Switch off in a compiled model all that a Tree has not."""
+    take_away(m)
+    for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
+        m.opt.disableflags |= bit((flag,))
+    m.opt.enableflags = 0
+
+
+def take_away(m: mujoco.MjModel) -> None:
+    """Set to zero what a Tree has not and no flag switches off, and what a flag of the file disables.
 
     Armature of actuators stays: MuJoCo has it in the mass matrix whether they act or not.
     """
@@ -159,9 +167,6 @@ def switch_off(m: mujoco.MjModel) -> None:
     m.jnt_stiffness[:] *= on(m, "SPRING")
     for flag in ("GRAVITY", "DAMPER", "SPRING", "EULERDAMP"):
         m.opt.disableflags &= ~bit((flag,))
-    for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
-        m.opt.disableflags |= bit((flag,))
-    m.opt.enableflags = 0
     m.opt.density = m.opt.viscosity = 0.0
     for name in ZERO:
         if hasattr(m, name):
