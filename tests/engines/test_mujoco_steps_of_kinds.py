@@ -4,8 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from files import EVERYTHING, case_of, random_state
-from test_mujoco_reading import assert_the_same
+from files import EVERYTHING, assert_the_same, case_of, random_state
 
 import tmt
 from compare.engines.mujoco import engine, read

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from tmt.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
+
 KINDS = {
     mujoco.mjtJoint.mjJNT_HINGE: "hinge",
     mujoco.mjtJoint.mjJNT_SLIDE: "slide",
@@ -15,7 +17,6 @@ KINDS = {
     mujoco.mjtJoint.mjJNT_FREE: "free",
 }
 PARTS = ("x", "y", "z", "turn")  # of a free joint
-NUMBERS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # in qpos and in qvel
 
 
 class Place(NamedTuple):
