@@ -245,11 +245,11 @@ def test_a_callback_is_refused():
 @pytest.mark.parametrize(
     ("text", "names", "name", "found"),
     [
-        (mjcf(TWO, after=TENDON.format("")), "COUNTS", "ntendon", "ntendon"),
-        (mjcf(PLAIN.replace('name="j"', 'name="j" stiffness="1"')), "FIELDS", "jnt_stiffness", "jnt_stiffness"),
-        (mjcf(before='<option wind="1 0 0"/>'), "OPTIONS", "wind", "the option wind"),
-        (mjcf(before='<option><flag spring="disable"/></option>'), "DISABLING", "SPRING", "the flag spring"),
-        (mjcf(before='<option><flag energy="enable"/></option>'), "ENABLING", "ENERGY", "the flag energy"),
+        (mjcf(TWO, after=TENDON.format("")), "KNOWN_COUNTS", "ntendon", "ntendon"),
+        (mjcf(PLAIN.replace('name="j"', 'name="j" stiffness="1"')), "KNOWN_FIELDS", "jnt_stiffness", "jnt_stiffness"),
+        (mjcf(before='<option wind="1 0 0"/>'), "KNOWN_OPTIONS", "wind", "the option wind"),
+        (mjcf(before='<option><flag spring="disable"/></option>'), "KNOWN_DISABLING", "SPRING", "the flag spring"),
+        (mjcf(before='<option><flag energy="enable"/></option>'), "KNOWN_ENABLING", "ENERGY", "the flag energy"),
     ],
 )
 def test_what_a_newer_mujoco_brings_is_refused_by_name_where_it_is_used(text, names, name, found, monkeypatch):

@@ -5,11 +5,12 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from .dynamics import FLAGS, MujocoDynamics
+from .dynamics import MujocoDynamics
 from .engine import Mujoco
+from .flags import FLAGS
 from .inventory import take_away
 from .joints import joint_name, kind_of
-from .lock import clear, editable, named
+from .lock import clear, editable, with_names
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
 MINIMAL = "nothing (minimal)"
@@ -95,7 +96,7 @@ def edited(engine: Mujoco, edit: Callable) -> Mujoco:
 def bare(spec: mujoco.MjSpec) -> None:
     """Take out of a spec what a Tree has not: of its own things none may touch, act, or limit a joint."""
     spec.compiler.fusestatic = False
-    named(spec)
+    with_names(spec)
     clear(spec, set(), bare=True)
     for pair in list(spec.pairs):
         spec.delete(pair)

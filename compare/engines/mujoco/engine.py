@@ -8,7 +8,8 @@ import mujoco
 
 from ...case import Case
 from .. import Method
-from .dynamics import INTEGRATORS, MujocoDynamics
+from .dynamics import MujocoDynamics
+from .flags import INTEGRATORS
 from .inventory import switch_off
 from .lock import locked_model
 

@@ -168,7 +168,7 @@ def take_away(m: mujoco.MjModel) -> None:
     for flag in ("GRAVITY", "DAMPER", "SPRING", "EULERDAMP"):
         m.opt.disableflags &= ~bit((flag,))
     m.opt.density = m.opt.viscosity = 0.0
-    for name in ZERO:
+    for name in NOT_HAD_FIELDS:
         if hasattr(m, name):
             getattr(m, name)[:] = 0
     for name in ("jnt_plasticadr", "tendon_plasticadr"):  # a spring with a plastic state yields, at whatever force
@@ -176,7 +176,7 @@ def take_away(m: mujoco.MjModel) -> None:
             getattr(m, name)[:] = -1
 
 
-ZERO = (
+NOT_HAD_FIELDS = (
     "body_gravcomp",
     "dof_dampingpoly",
     "jnt_stiffnesspoly",

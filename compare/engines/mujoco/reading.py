@@ -9,11 +9,11 @@ import numpy as np
 
 import tmt
 
-from .dynamics import NAMES
 from .engine import Mujoco
 from .file import compiled
+from .flags import NAMES
 from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks, take_away
-from .joints import Place, kind_of, moved, own_name, places, reference
+from .joints import Place, joint_places, kind_of, moved, own_name, reference_qpos
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
 from .values import refuse_values
@@ -48,7 +48,7 @@ def read(source: Path | str) -> Reading:
             raise ValueError("it has no joint; at least one is expected")
         refuse(model)
         refuse_values(model)
-        joints = places(model)
+        joints = joint_places(model)
         bodies = moving_bodies(model)
         tree = tree_of(model, joints, bodies)
     except ModelError:
@@ -98,7 +98,7 @@ def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int
     model = mujoco.MjModel.__copy__(whole)
     take_away(model)  # what a flag of the file disables is zero
     data = mujoco.MjData(model)
-    data.qpos[:] = reference(model)
+    data.qpos[:] = reference_qpos(model)
     mujoco.mj_kinematics(model, data)
     places, carrier = list(joints.values()), carriers(model, joints)
     anchors = [np.zeros(3) if is_free(model, place) else data.xanchor[place.joint] for place in places]
@@ -112,7 +112,7 @@ def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int
         hinge_names=list(joints),
         parent=parents,
         offset=[anchor - (anchors[before] if before >= 0 else 0.0) for anchor, before in zip(anchors, parents)],
-        axis=[axis for place in places for axis in axes(model, data, place)],
+        axis=[axis for place in places for axis in speed_axes(model, data, place)],
         damping=model.dof_damping[speeds],
         body_names=[own_name(model.body(body).name, "body", body) for body in bodies],
         body_hinge=hangs,
@@ -140,7 +140,7 @@ def parent(model: mujoco.MjModel, number: int, place: Place, carrier: list[int])
     return carrier[model.body_parentid[body]] if first else number - 1
 
 
-def axes(model: mujoco.MjModel, data: mujoco.MjData, place: Place) -> np.ndarray:
+def speed_axes(model: mujoco.MjModel, data: mujoco.MjData, place: Place) -> np.ndarray:
     """The directions of a joint's speeds at the reference position: a ball's are the axes of its body."""
     if is_free(model, place):
         return np.eye(3) if place.kind == "ball" else np.eye(3)[[place.dofs.start - model.jnt_dofadr[place.joint]]]

@@ -5,7 +5,7 @@ import numpy as np
 
 from .joints import joint_name, own_name
 
-OF_BODIES = {
+BODY_FIELDS = {
     "pos": "body_pos",
     "quat": "body_quat",
     "mass": "body_mass",
@@ -13,8 +13,8 @@ OF_BODIES = {
     "inertial pos": "body_ipos",
     "inertial quat": "body_iquat",
 }
-OF_JOINTS = {"pos": "jnt_pos", "axis": "jnt_axis", "stiffness": "jnt_stiffness"}
-OF_SPEEDS = {"armature": "dof_armature", "damping": "dof_damping"}
+JOINT_FIELDS = {"pos": "jnt_pos", "axis": "jnt_axis", "stiffness": "jnt_stiffness"}
+SPEED_FIELDS = {"armature": "dof_armature", "damping": "dof_damping"}
 NOT_BELOW_ZERO = ("stiffness", "armature", "damping")
 
 
@@ -23,9 +23,9 @@ def refuse_values(m: mujoco.MjModel) -> None:
     bodies = [own_name(m.body(i).name, "body", i) for i in range(m.nbody)]
     joints = [joint_name(m, j) for j in range(m.njnt)]
     for what, names, fields in (
-        ("body", bodies, OF_BODIES),
-        ("joint", joints, OF_JOINTS),
-        ("joint", [joints[j] for j in m.dof_jntid], OF_SPEEDS),
+        ("body", bodies, BODY_FIELDS),
+        ("joint", joints, JOINT_FIELDS),
+        ("joint", [joints[j] for j in m.dof_jntid], SPEED_FIELDS),
     ):
         for word, field in fields.items():
             values = getattr(m, field).reshape(len(names), -1)
