@@ -10,7 +10,8 @@ from tmt.methods import lone_speeds
 
 from ...case import Case
 from .. import Method
-from .dynamics import INTEGRATORS, MujocoDynamics
+from .dynamics import MujocoDynamics
+from .flags import INTEGRATORS
 from .inventory import switch_off
 from .lock import locked_model
 
@@ -58,6 +59,7 @@ class Mujoco:
 
     bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if it was changed since
     then, so that no joint can be taken out. bare: all that a Tree has not is switched off, see inventory.
+    warnings: of MuJoCo's compiler, one line each.
     """
 
     name = "mujoco"
@@ -70,12 +72,13 @@ class Mujoco:
         bodies: Sequence[int],
         source: Path | str | None,
         bare: bool = False,
+        warnings: tuple[str, ...] = (),
         methods: Mapping[str, Method] = METHODS,
     ):
         self.methods = methods
         self.integrator, self.bare = model.opt.integrator, bare  # of the file
         self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
-        self.known = {}
+        self.known, self.warnings = {}, warnings
 
     def __getstate__(self):
         return self.__dict__ | {"known": {}}

@@ -16,8 +16,10 @@ from .lock import ModelError, name_of
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
     """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
     path = Path(path)
-    model, _ = compiled(path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path)))  # bytes: any name, in any locale
-    return with_hinges(model, path, tree)
+    model, warned = compiled(
+        path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path))
+    )  # bytes: any name, in any locale
+    return with_hinges(model, path, tree, warned)
 
 
 def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, tuple[str, ...]]:
@@ -55,7 +57,7 @@ def parse(text: str, tree: tmt.Tree) -> Mujoco:
     return with_hinges(mujoco.MjModel.from_xml_string(text), text, tree)
 
 
-def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> Mujoco:
+def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree, warned: tuple = ()) -> Mujoco:
     """The engine, if the model moves by exactly the hinges of the Tree; it remembers its source, a Path or MJCF text."""
     hinges = tree.hinge_names
     names = [model.joint(j).name for j in range(model.njnt)]
@@ -65,7 +67,7 @@ def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> Mu
         raise ModelError(
             f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected"
         )
-    return Mujoco(model, hinges, bodies(model, source, tree), source)
+    return Mujoco(model, hinges, bodies(model, source, tree), source, warnings=warned)
 
 
 def bodies(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> list[int]:

@@ -17,6 +17,13 @@ import numpy as np
 from .joints import joint_name, kind_of, parts_of
 from .rotors import rotors
 
+NO_DEFAULTS = {  # of a joint that is added: a class of the file may have others
+    "ref": 0.0,
+    "springref": 0.0,
+    "springdamper": np.zeros(2),
+    "limited": mujoco.mjtLimited.mjLIMITED_FALSE,
+    "range": np.zeros(2),
+}
 ALIGNED, BY_COMPILER = mujoco.mjtAlignFree.mjALIGNFREE_TRUE, mujoco.mjtAlignFree.mjALIGNFREE_AUTO
 
 
@@ -40,7 +47,7 @@ def editable(source: Path | str) -> mujoco.MjSpec:
 
 
 def locked_model(source: Path | str | None, positions: Mapping, bare: bool = False) -> mujoco.MjModel:
-    """The compiled model without the joints that are named in `positions`, {name: rad, m or quaternion}.
+    """The compiled model without the joints that are with_names in `positions`, {name: rad, m or quaternion}.
 
     Names are those of joints.places; every body keeps its number. Keyframes and sensors go, and so do the actuators and
     equalities of a locked joint; bare: all tendons and equalities, and all actuators but those with armature. ModelError if
@@ -60,22 +67,20 @@ def locked_model(source: Path | str | None, positions: Mapping, bare: bool = Fal
 def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> mujoco.MjModel:
     """The model of a spec whose joints at these positions have been taken out."""
     spec.compiler.fusestatic = False
-    whole = spec.compile()  # anchors, axes and frames as they are after defaults, degrees and nested frames
-    locked = [name for name in positions if name not in {joint.name for joint in spec.joints}]
-    if locked or bare:
-        for joint in spec.joints:
-            joint.name = joint_name(whole, joint.id)
+    whole = with_names(spec)  # anchors, axes and frames as they are after defaults, degrees and nested frames
     parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
     clear(spec, {*positions, *parted}, bare)
-    rests = {}
+    rests, elements = {}, {joint.name: joint for joint in spec.joints}
     for name, parts in parted.items():
-        rests |= part(spec, whole, name, parts)
+        rests |= part(spec, whole, elements[name], parts)
     if parted:
         whole = spec.compile()
-    for number, body in enumerate(spec.bodies):
-        joints = [whole.joint(joint.name) for joint in body.joints]
+    for body in spec.bodies:
+        elements = {joint.name: joint for joint in body.joints}
+        joints = [whole.joint(name) for name in elements]
         if not {joint.name for joint in joints} & set(positions):
             continue
+        number = joints[0].bodyid[0]
         frame = whole.body_pos[number].copy(), whole.body_quat[number].copy()
         moved = []  # anchor and axis of the joints that stay, those before a locked one moved by it
         for joint in joints:
@@ -95,19 +100,30 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
         body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         body.pos, body.quat = frame
         for name, pos, axis in moved:
-            joint = spec.joint(name)
+            joint = elements[name]
             if joint.frame is not None:
                 joint.set_frame(body.add_frame())
             joint.pos, joint.axis = pos, axis
         for joint in joints:
             if joint.name in positions:
-                spec.delete(spec.joint(joint.name))
+                spec.delete(elements[joint.name])
     model = spec.compile()
     for name, rest in rests.items():
         if name not in positions:
             start = model.joint(name).qposadr[0]
             model.qpos_spring[start : start + len(rest)] = rest
     return model
+
+
+def with_names(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The compiled model of a spec, in which every joint is given the name that the project calls it by."""
+    whole = spec.compile()
+    other = [(joint, joint_name(whole, joint.id)) for joint in spec.joints if joint.name != joint_name(whole, joint.id)]
+    for joint, name in other:
+        for actuator in spec.actuators:
+            actuator.target = name if joint.name and actuator.target == joint.name else actuator.target
+        joint.name = name
+    return spec.compile() if other else whole
 
 
 def clear(spec: mujoco.MjSpec, locked: set, bare: bool) -> None:
@@ -124,9 +140,9 @@ def free_joints(model: mujoco.MjModel) -> list[str]:
     return [joint_name(model, j) for j in range(model.njnt) if kind_of(model, j) == "free"]
 
 
-def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, name: str, parts: list[str]) -> dict:
+def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, free, parts: list[str]) -> dict:
     """Put three slides and a ball in the place of a free joint; where their springs rest, by their names."""
-    free, old = spec.joint(name), whole.joint(name)
+    name, old = free.name, whole.joint(free.name)
     body, start = free.parent, old.qposadr[0]
     if aligns(free):
         raise ValueError(
@@ -142,7 +158,7 @@ def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, name: str, parts: list[str]
     spec.delete(free)
     kinds = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
     for part, kind, axis in zip(parts, kinds, [*np.eye(3), np.eye(3)[2]]):
-        body.add_joint(name=part, type=kind, axis=axis, pos=np.zeros(3), **values)
+        body.add_joint(name=part, type=kind, axis=axis, pos=np.zeros(3), **NO_DEFAULTS, **values)
     rest = whole.qpos_spring[start : start + 7]
     return dict(zip(parts, (rest[0:1], rest[1:2], rest[2:3], rest[3:7])))
 
