@@ -113,9 +113,14 @@ def compared(engines: Mapping[str, Engine], case: Case) -> dict[str, Dynamics]:
 
 
 def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray]]:
-    """The batch shape that values (..., n) have together, and each of them as rows, (states, n), contiguous; a number is n."""
-    shape = np.broadcast_shapes(*map(np.shape, values))
-    return shape[:-1], [np.array(np.broadcast_to(a, shape), float, order="C").reshape(-1, shape[-1]) for a in values]
+    """The batch shape that values (..., n) have together, and each of them as rows, (states, n), contiguous.
+
+    Each has an n of its own, as positions and speeds may; a number is a row of one.
+    """
+    values = [np.atleast_1d(np.asarray(value, float)) for value in values]
+    batch = np.broadcast_shapes(*(value.shape[:-1] for value in values))
+    rows = [np.broadcast_to(value, (*batch, value.shape[-1])) for value in values]
+    return batch, [np.array(row, order="C").reshape(-1, row.shape[-1]) for row in rows]
 
 
 def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:

@@ -48,9 +48,10 @@ class HeyokaDynamics(TmtDynamics):
     def acceleration(self, q, v, tau) -> np.ndarray:
         return self.evaluated(q, v, tau)[..., -self.coordinates.nv :]
 
-    def evaluated(self, q, v=0.0, tau=0.0) -> np.ndarray:
+    def evaluated(self, q, v=None, tau=None) -> np.ndarray:
         """Mbar by rows, h and the acceleration at each state, (..., n (n + 2))."""
-        batch, states = rows_of_states(q, v, tau)
+        none = np.zeros(self.coordinates.nv)
+        batch, states = rows_of_states(q, none if v is None else v, none if tau is None else tau)
         return dynamics(self.tree)(np.concatenate(states, axis=1).T.copy()).T.reshape(*batch, -1)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:

@@ -52,9 +52,10 @@ class ScipyDynamics(TmtDynamics):
         """rate(y, tau): dy/dt of y = (q, v), (2n,)."""
         return kernels.evaluator(self.tree, "forward_dynamics").rate
 
-    def evaluated(self, quantity, size, q, v=0.0, tau=0.0) -> np.ndarray:
+    def evaluated(self, quantity, size, q, v=None, tau=None) -> np.ndarray:
         """A compiled quantity of so many numbers at each state, (..., size)."""
-        batch, states = rows_of_states(q, v, tau)
+        none = np.zeros(self.coordinates.nv)
+        batch, states = rows_of_states(q, none if v is None else v, none if tau is None else tau)
         result = np.empty((len(states[0]), size))
         kernels.evaluator(self.tree, quantity).each(*states, result)
         return result.reshape(*batch, size)

@@ -3,5 +3,6 @@
 from .engine import Mujoco
 from .file import load, parse
 from .lock import ModelError
+from .reading import Reading, engine, read
 
-__all__ = ["ModelError", "Mujoco", "load", "parse"]
+__all__ = ["ModelError", "Mujoco", "Reading", "engine", "load", "parse", "read"]

@@ -26,9 +26,9 @@ def library() -> ctypes.CDLL | None:
 
 
 class MinimalCalls:
-    """Dynamics by only those of MuJoCo's functions that a tree of hinges with damping needs, called by their addresses.
+    """Dynamics by only those of MuJoCo's functions that a tree of joints with damping needs, called by their addresses.
 
-    Contact and constraint stages are off; springs, tendons and actuators have no part in it.
+    Contact and constraint stages are off; tendons and actuators have no part in it, and springs only in the acceleration.
     """
 
     def __init__(self, dynamics: MujocoDynamics):
@@ -44,7 +44,7 @@ class MinimalCalls:
         return None if library() else "MuJoCo's library was not found beside its package"
 
     def mass_matrix(self, q) -> np.ndarray:
-        """M, kg m2, (..., n, n): mj_makeM (or mj_crb), laid out by mj_fullM."""
+        """M, kg m2, (..., nv, nv): mj_makeM (or mj_crb), laid out by mj_fullM."""
         full = np.zeros((self.model.nv, self.model.nv))
 
         def dense():
@@ -54,15 +54,19 @@ class MinimalCalls:
         return self.each(dense, q, 0.0, 0.0)
 
     def bias(self, q, v) -> np.ndarray:
-        """h, N m, (..., n): mj_rne."""
+        """h, N m, (..., nv): mj_rne."""
         return self.each(lambda: self.force[self.dofs], q, v, 0.0)
 
     def acceleration(self, q, v, tau) -> np.ndarray:
-        """rad/s2, (..., n): mj_solveM of tau - D v - h."""
+        """rad/s2, (..., nv): mj_solveM of tau - D v - h, less what springs take."""
 
         def solved():
             d = self.data
-            self.force[:] = d.qfrc_applied - self.model.dof_damping * d.qvel - self.force
+            if self.model.jnt_stiffness.any():
+                mujoco.mj_passive(self.model, d)
+                self.force[:] = d.qfrc_applied + d.qfrc_passive - self.force
+            else:
+                self.force[:] = d.qfrc_applied - self.model.dof_damping * d.qvel - self.force
             self.functions["mj_factorM"](*self.addresses)
             self.functions["mj_solveM"](*self.addresses, self.solution.ctypes.data, self.force.ctypes.data, 1)
             return self.solution[self.dofs]

@@ -14,6 +14,7 @@ import numpy as np
 from mujoco.rollout import rollout
 
 from .. import GRID, Motion, Prepared, Setting, rows_of_states
+from .joints import moved, places
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
@@ -37,23 +38,26 @@ FLAGS = {
 
 
 class MujocoDynamics:
-    """MuJoCo with one model of given joints; quantities at any states q, v, tau of shape (..., n).
+    """MuJoCo with one model of given joints; quantities at any states q (..., nq), v and tau (..., nv).
 
-    Columns follow the names of the coordinates, whatever the order in the file. bodies: their numbers in the model; the axes
-    of a body are those that coincide with the world's at q = 0.
+    Columns follow the names of the coordinates, whatever the order in the file; a free joint of the model is four of them.
+    bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero, (nq,).
+    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move.
     """
 
-    def __init__(self, model, coordinates, bodies):
+    def __init__(self, model, coordinates, bodies, zero, bare=False):
         # where states are evaluated the file's integrator must not matter, as `discrete` does
         model.opt.integrator = INTEGRATORS["RK4"]
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
         self.model, self.data = model, mujoco.MjData(model)
-        self.coordinates, self.bodies = coordinates, list(bodies)
-        joints = [model.joint(name) for name in coordinates.names]
-        self.joints = np.array([joint.id for joint in joints])
-        self.qpos = np.array([joint.qposadr[0] for joint in joints])
-        self.dofs = np.array([joint.dofadr[0] for joint in joints])
-        self.forward(np.zeros(len(joints)))
+        self.coordinates, self.bodies, self.bare = coordinates, list(bodies), bare
+        known = places(model)
+        joints = [known[name] for name in coordinates.names]
+        self.joints = np.array([place.joint for place in joints])
+        self.qpos = np.array([i for place in joints for i in place.qpos])
+        self.dofs = np.array([i for place in joints for i in place.dofs])
+        self.forward(zero)
+        self.resting = self.weight_of_resting() if bare else 0.0
         self.zero_axes = self.turns(self.data.xmat)
 
     def enabled(self, flag: str) -> bool:
@@ -71,7 +75,7 @@ class MujocoDynamics:
         return self._each(lambda d: self._to_body(d.cvel[self.bodies, :3]), q, v)
 
     def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
-        """T_b and B_b, (..., m, 3, n): mj_jacBodyCom, its rotational part turned into body axes."""
+        """T_b and B_b, (..., m, 3, nv): mj_jacBodyCom, its rotational part turned into body axes."""
 
         def both(d):
             jacobians = np.zeros((2, len(self.bodies), 3, self.model.nv))
@@ -95,7 +99,7 @@ class MujocoDynamics:
         return result[..., 0, :, :], result[..., 1, :, :]
 
     def mass_matrix(self, q) -> np.ndarray:
-        """M, kg m2, (..., n, n): mj_fullM."""
+        """M, kg m2, (..., nv, nv): mj_fullM."""
         full = np.zeros((self.model.nv, self.model.nv))
 
         def dense(d):
@@ -105,19 +109,19 @@ class MujocoDynamics:
         return self._each(dense, q)
 
     def bias(self, q, v) -> np.ndarray:
-        """h, N m, (..., n): qfrc_bias."""
+        """h, N m, (..., nv): qfrc_bias."""
         return self._each(lambda d: d.qfrc_bias[self.dofs], q, v)
 
     def gravity_balance(self, q) -> np.ndarray:
-        """The torque that holds the model, N m, (..., n): qfrc_bias at rest."""
-        return self.bias(q, np.zeros_like(q))
+        """The torque that holds the model against its weight, N m, (..., nv): qfrc_bias at rest."""
+        return self.bias(q, 0.0)
 
     def acceleration(self, q, v, tau) -> np.ndarray:
-        """a, rad/s2, (..., n): qacc."""
+        """a, rad/s2, (..., nv): qacc."""
         return self._each(lambda d: d.qacc[self.dofs], q, v, tau)
 
     def inverse(self, q, v, a) -> np.ndarray:
-        """The torque for which a is the acceleration, N m, (..., n): mj_inverse."""
+        """The torque for which a is the acceleration, N m, (..., nv): mj_inverse."""
 
         def torque(d):
             d.qacc[self.dofs] = d.qfrc_applied[self.dofs]
@@ -127,10 +131,11 @@ class MujocoDynamics:
         return self._each(torque, q, v, a)  # a travels in the place of tau
 
     def other_forces(self, q, v) -> dict:
-        """What else acts than gravity, torque and damping, by its source, N m, (..., n) each."""
-        D = self.model.dof_damping
+        """What else acts than what the case's equations have, by its source, N m, (..., nv) each."""
+        D, known = self.model.dof_damping, self.bare
+        passive = "fluid and tendons" if known else "springs, fluid and tendons"
         return {
-            "springs, fluid and tendons": self._each(lambda d: (d.qfrc_passive + D * d.qvel)[self.dofs], q, v),
+            passive: self._each(lambda d: (d.qfrc_passive + D * d.qvel - known * d.qfrc_spring)[self.dofs], q, v),
             "actuators": self._each(lambda d: d.qfrc_actuator[self.dofs], q, v),
             "constraints and contacts": self._each(lambda d: d.qfrc_constraint[self.dofs], q, v),
         }
@@ -146,16 +151,16 @@ class MujocoDynamics:
     # motion
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        """Motion under constant torque: t (steps + 1,), q and v (..., steps + 1, n), by an integrator of MuJoCo.
+        """Motion under constant torque by an integrator of MuJoCo: q (..., steps + 1, nq), v (..., steps + 1, nv).
 
         From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
         """
         refuse_tolerance(tolerance, method)
-        shape = np.broadcast_shapes(np.shape(q), np.shape(v), np.shape(tau))
+        batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
         starts, follow = self.runner(q, v, tau, dt, steps, method)
         *paths, ended = self.path(starts, follow(), dt)
-        q, v = (path.reshape(*shape[:-1], steps + 1, shape[-1]) for path in paths)
-        evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(shape[:-1])[()]
+        q, v = (path.reshape(*batch, steps + 1, path.shape[-1]) for path in paths)
+        evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(batch)[()]
         return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended, steps)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
@@ -171,7 +176,7 @@ class MujocoDynamics:
         return run, read
 
     def path(self, starts, states, dt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """q and v of runs (runs, steps + 1, n), NaN from the moment in which one has diverged, and why it has, or None."""
+        """q and v of runs (runs, steps + 1, ...), NaN from the moment in which one has diverged, and why it has, or None."""
         states = np.concatenate([starts[:, None], states], axis=1)
         advanced = np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0
         ran = np.isfinite(states).all(axis=2) & advanced
@@ -210,7 +215,7 @@ class MujocoDynamics:
         return starts, run
 
     def own_copy(self, dt, integrator, q=0.0, v=0.0, tau=0.0) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """A copy of the model with this step and integrator, and data at a state (n,), for whoever steps on their own."""
+        """A copy of the model with this step and integrator, and data at one state, for whoever steps on their own."""
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, tau
@@ -222,26 +227,32 @@ class MujocoDynamics:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""
         batch, states = rows_of_states(q, v, tau)
         values = [np.array(read(self.forward(*state))) for state in zip(*states)]
-        return np.array(values).reshape(*batch, *values[0].shape)
+        return np.array(values).reshape((*batch, *values[0].shape))
 
     def forward(self, q, v=0.0, tau=0.0) -> mujoco.MjData:
-        """The data after mj_forward at a state (n,)."""
+        """The data after mj_forward at one state."""
         d = self.data
         d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
         mujoco.mj_forward(self.model, d)
         return d
 
+    def weight_of_resting(self) -> float:
+        """Potential energy of the bodies that the Tree leaves out as they never move, J: a constant that MuJoCo counts."""
+        m = self.model
+        resting = np.setdiff1d(np.flatnonzero(~moved(m)), self.bodies)
+        return -float(m.body_mass[resting] @ self.data.xipos[resting] @ m.opt.gravity)
+
     def _energies(self, d):
         mujoco.mj_energyPos(self.model, d)
         mujoco.mj_energyVel(self.model, d)
-        return d.energy
+        return d.energy - [self.resting, 0.0] if self.resting else d.energy
 
     def turns(self, xmat) -> np.ndarray:
         """The orientations of the bodies, (m, 3, 3), of xmat or ximat."""
         return xmat[self.bodies].reshape(-1, 3, 3).copy()
 
     def _to_body(self, vectors):
-        """World components to body axes, the axes of the world at q = 0."""
+        """World components to body axes, the axes of the world at the position zero."""
         turns = self.turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
         return np.einsum("bji,bj...->bi...", turns, vectors)
 

@@ -9,6 +9,7 @@ import mujoco
 from ...case import Case
 from .. import Method
 from .dynamics import INTEGRATORS, MujocoDynamics
+from .inventory import switch_off
 from .lock import locked_model
 
 SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme
@@ -28,14 +29,21 @@ class Mujoco:
     """MuJoCo with one compiled model of given joints.
 
     bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if it was changed since
-    then, so that no joint can be taken out.
+    then, so that no joint can be taken out. bare: all that a Tree has not is switched off, see inventory.
     """
 
     name = "mujoco"
     methods: ClassVar[Mapping[str, Method]] = METHODS
 
-    def __init__(self, model: mujoco.MjModel, joints: Sequence[str], bodies: Sequence[int], source: Path | str | None):
-        self.integrator = model.opt.integrator  # of the file
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        joints: Sequence[str],
+        bodies: Sequence[int],
+        source: Path | str | None,
+        bare: bool = False,
+    ):
+        self.integrator, self.bare = model.opt.integrator, bare  # of the file
         self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
         self.known = {}
 
@@ -51,15 +59,22 @@ class Mujoco:
         A model with locked joints is compiled from the source again, without them. ModelError if that is not possible.
         """
         changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints
-        dynamics = self.known.pop(changes, None) or MujocoDynamics(self.changed(case), case.coordinates, self.bodies)
+        dynamics = self.known.pop(changes, None) or self.dynamics(case)
         self.known[changes] = dynamics
         if len(self.known) > MODELS:
             del self.known[next(iter(self.known))]
         return dynamics
 
+    def dynamics(self, case: Case) -> MujocoDynamics:
+        """The dynamics of a case, made anew."""
+        return MujocoDynamics(self.changed(case), case.coordinates, self.bodies, case.tree.zero, self.bare)
+
     def changed(self, case: Case) -> mujoco.MjModel:
         """The model with what the case changes."""
-        model = locked_model(self.source, case.locked) if case.locked else mujoco.MjModel.__copy__(self.model)
+        copied = mujoco.MjModel.__copy__
+        model = locked_model(self.source, case.locked, self.bare) if case.locked else copied(self.model)
+        if self.bare:
+            switch_off(model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
         model.dof_damping[:] += case.scene.damping

@@ -1,6 +1,8 @@
 """From a file to an engine: MJCF is read, compiled, and refused in one line where it does not have a robot's joints."""
 
 import os
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -13,19 +15,39 @@ from .lock import ModelError, name_of
 
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
     """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
-    if Path(path).exists() and not (Path(path).is_file() or Path(path).is_dir()):
+    path = Path(path)
+    model, _ = compiled(path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path)))  # bytes: any name, in any locale
+    return with_hinges(model, path, tree)
+
+
+def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """The model that compiling a source gives, and what MuJoCo's compiler warns of, one line each; ModelError if it cannot be."""
+    text = text_of(source) if isinstance(source, Path) else source
+    found, before = [], mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(found.append)
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            model = compiling()
+    except ValueError as error:
+        name = name_of(source)
+        if "<mujoco" not in text:
+            raise ModelError(f"{name} is not MJCF: MuJoCo says {error}") from None
+        raise ModelError(f"MuJoCo cannot compile {name}: {error}") from None
+    finally:
+        mujoco.set_mju_user_warning(before)
+    lines = [" ".join(str(line).split()) for line in (*found, *(warning.message for warning in caught))]
+    return model, tuple(dict.fromkeys(lines))
+
+
+def text_of(path: Path) -> str:
+    """The text of a file; ModelError if it cannot be read, and read again."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
         raise ModelError(f"{path} is no file that can be read again; an MJCF file is expected")
     try:
-        text = Path(path).read_text(encoding="utf-8", errors="replace")
+        return path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise ModelError(f"cannot read {path}: {error.strerror}; an MJCF file is expected") from None
-    try:
-        model = mujoco.MjModel.from_xml_path(os.fsencode(path))  # bytes: any name, in any locale
-    except ValueError as error:
-        if "<mujoco" not in text:
-            raise ModelError(f"{path} is not MJCF: MuJoCo says {error}") from None
-        raise ModelError(f"MuJoCo cannot compile {path}: {error}") from None
-    return with_hinges(model, Path(path), tree)
 
 
 def parse(text: str, tree: tmt.Tree) -> Mujoco:

@@ -9,9 +9,9 @@ NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/
 
 
 def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
-    """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, (2n, 2n).
+    """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, positions as movements, (2nv, 2nv).
 
-    q, tau: (n,) rad, N m. By mjd_transitionFD, central differences of 1e-6; where it refuses (RK4, delays) steps are
+    q: (nq,) rad, m; tau: (nv,) N m. By mjd_transitionFD, central differences of 1e-6; where it refuses (RK4, delays) steps are
     differenced here.
     """
     if integrator == "RK4":
@@ -29,11 +29,13 @@ def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: flo
 
 def differenced(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
     """The same by central differences of steps."""
-    n, ends = len(dynamics.dofs), []
+    n, ends, coordinates = len(dynamics.dofs), [], dynamics.coordinates
     for sign in (1.0, -1.0):
-        start = np.concatenate([q, np.zeros(n)]) + sign * NUDGE * np.eye(2 * n)
-        ends.append(dynamics.run(start[:, :n], start[:, n:], tau, dt, 1, integrator).states[:, 1])
-    return (ends[0] - ends[1]).T / (2.0 * NUDGE)
+        nudges = sign * NUDGE * np.eye(2 * n)
+        motion = dynamics.run(coordinates.move(q, nudges[:, :n]), nudges[:, n:], tau, dt, 1, integrator)
+        ends.append((motion.q[:, 1], motion.v[:, 1]))
+    (q1, v1), (q0, v0) = ends
+    return np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1).T / (2.0 * NUDGE)
 
 
 def left_to_itself(
@@ -41,7 +43,7 @@ def left_to_itself(
 ) -> dict:
     """A run with MuJoCo's defaults, automatic reset included, and what MuJoCo says of it.
 
-    q, qd: (steps + 1, n); time: (steps + 1,) s, of MuJoCo's own clock; warnings: their number at the end.
+    q: (steps + 1, nq); qd: (steps + 1, nv); time: (steps + 1,) s, of MuJoCo's own clock; warnings: their number at the end.
     """
     model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
     model.opt.disableflags &= ~int(FLAGS["autoreset"])
@@ -50,13 +52,13 @@ def left_to_itself(
         states.append([data.time, *data.qpos[dynamics.qpos], *data.qvel[dynamics.dofs]])
         if k < steps:
             mujoco.mj_step(model, data)
-    time, n = np.array(states), len(dynamics.dofs)
+    time, q, qd = np.split(np.array(states), [1, 1 + len(dynamics.qpos)], axis=1)
     warnings = sum(int(warning.number) for warning in data.warning)
-    return {"time": time[:, 0], "q": time[:, 1 : 1 + n], "qd": time[:, 1 + n :], "warnings": warnings}
+    return {"time": time[:, 0], "q": q, "qd": qd, "warnings": warnings}
 
 
 def implicit_derivative(dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, dt: float = 1e-3) -> np.ndarray:
-    """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (n, n): qDeriv."""
+    """d(passive force - bias)/dqd that the implicit integrator uses, N m s/rad, (nv, nv): qDeriv."""
     model, data = dynamics.own_copy(dt, "implicit", q, qd)
     mujoco.mj_step(model, data)
     dense = np.zeros((model.nv, model.nv))

@@ -1,8 +1,9 @@
 """A model with fewer joints: the file is read again as an MjSpec, and its joints are taken out there.
 
-A joint that is only deleted stays at zero. At another angle the body's frame must be turned about the joint's anchor,
-and the joints that come before it in the same body turned back, for they act before it. Nothing is fused (fusestatic
-gives wrong inertias up to MuJoCo 3.10) and nothing is printed as XML (which has seven digits).
+A joint that is only deleted stays at its reference. At another position the body's frame must be turned about the joint's
+anchor, or moved along its axis, and the joints that come before it in the same body turned and moved back, for they act before
+it. A free joint becomes three slides and a ball before. Nothing is fused (fusestatic gives
+wrong inertias up to MuJoCo 3.10) and nothing is printed as XML (which has seven digits).
 """
 
 import os
@@ -12,6 +13,11 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+
+from .joints import joint_name, kind_of, parts_of
+from .rotors import rotors
+
+ALIGNED, BY_COMPILER = mujoco.mjtAlignFree.mjALIGNFREE_TRUE, mujoco.mjtAlignFree.mjALIGNFREE_AUTO
 
 
 class ModelError(ValueError):
@@ -33,50 +39,57 @@ def editable(source: Path | str) -> mujoco.MjSpec:
     )
 
 
-def locked_model(source: Path | str | None, angles: dict) -> mujoco.MjModel:
-    """The compiled model without the joints that are named in `angles`, {name: rad}; every body keeps its number.
+def locked_model(source: Path | str | None, positions: Mapping, bare: bool = False) -> mujoco.MjModel:
+    """The compiled model without the joints that are named in `positions`, {name: rad, m or quaternion}.
 
-    Keyframes and sensors go, and so do the actuators and equalities of a locked joint. ModelError if more refers to it, or
-    there is no source.
+    Names are those of joints.places; every body keeps its number. Keyframes and sensors go, and so do the actuators and
+    equalities of a locked joint; bare: all tendons and equalities, and all actuators but those with armature. ModelError if
+    more refers to it, or there is no source.
     """
+    names = ", ".join(positions)
     if source is None:
-        raise ModelError(f"a model that was changed after it was read cannot have {', '.join(angles)} locked")
+        raise ModelError(f"a model that was changed after it was read cannot have {names} locked")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-            return compiled_without(editable(source), angles)
+            return compiled_without(editable(source), positions, bare)
     except ValueError as error:
-        raise ModelError(f"MuJoCo cannot compile {name_of(source)} with {', '.join(angles)} locked: {error}") from None
+        raise ModelError(f"MuJoCo cannot compile {name_of(source)} with {names} locked: {error}") from None
 
 
-def compiled_without(spec: mujoco.MjSpec, angles: Mapping[str, float]) -> mujoco.MjModel:
-    """The model of a spec whose joints at these angles have been taken out."""
+def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> mujoco.MjModel:
+    """The model of a spec whose joints at these positions have been taken out."""
     spec.compiler.fusestatic = False
     whole = spec.compile()  # anchors, axes and frames as they are after defaults, degrees and nested frames
-    bound = [a for a in spec.actuators if a.target in angles]
-    bound += list(spec.sensors)  # they measure, and change nothing
-    bound += [e for e in spec.equalities if {e.name1, e.name2} & set(angles)]
-    for element in (*spec.keys, *bound):  # a keyframe has an angle for every hinge
-        spec.delete(element)
+    locked = [name for name in positions if name not in {joint.name for joint in spec.joints}]
+    if locked or bare:
+        for joint in spec.joints:
+            joint.name = joint_name(whole, joint.id)
+    parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
+    clear(spec, {*positions, *parted}, bare)
+    rests = {}
+    for name, parts in parted.items():
+        rests |= part(spec, whole, name, parts)
+    if parted:
+        whole = spec.compile()
     for number, body in enumerate(spec.bodies):
         joints = [whole.joint(joint.name) for joint in body.joints]
-        if not {joint.name for joint in joints} & set(angles):
+        if not {joint.name for joint in joints} & set(positions):
             continue
         frame = whole.body_pos[number].copy(), whole.body_quat[number].copy()
         moved = []  # anchor and axis of the joints that stay, those before a locked one moved by it
         for joint in joints:
-            if joint.name not in angles:
+            if joint.name not in positions:
                 moved.append((joint.name, joint.pos.copy(), joint.axis.copy()))
                 continue
-            angle = angles[joint.name] - float(whole.qpos0[joint.qposadr[0]])
-            if angle:
-                turn, back = np.zeros((2, 4))
-                mujoco.mju_axisAngle2Quat(turn, joint.axis, angle)
-                mujoco.mju_negQuat(back, turn)
-                frame = placed(*frame, joint.pos - turned(joint.pos, turn)), product(frame[1], turn)
-                moved = [
-                    (name, joint.pos + turned(pos - joint.pos, back), turned(axis, back)) for name, pos, axis in moved
-                ]
+            anchor, shift, turn = movement(whole, joint, positions[joint.name])
+            if turn is not None:
+                back = conjugate(turn)
+                frame = placed(*frame, anchor - turned(anchor, turn)), product(frame[1], turn)
+                moved = [(name, anchor + turned(pos - anchor, back), turned(axis, back)) for name, pos, axis in moved]
+            elif shift is not None:
+                frame = placed(*frame, shift), frame[1]
+                moved = [(name, pos - shift, axis) for name, pos, axis in moved]
         if body.frame is not None:
             body.set_frame(body.parent.add_frame())  # what was a nested frame's part is in the compiled numbers
         body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
@@ -87,9 +100,65 @@ def compiled_without(spec: mujoco.MjSpec, angles: Mapping[str, float]) -> mujoco
                 joint.set_frame(body.add_frame())
             joint.pos, joint.axis = pos, axis
         for joint in joints:
-            if joint.name in angles:
+            if joint.name in positions:
                 spec.delete(spec.joint(joint.name))
-    return spec.compile()
+    model = spec.compile()
+    for name, rest in rests.items():
+        if name not in positions:
+            start = model.joint(name).qposadr[0]
+            model.qpos_spring[start : start + len(rest)] = rest
+    return model
+
+
+def clear(spec: mujoco.MjSpec, locked: set, bare: bool) -> None:
+    """Delete what has a number for every joint, measures, or refers to a locked joint."""
+    gone = [*spec.keys, *spec.sensors]  # sensors measure, and change nothing
+    gone += [e for e in spec.equalities if bare or {e.name1, e.name2} & locked]
+    gone += [a for a in spec.actuators if a.target in locked or (bare and not a.armature)]
+    gone += [*spec.tendons, *spec.tuples] if bare else []
+    for element in gone:
+        spec.delete(element)
+
+
+def free_joints(model: mujoco.MjModel) -> list[str]:
+    return [joint_name(model, j) for j in range(model.njnt) if kind_of(model, j) == "free"]
+
+
+def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, name: str, parts: list[str]) -> dict:
+    """Put three slides and a ball in the place of a free joint; where their springs rest, by their names."""
+    free, old = spec.joint(name), whole.joint(name)
+    body, start = free.parent, old.qposadr[0]
+    if aligns(free):
+        raise ValueError(
+            f"free joint {name!r} is aligned with the inertia of its body; none of its parts can be locked"
+        )
+    values = {field: getattr(free, field) for field in ("damping", "armature", "stiffness")}
+    values = {field: np.array(value) if np.ndim(value) else value for field, value in values.items()}
+    values["armature"] += rotors(whole)[old.dofadr[0]]  # of actuators, which are gone
+    if body.frame is not None:
+        body.set_frame(body.parent.add_frame())
+    body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+    body.pos, body.quat = np.zeros(3), [1.0, 0.0, 0.0, 0.0]
+    spec.delete(free)
+    kinds = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
+    for part, kind, axis in zip(parts, kinds, [*np.eye(3), np.eye(3)[2]]):
+        body.add_joint(name=part, type=kind, axis=axis, pos=np.zeros(3), **values)
+    rest = whole.qpos_spring[start : start + 7]
+    return dict(zip(parts, (rest[0:1], rest[1:2], rest[2:3], rest[3:7])))
+
+
+def movement(whole: mujoco.MjModel, joint, position) -> tuple:
+    """What a joint at a position does to its body's frame, in that frame: anchor, shift along the axis or None, turn or None."""
+    if kind_of(whole, joint.id) == "ball":
+        return joint.pos, None, np.array(position, float)
+    off = position - float(whole.qpos0[joint.qposadr[0]])
+    if not off:
+        return joint.pos, None, None
+    if kind_of(whole, joint.id) == "slide":
+        return joint.pos, joint.axis * off, None
+    turn = np.zeros(4)
+    mujoco.mju_axisAngle2Quat(turn, joint.axis, off)
+    return joint.pos, None, turn
 
 
 def placed(origin: np.ndarray, quat: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -109,3 +178,18 @@ def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     result = np.zeros(4)
     mujoco.mju_mulQuat(result, first, second)
     return result
+
+
+def conjugate(quat: np.ndarray) -> np.ndarray:
+    """The inverse of a quaternion of length 1."""
+    result = np.zeros(4)
+    mujoco.mju_negQuat(result, quat)
+    return result
+
+
+def aligns(joint) -> bool:
+    """Whether the compiler turns the frame of a free joint's body into its inertial frame."""
+    if mujoco.mjtJoint(joint.type) != mujoco.mjtJoint.mjJNT_FREE:
+        return False
+    align = mujoco.mjtAlignFree(joint.align)
+    return align == ALIGNED or (align == BY_COMPILER and bool(joint.compiler.alignfree))

@@ -1,12 +1,12 @@
 """The compiled model read back in the project's symbols: what the compiler made of the file."""
 
-from collections.abc import Sequence
-
 import mujoco
 import numpy as np
 
 from .dynamics import FLAGS, MujocoDynamics
 from .engine import Mujoco
+from .flags import bit
+from .pairs import contact_pairs
 
 STATED_FLAGS = {  # flags that the equations of motion depend on, by the names that MuJoCo's versions give them
     "flag gravity": ("GRAVITY",),
@@ -88,30 +88,6 @@ def absent(m: mujoco.MjModel) -> dict:
     sums = {name: float(np.abs(getattr(m, field, np.zeros(1))).sum()) for name, field in names.items()}
     stages = int(FLAGS["contact"]) | int(FLAGS["constraint"])
     return sums | {"contact pairs": 0.0 if m.opt.disableflags & stages else float(contact_pairs(m))}
-
-
-def contact_pairs(m: mujoco.MjModel) -> int:
-    """How many pairs of geoms may touch, as MuJoCo chooses them: of two bodies that move against each other."""
-    count, weld = m.npair, m.body_weldid
-    parent_filter = not m.opt.disableflags & bit(("FILTERPARENT",))
-    excluded = {int(signature) for signature in m.exclude_signature}
-    for i in range(m.ngeom):
-        for j in range(i + 1, m.ngeom):
-            one, other = sorted((int(m.geom_bodyid[i]), int(m.geom_bodyid[j])))
-            a, b = weld[one], weld[other]
-            over = [weld[m.body_parentid[w]] for w in (a, b)]
-            related = parent_filter and a and b and (a == over[1] or b == over[0])
-            wanted = m.geom_contype[i] & m.geom_conaffinity[j] or m.geom_contype[j] & m.geom_conaffinity[i]
-            count += bool(a != b and wanted and not related and (one << 16) + other not in excluded)
-    return count
-
-
-def bit(members: Sequence[str]) -> int:
-    """The bit of the first of these disable flags that the installed MuJoCo has; 0 if it has none of them."""
-    for member in members:
-        if hasattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"):
-            return int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"))
-    return 0
 
 
 def options(engine: Mujoco, dynamics: MujocoDynamics) -> dict:

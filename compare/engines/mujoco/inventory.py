@@ -1,0 +1,190 @@
+"""What a file has, what of it a Tree has, and what is switched off in MuJoCo for the comparison or cannot be compared."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from .flags import bit, enabling, on
+from .joints import joint_name, kind_of, own_name
+from .pairs import touching
+from .unknown import unknown
+
+MODELLED, OFF, OPEN = "modelled", "switched_off", "open_tree"
+
+
+class Feature(NamedTuple):
+    """Something that a file has: a row of the inventory."""
+
+    feature: str
+    count: int
+    names: tuple[str, ...]
+    treatment: str  # modelled, switched_off, open_tree
+    reason: str
+
+
+REASONS = {
+    "hinge": (MODELLED, "a joint of the equations: an angle"),
+    "slide": (MODELLED, "a joint of the equations: a length"),
+    "ball": (MODELLED, "a joint of the equations: a quaternion"),
+    "free": (MODELLED, "three slides along the world's axes and a ball"),
+    "armature": (MODELLED, "on the diagonal of the mass matrix"),
+    "damping": (MODELLED, "a force against each speed, linear in it"),
+    "spring": (MODELLED, "a force towards the rest position, linear in the distance"),
+    "contact": (OFF, "the equations have no contacts"),
+    "limit": (OFF, "the equations have no limits"),
+    "frictionloss": (OFF, "the equations have no dry friction"),
+    "clamp": (OFF, "it cuts forces of actuators, which are off"),
+    "fluid": (OFF, "the equations have no medium around the bodies"),
+    "gravcomp": (OFF, "the equations have the whole weight"),
+    "actuator": (OFF, "the torques of a comparison are given, the same to all"),
+    "equality": (OPEN, "the equations are those of the open tree"),
+    "tendon": (OFF, "the equations have no forces along tendons"),
+    "keyframe": (MODELLED, "postures of the comparison"),
+    "other": (OFF, "it changes the motion, and the equations do not have it"),
+}
+
+
+def features(model: mujoco.MjModel) -> tuple[Feature, ...]:
+    """The inventory of a compiled model: a row for each thing that it has, always in the same order."""
+    found = names_of_features(model)
+    return tuple(
+        Feature(feature, len(found[feature]), tuple(found[feature]), *REASONS[feature])
+        for feature in REASONS
+        if found[feature]
+    )
+
+
+def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
+    """What has each feature, by name."""
+    actuators, tendons = getattr(m, "nactuator", m.nu), range(m.ntendon)
+
+    def joints(chosen) -> list[str]:
+        return [joint_name(m, j) for j in range(m.njnt) if chosen(j)]
+
+    def speeds(values) -> list[str]:
+        return joints(lambda j: np.any(values[m.dof_jntid == j]))
+
+    def named(what: str, numbers) -> list[str]:
+        return [own_name(getattr(m, what)(int(i)).name, what, int(i)) for i in numbers]
+
+    clamped = m.actuator_ctrllimited.astype(bool)  # of each input, of which an actuator may have several
+    if hasattr(m, "actuator_ctrlnum"):
+        clamped = np.array([clamped[a : a + n].any() for a, n in zip(m.actuator_ctrladr, m.actuator_ctrlnum)], bool)
+    clamped = (
+        clamped | per_actuator(m.actuator_forcelimited, actuators) | per_actuator(m.actuator_actlimited, actuators)
+    )
+    constrained = on(m, "CONSTRAINT")
+    rotor = np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))
+    limited = constrained and on(m, "LIMIT")
+    rubbed = constrained and on(m, "FRICTIONLOSS")
+    return {
+        **{kind: joints(lambda j, kind=kind: kind_of(m, j) == kind) for kind in ("hinge", "slide", "ball", "free")},
+        "armature": speeds(m.dof_armature) + named("actuator", rotor),
+        "damping": speeds(m.dof_damping) if on(m, "DAMPER") else [],
+        "spring": joints(lambda j: m.jnt_stiffness[j]) if on(m, "SPRING") else [],
+        "contact": named("geom", touching(m)) if constrained and on(m, "CONTACT") else [],
+        "limit": (joints(lambda j: m.jnt_limited[j]) + named("tendon", np.flatnonzero(m.tendon_limited))) * limited,
+        "frictionloss": (speeds(m.dof_frictionloss) + named("tendon", np.flatnonzero(m.tendon_frictionloss))) * rubbed,
+        "clamp": named("actuator", np.flatnonzero(clamped))
+        + joints(lambda j: m.jnt_actfrclimited[j])
+        + named("tendon", np.flatnonzero(m.tendon_actfrclimited)),
+        "fluid": [name for name in ("density", "viscosity") if getattr(m.opt, name)],
+        "gravcomp": named("body", np.flatnonzero(m.body_gravcomp)),
+        "actuator": named("actuator", range(actuators)),
+        "equality": list(open_equalities(m)),
+        "tendon": named("tendon", tendons),
+        "keyframe": named("key", range(m.nkey)),
+        "other": others(m, joints, speeds),
+    }
+
+
+def others(m: mujoco.MjModel, joints, speeds) -> list[str]:
+    """Whatever else would change the motion, and is switched off."""
+    found = [f"flag {flag.lower()}" for flag in ENABLED if m.opt.enableflags & enabling(flag)]
+    if not on(m, "EULERDAMP"):
+        found.append("flag eulerdamp")
+    if on(m, "DAMPER"):
+        found += [f"polynomial damping of {name}" for name in speeds(field(m, "dof_dampingpoly", m.nv))]
+    if on(m, "SPRING"):
+        found += [
+            f"polynomial stiffness of {name}"
+            for name in joints(lambda j: np.any(field(m, "jnt_stiffnesspoly", m.njnt)[j]))
+        ]
+        found += [
+            f"spring yield of {name}" for name in joints(lambda j: np.any(field(m, "jnt_springyield", m.njnt)[j]))
+        ]
+    return found
+
+
+ENABLED = ("SLEEP", "INVDISCRETE", "IPC", "SPECULATIVE")  # enable flags that can change a motion
+
+
+def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
+    """The names of the equalities that the file has in force: they are off."""
+    if not (on(m, "CONSTRAINT") and on(m, "EQUALITY")):
+        return ()
+    return tuple(own_name(m.equality(int(i)).name, "equality", int(i)) for i in np.flatnonzero(m.eq_active0))
+
+
+def refused(m: mujoco.MjModel) -> None:
+    """ValueError, in one line, for what a Tree has not and cannot be switched off, and for what this reader does not know."""
+    if m.nflex:
+        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
+        raise ValueError(f"flex {name!r} is a body that deforms; only rigid bodies are compared")
+    for body in np.flatnonzero(m.body_plugin >= 0):
+        name = own_name(m.body(int(body)).name, "body", int(body))
+        raise ValueError(f"a plugin in the passive force acts on {name!r}; its forces are not known")
+    for tendon in np.flatnonzero(m.tendon_armature):
+        name = own_name(m.tendon(int(tendon)).name, "tendon", int(tendon))
+        raise ValueError(f"tendon {name!r} has armature, which couples joints; only the armature of joints is compared")
+    for name in dir(mujoco):
+        if name.startswith("get_mjcb_") and getattr(mujoco, name)() is not None:
+            raise ValueError(f"the callback {name.removeprefix('get_')} is set; its forces are not known")
+    if found := unknown(m):
+        raise ValueError(f"it uses {found}, which is not known here; what is not known is not compared")
+
+
+def switch_off(m: mujoco.MjModel) -> None:
+    """Switch off in a compiled model all that a Tree has not; what a flag of the file disables is set to zero instead.
+
+    Armature of actuators stays: MuJoCo has it in the mass matrix whether they act or not.
+    """
+    m.opt.gravity[:] *= on(m, "GRAVITY")
+    m.dof_damping[:] *= on(m, "DAMPER")
+    m.jnt_stiffness[:] *= on(m, "SPRING")
+    for flag in ("GRAVITY", "DAMPER", "SPRING", "EULERDAMP"):
+        m.opt.disableflags &= ~bit((flag,))
+    for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
+        m.opt.disableflags |= bit((flag,))
+    m.opt.enableflags = 0
+    m.opt.density = m.opt.viscosity = 0.0
+    for name in ZERO:
+        if hasattr(m, name):
+            getattr(m, name)[:] = 0
+
+
+ZERO = (
+    "body_gravcomp",
+    "dof_dampingpoly",
+    "jnt_stiffnesspoly",
+    "jnt_springyield",
+    "actuator_damping",
+    "actuator_dampingpoly",
+    "tendon_stiffness",
+    "tendon_stiffnesspoly",
+    "tendon_springyield",
+    "tendon_damping",
+    "tendon_dampingpoly",
+    "dof_frictionloss",
+    "tendon_frictionloss",
+)
+
+
+def field(m: mujoco.MjModel, name: str, rows: int) -> np.ndarray:
+    """A field of the model; zeros where the installed MuJoCo does not have it."""
+    return getattr(m, name, np.zeros(rows))
+
+
+def per_actuator(values, actuators: int) -> np.ndarray:
+    return np.asarray(values, bool).reshape(-1)[:actuators]

@@ -1,0 +1,82 @@
+"""The joints of a compiled model as those of a Tree: their names, and where they stand in MuJoCo's vectors.
+
+A free joint is four joints of a Tree: slides along the world's three axes, read at the origin, and a ball.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+KINDS = {
+    mujoco.mjtJoint.mjJNT_HINGE: "hinge",
+    mujoco.mjtJoint.mjJNT_SLIDE: "slide",
+    mujoco.mjtJoint.mjJNT_BALL: "ball",
+    mujoco.mjtJoint.mjJNT_FREE: "free",
+}
+PARTS = ("x", "y", "z", "turn")  # of a free joint
+NUMBERS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # in qpos and in qvel
+
+
+class Place(NamedTuple):
+    """Where a joint of a Tree stands in MuJoCo's vectors."""
+
+    kind: str  # hinge, slide, ball
+    joint: int  # its number in the model, the same for the four of a free joint
+    qpos: range
+    dofs: range
+
+
+def own_name(name: str, what: str, number: int) -> str:
+    """What an element is called: by its name if that can stand in a line, else `joint 3`."""
+    return name if name.strip() and name.isprintable() else f"{what} {number}"
+
+
+def joint_name(model: mujoco.MjModel, number: int) -> str:
+    return own_name(model.joint(number).name, "joint", number)
+
+
+def kind_of(model: mujoco.MjModel, number: int) -> str:
+    """hinge, slide, ball or free."""
+    return KINDS[mujoco.mjtJoint(model.jnt_type[number])]
+
+
+def parts_of(name: str) -> list[str]:
+    """The four joints of a free one of this name."""
+    return [f"{name} {part}" for part in PARTS]
+
+
+def places(model: mujoco.MjModel) -> dict[str, Place]:
+    """The joints of a Tree by their names, in the order of the file."""
+    found = []
+    for number in range(model.njnt):
+        name, kind = joint_name(model, number), kind_of(model, number)
+        free = kind == "free"
+        names, kinds = (parts_of(name), ["slide"] * 3 + ["ball"]) if free else ([name], [kind])
+        q, v = int(model.jnt_qposadr[number]), int(model.jnt_dofadr[number])
+        for name, kind in zip(names, kinds):
+            nq, nv = NUMBERS[kind]
+            found.append((name, Place(kind, number, range(q, q + nq), range(v, v + nv))))
+            q, v = q + nq, v + nv
+    names = [name for name, _ in found]
+    if len(set(names)) < len(names):
+        raise ValueError(f"two of its joints are called {next(name for name in names if names.count(name) > 1)!r}")
+    return dict(found)
+
+
+def reference(model: mujoco.MjModel) -> np.ndarray:
+    """qpos where every frame of the Tree is parallel to the world's: qpos0, free bodies at the origin and not turned."""
+    qpos = model.qpos0.copy()
+    for number in range(model.njnt):
+        if kind_of(model, number) == "free":
+            start = model.jnt_qposadr[number]
+            qpos[start : start + 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    return qpos
+
+
+def moved(model: mujoco.MjModel) -> np.ndarray:
+    """Of each body whether a joint moves it, (nbody,)."""
+    found = np.zeros(model.nbody, bool)
+    for body in range(1, model.nbody):
+        found[body] = found[model.body_parentid[body]] or model.body_jntnum[body] > 0
+    return found

@@ -1,0 +1,77 @@
+"""What MuJoCo's models have from 3.10 to 4.0.0, and the reader has been checked with: anything else is not known."""
+
+
+def words(text: str, prefix: str = "") -> frozenset:
+    """The words of a text, each after a prefix."""
+    return frozenset(prefix + word for word in text.split())
+
+
+COUNTS = words("""
+nB nC nD nJfe nJfv nJmom nJten nM na nactuator narena nbody nbuffer nbvh nbvhdynamic nbvhstatic ncam nconmax
+nefm0L nefm0dof nefmCvert nemax neq nexclude nflex nflexbending nflexedge nflexelem nflexelemdata
+nflexelemedge nflexevpair nflexnode nflexshelldata nflexstiffness nflextexcoord nflexvert ngeom ngravcomp
+nhfield nhfielddata nhistory njmax njnt nkey nlight nmat nmesh nmeshdegmax nmeshface nmeshgraph nmeshnormal
+nmeshpoly nmeshpolymap nmeshpolyvert nmeshtexcoord nmeshvert nmocap nnames nnames_map nnumeric nnumericdata
+noct nout npair npaths nplastic nplugin npluginattr npluginstate npolygonmax nq nsensor nsensordata nsite
+nskin nskinbone nskinbonevert nskinface nskintexvert nskinvert ntendon ntex ntexdata ntext ntextdata ntree
+ntuple ntupledata nu nuser_actuator nuser_body nuser_cam nuser_geom nuser_jnt nuser_sensor nuser_site
+nuser_tendon nuserdata nv nwrap
+""")
+OPTIONS = words("""
+ccd_iterations ccd_tolerance cone density disableactuator disableflags enableflags gravity impratio integrator
+iterations jacobian ls_iterations ls_tolerance magnetic noslip_iterations noslip_tolerance o_friction o_margin
+o_solimp o_solref sdf_initpoints sdf_iterations sleep_tolerance solver timestep tolerance viscosity wind
+""")
+DISABLING = words("""
+ACTUATION AUTORESET CLAMPCTRL CONSTRAINT CONTACT DAMPER EQUALITY EULERDAMP FILTERPARENT FRICTIONLOSS GRAVITY
+ISLAND LIMIT MIDPHASE MULTICCD NATIVECCD REFSAFE SENSOR SPRING WARMSTART
+""")
+ENABLING = words("""
+DIAGEXACT ENERGY FWDINV INVDISCRETE IPC OVERRIDE SLEEP SPECULATIVE
+""")
+FIELDS = frozenset()
+FIELDS |= words(
+    """
+    bvhadr bvhnum conaffinity contype dofadr dofnum geomadr geomnum gravcomp inertia invweight0 ipos
+    iquat jntadr jntnum margin mass mocapid parentid plugin pos quat rootid sameframe simple subtreemass
+    treeid user weldid
+    """,
+    "body_",
+)
+FIELDS |= words(
+    """
+    M0 Madr armature bodyid damping dampingpoly frictionloss invweight0 jntid length parentid simplenum
+    solimp solref treeid
+    """,
+    "dof_",
+)
+FIELDS |= words(
+    """
+    actfrclimited actfrcrange actgravcomp actuatorid axis bodyid dofadr group limited margin plasticadr
+    pos qposadr range solimp solref springyield stiffness stiffnesspoly type user
+    """,
+    "jnt_",
+)
+FIELDS |= words(
+    """
+    actfrclimited actfrcrange actuatorid adr armature damping dampingpoly frictionloss group invweight0
+    length0 lengthspring limited margin matid num plasticadr range rgba solimp_fri solimp_lim solref_fri
+    solref_lim springyield stiffness stiffnesspoly treeid treenum type user width
+    """,
+    "tendon_",
+)
+FIELDS |= words(
+    """
+    active0 data obj1id obj2id objtype solimp solref type
+    """,
+    "eq_",
+)
+FIELDS |= words(
+    """
+    acc0 actadr actearly actlimited actnum actrange armature biasprm biastype cranklength ctrladr
+    ctrllimited ctrlnum ctrlrange ctrlspec damping dampingpoly delay dynprm dyntype forcelimited
+    forcerange gainprm gaintype gear group history historyadr length0 lengthrange outadr outnum plugin
+    trnid trntype user
+    """,
+    "actuator_",
+)
