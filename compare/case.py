@@ -156,7 +156,7 @@ class Scene:
             object.__setattr__(self, name, float(value))
         each = are_numbers(self.damping) and len(self.damping) > 0
         wrong = not (each or is_number(self.damping)) or np.min(self.damping) < 0.0
-        self.refuse("damping", wrong, "at least 0 N m s/rad, or so much for each joint,")
+        self.refuse("damping", wrong, "at least 0 N m s/rad")
         object.__setattr__(self, "damping", tuple(float(v) for v in self.damping) if each else float(self.damping))
         self.refuse("gravity", not isinstance(self.gravity, bool | np.bool_), "True, the model's own, or False, none")
         object.__setattr__(self, "gravity", bool(self.gravity))
