@@ -127,7 +127,14 @@ def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
     return tuple(own_name(m.equality(int(i)).name, "equality", int(i)) for i in np.flatnonzero(m.eq_active0))
 
 
-def refused(m: mujoco.MjModel) -> None:
+def refuse_callbacks() -> None:
+    """ValueError, in one line, for functions of the user's own that MuJoCo calls."""
+    for name in dir(mujoco):
+        if name.startswith("get_mjcb_") and getattr(mujoco, name)() is not None:
+            raise ValueError(f"the callback {name.removeprefix('get_')} is set; its forces are not known")
+
+
+def refuse(m: mujoco.MjModel) -> None:
     """ValueError, in one line, for what a Tree has not and cannot be switched off, and for what this reader does not know."""
     if m.nflex:
         name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
@@ -138,9 +145,6 @@ def refused(m: mujoco.MjModel) -> None:
     for tendon in np.flatnonzero(m.tendon_armature):
         name = own_name(m.tendon(int(tendon)).name, "tendon", int(tendon))
         raise ValueError(f"tendon {name!r} has armature, which couples joints; only the armature of joints is compared")
-    for name in dir(mujoco):
-        if name.startswith("get_mjcb_") and getattr(mujoco, name)() is not None:
-            raise ValueError(f"the callback {name.removeprefix('get_')} is set; its forces are not known")
     if found := unknown(m):
         raise ValueError(f"it uses {found}, which is not known here; what is not known is not compared")
 
@@ -162,6 +166,9 @@ def switch_off(m: mujoco.MjModel) -> None:
     for name in ZERO:
         if hasattr(m, name):
             getattr(m, name)[:] = 0
+    for name in ("jnt_plasticadr", "tendon_plasticadr"):  # a spring with a plastic state yields, at whatever force
+        if hasattr(m, name):
+            getattr(m, name)[:] = -1
 
 
 ZERO = (

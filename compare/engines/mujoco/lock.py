@@ -60,11 +60,7 @@ def locked_model(source: Path | str | None, positions: Mapping, bare: bool = Fal
 def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> mujoco.MjModel:
     """The model of a spec whose joints at these positions have been taken out."""
     spec.compiler.fusestatic = False
-    whole = spec.compile()  # anchors, axes and frames as they are after defaults, degrees and nested frames
-    locked = [name for name in positions if name not in {joint.name for joint in spec.joints}]
-    if locked or bare:
-        for joint in spec.joints:
-            joint.name = joint_name(whole, joint.id)
+    whole = named(spec)  # anchors, axes and frames as they are after defaults, degrees and nested frames
     parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
     clear(spec, {*positions, *parted}, bare)
     rests = {}
@@ -72,10 +68,11 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
         rests |= part(spec, whole, name, parts)
     if parted:
         whole = spec.compile()
-    for number, body in enumerate(spec.bodies):
+    for body in spec.bodies:
         joints = [whole.joint(joint.name) for joint in body.joints]
         if not {joint.name for joint in joints} & set(positions):
             continue
+        number = joints[0].bodyid[0]
         frame = whole.body_pos[number].copy(), whole.body_quat[number].copy()
         moved = []  # anchor and axis of the joints that stay, those before a locked one moved by it
         for joint in joints:
@@ -108,6 +105,17 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
             start = model.joint(name).qposadr[0]
             model.qpos_spring[start : start + len(rest)] = rest
     return model
+
+
+def named(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The compiled model of a spec, in which every joint is given the name that the project calls it by."""
+    whole = spec.compile()
+    other = [(joint, joint_name(whole, joint.id)) for joint in spec.joints if joint.name != joint_name(whole, joint.id)]
+    for joint, name in other:
+        for actuator in spec.actuators:
+            actuator.target = name if joint.name and actuator.target == joint.name else actuator.target
+        joint.name = name
+    return spec.compile() if other else whole
 
 
 def clear(spec: mujoco.MjSpec, locked: set, bare: bool) -> None:

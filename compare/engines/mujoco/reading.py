@@ -12,7 +12,7 @@ import tmt
 from .dynamics import NAMES
 from .engine import Mujoco
 from .file import compiled
-from .inventory import Feature, features, open_equalities, refused
+from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks
 from .joints import kind_of, moved, own_name, places, reference
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
@@ -41,14 +41,17 @@ class Reading:
 
 def read(source: Path | str) -> Reading:
     """The reading of an MJCF file (a Path) or of MJCF text; ModelError, in one line, where it cannot be compared."""
-    model, warnings = compiled(source, lambda: without_fusing(editable(source)))
     try:
-        refused(model)
+        refuse_callbacks()
+        model, warnings = compiled(source, lambda: without_fusing(editable(source)))
+        refuse(model)
         if not model.njnt:
             raise ValueError("it has no joint; at least one is expected")
         joints = places(model)
         bodies = moving_bodies(model)
         tree = tree_of(model, joints, bodies)
+    except ModelError:
+        raise
     except ValueError as error:
         raise ModelError(f"{name_of(source)} cannot be compared: {error}") from None
     return Reading(

@@ -1,0 +1,92 @@
+"""Slides, balls and free joints, or parts of these, locked in MuJoCo: the smaller model is the Tree without them."""
+
+import numpy as np
+import pytest
+from files import EVERYTHING, case_of, mjcf, random_mjcf, random_state
+from test_mujoco_reading import TENDON, TWO, assert_the_same
+
+from compare.engines.mujoco import ModelError, engine, read
+
+
+def assert_locked(reading, names, rng):
+    """MuJoCo with these joints locked at random positions is tmt's Tree with them locked there."""
+    tree = reading.tree
+    q, _, _ = random_state(tree, rng)
+    at = dict(zip(tree.hinge_names, (q[joint.q] for joint in tree.coordinates.joints)))
+    positions = {name: tuple(at[name]) if len(at[name]) > 1 else float(at[name][0]) for name in names}
+    smaller = tree.lock(positions)
+    dynamics = engine(reading).of(case_of(smaller, positions))
+    assert dynamics.model.nv == len(smaller.axis)
+    assert_the_same(dynamics, smaller, rng, states=2)
+    return dynamics
+
+
+def test_each_joint_alone_and_each_left_alone(rng):
+    reading = read(EVERYTHING)
+    names = reading.tree.hinge_names
+    for name in names:
+        assert_locked(reading, [name], rng)
+        assert_locked(reading, [other for other in names if other != name], rng)
+
+
+@pytest.mark.parametrize(
+    "parts", [["x"], ["turn"], ["x", "z"], ["y", "turn"], ["x", "y", "z"], ["x", "y", "z", "turn"]]
+)
+def test_parts_of_a_free_joint(parts, rng):
+    reading = read(EVERYTHING)
+    assert_locked(reading, [f"float {part}" for part in parts], rng)
+    assert_locked(reading, [f"float {part}" for part in parts] + ["joint 1", "shoulder"], rng)
+
+
+def test_random_joints_of_random_files(rng):
+    for _ in range(8):
+        reading = read(random_mjcf(rng))
+        names = list(reading.tree.hinge_names)
+        for _ in range(3):
+            assert_locked(reading, rng.choice(names, rng.integers(1, len(names)), replace=False).tolist(), rng)
+
+
+def test_what_refers_to_a_locked_joint_goes_too(rng):
+    more = TENDON.format('stiffness="3"') + (
+        '<equality><joint joint1="j" joint2="k"/></equality><sensor><tendonpos tendon="t"/><jointpos joint="j"/></sensor>'
+        '<actuator><position joint="j" kp="9"/><motor tendon="t"/><general joint="k" armature="0.3" gear="2"/></actuator>'
+        '<custom><tuple name="u"><element objtype="joint" objname="j"/></tuple></custom><keyframe><key qpos="1 2"/></keyframe>'
+    )
+    reading = read(mjcf(TWO, after=more))
+    assert assert_locked(reading, ["j"], rng).model.nu == 1  # the one with armature
+    assert_locked(reading, ["k"], rng)
+
+
+def test_a_joint_whose_name_cannot_stand_in_a_line_is_called_by_its_number(rng):
+    more = '<actuator><general joint="a&#10;b" armature="0.3" gear="2"/></actuator>'
+    reading = read(mjcf(TWO.replace('"j"', '"a&#10;b"'), after=more))
+    assert reading.tree.hinge_names == ("joint 0", "k") and reading.tree.armature == (1.2, 0.0)
+    assert_locked(reading, ["joint 0"], rng)
+    assert_locked(reading, ["k"], rng)
+
+
+def test_the_armature_of_an_actuator_on_a_free_joint_stays(rng):
+    body = '<body><joint name="f" type="free"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/></body>'
+    reading = read(mjcf(body, after='<actuator><general joint="f" armature="0.5" gear="2"/></actuator>'))
+    assert reading.tree.armature == (2.0,) * 6
+    assert_locked(reading, ["f y", "f turn"], rng)
+
+
+def test_a_free_body_aligned_with_its_inertia_is_compared_and_not_locked(rng):
+    body = '<body euler="10 20 30"><freejoint name="f" align="true"/><geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0"/></body>'
+    reading = read(mjcf(body))
+    assert_the_same(engine(reading).of(case_of(reading.tree)), reading.tree, rng)
+    with pytest.raises(ModelError, match="free joint 'f' is aligned with the inertia of its body") as error:
+        assert_locked(reading, ["f x"], rng)
+    assert "\n" not in str(error.value)
+
+
+def test_bodies_that_the_file_fuses_keep_their_numbers(rng):
+    tip = '<body pos="0.3 0 0"><joint name="k" axis="0 1 0"/><geom size="0.1"/></body>'
+    body = f'<body name="c" pos="0.1 0 0"><geom size="0.2"/>{tip}</body>'
+    content = f'<body><joint name="j"/><geom size="0.1" pos="0.2 0 0"/>{body}</body>'
+    reading = read(mjcf(content, '<compiler fusestatic="true"/>'))
+    assert reading.tree.body_names == ("body 1", "c", "body 3")
+    for names in (["j"], ["k"]):
+        assert_locked(reading, names, rng)
+    assert np.allclose(reading.tree.mass[1], 8 * reading.tree.mass[2])

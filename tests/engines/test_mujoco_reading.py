@@ -1,0 +1,301 @@
+"""A file read as a Tree: MuJoCo and tmt have the same numbers of every kind of joint, and what differs is listed or refused."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from files import EVERYTHING, PLAIN, TWO, case_of, mjcf, random_mjcf, random_state
+
+import tmt
+from compare.engines.mujoco import ModelError, engine, known, read, unknown
+from compare.engines.mujoco.inventory import REASONS
+
+EPS = np.finfo(float).eps
+
+
+def assert_the_same(dynamics, tree, rng, states=3):
+    """Every quantity of MuJoCo and tmt within 64 eps of the scale of what is summed."""
+
+    def same(found, expected, scale):
+        assert np.abs(np.asarray(found) - expected).max() <= 64 * EPS * scale
+
+    for _ in range(states):
+        q, v, tau = random_state(tree, rng)
+        M, h = tmt.mass_matrix(q, tree), tmt.bias(q, v, tree)
+        largest, reach = np.abs(M).max(), 1.0 + np.abs(tmt.com_positions(q, tree)).max()
+        force = largest * (v @ v) + sum(tree.mass) * np.linalg.norm(tree.gravity) * reach
+        force += np.abs(tmt.spring_torque(q, tree)).max()
+        same(dynamics.mass_matrix(q), M, largest)
+        same(dynamics.bias(q, v), h, force)
+        same(dynamics.gravity_balance(q), tmt.gravity_balance(q, tree), force)
+        cond = np.linalg.cond(M)
+        same(dynamics.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), cond * (force + 1.0) / largest * cond)
+        same(dynamics.com_positions(q), tmt.com_positions(q, tree), reach)
+        same(dynamics.angular_velocities(q, v), tmt.angular_velocities(q, v, tree), np.abs(v).sum())
+        for pair, expected, scale in (
+            (dynamics.jacobians(q), tmt.jacobians(q, tree), reach),
+            (dynamics.convective_terms(q, v), tmt.convective_terms(q, v, tree), reach * np.abs(v).sum() ** 2),
+        ):
+            for found, value in zip(pair, expected):
+                same(found, value, scale)
+        energy = force * reach + largest * (v @ v)
+        same(dynamics.potential_energy(q), tmt.potential_energy(q, tree), energy)
+        same(dynamics.energy(q, v), tmt.energy(q, v, tree), energy)
+        for forces in dynamics.other_forces(q, v).values():
+            same(forces, 0.0, force)
+
+
+def compared(text, rng, states=3):
+    reading = read(text)
+    assert_the_same(engine(reading).of(case_of(reading.tree)), reading.tree, rng, states)
+    return reading
+
+
+def test_a_file_with_everything_is_the_same_in_both(rng):
+    reading = compared(EVERYTHING, rng)
+    tree = reading.tree
+    assert tree.hinge_names[:8] == (
+        "float x",
+        "float y",
+        "float z",
+        "float turn",
+        "joint 1",
+        "rail",
+        "turn",
+        "shoulder",
+    )
+    assert tree.kind == ("slide",) * 3 + ("ball", "hinge", "slide", "hinge", "ball", "hinge", "ball")
+    assert tree.body_names == ("base", "upper", "body 4", "arm", "hand")
+    assert tree.parent == (-1, 0, 1, 2, 3, 4, 5, -1, 7, 8)
+    assert np.allclose(tree.armature, [0.01] * 8 + [0.01 + 0.02 * 9] + [0.01] * 7)
+    assert tree.stiffness == (3.0,) * 4 + (2.0, 0.0, 0.0, 4.0, 0.0, 0.0)
+    assert np.allclose(tree.reference, [0, 0, 0, 0, np.radians(20), 0.2, 0, 0, 0, 0])
+    assert np.allclose(tree.rest[7], np.radians(-30)) and np.allclose(tree.rest[:7], reading.qpos0[:7])
+    degree = np.pi / 180
+    assert reading.ranges[4:7] == (None, (-0.5, 0.5), (-90 * degree, 45 * degree)) and reading.ranges[0] is None
+    assert list(reading.keyframes) == ["home", "key 1"] and reading.keyframes["home"].shape == (len(tree.rest),)
+    assert reading.keyframes["home"][3] == 1.0  # a quaternion of length 2 in the file
+    assert (reading.integrator, reading.dt, reading.warnings) == ("Euler", 0.002, ())
+    assert [f.feature for f in reading.features] == [
+        "hinge", "slide", "ball", "free", "armature", "damping", "spring", "contact", "limit", "actuator", "keyframe",
+    ]  # fmt: skip
+
+
+def test_random_files_are_the_same_in_both(rng):
+    for _ in range(12):
+        compared(random_mjcf(rng), rng)
+
+
+def test_a_change_of_the_case_reaches_mujoco(rng):
+    reading = read(random_mjcf(rng))
+    tree = replace(reading.tree, gravity=(0.0,) * 3, damping=np.add(reading.tree.damping, 0.4))
+    assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng)
+
+
+def test_a_flag_of_the_file_counts(rng):
+    text = '<joint name="j" damping="1" stiffness="3"/>'
+    for flag, field in (("gravity", "gravity"), ("damper", "damping"), ("spring", "stiffness")):
+        option = f'<option><flag {flag}="disable"/></option>'
+        reading = compared(mjcf(PLAIN.replace('<joint name="j"/>', text), option), rng)
+        assert not any(getattr(reading.tree, field))
+        # damping that a scene adds acts all the same
+        damped = replace(reading.tree, damping=np.add(reading.tree.damping, 0.5))
+        assert_the_same(engine(reading).of(case_of(damped, damping=0.5)), damped, rng)
+
+
+TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
+MORE = {  # feature: file, names
+    "hinge": (mjcf(), ("j",)),
+    "slide": (mjcf(PLAIN.replace("name=\"j\"", "type=\"slide\"")), ("joint 0",)),
+    "ball": (mjcf(PLAIN.replace("name=\"j\"", "name=\"j\" type=\"ball\"")), ("j",)),
+    "free": (mjcf(PLAIN.replace("name=\"j\"", "name=\"j\" type=\"free\"")), ("j",)),
+    "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
+    "damping": (mjcf(PLAIN.replace("name=\"j\"", "name=\"j\" damping=\"1\"")), ("j",)),
+    "spring": (mjcf(PLAIN.replace("name=\"j\"", "name=\"j\" stiffness=\"1\"")), ("j",)),
+    "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
+    "limit": (mjcf(PLAIN.replace("name=\"j\"", "name=\"j\" range=\"-1 1\"")), ("j",)),
+    "frictionloss": (mjcf(PLAIN.replace("name=\"j\"", "name=\"j\" frictionloss=\"1\"")), ("j",)),
+    "clamp": (
+        mjcf(PLAIN.replace("name=\"j\"", "name=\"j\" actuatorfrcrange=\"-1 1\""),
+             after='<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'),
+        ("b", "j"),
+    ),
+    "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
+    "gravcomp": (mjcf(PLAIN.replace("name=\"b\"", "name=\"b\" gravcomp=\"1\"")), ("b",)),
+    "actuator": (mjcf(after='<actuator><position joint="j" kp="100" kv="3"/></actuator>'), ("actuator 0",)),
+    "equality": (mjcf(TWO, after='<equality><joint name="mimic" joint1="j" joint2="k"/></equality>'), ("mimic",)),
+    "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
+    "keyframe": (mjcf(after='<keyframe><key qpos="0.3"/></keyframe>'), ("key 0",)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("feature", [name for name in REASONS if name != "other"])
+def test_each_feature_is_listed_and_modelled_or_switched_off(feature, rng):
+    text, names = MORE[feature]
+    row = next(row for row in compared(text, rng).features if row.feature == feature)
+    assert (row.count, row.names) == (len(names), names)
+    assert (row.treatment, row.reason) == REASONS[feature] and row.reason
+
+
+def test_a_file_without_a_feature_has_no_row_of_it():
+    assert [row.feature for row in read(mjcf()).features] == ["hinge"]
+    off = '<option><flag contact="disable" limit="disable"/></option>'
+    text = mjcf(PLAIN.replace('name="j"', 'name="j" range="-1 1"') + '<geom type="plane" size="1 1 1"/>', off)
+    assert [row.feature for row in read(text).features] == ["hinge"]
+
+
+def test_equalities_open_the_tree():
+    text = mjcf(
+        TWO, after='<equality><weld body1="c"/><joint name="m" joint1="j" joint2="k" active="false"/></equality>'
+    )
+    assert read(text).open_tree == ("equality 0",)
+
+
+OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
+    "polynomial damping of j": ('damping="1 2 3"', "", 'damping="1"'),
+    "polynomial stiffness of j": ('stiffness="1 2 3"', "", 'stiffness="1"'),
+    "spring yield of j": ('stiffness="10" springyield="0.1"', "", 'stiffness="10"'),
+    "flag eulerdamp": ('damping="1"', '<option><flag eulerdamp="disable"/></option>', 'damping="1"'),
+    "flag sleep": ("", '<option><flag sleep="enable" energy="enable" fwdinv="enable"/></option>', ""),
+    "flag invdiscrete": ("", '<option><flag invdiscrete="enable" override="enable"/></option>', ""),
+}
+
+
+def run_of(text, integrator):
+    """What MuJoCo makes of a file from one state."""
+    reading = read(text)
+    run = engine(reading).of(case_of(reading.tree)).run
+    return run(np.array([1.2]), np.array([2.0]), np.array([0.1]), 0.01, 50, integrator).states
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_else_changes_a_motion_is_switched_off_by_name(name, rng):
+    joint, option, plain = OTHERS[name]
+    if "yield" in name and mujoco.__version__ < "4":
+        pytest.skip("this MuJoCo has no springs that yield")
+    text, without = (
+        mjcf(PLAIN.replace('name="j"', f'name="j" {part}'), before) for part, before in ((joint, option), (plain, ""))
+    )
+    reading = compared(text, rng)
+    assert [row.names for row in reading.features if row.feature == "other"] == [(name,)]
+    for integrator in ("Euler", "implicit", "RK4"):
+        assert np.array_equal(run_of(text, integrator), run_of(without, integrator))
+
+
+WITHOUT_EFFECT = {
+    "servo": mjcf(after='<actuator><position joint="j" kp="100" kv="3"/></actuator>'),
+    "motor with damping": mjcf(after='<actuator><general joint="j" damping="3"/></actuator>'),
+    "floor": mjcf(PLAIN + '<geom type="plane" size="1 1 1"/>'),
+    "limit": mjcf(PLAIN.replace('name="j"', 'name="j" range="-1 1"')),
+    "friction": mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')),
+    "water": mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'),
+    "no weight": mjcf(PLAIN.replace('name="b"', 'name="b" gravcomp="1"')),
+}
+
+
+@pytest.mark.parametrize("name", WITHOUT_EFFECT)
+def test_a_run_is_that_of_the_plain_file(name):
+    for integrator in ("implicitfast", "RK4"):
+        assert np.array_equal(run_of(WITHOUT_EFFECT[name], integrator), run_of(mjcf(), integrator))
+
+
+REFUSED = {
+    "tendon armature": (mjcf(TWO, after=TENDON.format('armature="1"')), "tendon 't' has armature"),
+    "armature along a tendon": (
+        mjcf(TWO, after=TENDON.format("") + '<actuator><general name="a" tendon="t" armature="1"/></actuator>'),
+        "actuator 'a' has armature and acts on no joint",
+    ),
+    "flex": (
+        mjcf(PLAIN + '<flexcomp name="soft" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" radius="0.01" dim="2" mass="1"/>'),
+        "flex 'soft'",
+    ),
+    "plugin": (
+        mjcf(PLAIN.replace("</body>", '<plugin plugin="mujoco.elasticity.cable"/></body>'),
+             '<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'),
+        "a plugin in the passive force acts on 'b'",
+    ),
+    "no joint": (mjcf('<body><geom size="0.1"/></body>'), "it has no joint; at least one is expected"),
+    "empty": ("<mujoco/>", "it has no joint; at least one is expected"),
+    "no mass": (mjcf('<body><joint/></body>'), "mass and inertia of moving bodies must be larger"),
+    "not a number": (mjcf(PLAIN.replace('name="j"', 'damping="nan"')), "finite numbers are expected"),
+    "negative damping": (mjcf(PLAIN.replace('name="j"', 'damping="-1"')), "values of at least 0 N m s/rad are expected"),
+    "same axis twice": (mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "turn together"),
+    "a name taken": (
+        mjcf('<body><freejoint name="r"/><geom size="0.1"/><body><joint name="r x"/><geom size="0.1"/></body></body>'),
+        "two of its joints are called 'r x'",
+    ),
+    "broken": ("<mujoco><worldb", "MuJoCo cannot compile the text: XML parse error"),
+    "something else": ("hello", "the text is not MJCF: MuJoCo says"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_compared_is_refused_in_one_line(name, capfd):
+    text, why = REFUSED[name]
+    if name == "plugin" and mujoco.__version__ >= "4":
+        pytest.skip("this MuJoCo's package brings no plugin with a passive force")
+    with pytest.raises(ModelError, match=r"^(the text|MuJoCo)") as error:
+        read(text)
+    assert why in str(error.value) and "\n" not in str(error.value)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (None, "No such file"),
+        ("<mujoco><worldbody><body><geom type='mesh' mesh='m'/></body></worldbody></mujoco>", "mesh 'm' not found"),
+        ("<mujoco><asset><mesh name='m' file='gone.stl'/></asset></mujoco>", "gone.stl"),
+        ("<mujoco><include file='gone.xml'/></mujoco>", "gone.xml"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_named_in_one_line(content, why, tmp_path):
+    path = tmp_path / "robot.xml"
+    if content:
+        path.write_text(content)
+    with pytest.raises(ModelError, match=r"robot\.xml") as error:
+        read(path)
+    assert why in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_callback_is_refused():
+    mujoco.set_mjcb_passive(lambda model, data: None)
+    try:
+        with pytest.raises(ModelError, match="the callback mjcb_passive is set"):
+            read(mjcf())
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "name", "found"),
+    [
+        (mjcf(TWO, after=TENDON.format("")), "COUNTS", "ntendon", "ntendon"),
+        (mjcf(PLAIN.replace('name="j"', 'name="j" stiffness="1"')), "FIELDS", "jnt_stiffness", "jnt_stiffness"),
+        (mjcf(before='<option wind="1 0 0"/>'), "OPTIONS", "wind", "the option wind"),
+        (mjcf(before='<option><flag spring="disable"/></option>'), "DISABLING", "SPRING", "the flag spring"),
+        (mjcf(before='<option><flag energy="enable"/></option>'), "ENABLING", "ENERGY", "the flag energy"),
+    ],
+)
+def test_what_a_newer_mujoco_brings_is_refused_by_name_where_it_is_used(text, names, name, found, monkeypatch):
+    read(text)
+    monkeypatch.setattr(unknown, names, getattr(known, names) - {name})
+    with pytest.raises(ModelError, match=f"it uses {found}, which is not known here"):
+        read(text)
+    read(mjcf())
+
+
+def test_what_the_compiler_warns_of_is_one_line(capfd):
+    (line,) = read(mjcf(PLAIN.replace('size="0.1"', 'size="0.1" mass="nan"'))).warnings
+    assert "NaN" in line and "\n" not in line and capfd.readouterr() == ("", "")
+
+
+def test_a_free_body_thrown_moves_as_newton_says():
+    reading = read(mjcf('<body pos="1 2 3" euler="30 0 0"><freejoint name="r"/><geom size="0.1"/></body>'))
+    assert reading.qpos0[:3].tolist() == [1.0, 2.0, 3.0]
+    q, v, dynamics = reading.qpos0, np.array([1.0, 0, 2, 3, 2, 1]), engine(reading).of(case_of(reading.tree))
+    motion = dynamics.run(np.array([q, q]), v, np.zeros(6), 0.01, 10, "RK4")
+    assert motion.q.shape == (2, 11, 7) and motion.v.shape == (2, 11, 6)
+    expected = q[:3] + 0.1 * v[:3] + [0.0, 0.0, -9.81 * 0.005]
+    assert np.allclose(motion.q[1, -1, :3], expected, atol=1e-12)
