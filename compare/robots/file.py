@@ -32,22 +32,23 @@ class Reading(Protocol):
 
 
 def robot_of(reading: Reading, shown: str) -> Robot:
-    """The robot of a file that is called `shown`: its numbers are those that MuJoCo compiled."""
-    found = positions(reading)
+    """The robot of a file that a report calls `shown`: its numbers are those that MuJoCo compiled."""
+    found = named_positions(reading)
     start = next(name for name in found if name != "qpos0" or len(found) == 1)
     return Robot(
         name=reading.name or Path(shown).stem or shown,
-        mjcf=Path(shown),
+        mjcf=reading.source if isinstance(reading.source, Path) else Path(shown),
         tree=reading.tree,
         postures={},
         positions=found,
         ranges=tuple(reading.ranges),
-        scenes=scenes(reading.tree, start, np.array(found[start]), reading.dt),
+        scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt),
+        described=shown,
         features=tuple(reading.features),
     )
 
 
-def positions(reading: Reading) -> dict[str, tuple]:
+def named_positions(reading: Reading) -> dict[str, tuple]:
     """Postures by their names, (nq,) each: the keyframes, qpos0, and the middle of the ranges; of equal ones the first."""
     coordinates = Coordinates(reading.tree.hinge_names, reading.tree.kind)
     middle = np.array(reading.qpos0, dtype=float)
@@ -63,7 +64,7 @@ def positions(reading: Reading) -> dict[str, tuple]:
     return found
 
 
-def scenes(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[Scene, ...]:
+def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[Scene, ...]:
     """The scenes: held at a posture by what balances gravity and springs, let go, let go with damping, a free body thrown.
 
     Of each nothing is expected but agreement, for as long as rounding allows. What rests where it is let go is set going.
@@ -72,12 +73,12 @@ def scenes(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[Scene,
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     inverse = np.linalg.pinv(tmt.mass_matrix(q, tree), hermitian=True)
     accelerations = inverse @ -(tmt.gravity_balance(q, tree) + tmt.spring_torque(q, tree))
-    added = damping(inverse, accelerations)
+    added = added_damping(inverse, accelerations)
     rests = np.abs(accelerations).max() < STILL
     going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * (3 if kind == "ball" else 1))}
     how, speed = ("set going", going) if rests else ("let go", {})
-    timing = {"duration": DURATION, "dt": DURATION / steps(tree, q, inverse, dt), "judged": 0.0}
-    damped = timing | {"dt": DURATION / steps(tree, q, inverse, dt, added)}
+    timing = {"duration": DURATION, "dt": DURATION / coarsest(tree, q, inverse, dt), "judged": 0.0}
+    damped = timing | {"dt": DURATION / coarsest(tree, q, inverse, dt, added)}
     made = [] if rests else [Scene(f"{start}, held", start, "hold", tags=("own",), **timing)]
     made += [
         Scene(f"{start}, {how}", start, tags=("own", "speed", "regular"), **speed, **timing),
@@ -88,7 +89,7 @@ def scenes(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[Scene,
     return tuple(made)
 
 
-def damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]:
+def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]:
     """Damping for each speed, (nv,) N m s/rad or N s/m, that lets a robot sink and not swing.
 
     A joint that the others give way to has the inertia 1 / (Mbar^-1)_ii; with it every joint decays at the same rate: twice that
@@ -98,7 +99,7 @@ def damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]
     return tuple(float(rate / ease) for ease in np.diag(inverse))
 
 
-def steps(tree: tmt.Tree, q: np.ndarray, inverse: np.ndarray, dt: float, added: tuple = ()) -> int:
+def coarsest(tree: tmt.Tree, q: np.ndarray, inverse: np.ndarray, dt: float, added: tuple = ()) -> int:
     """Into how many steps a scene is divided: 64, 128 ... 8192; no step is longer than dt, s, or than the fastest decay or swing.
 
     That is 1 over the rate, 1/s, of the joints' own damping, what is added, and the springs at q.

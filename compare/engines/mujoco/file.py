@@ -2,7 +2,7 @@
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import mujoco
@@ -10,14 +10,27 @@ import mujoco
 import tmt
 
 from .engine import Mujoco
-from .lock import ModelError, name_of
+from .lock import ModelError, editable, name_of
 
 
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
     """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
+    return load_with_warnings(path, tree)[0]
+
+
+def load_with_warnings(path: str | Path, tree: tmt.Tree) -> tuple[Mujoco, tuple[str, ...]]:
+    """The same, and what MuJoCo's compiler warns of, one line each."""
     path = Path(path)
-    model, _ = compiled(path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path)))  # bytes: any name, in any locale
-    return with_hinges(model, path, tree)
+    model, warned = compiled(path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path)))  # bytes: any name
+    return with_hinges(model, path, tree), warned
+
+
+def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
+    """Whether a file has exactly the hinges of these names, in any order; ModelError if it cannot be read."""
+    path = Path(path)
+    spec, _ = compiled(path, lambda: editable(path))
+    found = sorted((joint.name, joint.type) for joint in spec.joints)
+    return found == [(name, mujoco.mjtJoint.mjJNT_HINGE) for name in sorted(names)]
 
 
 def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, tuple[str, ...]]:
