@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from .engines.mujoco import Mujoco, Reading, engine, has_hinges, load_with_warnings, read
+from .engines.mujoco import Mujoco, Reading, engine, has_hinges, load, read
 from .process.streams import in_one_line
 from .robots import Robot
 from .robots.arm import ARM
@@ -58,8 +58,8 @@ def compared_with(asked: str | None, path: str | None) -> Compared:
     if asked is None:
         asked = "arm" if path is None or has_hinges(path, ARM.joints) else "model"
     if asked == "arm":
-        mujoco, warnings = load_with_warnings(file, ARM.tree)
-        return Compared(Reference("arm", shown, warnings=warnings), ARM, mujoco, None)
+        mujoco = load(file, ARM.tree)
+        return Compared(Reference("arm", shown, warnings=mujoco.warnings), ARM, mujoco, None)
     reading = read(Path(file))
     reference = Reference("model", shown, reading.open_tree, reading.warnings)
     return Compared(reference, robot_of(reading, shown), engine(reading), reading)

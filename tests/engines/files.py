@@ -6,10 +6,14 @@ import numpy as np
 
 import tmt
 
+EPS = np.finfo(float).eps
+
 PLAIN = '<body name="b"><joint name="j"/><geom name="g" size="0.1" pos="0.2 0 0"/></body>'
 TWO = PLAIN.replace(
     "</body>", '<body name="c" pos="0.5 0 0"><joint name="k" axis="0 1 0"/><geom name="h" size="0.1"/></body></body>'
 )
+
+TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
 
 # a free base with a spring, turned; nested frames; several joints in one body; anchors off the origin; degrees; unnamed elements;
 # references and rest positions away from zero; bodies fixed to the world and to others; armature of an actuator; keyframes
@@ -134,3 +138,35 @@ def random_state(tree: tmt.Tree, rng: np.random.Generator) -> tuple[np.ndarray, 
         quaternion = rng.normal(size=4)
         q += list(quaternion / np.linalg.norm(quaternion)) if kind == "ball" else [reference + rng.uniform(-2.0, 2.0)]
     return np.array(q), rng.uniform(-3.0, 3.0, len(tree.axis)), rng.uniform(-1.0, 1.0, len(tree.axis))
+
+
+def assert_the_same(dynamics, tree, rng, states=3):
+    """Every quantity of MuJoCo and tmt within 64 eps of the scale of what is summed."""
+
+    def same(found, expected, scale):
+        assert np.abs(np.asarray(found) - expected).max() <= 64 * EPS * scale
+
+    for _ in range(states):
+        q, v, tau = random_state(tree, rng)
+        M, h = tmt.mass_matrix(q, tree), tmt.bias(q, v, tree)
+        largest, reach = np.abs(M).max(), 1.0 + np.abs(tmt.com_positions(q, tree)).max()
+        force = largest * (v @ v) + sum(tree.mass) * np.linalg.norm(tree.gravity) * reach
+        force += np.abs(tmt.spring_torque(q, tree)).max()
+        same(dynamics.mass_matrix(q), M, largest)
+        same(dynamics.bias(q, v), h, force)
+        same(dynamics.gravity_balance(q), tmt.gravity_balance(q, tree), force)
+        cond = np.linalg.cond(M)
+        same(dynamics.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), cond * (force + 1.0) / largest * cond)
+        same(dynamics.com_positions(q), tmt.com_positions(q, tree), reach)
+        same(dynamics.angular_velocities(q, v), tmt.angular_velocities(q, v, tree), np.abs(v).sum())
+        for pair, expected, scale in (
+            (dynamics.jacobians(q), tmt.jacobians(q, tree), reach),
+            (dynamics.convective_terms(q, v), tmt.convective_terms(q, v, tree), reach * np.abs(v).sum() ** 2),
+        ):
+            for found, value in zip(pair, expected):
+                same(found, value, scale)
+        energy = force * reach + largest * (v @ v)
+        same(dynamics.potential_energy(q), tmt.potential_energy(q, tree), energy)
+        same(dynamics.energy(q, v), tmt.energy(q, v, tree), energy)
+        for forces in dynamics.other_forces(q, v).values():
+            same(forces, 0.0, force)

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from files import EVERYTHING, case_of, mjcf, random_mjcf, random_state
-from test_mujoco_reading import TENDON, TWO, assert_the_same
+from files import EVERYTHING, TENDON, TWO, assert_the_same, case_of, mjcf, random_mjcf, random_state
 
 from compare.engines.mujoco import ModelError, engine, read
 

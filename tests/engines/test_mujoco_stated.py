@@ -5,7 +5,7 @@ import pytest
 from files import EVERYTHING, PLAIN, mjcf, random_mjcf
 
 from compare.engines.mujoco import read
-from compare.engines.mujoco.stated import stated
+from compare.engines.mujoco.stated import stated_numbers
 from compare.robots.arm import ARM
 
 SMALL = 1e-14  # relative; of a tensor up to MuJoCo 3.10: its principal moments are found to about 1e-6
@@ -18,12 +18,12 @@ def difference(row):
 
 
 def rows_of(text):
-    return {(row.place, row.quantity): row for row in stated(read(text))}
+    return {(row.place, row.quantity): row for row in stated_numbers(read(text))}
 
 
 @pytest.mark.parametrize("text", [EVERYTHING, ARM.mjcf], ids=["everything", "arm"])
 def test_a_file_that_asks_for_no_change_states_what_is_compiled(text):
-    rows = stated(read(text))
+    rows = stated_numbers(read(text))
     assert {"pos", "mass", "com", "inertia", "axis", "armature", "damping", "stiffness"} <= {
         row.quantity for row in rows
     }
@@ -36,7 +36,7 @@ def test_a_file_that_asks_for_no_change_states_what_is_compiled(text):
 
 def test_random_files_state_what_is_compiled(rng):
     for _ in range(5):
-        for row in stated(read(random_mjcf(rng))):
+        for row in stated_numbers(read(random_mjcf(rng))):
             assert difference(row) <= DIGITS.get(row.quantity, SMALL) and not row.why
 
 
@@ -108,7 +108,7 @@ def test_a_number_that_differs_without_an_option_is_found():
     reading = read(mjcf(BODY.format("")))
     reading.model.body_mass[1] = 1.5
     reading.model.dof_damping[0] = 0.1
-    wrong = [row for row in stated(reading) if not row.why and difference(row) > SMALL]
+    wrong = [row for row in stated_numbers(reading) if not row.why and difference(row) > SMALL]
     assert [(row.place, row.quantity, row.stated, row.compiled) for row in wrong] == [
         ("b", "mass", 1.0, 1.5),
         ("j", "damping", 0.0, 0.1),

@@ -5,9 +5,12 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from .dynamics import FLAGS, MujocoDynamics
+from .dynamics import MujocoDynamics
 from .engine import Mujoco
-from .lock import editable
+from .flags import FLAGS
+from .inventory import take_away
+from .joints import joint_name, kind_of
+from .lock import clear, editable, with_names
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
 MINIMAL = "nothing (minimal)"
@@ -22,6 +25,10 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
     radius: of the capsules, m; near, far: heights of a floor in reach and of one out of reach, m. No joint of these engines can
     be locked.
     """
+    model = engine.model
+    kinds = {joint_name(model, j): kind_of(model, j) for j in range(model.njnt)}
+    single = [name for name in engine.joints if kinds.get(name) in ("hinge", "slide")]  # with one number, for a sensor
+    last = next(reversed(single), next(reversed(kinds)))
 
     def capsules(spec):
         for body in engine.bodies:
@@ -42,11 +49,11 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
 
     def sensors(spec):
         for kind in (mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL):
-            for joint in engine.joints:
+            for joint in single:
                 spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
 
     def motor(spec):
-        spec.add_actuator(target=engine.joints[-1], trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        spec.add_actuator(target=last, trntype=mujoco.mjtTrn.mjTRN_JOINT)
 
     def default(spec):
         spec.option.disableflags = spec.option.enableflags = 0
@@ -63,7 +70,7 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
         "contact stage": lambda spec: stage(spec, "contact"),
         "constraint stage": lambda spec: stage(spec, "constraint"),
         "energy flag": energy,
-        f"{2 * len(engine.joints)} sensors": sensors,
+        f"{2 * len(single)} sensors": sensors,
         "a motor": motor,
         "default flags": default,
         CAPSULES: default_with(capsules),
@@ -76,9 +83,29 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
 def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     """The engine's model from its file, its contact and constraint stages off, with an edit."""
     spec = editable(engine.source)
+    if engine.bare:
+        bare(spec)
     spec.option.disableflags |= LEFT_OUT
     edit(spec)
-    return Mujoco(spec.compile(), engine.joints, engine.bodies, None)
+    model = spec.compile()
+    if engine.bare:
+        take_away(model)
+    return Mujoco(model, engine.joints, engine.bodies, None)
+
+
+def bare(spec: mujoco.MjSpec) -> None:
+    """Take out of a spec what a Tree has not: of its own things none may touch, act, or limit a joint."""
+    spec.compiler.fusestatic = False
+    with_names(spec)
+    clear(spec, set(), bare=True)
+    for pair in list(spec.pairs):
+        spec.delete(pair)
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = 0
+    for joint in spec.joints:
+        joint.limited, joint.frictionloss = mujoco.mjtLimited.mjLIMITED_FALSE, 0.0
+    for actuator in spec.actuators:  # whose armature counts
+        actuator.gainprm[:], actuator.biasprm[:] = 0.0, 0.0
 
 
 def contacts(

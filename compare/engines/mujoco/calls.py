@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 
 from .. import rows_of_states
-from .dynamics import FLAGS, MujocoDynamics
+from .dynamics import MujocoDynamics
+from .flags import FLAGS
 
 TINY_STEP = 1e-9  # s: a loop of steps stays where it starts
 

@@ -14,27 +14,13 @@ import numpy as np
 from mujoco.rollout import rollout
 
 from .. import GRID, Motion, Prepared, Setting, rows_of_states
-from .joints import moved, places
+from .flags import EVALUATIONS, FLAGS, INTEGRATORS
+from .joints import joint_places, resting
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
 _log.logto_file = _log.logto_console = False
 _log.set()
-
-# by MuJoCo's names, as far as the installed version has them (discrete: from 3.13)
-NAMES = {"Euler": "EULER", "implicitfast": "IMPLICITFAST", "discrete": "DISCRETE", "implicit": "IMPLICIT", "RK4": "RK4"}
-INTEGRATORS = {
-    name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}")
-    for name, member in NAMES.items()
-    if hasattr(mujoco.mjtIntegrator, f"mjINT_{member}")
-}
-EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
-FLAGS = {
-    "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
-    "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
-    "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY,
-    "autoreset": mujoco.mjtDisableBit.mjDSBL_AUTORESET,
-}
 
 
 class MujocoDynamics:
@@ -51,13 +37,13 @@ class MujocoDynamics:
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
         self.model, self.data = model, mujoco.MjData(model)
         self.coordinates, self.bodies, self.bare = coordinates, list(bodies), bare
-        known = places(model)
+        known = joint_places(model)
         joints = [known[name] for name in coordinates.names]
         self.joints = np.array([place.joint for place in joints])
         self.qpos = np.array([i for place in joints for i in place.qpos])
         self.dofs = np.array([i for place in joints for i in place.dofs])
         self.forward(zero)
-        self.resting = self.weight_of_resting() if bare else 0.0
+        self.left_out = np.setdiff1d(resting(model), self.bodies) if bare else []
         self.zero_axes = self.turns(self.data.xmat)
 
     def enabled(self, flag: str) -> bool:
@@ -236,16 +222,13 @@ class MujocoDynamics:
         mujoco.mj_forward(self.model, d)
         return d
 
-    def weight_of_resting(self) -> float:
-        """Potential energy of the bodies that the Tree leaves out as they never move, J: a constant that MuJoCo counts."""
-        m = self.model
-        resting = np.setdiff1d(np.flatnonzero(~moved(m)), self.bodies)
-        return -float(m.body_mass[resting] @ self.data.xipos[resting] @ m.opt.gravity)
-
     def _energies(self, d):
+        mass, out = self.model.body_mass, self.left_out
+        weighed, mass[out] = mass[out], 0.0
         mujoco.mj_energyPos(self.model, d)
+        mass[out] = weighed
         mujoco.mj_energyVel(self.model, d)
-        return d.energy - [self.resting, 0.0] if self.resting else d.energy
+        return d.energy
 
     def turns(self, xmat) -> np.ndarray:
         """The orientations of the bodies, (m, 3, 3), of xmat or ximat."""

@@ -8,7 +8,8 @@ import mujoco
 
 from ...case import Case
 from .. import Method
-from .dynamics import INTEGRATORS, MujocoDynamics
+from .dynamics import MujocoDynamics
+from .flags import INTEGRATORS
 from .inventory import switch_off
 from .lock import locked_model
 
@@ -30,6 +31,7 @@ class Mujoco:
 
     bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if it was changed since
     then, so that no joint can be taken out. bare: all that a Tree has not is switched off, see inventory.
+    warnings: of MuJoCo's compiler, one line each.
     """
 
     name = "mujoco"
@@ -42,10 +44,11 @@ class Mujoco:
         bodies: Sequence[int],
         source: Path | str | None,
         bare: bool = False,
+        warnings: tuple[str, ...] = (),
     ):
         self.integrator, self.bare = model.opt.integrator, bare  # of the file
         self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
-        self.known = {}
+        self.known, self.warnings = {}, warnings
 
     def __getstate__(self):
         return self.__dict__ | {"known": {}}

@@ -15,22 +15,19 @@ from .lock import ModelError, editable, name_of
 
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
     """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
-    return load_with_warnings(path, tree)[0]
-
-
-def load_with_warnings(path: str | Path, tree: tmt.Tree) -> tuple[Mujoco, tuple[str, ...]]:
-    """The same, and what MuJoCo's compiler warns of, one line each."""
     path = Path(path)
-    model, warned = compiled(path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path)))  # bytes: any name
-    return with_hinges(model, path, tree), warned
+    model, warned = compiled(
+        path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path))
+    )  # bytes: any name, in any locale
+    return with_hinges(model, path, tree, warned)
 
 
 def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
     """Whether a file has exactly the hinges of these names, in any order; ModelError if it cannot be read."""
     path = Path(path)
     spec, _ = compiled(path, lambda: editable(path))
-    found = sorted((joint.name, joint.type) for joint in spec.joints)
-    return found == [(name, mujoco.mjtJoint.mjJNT_HINGE) for name in sorted(names)]
+    hinges = [joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE]
+    return len(hinges) == len(spec.joints) and sorted(hinges) == sorted(names)
 
 
 def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, tuple[str, ...]]:
@@ -68,7 +65,7 @@ def parse(text: str, tree: tmt.Tree) -> Mujoco:
     return with_hinges(mujoco.MjModel.from_xml_string(text), text, tree)
 
 
-def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> Mujoco:
+def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree, warned: tuple = ()) -> Mujoco:
     """The engine, if the model moves by exactly the hinges of the Tree; it remembers its source, a Path or MJCF text."""
     hinges = tree.hinge_names
     names = [model.joint(j).name for j in range(model.njnt)]
@@ -78,7 +75,7 @@ def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> Mu
         raise ModelError(
             f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected"
         )
-    return Mujoco(model, hinges, bodies(model, source, tree), source)
+    return Mujoco(model, hinges, bodies(model, source, tree), source, warnings=warned)
 
 
 def bodies(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> list[int]:

@@ -1,8 +1,23 @@
-"""Flags of a model by their names, as far as the installed MuJoCo has them."""
+"""Flags and integrators by their names, as far as the installed MuJoCo has them."""
 
 from collections.abc import Sequence
 
 import mujoco
+
+# by MuJoCo's names, as far as the installed version has them (discrete: from 3.13)
+NAMES = {"Euler": "EULER", "implicitfast": "IMPLICITFAST", "discrete": "DISCRETE", "implicit": "IMPLICIT", "RK4": "RK4"}
+INTEGRATORS = {
+    name: getattr(mujoco.mjtIntegrator, f"mjINT_{member}")
+    for name, member in NAMES.items()
+    if hasattr(mujoco.mjtIntegrator, f"mjINT_{member}")
+}
+EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
+FLAGS = {
+    "contact": mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    "constraint": mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
+    "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY,
+    "autoreset": mujoco.mjtDisableBit.mjDSBL_AUTORESET,
+}
 
 
 def bit(members: Sequence[str]) -> int:

@@ -150,7 +150,15 @@ def refuse(m: mujoco.MjModel) -> None:
 
 
 def switch_off(m: mujoco.MjModel) -> None:
-    """Switch off in a compiled model all that a Tree has not; what a flag of the file disables is set to zero instead.
+    """Switch off in a compiled model all that a Tree has not."""
+    take_away(m)
+    for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
+        m.opt.disableflags |= bit((flag,))
+    m.opt.enableflags = 0
+
+
+def take_away(m: mujoco.MjModel) -> None:
+    """Set to zero what a Tree has not and no flag switches off, and what a flag of the file disables.
 
     Armature of actuators stays: MuJoCo has it in the mass matrix whether they act or not.
     """
@@ -159,11 +167,8 @@ def switch_off(m: mujoco.MjModel) -> None:
     m.jnt_stiffness[:] *= on(m, "SPRING")
     for flag in ("GRAVITY", "DAMPER", "SPRING", "EULERDAMP"):
         m.opt.disableflags &= ~bit((flag,))
-    for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
-        m.opt.disableflags |= bit((flag,))
-    m.opt.enableflags = 0
     m.opt.density = m.opt.viscosity = 0.0
-    for name in ZERO:
+    for name in NOT_HAD_FIELDS:
         if hasattr(m, name):
             getattr(m, name)[:] = 0
     for name in ("jnt_plasticadr", "tendon_plasticadr"):  # a spring with a plastic state yields, at whatever force
@@ -171,7 +176,7 @@ def switch_off(m: mujoco.MjModel) -> None:
             getattr(m, name)[:] = -1
 
 
-ZERO = (
+NOT_HAD_FIELDS = (
     "body_gravcomp",
     "dof_dampingpoly",
     "jnt_stiffnesspoly",

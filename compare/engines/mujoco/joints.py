@@ -8,14 +8,15 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from tmt.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
+
 KINDS = {
     mujoco.mjtJoint.mjJNT_HINGE: "hinge",
     mujoco.mjtJoint.mjJNT_SLIDE: "slide",
     mujoco.mjtJoint.mjJNT_BALL: "ball",
     mujoco.mjtJoint.mjJNT_FREE: "free",
 }
-PARTS = ("x", "y", "z", "turn")  # of a free joint
-NUMBERS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # in qpos and in qvel
+FREE_PARTS = ("x", "y", "z", "turn")  # of a free joint
 
 
 class Place(NamedTuple):
@@ -43,10 +44,10 @@ def kind_of(model: mujoco.MjModel, number: int) -> str:
 
 def parts_of(name: str) -> list[str]:
     """The four joints of a free one of this name."""
-    return [f"{name} {part}" for part in PARTS]
+    return [f"{name} {part}" for part in FREE_PARTS]
 
 
-def places(model: mujoco.MjModel) -> dict[str, Place]:
+def joint_places(model: mujoco.MjModel) -> dict[str, Place]:
     """The joints of a Tree by their names, in the order of the file."""
     found = []
     for number in range(model.njnt):
@@ -64,7 +65,7 @@ def places(model: mujoco.MjModel) -> dict[str, Place]:
     return dict(found)
 
 
-def reference(model: mujoco.MjModel) -> np.ndarray:
+def reference_qpos(model: mujoco.MjModel) -> np.ndarray:
     """qpos where every frame of the Tree is parallel to the world's: qpos0, free bodies at the origin and not turned."""
     qpos = model.qpos0.copy()
     for number in range(model.njnt):
@@ -80,3 +81,8 @@ def moved(model: mujoco.MjModel) -> np.ndarray:
     for body in range(1, model.nbody):
         found[body] = found[model.body_parentid[body]] or model.body_jntnum[body] > 0
     return found
+
+
+def resting(model: mujoco.MjModel) -> np.ndarray:
+    """The numbers of the bodies that no joint moves."""
+    return np.flatnonzero(~moved(model))

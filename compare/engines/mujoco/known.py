@@ -1,12 +1,12 @@
 """What MuJoCo's models have from 3.10 to 4.0.0, and the reader has been checked with: anything else is not known."""
 
 
-def words(text: str, prefix: str = "") -> frozenset:
-    """The words of a text, each after a prefix."""
+def word_set(text: str, prefix: str = "") -> frozenset:
+    """The word_set of a text, each after a prefix."""
     return frozenset(prefix + word for word in text.split())
 
 
-COUNTS = words("""
+KNOWN_COUNTS = word_set("""
 nB nC nD nJfe nJfv nJmom nJten nM na nactuator narena nbody nbuffer nbvh nbvhdynamic nbvhstatic ncam nconmax
 nefm0L nefm0dof nefmCvert nemax neq nexclude nflex nflexbending nflexedge nflexelem nflexelemdata
 nflexelemedge nflexevpair nflexnode nflexshelldata nflexstiffness nflextexcoord nflexvert ngeom ngravcomp
@@ -17,20 +17,20 @@ nskin nskinbone nskinbonevert nskinface nskintexvert nskinvert ntendon ntex ntex
 ntuple ntupledata nu nuser_actuator nuser_body nuser_cam nuser_geom nuser_jnt nuser_sensor nuser_site
 nuser_tendon nuserdata nv nwrap
 """)
-OPTIONS = words("""
+KNOWN_OPTIONS = word_set("""
 ccd_iterations ccd_tolerance cone density disableactuator disableflags enableflags gravity impratio integrator
 iterations jacobian ls_iterations ls_tolerance magnetic noslip_iterations noslip_tolerance o_friction o_margin
 o_solimp o_solref sdf_initpoints sdf_iterations sleep_tolerance solver timestep tolerance viscosity wind
 """)
-DISABLING = words("""
+KNOWN_DISABLING = word_set("""
 ACTUATION AUTORESET CLAMPCTRL CONSTRAINT CONTACT DAMPER EQUALITY EULERDAMP FILTERPARENT FRICTIONLOSS GRAVITY
 ISLAND LIMIT MIDPHASE MULTICCD NATIVECCD REFSAFE SENSOR SPRING WARMSTART
 """)
-ENABLING = words("""
+KNOWN_ENABLING = word_set("""
 DIAGEXACT ENERGY FWDINV INVDISCRETE IPC OVERRIDE SLEEP SPECULATIVE
 """)
-FIELDS = frozenset()
-FIELDS |= words(
+KNOWN_FIELDS = frozenset()
+KNOWN_FIELDS |= word_set(
     """
     bvhadr bvhnum conaffinity contype dofadr dofnum geomadr geomnum gravcomp inertia invweight0 ipos
     iquat jntadr jntnum margin mass mocapid parentid plugin pos quat rootid sameframe simple subtreemass
@@ -38,21 +38,21 @@ FIELDS |= words(
     """,
     "body_",
 )
-FIELDS |= words(
+KNOWN_FIELDS |= word_set(
     """
     M0 Madr armature bodyid damping dampingpoly frictionloss invweight0 jntid length parentid simplenum
     solimp solref treeid
     """,
     "dof_",
 )
-FIELDS |= words(
+KNOWN_FIELDS |= word_set(
     """
     actfrclimited actfrcrange actgravcomp actuatorid axis bodyid dofadr group limited margin plasticadr
     pos qposadr range solimp solref springyield stiffness stiffnesspoly type user
     """,
     "jnt_",
 )
-FIELDS |= words(
+KNOWN_FIELDS |= word_set(
     """
     actfrclimited actfrcrange actuatorid adr armature damping dampingpoly frictionloss group invweight0
     length0 lengthspring limited margin matid num plasticadr range rgba solimp_fri solimp_lim solref_fri
@@ -60,13 +60,13 @@ FIELDS |= words(
     """,
     "tendon_",
 )
-FIELDS |= words(
+KNOWN_FIELDS |= word_set(
     """
     active0 data obj1id obj2id objtype solimp solref type
     """,
     "eq_",
 )
-FIELDS |= words(
+KNOWN_FIELDS |= word_set(
     """
     acc0 actadr actearly actlimited actnum actrange armature biasprm biastype cranklength ctrladr
     ctrllimited ctrlnum ctrlrange ctrlspec damping dampingpoly delay dynprm dyntype forcelimited

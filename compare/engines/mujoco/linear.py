@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 
-from .dynamics import FLAGS, MujocoDynamics
+from .dynamics import MujocoDynamics
+from .flags import FLAGS
 
 NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/s
 

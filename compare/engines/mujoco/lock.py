@@ -40,7 +40,7 @@ def editable(source: Path | str) -> mujoco.MjSpec:
 
 
 def locked_model(source: Path | str | None, positions: Mapping, bare: bool = False) -> mujoco.MjModel:
-    """The compiled model without the joints that are named in `positions`, {name: rad, m or quaternion}.
+    """The compiled model without the joints that are with_names in `positions`, {name: rad, m or quaternion}.
 
     Names are those of joints.places; every body keeps its number. Keyframes and sensors go, and so do the actuators and
     equalities of a locked joint; bare: all tendons and equalities, and all actuators but those with armature. ModelError if
@@ -60,7 +60,7 @@ def locked_model(source: Path | str | None, positions: Mapping, bare: bool = Fal
 def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> mujoco.MjModel:
     """The model of a spec whose joints at these positions have been taken out."""
     spec.compiler.fusestatic = False
-    whole = named(spec)  # anchors, axes and frames as they are after defaults, degrees and nested frames
+    whole = with_names(spec)  # anchors, axes and frames as they are after defaults, degrees and nested frames
     parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
     clear(spec, {*positions, *parted}, bare)
     rests = {}
@@ -107,7 +107,7 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     return model
 
 
-def named(spec: mujoco.MjSpec) -> mujoco.MjModel:
+def with_names(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The compiled model of a spec, in which every joint is given the name that the project calls it by."""
     whole = spec.compile()
     other = [(joint, joint_name(whole, joint.id)) for joint in spec.joints if joint.name != joint_name(whole, joint.id)]

@@ -3,9 +3,9 @@
 import mujoco
 import numpy as np
 
-from .dynamics import FLAGS, MujocoDynamics
+from .dynamics import MujocoDynamics
 from .engine import Mujoco
-from .flags import bit
+from .flags import FLAGS, bit
 from .pairs import contact_pairs
 
 STATED_FLAGS = {  # flags that the equations of motion depend on, by the names that MuJoCo's versions give them

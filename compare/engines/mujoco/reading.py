@@ -9,13 +9,14 @@ import numpy as np
 
 import tmt
 
-from .dynamics import NAMES
 from .engine import Mujoco
 from .file import compiled
-from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks
-from .joints import kind_of, moved, own_name, places, reference
+from .flags import NAMES
+from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks, take_away
+from .joints import Place, joint_places, kind_of, moved, own_name, reference_qpos
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
+from .values import refuse_values
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,11 @@ def read(source: Path | str) -> Reading:
     try:
         refuse_callbacks()
         model, warnings = compiled(source, lambda: without_fusing(editable(source)))
-        refuse(model)
         if not model.njnt:
             raise ValueError("it has no joint; at least one is expected")
-        joints = places(model)
+        refuse(model)
+        refuse_values(model)
+        joints = joint_places(model)
         bodies = moving_bodies(model)
         tree = tree_of(model, joints, bodies)
     except ModelError:
@@ -73,7 +75,8 @@ def read(source: Path | str) -> Reading:
 
 def engine(reading: Reading) -> Mujoco:
     """MuJoCo with all of it switched off that the Tree has not."""
-    return Mujoco(reading.model, reading.tree.hinge_names, reading.bodies, reading.source, bare=True)
+    names = reading.tree.hinge_names
+    return Mujoco(reading.model, names, reading.bodies, reading.source, bare=True, warnings=reading.warnings)
 
 
 def without_fusing(spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -88,59 +91,64 @@ def moving_bodies(model: mujoco.MjModel) -> list[int]:
     return [int(body) for body in np.flatnonzero(massive & moved(model))]
 
 
-def tree_of(model: mujoco.MjModel, joints: Mapping, bodies: list[int]) -> tmt.Tree:
+def tree_of(whole: mujoco.MjModel, joints: Mapping[str, Place], bodies: list[int]) -> tmt.Tree:
     """The Tree of a compiled model.
 
     Frames are read where mj_kinematics puts them at the reference position: that honours `sameframe`. There all of the
     Tree's frames are parallel to the world's, so that everything is in world axes.
     """
+    model = mujoco.MjModel.__copy__(whole)
+    take_away(model)  # what a flag of the file disables is zero
     data = mujoco.MjData(model)
-    data.qpos[:] = reference(model)
+    data.qpos[:] = reference_qpos(model)
     mujoco.mj_kinematics(model, data)
-    carrier = carriers(model, joints)  # of each body the last joint of the Tree that moves it, -1: none
-    listed = list(joints.values())
-    parent, anchor = [], np.array([data.xanchor[place.joint] for place in listed])
-    axis, springs = [], []
-    for i, place in enumerate(listed):
-        body = int(model.jnt_bodyid[place.joint])
-        first = place.joint == model.body_jntadr[body] and place.dofs.start == model.jnt_dofadr[place.joint]
-        parent.append(carrier[model.body_parentid[body]] if first else i - 1)
-        free = kind_of(model, place.joint) == "free"
-        if free:
-            anchor[i] = 0.0
-        if place.kind == "ball":
-            axis += list(np.eye(3) if free else data.xmat[body].reshape(3, 3).T)
-        else:
-            axis.append(
-                np.eye(3)[place.dofs.start - model.jnt_dofadr[place.joint]] if free else data.xaxis[place.joint]
-            )
-        springs.append(model.jnt_stiffness[place.joint])
-    flags = model.opt.disableflags
-    inertia = [R @ np.diag(i) @ R.T for R, i in zip(data.ximat.reshape(-1, 3, 3)[bodies], model.body_inertia[bodies])]
+    places, carrier = list(joints.values()), carriers(model, joints)
+    anchors = [np.zeros(3) if is_free(model, place) else data.xanchor[place.joint] for place in places]
+    parents = [parent(model, i, place, carrier) for i, place in enumerate(places)]
     hangs = [carrier[body] for body in bodies]
-    at = [i for place in listed for i in place.qpos]
-    by = [i for place in listed for i in place.dofs]
+    turns = data.ximat[bodies].reshape(-1, 3, 3)
+    inertia = [R @ np.diag(moments) @ R.T for R, moments in zip(turns, model.body_inertia[bodies])]
+    speeds = [i for place in places for i in place.dofs]
+    single = [place.kind != "ball" and not is_free(model, place) for place in places]
     return tmt.Tree(
         hinge_names=list(joints),
-        parent=parent,
-        offset=[a - (anchor[p] if p >= 0 else 0.0) for a, p in zip(anchor, parent)],
-        axis=axis,
-        damping=np.where(flags & int(mujoco.mjtDisableBit.mjDSBL_DAMPER), 0.0, model.dof_damping[by]),
+        parent=parents,
+        offset=[anchor - (anchors[before] if before >= 0 else 0.0) for anchor, before in zip(anchors, parents)],
+        axis=[axis for place in places for axis in speed_axes(model, data, place)],
+        damping=model.dof_damping[speeds],
         body_names=[own_name(model.body(body).name, "body", body) for body in bodies],
         body_hinge=hangs,
         mass=model.body_mass[bodies],
-        com=[data.xipos[body] - anchor[i] for body, i in zip(bodies, hangs)],
+        com=[data.xipos[body] - anchors[joint] for body, joint in zip(bodies, hangs)],
         inertia=[(tensor + tensor.T) / 2.0 for tensor in inertia],
-        gravity=model.opt.gravity * (not flags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)),
-        kind=[place.kind for place in listed],
-        armature=(model.dof_armature + rotors(model))[by],
-        stiffness=np.where(flags & int(mujoco.mjtDisableBit.mjDSBL_SPRING), 0.0, springs),
-        rest=model.qpos_spring[at],
-        reference=[
-            model.qpos0[place.qpos.start] if kind_of(model, place.joint) in ("hinge", "slide") else 0.0
-            for place in listed
-        ],
+        gravity=model.opt.gravity,
+        kind=[place.kind for place in places],
+        armature=(model.dof_armature + rotors(model))[speeds],
+        stiffness=[model.jnt_stiffness[place.joint] for place in places],
+        rest=[model.qpos_spring[i] for place in places for i in place.qpos],
+        reference=[model.qpos0[place.qpos.start] if one else 0.0 for place, one in zip(places, single)],
     )
+
+
+def is_free(model: mujoco.MjModel, place: Place) -> bool:
+    """Whether a joint of the Tree is part of a free joint."""
+    return kind_of(model, place.joint) == "free"
+
+
+def parent(model: mujoco.MjModel, number: int, place: Place, carrier: list[int]) -> int:
+    """The joint of the Tree before one: in the same body, or the last that moves the body before."""
+    body = int(model.jnt_bodyid[place.joint])
+    first = model.body_dofadr[body] == place.dofs.start
+    return carrier[model.body_parentid[body]] if first else number - 1
+
+
+def speed_axes(model: mujoco.MjModel, data: mujoco.MjData, place: Place) -> np.ndarray:
+    """The directions of a joint's speeds at the reference position: a ball's are the axes of its body."""
+    if is_free(model, place):
+        return np.eye(3) if place.kind == "ball" else np.eye(3)[[place.dofs.start - model.jnt_dofadr[place.joint]]]
+    if place.kind == "ball":
+        return data.xmat[model.jnt_bodyid[place.joint]].reshape(3, 3).T
+    return data.xaxis[[place.joint]]
 
 
 def carriers(model: mujoco.MjModel, joints: Mapping) -> list[int]:
@@ -168,7 +176,7 @@ def own_model_name(model: mujoco.MjModel) -> str:
     return name if name.isprintable() and name != "MuJoCo Model" else ""  # MuJoCo's own for none
 
 
-def limits(model: mujoco.MjModel, place) -> tuple[float, float] | None:
+def limits(model: mujoco.MjModel, place: Place) -> tuple[float, float] | None:
     """The range of a joint, if the file gives it one."""
     low, high = map(float, model.jnt_range[place.joint])
     return (low, high) if model.jnt_limited[place.joint] else None

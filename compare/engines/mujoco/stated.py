@@ -27,7 +27,7 @@ class Stated(NamedTuple):
     why: str  # the option of the file that asks for a change of it, "": none does
 
 
-def stated(reading: Reading) -> list[Stated]:
+def stated_numbers(reading: Reading) -> list[Stated]:
     """A row for every mass, place, tensor, axis, armature, damping and stiffness that the file states."""
     spec, numbered, model = editable(reading.source), editable(reading.source), reading.model
     with warnings.catch_warnings():
@@ -54,7 +54,7 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
         "inertia": tensor(model.body_iquat[number], model.body_inertia[number]),
     }
     if not body.explicitinertial:
-        geoms = [geom for geom in body.geoms if counts(geom, options)]
+        geoms = [geom for geom in body.geoms if in_inertia(geom, options)]
         masses = [geom.mass for geom in geoms]
         of_geoms = float(np.sum(masses)) if geoms and np.isfinite(masses).all() else None
         why = changed_mass(spec, options, of_geoms)
@@ -149,7 +149,7 @@ def changed_inertia(spec: mujoco.MjSpec, options, inertia: np.ndarray) -> str:
     return "balanceinertia" if options.balanceinertia and moments[0] + moments[1] < moments[2] else ""
 
 
-def counts(geom, options) -> bool:
+def in_inertia(geom, options) -> bool:
     """Whether the compiler takes a geom into the inertia of its body."""
     low, high = options.inertiagrouprange
     return low <= geom.group <= high

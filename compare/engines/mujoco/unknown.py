@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from .joints import KINDS
-from .known import COUNTS, DISABLING, ENABLING, FIELDS, OPTIONS
+from .known import KNOWN_COUNTS, KNOWN_DISABLING, KNOWN_ENABLING, KNOWN_FIELDS, KNOWN_OPTIONS
 
 PLAIN = """<mujoco><worldbody><body><freejoint/><geom size="0.1"/>
 <body><joint/><geom size="0.1"/><body><joint type="ball"/><geom size="0.1"/></body></body>
@@ -21,8 +21,8 @@ def unknown(model: mujoco.MjModel) -> str:
     """
     plain = plain_model()
     for flags, known, enum, prefix in (
-        (model.opt.enableflags, ENABLING, mujoco.mjtEnableBit, "mjENBL_"),
-        (model.opt.disableflags, DISABLING, mujoco.mjtDisableBit, "mjDSBL_"),
+        (model.opt.enableflags, KNOWN_ENABLING, mujoco.mjtEnableBit, "mjENBL_"),
+        (model.opt.disableflags, KNOWN_DISABLING, mujoco.mjtDisableBit, "mjDSBL_"),
     ):
         for name, bit in members(enum, prefix):
             if name not in known and flags & bit:
@@ -31,13 +31,13 @@ def unknown(model: mujoco.MjModel) -> str:
         if mujoco.mjtJoint(model.jnt_type[number]) not in KINDS:
             return f"a joint of the type {mujoco.mjtJoint(model.jnt_type[number]).name}"
     for name in numbers_of(model):
-        if name not in COUNTS and getattr(model, name) and not getattr(plain, name):
+        if name not in KNOWN_COUNTS and getattr(model, name) and not getattr(plain, name):
             return name
     for name in attributes(model.opt):
-        if name not in OPTIONS and not np.array_equal(getattr(model.opt, name), getattr(plain.opt, name)):
+        if name not in KNOWN_OPTIONS and not np.array_equal(getattr(model.opt, name), getattr(plain.opt, name)):
             return f"the option {name}"
     for name in attributes(model):
-        if name.startswith(PREFIXES) and name not in FIELDS and in_use(model, name) and not in_use(plain, name):
+        if name.startswith(PREFIXES) and name not in KNOWN_FIELDS and in_use(model, name) and not in_use(plain, name):
             return name
     return ""
 

@@ -6,6 +6,7 @@ import numpy as np
 
 import tmt
 
+from ...engines.mujoco.inventory import MODELLED, OPEN
 from ...engines.mujoco.stated import Stated, stated
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
@@ -24,14 +25,13 @@ TOLERANCE = (
     "its principal axes and back (MuJoCo 3.10 turns a fullinertia only to about 1e-8). Forces of what is switched off: exactly "
     "0; where springs and damping are taken from a sum, 64 eps x the largest of these."
 )
-UNITS = {"mass": "kg", "pos": "m", "com": "m", "inertia": "kg m2", "anchor": "m", "axis": ""}
+UNITS_OF_ALL = {"mass": "kg", "pos": "m", "com": "m", "inertia": "kg m2", "anchor": "m", "axis": ""}
 OF_MOVEMENTS = {  # of joints that turn, and of slides
     "armature": ("kg m2", "kg"),
     "damping": ("N m s/rad", "N s/m"),
     "stiffness": ("N m/rad", "N/m"),
 }
 PASSIVE = "fluid and tendons"  # their forces are in MuJoCo's sum with those of springs and damping
-MODELLED, OPEN = "modelled", "open_tree"  # treatments of the inventory
 
 
 def rows_of_file(setup: Setup) -> Result:
@@ -67,8 +67,8 @@ def rows_of_file(setup: Setup) -> Result:
 
 def unit_of(robot: Robot, number: Stated) -> str:
     """The unit of a number of a body or joint."""
-    if number.quantity in UNITS:
-        return UNITS[number.quantity]
+    if number.quantity in UNITS_OF_ALL:
+        return UNITS_OF_ALL[number.quantity]
     kinds = dict(zip(robot.joints, robot.tree.kind))
     return OF_MOVEMENTS[number.quantity][kinds.get(number.place, "slide") == "slide"]  # a free joint's first is one
 

@@ -1,0 +1,70 @@
+"""Steps of models with quaternions: their derivatives, minimal calls, additions, and what goes to another process."""
+
+import pickle
+
+import numpy as np
+import pytest
+from files import EVERYTHING, assert_the_same, case_of, random_state
+
+import tmt
+from compare.engines.mujoco import engine, read
+from compare.engines.mujoco.additions import MINIMAL, contacts, with_additions
+from compare.engines.mujoco.calls import MinimalCalls
+from compare.engines.mujoco.linear import differenced, implicit_derivative, left_to_itself, transition
+
+
+@pytest.fixture(scope="module")
+def reading():
+    return read(EVERYTHING)
+
+
+@pytest.fixture
+def dynamics(reading):
+    return engine(reading).of(case_of(reading.tree))
+
+
+def test_a_step_is_differenced_in_movements(reading, dynamics, rng):
+    q, _, tau = random_state(reading.tree, rng)
+    for integrator in ("Euler", "implicit"):
+        A = transition(dynamics, q, tau, 1e-3, integrator)
+        assert A.shape == (2 * dynamics.coordinates.nv,) * 2
+        assert np.allclose(A, differenced(dynamics, q, tau, 1e-3, integrator), atol=1e-6)
+    assert np.allclose(transition(dynamics, q, tau, 1e-9, "RK4"), np.eye(len(A)), atol=1e-5)
+
+
+def test_a_run_left_to_itself_has_positions_and_speeds(reading, dynamics, rng):
+    q, v, tau = random_state(reading.tree, rng)
+    found = left_to_itself(dynamics, q, v, tau, 1e-3, 4, "Euler")
+    motion = dynamics.run(q, v, tau, 1e-3, 4, "Euler")
+    assert np.array_equal(found["q"], motion.q) and np.array_equal(found["qd"], motion.v)
+    assert implicit_derivative(dynamics, q, v).shape == (len(v), len(v))
+
+
+def test_minimal_calls_are_the_same(reading, dynamics, rng):
+    if MinimalCalls.unavailable():
+        pytest.skip("MuJoCo's library is not beside its package")
+    minimal = MinimalCalls(dynamics)
+    q, v, tau = (np.array(values) for values in zip(*(random_state(reading.tree, rng) for _ in range(3))))
+    assert np.allclose(minimal.mass_matrix(q), dynamics.mass_matrix(q), atol=1e-13)
+    assert np.allclose(minimal.bias(q, v), dynamics.bias(q, v), atol=1e-11)
+    assert np.allclose(minimal.acceleration(q, v, tau), dynamics.acceleration(q, v, tau), rtol=1e-9, atol=1e-9)
+
+
+def test_additions_to_a_bare_model(reading, rng):
+    engines = with_additions(engine(reading), 0.02, -5.0, -50.0)
+    assert "8 sensors" in engines
+    case, state = case_of(reading.tree), random_state(reading.tree, rng)
+    bare = engine(reading).of(case).run(*state, 1e-3, 5, "RK4").states
+    for name, addition in engines.items():
+        dynamics = addition.of(case)
+        if name == MINIMAL:
+            assert np.allclose(dynamics.acceleration(*state), tmt.acceleration(*state, reading.tree), rtol=1e-9)
+        if "capsules" not in name:
+            assert np.allclose(dynamics.run(*state, 1e-3, 5, "RK4").states, bare, rtol=1e-12, atol=1e-12)
+            assert contacts(dynamics, *state, 1e-3, 5, "RK4") == (0.0, False)
+
+
+def test_a_reading_and_its_engine_can_go_to_another_process(reading, rng):
+    again, other = pickle.loads(pickle.dumps((reading, engine(reading))))
+    assert again.tree == reading.tree and again.features == reading.features
+    assert_the_same(other.of(case_of(again.tree)), again.tree, rng, states=1)
