@@ -7,7 +7,7 @@ import numpy as np
 import tmt
 
 from ...engines.mujoco.inventory import MODELLED, OPEN
-from ...engines.mujoco.stated import Stated, stated
+from ...engines.mujoco.stated import Stated, stated_numbers
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...judge.words import listed
@@ -31,6 +31,7 @@ OF_MOVEMENTS = {  # of joints that turn, and of slides
     "damping": ("N m s/rad", "N s/m"),
     "stiffness": ("N m/rad", "N/m"),
 }
+OF_BODY = ("mass", "pos", "com", "inertia")  # quantities; the others are of joints
 PASSIVE = "fluid and tendons"  # their forces are in MuJoCo's sum with those of springs and damping
 
 
@@ -38,7 +39,7 @@ def rows_of_file(setup: Setup) -> Result:
     """A row for each number, a check for each that the file states, the inventory, and sentences on what is not as stated."""
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit", "asked_by"])
     causes, changed = [], []
-    for number in stated(setup.reading):
+    for number in stated_numbers(setup.reading):
         unit = unit_of(setup.robot, number)
         compiled = np.ravel(number.compiled).astype(float)
         known = number.stated is not None
@@ -133,7 +134,9 @@ def changes_in_words(changed: Sequence[tuple[Stated, str]]) -> list[str]:
         of_why = [(number, unit) for number, unit in changed if number.why == why]
         for quantity in dict.fromkeys(number.quantity for number, _ in of_why):
             of_quantity = [(number, unit) for number, unit in of_why if number.quantity == quantity]
-            parts.append(f"{quantity} of {len(of_quantity)} ({most_in_words(of_quantity)})")
+            one, many = ("body", "bodies") if quantity in OF_BODY else ("joint", "joints")
+            count = f"{len(of_quantity)} {one if len(of_quantity) == 1 else many}"
+            parts.append(f"{quantity} of {count} ({most_in_words(of_quantity)})")
         sentences.append(f"By {why} the compiler sets {listed(parts)}.")
     return sentences
 
