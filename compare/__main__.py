@@ -25,7 +25,8 @@ EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
   python -m compare all --quick                  the same with fewer states, in seconds
   python -m compare mass --out /tmp/mass         one experiment, report elsewhere
-  python -m compare all --mjcf my_arm.xml        your MJCF compared with the stated arm
+  python -m compare all --mjcf my_arm.xml        your MJCF of the arm compared with the stated numbers
+  python -m compare all --mjcf robot.xml         any robot compared with tmt's equations for its compiled model
   python -m compare speed --scenes my.toml       your own scenes beside those of the arm
 
 exit status: 0 all checks pass; 1 a check failed; 2 the request could not be carried out
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = Parser(
         prog="python -m compare",
-        description="Compare the TMT method with MuJoCo on a human arm, and write a report.",
+        description="Compare the TMT method with MuJoCo, on a human arm or on your robot, and write a report.",
         epilog="experiments:\n" + "".join(f"  {k:<13} {v}\n" for k, v in EXPERIMENTS.items()) + "\n" + EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -66,13 +67,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--mjcf",
         type=not_empty,
         metavar="FILE",
-        help="another model of the same hinges, compared with the stated arm",
+        help="your model, an MJCF file",
+    )
+    parser.add_argument(
+        "--reference",
+        choices=["arm", "model"],
+        metavar="WHAT",
+        help="what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges), or model, "
+        "tmt's equations for the model as MuJoCo compiled it (default for any other)",
     )
     parser.add_argument(
         "--scenes",
         type=not_empty,
         metavar="FILE",
-        help="scenes of your own (TOML), beside those of the arm in trajectory, speed and reduction",
+        help="scenes of your own (TOML), beside those of the robot in trajectory, speed and reduction",
     )
     options = parser.parse_args(arguments)
     if options.scenes and options.experiment not in (*FOLLOWING_SCENES, "all"):
@@ -102,21 +110,25 @@ class Refused(ValueError):
 def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
-    from .engines.mujoco import ModelError, load
+    from .engines.mujoco import ModelError
     from .process.workers import WorkerEnded, start_workers
+    from .reference import compared_with  # imports are here, so that --help and a wrong word answer at once
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
-    from .robots.arm import ARM  # imports are here, so that --help and a wrong word answer at once
     from .scene_file import SceneError, read_scenes
 
     terminal = Terminal()
-    path = options.mjcf or ARM.mjcf
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        robot = ARM.with_scenes(read_scenes(options.scenes, ARM)) if options.scenes else ARM
-        mujoco = load(path, robot.tree)
+        reference, robot, mujoco, reading = compared_with(options.reference, options.mjcf)
+        if options.scenes:
+            robot = robot.with_scenes(read_scenes(options.scenes, robot))
+        if options.experiment != "all" and (reason := skipped(options.experiment, robot)):
+            raise Refused(f"{options.experiment} cannot serve {robot.name}: {reason}")
         before = made_by(options.out)
         with new_report(options.out) as folder:
+            for line in reference.lines:
+                terminal.say(line)
             with start_workers() as workers, terminal.progress("imports"):
                 from . import experiment
                 from .case import SEED
@@ -125,20 +137,18 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
 
                 workers.submit(experiment.warm_up)
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
-                if options.experiment in reasons:
-                    raise Refused(f"{options.experiment} cannot serve {robot.name}: {reasons[options.experiment]}")
-                shown = str(path) if options.mjcf else "mjcf/arm.xml"
-                origin = provenance.provenance(command, path, shown, SEED)  # of the model as it was read
-                of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+                origin = provenance.provenance(command, robot.mjcf, reference.file, SEED)  # of the model as it was read
+                of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
                 sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
-            words = verdict.verdict(sections, len(EXPERIMENTS), causes)
+            words = verdict.verdict(sections, len(EXPERIMENTS), causes, reference.compared)
             origin["seconds"] = round(time.perf_counter() - started, 1)
-            files.write(folder, verdict.Report(sections, robot, origin, words, causes, list(reasons.items())))
+            report = verdict.Report(sections, robot, origin, words, causes, list(reasons.items()), reference)
+            files.write(folder, report)
     except (ModelError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()

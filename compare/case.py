@@ -127,7 +127,7 @@ class Scene:
     ) = ()  # a posture's name, or an angle in deg for each joint (m, a quaternion); (): the reference
     torque: str | tuple = "free"  # "free": none; "hold": what balances gravity and springs at the start, by TMT; or N m
     speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
-    damping: float = 0.0  # N m s/rad, added to that of every joint
+    damping: float | tuple = 0.0  # N m s/rad (N s/m), added to that of every joint; or a number for each speed
     gravity: bool = True  # the robot's own, or none
     locked: tuple = ()  # names of the joints that stay at the start
     duration: float = 5.0  # s
@@ -154,8 +154,10 @@ class Scene:
             value = getattr(self, name)
             self.refuse(name, not is_number(value) or value <= 0.0, "a time in s above 0")
             object.__setattr__(self, name, float(value))
-        self.refuse("damping", not is_number(self.damping) or self.damping < 0.0, "at least 0 N m s/rad")
-        object.__setattr__(self, "damping", float(self.damping))
+        each = are_numbers(self.damping) and len(self.damping) > 0
+        wrong = not (each or is_number(self.damping)) or np.min(self.damping) < 0.0
+        self.refuse("damping", wrong, "at least 0 N m s/rad")
+        object.__setattr__(self, "damping", tuple(float(v) for v in self.damping) if each else float(self.damping))
         self.refuse("gravity", not isinstance(self.gravity, bool | np.bool_), "True, the model's own, or False, none")
         object.__setattr__(self, "gravity", bool(self.gravity))
         steps = f"a step that divides {self.duration:g} s"
@@ -197,7 +199,8 @@ class Case:
         units = ", ".join(of_kinds[kind] for kind in dict.fromkeys(whole.all_kinds))
         if isinstance(scene.posture, str):
             count = f"{whole.nq} numbers, one per joint ({', '.join(whole.positions)})"
-            postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and self.robot.postures]
+            named = self.robot.postures or self.robot.positions
+            postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and named]
             accepted = f"{', '.join(postures)} or {count}, in {units}" if postures else f"{count}, in {units}"
             scene.refuse("posture", scene.posture not in postures, accepted)
         for name, unit in (("posture", units), ("torque", "N m"), ("speed", "deg/s")):
@@ -210,6 +213,8 @@ class Case:
             for joint in whole.places.balls:
                 wrong = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) > CLOSE_TO_ONE
                 scene.refuse("posture", wrong, "a quaternion w, x, y, z of length 1 for each ball")
+        known = not isinstance(scene.damping, tuple) or len(scene.damping) == whole.nv
+        scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({', '.join(whole.speeds)}),")
         unknown = [name for name in scene.locked if name not in names]
         most = f"a tuple of at most {len(names) - 1} of {', '.join(names)}"
         scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)
@@ -260,7 +265,7 @@ class Case:
         """The robot's Tree with the scene's damping added, and without gravity if the scene has none; no joint locked."""
         tree, scene = self.robot.tree, self.scene
         gravity = tree.gravity if scene.gravity else (0.0, 0.0, 0.0)
-        return dataclasses.replace(tree, damping=tuple(d + scene.damping for d in tree.damping), gravity=gravity)
+        return dataclasses.replace(tree, damping=np.add(tree.damping, scene.damping), gravity=gravity)
 
     @property
     def locked(self) -> Mapping[str, float | tuple]:
@@ -309,6 +314,11 @@ class Case:
         elif torque == "free":
             torque = (0.0,) * self.robot.coordinates.nv
         return np.array(torque)[self._free("qd")]
+
+    @property
+    def added_damping(self) -> np.ndarray:
+        """What the scene adds to the damping of the free joints, N m s/rad, (nv,)."""
+        return np.broadcast_to(self.scene.damping, self.robot.coordinates.nv)[self._free("qd")]
 
     def free(self, values: np.ndarray) -> np.ndarray:
         """Of one value for each speed of all joints, (nv,), those of the free ones."""

@@ -35,6 +35,7 @@ class Setup:
     states: int = 10_000  # random states
     exact_states: int = 200  # of these, how many are compared with the exact values too
     map: Callable = map  # where the scenes of an experiment may run side by side
+    reading: object | None = None  # what the file was read as, see engines.mujoco.reading; None: the numbers are stated
     quiet: Callable = nothing  # waits until nothing runs beside: for timings
     progress: Callable = nothing  # says how far long work has come
     background: dict = field(default_factory=dict)  # work under way, by its name

@@ -30,7 +30,8 @@ def ran(tmp_path_factory):
 def test_all_passes_and_says_so_at_a_glance(ran):
     run, _ = ran
     assert run.status == 0, run.output
-    lines = readable_lines(run)
+    first, *lines = readable_lines(run)
+    assert first == "reference: arm; mjcf/arm.xml compared with the stated numbers"
     assert [line.split()[:2] for line in lines[: len(EXPERIMENTS)]] == [[name, "ok"] for name in EXPERIMENTS]
     text = words(lines[len(EXPERIMENTS) :])
     assert re.match(r"The two models agree: all \d+ checks pass\..*Report: reports/latest/index\.html \(", text)
@@ -50,7 +51,8 @@ def test_all_writes_the_files_that_are_promised_and_nothing_else(ran):
 def test_results_have_the_promised_fields(ran):
     _, folder = ran
     results = json.loads((folder / "reports/latest/results.json").read_text())
-    assert set(results) == {"passed", "checks", "causes", "skipped", "provenance"}
+    assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
+    assert results["reference"] == {"kind": "arm", "name": "arm"}
     assert (results["passed"], results["causes"], results["skipped"]) == (True, [], [])
     fields = {"experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note"}
     assert all(set(check) == fields for check in results["checks"])
@@ -99,6 +101,7 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
         ([], "required: EXPERIMENT"),
         (["mass", "--fast"], "unrecognized arguments: --fast"),
         (["mass", "--mjcf", ""], "--mjcf: it is empty"),
+        (["mass", "--reference", "robot"], "argument --reference: invalid choice: 'robot' (choose from"),
         (["mass", "--out", ""], "--out: it is empty"),
         (
             ["mass", "--scenes", "my.toml"],
@@ -124,10 +127,10 @@ def test_what_cannot_be_done_gets_one_line_and_status_2(arguments, says, capsys,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_hinges_get_status_2(tmp_path, capsys):
+def test_other_hinges_than_the_arms_get_status_2_where_the_arm_is_asked_for(tmp_path, capsys):
     model = tmp_path / "other.xml"
     model.write_text(ARM.mjcf.read_text().replace('name="gamma"', 'name="wrist"'))
-    assert main(["mass", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 2
+    assert main(["mass", "--reference", "arm", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 2
     assert "wrist (hinge); hinges alpha, beta, gamma and no others are expected" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 

@@ -18,6 +18,7 @@ DIRECTIONS = {
     "states": {"tmt", "robots", "case"},
     "robots": {"tmt", "case"},
     "scene_file": {"case", "robots"},
+    "reference": {"robots", "engines", "process"},
     "engines": {"tmt", "case"},
     "truth": {"tmt", "case"},
     "judge": {"tmt", "case"},
@@ -26,7 +27,7 @@ DIRECTIONS = {
     "setup": {"case", "states", "robots", "engines"},
     "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots", "setup"},
     "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
-    "__main__": {"case", "robots", "engines", "scene_file", "process", "report", "setup", "experiment", "experiments"},
+    "__main__": {"case", "engines", "reference", "scene_file", "process", "report", "setup", "experiment", "experiments"},
 }
 
 

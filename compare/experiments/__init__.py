@@ -11,7 +11,7 @@ from types import ModuleType
 from ..robots import Robot
 
 EXPERIMENTS = {
-    "parameters": "MuJoCo's compiled model read back beside the stated numbers",
+    "parameters": "MuJoCo's compiled model read back beside the stated numbers, and what is switched off",
     "published": "every number that the assignment prints",
     "kinematics": "positions, angular velocities, Jacobians, convective terms",
     "mass": "the mass matrix",

@@ -45,6 +45,11 @@ def readable(text: str) -> str:
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
+def in_one_line(text: str) -> str:
+    """Readable text without line ends and other signs that a terminal would obey: these are shown as numbers."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in readable(text))
+
+
 def prepare() -> None:
     """Make stdin, stdout and stderr such that they can be used: one that is closed leads nowhere, none refuses a letter."""
     for number in range(3):

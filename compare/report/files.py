@@ -20,8 +20,10 @@ def write(folder: Path, report: Report) -> None:
     checks = [check.record() for section in report.sections for check in section.result.checks]
     save(folder / "report.md", markdown(report))
     save(folder / "index.html", page(folder, report))
+    reference = report.reference
     results = {
         "passed": passed(report.sections),
+        "reference": None if reference is None else {"kind": reference.kind, "name": reference.name},
         "checks": checks,
         "causes": [
             {name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in report.causes

@@ -10,7 +10,7 @@ from string import Template
 
 import pandas as pd
 
-from ..judge.words import capital
+from ..judge.words import capital, listed
 from .questions import answers
 from .verdict import Report, Section, outcome, passed
 
@@ -25,18 +25,50 @@ def title(robot) -> str:
     return f"TMT and MuJoCo compared on {robot.described or robot.name}"
 
 
+def first_lines(reference) -> Sequence[str]:
+    """What the report is of, as on the terminal: what is compared with what, what is open, what MuJoCo warns of."""
+    return () if reference is None else reference.lines
+
+
 def introduction(robot) -> str:
     """What is compared, and how its tables are read."""
-    tree, named = robot.tree, robot.described or robot.name
-    bodies = how_many(len(tree.body_names), "rigid body", "rigid bodies")
-    hinges = how_many(len(tree.hinge_names), "hinge", "hinges")
-    return (
-        f"{capital(named)}, {bodies} on {hinges}, modelled twice: as MJCF, run by MuJoCo, and "
-        "by the TMT method in a program that shares nothing with it. Each difference stands beside a tolerance that was "
+    named = robot.described or robot.name
+    what = f"{how_many(len(robot.tree.body_names), 'rigid body', 'rigid bodies')} on {joints_in_words(robot)}"
+    return (of_file(named, what, robot.features) if robot.is_read else of_two_models(named, what)) + (
+        " Each difference stands beside a tolerance that was "
         "fixed beforehand (column bar); 'exact' is the method in 50-digit arithmetic, and distances from it are in eps = "
         "2.2e-16 of the quantity's scale. Of the states in a row, the largest difference is the largest of all; the worst is "
         "the one that comes closest to its tolerance."
     )
+
+
+def of_two_models(named: str, what: str) -> str:
+    """What is compared of a robot whose numbers are stated."""
+    return (
+        f"{capital(named)}, {what}, modelled twice: as MJCF, run by MuJoCo, and by the TMT method in a program that shares "
+        "nothing with it."
+    )
+
+
+def of_file(named: str, what: str, features: Sequence) -> str:
+    """What is compared of a robot that is read from a file, and what is switched off for that."""
+    off = [f"{feature.feature} ({feature.count})" for feature in features if feature.treatment != "modelled"]
+    return (
+        f"{named}: {what}. The numbers are those of the model as MuJoCo compiled it; tmt's equations of motion for these "
+        "numbers are compared with MuJoCo's, so that an agreement says that the equations are the same, and not that the "
+        "numbers are right. "
+        + (f"Switched off in MuJoCo, because the equations do not have it: {', '.join(off)}." if off else
+           "Nothing of the file is switched off.")
+    )  # fmt: skip
+
+
+def joints_in_words(robot) -> str:
+    """The joints of a robot by their kinds: of a file as it has them, a free joint as one."""
+    words = {"hinge": "hinges", "slide": "slides", "ball": "balls", "free": "free joints"}
+    kinds = robot.tree.kind
+    known = {feature.feature: feature.count for feature in robot.features} or {k: kinds.count(k) for k in kinds}
+    singular = {"free": "free joint"}
+    return listed([how_many(known[k], singular.get(k, k), many) for k, many in words.items() if known.get(k)])
 
 
 def how_many(count: int, one: str, many: str) -> str:
@@ -83,10 +115,11 @@ def failing(section: Section) -> pd.DataFrame:
 
 def markdown(report: Report) -> str:
     """The report as Markdown."""
-    sections, robot, origin, verdict, causes, skipped = report
-    lines = [f"# {title(robot)}", f"**{verdict}**"]
+    sections, robot, origin, verdict, causes, skipped, reference = report
+    lines = [plain_markdown(line) for line in first_lines(reference)]
+    lines += [f"# {plain_markdown(title(robot))}", f"**{verdict}**"]
     lines += ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
-    lines += [introduction(robot)]
+    lines += [plain_markdown(introduction(robot))]
     asked = questions(sections, robot)
     lines += [f"## {asked_by(robot)}", md_table(asked)] if len(asked) else []
     for section in sections:
@@ -120,6 +153,11 @@ def link(name: str) -> str:
     return f"[tables/{name}.csv](tables/{name}.csv)"
 
 
+def plain_markdown(text: str) -> str:
+    """A text in Markdown in which no sign of a file's name is markup."""
+    return re.sub(r"([\\`*<\[])", r"\\\1", text)
+
+
 def md_table(table: pd.DataFrame) -> str:
     cells = [list(table.columns), ["---"] * len(table.columns), *table.astype(str).values.tolist()]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
@@ -131,7 +169,7 @@ def origins(origin: dict) -> pd.DataFrame:
 
 def page(folder: Path, report: Report) -> str:
     """The report as one HTML file with its figures inside; folder: where these are."""
-    sections, robot, origin, verdict, causes, skipped = report
+    sections, robot, origin, verdict, causes, skipped, reference = report
     body = (
         ["<h2>Causes (1: an option or a convention, 2: a number)</h2>", html_table(of_causes(causes), "text")]
         if causes
@@ -171,7 +209,8 @@ def page(folder: Path, report: Report) -> str:
         ("provenance", "provenance"),
     ]
     return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
-        title=title(robot),
+        title=html.escape(title(robot)),
+        reference="".join(f"<p>{html.escape(line)}</p>\n" for line in first_lines(reference)),
         colour="#009E73" if passed(sections) else "#D55E00",
         verdict=html.escape(verdict),
         contents="".join(f'<a href="#{anchor}">{text}</a>' for anchor, text in links),

@@ -34,6 +34,7 @@ class Report(NamedTuple):
     verdict: str  # in words
     causes: Sequence[dict] = ()  # of what fails, the gravest first
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
+    reference: object | None = None  # a reference.Reference
 
 
 def failures(sections: Sequence[Section]) -> tuple[list, list]:
@@ -53,15 +54,20 @@ def worst(sections: Sequence[Section]) -> Check | None:
     return max(checks, key=lambda check: check.over_tolerance, default=None)
 
 
-def verdict(sections: Sequence[Section], experiments: int, causes: Sequence[dict] = ()) -> str:
-    """The outcome in words, with its cause or its worst figure; `experiments`: how many there are in all."""
+def verdict(
+    sections: Sequence[Section], experiments: int, causes: Sequence[dict] = (), compared: str = "The two models"
+) -> str:
+    """The outcome in words, with its cause or its worst figure.
+
+    experiments: how many there are in all; compared: what agrees or does not.
+    """
     checks = [check for section in sections for check in section.result.checks]
     names = ", ".join(section.name for section in sections)
     ran = "" if len(sections) == experiments else f" in {names} ({len(sections)} of {experiments} experiments)"
     differing, broke = failures(sections)
     stopped = f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."
     if differing:
-        text = f"The two models do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
+        text = f"{compared} do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
         if causes:
             more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
             others = sum(check.experiment != "parameters" for check in differing)
@@ -73,7 +79,7 @@ def verdict(sections: Sequence[Section], experiments: int, causes: Sequence[dict
         return f"{text} {stopped}" if broke else text
     if broke:
         return f"Not everything could be compared{ran}; the other {len(checks) - len(broke)} checks pass. {stopped}"
-    text = f"The two models agree{ran}: all {len(checks)} checks pass."
+    text = f"{compared} agree{ran}: all {len(checks)} checks pass."
     top = worst(sections)
     if top is None or top.value == 0.0:
         return text

@@ -91,10 +91,17 @@ class Robot:
     )  # (scene, rad): MuJoCo's time over tmt's, aimed at
     questions: tuple[Question, ...] = ()
     remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
+    # what a file has and how it is treated, see engines.mujoco.inventory; then the numbers are those that MuJoCo compiled
+    features: tuple = ()
 
     @property
     def joints(self) -> tuple[str, ...]:
         return self.tree.hinge_names
+
+    @property
+    def is_read(self) -> bool:
+        """Whether its numbers are those of a file, as MuJoCo compiled it; else they are stated."""
+        return bool(self.features)
 
     @property
     def coordinates(self) -> Coordinates:

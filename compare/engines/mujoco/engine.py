@@ -100,15 +100,16 @@ class Mujoco:
 
     def dynamics(self, case: Case) -> MujocoDynamics:
         """The dynamics of a case, made anew."""
-        return MujocoDynamics(self.changed(case), case.coordinates, self.bodies, case.tree.zero, self.bare)
+        dynamics = MujocoDynamics(self.changed(case), case.coordinates, self.bodies, case.tree.zero, self.bare)
+        dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
+        return dynamics
 
     def changed(self, case: Case) -> mujoco.MjModel:
-        """The model with what the case changes."""
+        """The model with what the case changes, but for the damping that it adds."""
         copied = mujoco.MjModel.__copy__
         model = locked_model(self.source, case.locked, self.bare) if case.locked else copied(self.model)
         if self.bare:
             switch_off(model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
-        model.dof_damping[:] += case.scene.damping
         return model

@@ -2,7 +2,7 @@
 
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import mujoco
@@ -10,7 +10,7 @@ import mujoco
 import tmt
 
 from .engine import Mujoco
-from .lock import ModelError, name_of
+from .lock import ModelError, editable, name_of
 
 
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
@@ -20,6 +20,14 @@ def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
         path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path))
     )  # bytes: any name, in any locale
     return with_hinges(model, path, tree, warned)
+
+
+def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
+    """Whether a file has exactly the hinges of these names, in any order; ModelError if it cannot be read."""
+    path = Path(path)
+    spec, _ = compiled(path, lambda: editable(path))
+    hinges = [joint.name for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_HINGE]
+    return len(hinges) == len(spec.joints) and sorted(hinges) == sorted(names)
 
 
 def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, tuple[str, ...]]:

@@ -24,6 +24,7 @@ class Reading:
     """What a file is to be compared as."""
 
     source: Path | str
+    name: str  # of the model, "": it has none that can stand in a line
     tree: tmt.Tree
     features: tuple[Feature, ...]  # of the file, in a fixed order; those that it has
     open_tree: tuple[str, ...]  # names of equalities that are off: the open tree is compared
@@ -57,6 +58,7 @@ def read(source: Path | str) -> Reading:
         raise ModelError(f"{name_of(source)} cannot be compared: {error}") from None
     return Reading(
         source=source,
+        name=own_model_name(model),
         tree=tree,
         features=features(model),
         open_tree=open_equalities(model),
@@ -174,6 +176,12 @@ def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
         mujoco.mj_normalizeQuat(model, qpos)
         found[own_name(model.key(number).name, "key", number)] = qpos
     return found
+
+
+def own_model_name(model: mujoco.MjModel) -> str:
+    """What the file calls its model; "" where it does not, or in no line of text."""
+    name = bytes(model.names).partition(b"\0")[0].decode("utf-8", "replace").strip()
+    return name if name.isprintable() and name != "MuJoCo Model" else ""  # MuJoCo's own for none
 
 
 def limits(model: mujoco.MjModel, place: Place) -> tuple[float, float] | None:

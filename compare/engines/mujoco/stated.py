@@ -21,7 +21,7 @@ class Stated(NamedTuple):
     """One number of a file, or a vector or tensor."""
 
     place: str  # the name of the body or joint
-    quantity: str  # mass, pos, com, inertia; pos, axis, armature, damping, stiffness
+    quantity: str  # mass, pos, com, inertia; anchor, axis, armature, damping, stiffness
     stated: np.ndarray | float | None  # kg, m, kg m2 ...; None: the file leaves it to the compiler
     compiled: np.ndarray | float
     why: str  # the option of the file that asks for a change of it, "": none does
@@ -80,7 +80,7 @@ def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
     if kind != "free":
         pos, turn = in_frames(joint.pos, joint.axis, joint)
         if kind != "slide":
-            rows.append(Stated(name, "pos", pos, model.jnt_pos[number].copy(), ""))
+            rows.append(Stated(name, "anchor", pos, model.jnt_pos[number].copy(), ""))
         if kind != "ball":
             rows.append(Stated(name, "axis", turn / np.linalg.norm(turn), model.jnt_axis[number].copy(), ""))
     asked = "springdamper" if np.any(joint.springdamper) else ""

@@ -29,7 +29,7 @@ def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
     engines = with_additions(setup.engines["mujoco"], *sizes(setup.robot.tree))
     models = {name: engine.of(case) for name, engine in engines.items()}
     # all are timed from where the robot rests on the floor that is in reach, so that there the contact stays
-    damped = engines[ON_FLOOR].of(case.changed(damping=case.scene.damping + SETTLED))
+    damped = engines[ON_FLOOR].of(case.changed(damping=np.add(case.scene.damping, SETTLED)))
     settled = damped.run(*case.start, case.tau, dt, FALL_STEPS, "Euler")
     rest = settled.q[-1], settled.v[-1], case.tau
     runs = {

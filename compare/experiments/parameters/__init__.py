@@ -7,11 +7,12 @@ import numpy as np
 
 import tmt
 
-from ..engines.mujoco.parameters import STATED_FLAGS, options, parameters
-from ..judge.check import Result
-from ..judge.scale import EPS, FACTOR
-from ..robots import Robot
-from ..setup import Setup
+from ...engines.mujoco.parameters import STATED_FLAGS, options, parameters
+from ...judge.check import Result
+from ...judge.scale import EPS, FACTOR
+from ...robots import Robot
+from ...setup import Setup
+from . import file
 
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
@@ -35,6 +36,8 @@ EXPLAINED = {  # forces, by the quantities that say why they act
 
 def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
+    if robot.is_read:
+        return file.CLAIM
     return (
         "The MJCF file, as MuJoCo compiled it, has the stated masses, centres of mass, inertia tensors (turned back into body "
         "axes, R diag R'), hinge axes, anchors, order, zero and gravity, and nothing that the method does not have: no "
@@ -45,6 +48,8 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
+    if robot.is_read:
+        return file.TOLERANCE
     return (
         "64 eps x the largest entry of the quantity (the compiler stores each number once; turning the inertia to its "
         "principal axes and back costs a few roundings; MuJoCo 3.10 turns a fullinertia only to about 1e-8). What must be "
@@ -83,6 +88,8 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
 
 def rows(setup: Setup) -> Result:
     """One row for each number; one check for each quantity of each hinge or body; the causes that follow."""
+    if setup.robot.is_read:
+        return file.rows_of_file(setup)
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
     tree, dynamics = setup.robot.tree, setup.compared()["mujoco"]
     compiled = parameters(dynamics)
@@ -161,6 +168,6 @@ def component(k: int, count: int) -> str:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from .figures import draw_sketch  # matplotlib is for the process that draws
+    from ..figures import draw_sketch  # matplotlib is for the process that draws
 
     yield partial(draw_sketch, robot)

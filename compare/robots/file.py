@@ -1,0 +1,128 @@
+"""A robot that is read from a file: its postures, and the scenes that any robot can play."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+import tmt
+
+from ..case import Coordinates, Scene
+from . import Robot
+
+DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
+LEAST_STEPS, MOST_STEPS_OF_A_FILE = 64, 8192  # of a scene, by its coarsest step
+STILL = 1e-6  # rad/s2 or m/s2: what accelerates less where it is let go stays
+THROWN_UP, TUMBLING = 2.0, (120.0, 60.0, -90.0)  # m/s, and deg/s about a free body's own axes
+SET_GOING = {"hinge": 60.0, "slide": 0.2, "ball": 60.0}  # deg/s or m/s
+
+
+class Reading(Protocol):
+    """What a file was read as, see engines.mujoco.reading."""
+
+    name: str
+    source: Path | str
+    tree: tmt.Tree
+    features: tuple
+    keyframes: Mapping[str, np.ndarray]
+    qpos0: np.ndarray
+    ranges: tuple
+    dt: float
+
+
+def robot_of(reading: Reading, shown: str) -> Robot:
+    """The robot of a file that a report calls `shown`: its numbers are those that MuJoCo compiled."""
+    found = named_positions(reading)
+    start = next(name for name in found if name != "qpos0" or len(found) == 1)
+    return Robot(
+        name=reading.name or Path(shown).stem or shown,
+        mjcf=reading.source if isinstance(reading.source, Path) else Path(shown),
+        tree=reading.tree,
+        postures={},
+        positions=found,
+        ranges=tuple(reading.ranges),
+        scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt),
+        described=shown,
+        features=tuple(reading.features),
+    )
+
+
+def named_positions(reading: Reading) -> dict[str, tuple]:
+    """Postures by their names, (nq,) each: the keyframes, qpos0, and the middle of the ranges; of equal ones the first."""
+    coordinates = Coordinates(reading.tree.hinge_names, reading.tree.kind)
+    middle = np.array(reading.qpos0, dtype=float)
+    for (kind, at, _), known in zip(coordinates.places.joints, reading.ranges):
+        if known and kind != "ball":
+            middle[at] = np.mean(known)
+    own = {"qpos0": reading.qpos0, "middle": middle}
+    keys = {f"key {name}" if name in own else name: q for name, q in reading.keyframes.items()}
+    found = {}
+    for name, q in (keys | own).items():
+        if not any(np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in found.values()):
+            found[name] = tuple(map(float, q))
+    return found
+
+
+def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[Scene, ...]:
+    """The scenes: held at a posture by what balances gravity and springs, let go, let go with damping, a free body thrown.
+
+    Of each nothing is expected but agreement, for as long as rounding allows. What rests where it is let go is set going.
+    start, q: the posture, its name and position (nq,); dt: s, of the file.
+    """
+    coordinates = Coordinates(tree.hinge_names, tree.kind)
+    inverse = np.linalg.pinv(tmt.mass_matrix(q, tree), hermitian=True)
+    accelerations = inverse @ -(tmt.gravity_balance(q, tree) + tmt.spring_torque(q, tree))
+    added = added_damping(inverse, accelerations)
+    rests = np.abs(accelerations).max() < STILL
+    going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * (3 if kind == "ball" else 1))}
+    how, speed = ("set going", going) if rests else ("let go", {})
+    timing = {"duration": DURATION, "dt": DURATION / coarsest(tree, q, inverse, dt), "judged": 0.0}
+    damped = timing | {"dt": DURATION / coarsest(tree, q, inverse, dt, added)}
+    made = [] if rests else [Scene(f"{start}, held", start, "hold", tags=("own",), **timing)]
+    made += [
+        Scene(f"{start}, {how}", start, tags=("own", "speed", "regular"), **speed, **timing),
+        Scene(f"{start}, {how}, damped", start, damping=added, tags=("own", "full only"), **speed, **damped),
+    ]
+    if speed_thrown := thrown(coordinates):
+        made.append(Scene(f"{start}, thrown", start, speed=speed_thrown, tags=("own", "full only"), **timing))
+    return tuple(made)
+
+
+def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]:
+    """Damping for each speed, (nv,) N m s/rad or N s/m, that lets a robot sink and not swing.
+
+    A joint that the others give way to has the inertia 1 / (Mbar^-1)_ii; with it every joint decays at the same rate: twice that
+    of a swing whose largest acceleration, at 1 rad or 1 m, is the one of letting go, at least 1 rad/s2.
+    """
+    rate = 2.0 * np.sqrt(max(1.0, np.abs(accelerations).max()))
+    return tuple(float(rate / ease) for ease in np.diag(inverse))
+
+
+def coarsest(tree: tmt.Tree, q: np.ndarray, inverse: np.ndarray, dt: float, added: tuple = ()) -> int:
+    """Into how many steps a scene is divided: 64, 128 ... 8192; no step is longer than dt, s, or than the fastest decay or swing.
+
+    That is 1 over the rate, 1/s, of the joints' own damping, what is added, and the springs at q.
+    """
+    decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
+    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
+    swing = np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max())
+    least = max(DURATION / dt, DURATION * decay, DURATION * swing)
+    count = LEAST_STEPS
+    while count < min(0.999 * least, MOST_STEPS_OF_A_FILE):
+        count *= 2
+    return count
+
+
+def thrown(coordinates: Coordinates) -> tuple[float, ...]:
+    """Speeds, (nv,) m/s and deg/s, of free bodies that are thrown up and tumble; () if there are none.
+
+    A free body is three slides and a ball in a row.
+    """
+    kinds, joints = coordinates.all_kinds, coordinates.places.joints
+    free = [i for i in range(3, len(kinds)) if kinds[i - 3 : i + 1] == ("slide", "slide", "slide", "ball")]
+    speed = np.zeros(coordinates.nv)
+    for i in free:
+        speed[joints[i - 1].qd] = THROWN_UP
+        speed[joints[i].qd] = TUMBLING
+    return tuple(map(float, speed)) if free else ()
