@@ -94,7 +94,11 @@ class Tree:
         singular.check_tree(self)
 
     def __repr__(self):
-        return f"Tree({', '.join(f'{field.name}={getattr(self, field.name)}' for field in fields(self))})"
+        """The fields, without those that may be left out and say nothing."""
+        n, nv = len(self.parent), len(self.axis)
+        plain = {"kind": ("hinge",) * n, "armature": (0.0,) * nv, "stiffness": (0.0,) * n, "rest": self.zero, "reference": (0.0,) * n}
+        said = {field.name: getattr(self, field.name) for field in fields(self)}
+        return f"Tree({', '.join(f'{name}={value}' for name, value in said.items() if value != plain.get(name))})"
 
     @property
     def coordinates(self) -> Coordinates:
