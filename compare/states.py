@@ -65,7 +65,7 @@ class Sample:
 def named(robot: Robot) -> Sample:
     """The named postures, or the reference if there are none; with random speeds and torques where those are asked for."""
     rng, q = np.random.default_rng([SEED, 1]), np.array(list(robot.poses.values()))
-    most = sizes(robot)[:, None]
+    most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, len(q), robot.coordinates.nv))
     name = "named postures" if robot.postures or robot.positions else "a posture"
     known, notes = of_named(robot), ()
@@ -77,18 +77,16 @@ def named(robot: Robot) -> Sample:
 
 
 def random(robot: Robot, states: int, exact_states: int) -> Sample:
-    """Random states: positions within the joints' ranges, speeds and torques within `sizes`."""
+    """Random states: positions within the joints' ranges, speeds and torques within `largest_speeds_and_torques`."""
     rng, asked, exact_asked = np.random.default_rng(SEED), states, exact_states
     states = min(asked, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
-    left = affordable(robot) - of_named(robot)
-    exact_states = min(exact_asked, states, max(1, left))
+    exact_states = min(exact_asked, states, max(1, affordable(robot) - of_named(robot)))
     notes = [f"{states:,} random states in place of {asked:,}: so many bodies and joints take long."] * (states < asked)
     if exact_states < min(exact_asked, states):
-        notes.append(
-            f"Exact values are known of {exact_states} random states in place of {exact_asked}: one takes about {seconds(robot):.1g} s."
-        )
+        left = f"{exact_states} random states in place of {exact_asked}"
+        notes.append(f"Exact values are known of {left}: one takes about {seconds(robot):.1g} s.")
     q = robot.coordinates.random(rng, states, robot.ranges)
-    most = sizes(robot)[:, None]
+    most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, states, robot.coordinates.nv))
     return Sample(robot.tree, "random states", q, speeds, torques, exact_states, notes=tuple(notes))
 
@@ -108,7 +106,7 @@ def of_named(robot: Robot) -> int:
     return min(len(robot.poses), max(1, affordable(robot) // 2))
 
 
-def sizes(robot: Robot) -> np.ndarray:
+def largest_speeds_and_torques(robot: Robot) -> np.ndarray:
     """The largest random speeds, rad/s, and torques, N m, (2, nv).
 
     Without stated ranges 10 of each. Else a speed goes through the joint's range in 1 s (a turn, 1 m without one), and a torque

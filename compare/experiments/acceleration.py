@@ -46,10 +46,11 @@ def tolerance(robot: Robot) -> str:
     if has_own_scales(robot.tree, robot.is_read):
         springs = ", k (|q| + |rest|)" if robot.tree.has_springs else ""
         return (
-            "64 eps x scale, each entry its own. With F_i the sum of the absolute convective, Euler and gravity terms of joint i"
-            f"{damping}{springs} and |tau|, where each is largest, and R = |Mbar terms| |qdd| + F: bias its own terms; accelerations "
-            "|Mbar^-1| R; inverse dynamics |Mbar| |Mbar^-1| R + R, entry by entry; power the same times |rates|; momenta the same "
-            "without gravity and torque; energy m g L + k (|q| + |rest|)^2 / 2 + |qd|' |Mbar terms| |qd| / 2, summed."
+            "64 eps x scale, each entry its own. With F_i the sum of the absolute convective, Euler and gravity terms of a "
+            f"joint{damping}{springs} and |tau|, where each is largest, and R = |terms of Mbar| |qdd| + F: bias its own terms; "
+            "accelerations |Mbar^-1| R; inverse dynamics |Mbar| |Mbar^-1| R + R, entry by entry; power the same times |rates|; "
+            "momenta the same without gravity and torque; energy the sum of m g L, of k (|q| + |rest|)^2 / 2, and of half the "
+            "terms of Mbar times |rates| twice."
         )
     return (
         f"With S the sum of the absolute convective, Euler and gravity terms{damping} and |tau|: bias 64 eps x S; accelerations "

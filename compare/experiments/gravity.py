@@ -56,10 +56,10 @@ def own_tolerance(tree: tmt.Tree) -> str:
 
 
 def gradient(potential_energy: Callable, q: np.ndarray, tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray]:
-    """dV/dq by the rules above, N m or N, (states, nv), from V of positions q, (..., nq); and which speeds it is exact for, (nv,).
+    """dV/dq by the rules above, N m or N, (states, nv), and for which of the speeds they are exact, (nv,).
 
-    In an angle V is a + b cos + c sin, and k x^2 / 2 with a spring, of which a difference over two turns leaves 8 pi^2 ... alone;
-    in a slide's length it is quadratic. The energy of a ball's spring is no such function.
+    potential_energy: V, J, of positions (..., nq). q: (states, nq). In an angle V is a + b cos + c sin, and a spring's k x^2 / 2:
+    a turn ahead less a turn back leaves 4 pi k x alone. In a slide's length V is quadratic. That of a ball's spring is neither.
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     kinds, stiffness = np.array(per_speed(tree, tree.kind)), np.array(per_speed(tree, tree.stiffness))
@@ -109,9 +109,8 @@ def rows(setup: Setup) -> Result:
 
     for sample in (setup.named, setup.random):
         q, scale = sample.q, scales(tree, is_read, sample.q)
-        at_rest = np.zeros(
-            (len(q), tree.coordinates.nv)
-        )  # given to TMT, MuJoCo's torque would leave the same number with the other sign
+        # given to TMT, MuJoCo's torque would leave the same number with the other sign
+        at_rest = np.zeros((len(q), tree.coordinates.nv))
         torque = ours.gravity_balance(q) + (tmt.spring_torque(q, tree) if tree.has_springs else 0.0)
         left = theirs.acceleration(q, at_rest, torque)
         allowed = scale.acceleration(scale.holding, 0.0)

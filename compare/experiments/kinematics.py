@@ -28,9 +28,9 @@ def tolerance(robot: Robot) -> str:
     """By what the claim is judged, with the robot's own scale."""
     if has_own_scales(robot.tree, robot.is_read):
         return (
-            "64 eps x scale, each entry its own. With L the largest distance from the origin that a centre of mass can have at that "
-            "state, S the sum of |rates| of the hinges and balls that move a body, V that of its slides: lengths L; T_b: L of a "
-            "hinge or ball, 1 of a slide; B_b: 1; angular velocity S; convective terms 2 S (L S + V) and S^2."
+            "64 eps x scale, each entry its own. With L the largest distance from the origin that a centre of mass can have at "
+            "that state, S the sum of |rates| of the hinges and balls that move a body, V that of its slides: lengths L; T_b: L "
+            "of a hinge or ball, 1 of a slide; B_b: 1; angular velocity S; convective terms 2 S (L S + V) and S^2."
         )
     reach = reaches(robot.tree).max()
     return (

@@ -10,7 +10,7 @@ import tmt
 
 from ..engines import LABELS
 from ..judge.check import Result, over
-from ..judge.entries import Entries, Numbers, has_own_scales, scales, unit
+from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from ..setup import Setup
@@ -35,10 +35,10 @@ def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
     if has_own_scales(robot.tree, robot.is_read):
         return (
-            "64 eps x scale, each entry its own: the sum over the bodies of m t_i t_j + |I| u_i u_j, and the armature, with t = L of a "
-            "hinge or ball that moves the body, 1 of a slide, and u = 1 and 0; L is the largest distance from the origin that a "
-            "centre of mass can have at that state. Definite: the smallest eigenvalue of Mbar, in units of its diagonal, is at "
-            "least 64 eps of the largest."
+            "64 eps x scale, each entry its own: the sum over the bodies of m t_i t_j + |I| u_i u_j, and the armature; t = L of "
+            "a hinge or ball that moves the body, 1 of a slide, and u = 1 and 0; L is the largest distance from the origin "
+            "that a centre of mass can have at that state. Definite: the smallest eigenvalue of Mbar, in units of its diagonal, "
+            "is at least 64 eps of the largest."
         )
     text = (
         "64 eps x the largest entry of Mbar at that state. Definite: the smallest eigenvalue is at least 64 eps of the "
@@ -84,14 +84,15 @@ def worst_condition(robot: Robot, mass_matrix: Callable) -> tuple:
 def rows(setup: Setup) -> Result:
     """Agreement at each named posture and at random states; symmetry, definiteness, conditioning."""
     result, robot, compared = Result("mass"), setup.robot, setup.compared()
+    own = has_own_scales(robot.tree, robot.is_read)
     units = " or ".join(dict.fromkeys([unit(robot.tree, "kg m2", "kg m"), unit(robot.tree, "kg m2", "kg")]))
     for sample in (*setup.named.each(), setup.random):
         M = {name: dynamics.mass_matrix(sample.q) for name, dynamics in compared.items()}
         scale = scales(robot.tree, robot.is_read, sample.q)
         result.agree(sample, "Mbar", units, *M.values(), scale.mass_matrix, truth="mass_matrix")
-    check_symmetry(result, M["tmt"], scale)  # MuJoCo's is one triangle written twice
+    check_symmetry(result, M["tmt"], scale.mass_matrix if own else None)  # MuJoCo's is one triangle written twice
     for name, dynamics in compared.items():
-        check_definiteness(result, LABELS[name], M[name], scale)
+        check_definiteness(result, LABELS[name], M[name], in_units=own)
         if robot.conditioning:
             value, worst = worst_condition(robot, dynamics.mass_matrix)
             mirrored = float(np.linalg.cond(dynamics.mass_matrix(at_angles(robot, worst * [-1.0, 1.0]))))
@@ -109,30 +110,30 @@ def rows(setup: Setup) -> Result:
     return result
 
 
-def check_symmetry(result: Result, M: np.ndarray, scale: Entries | Numbers) -> None:
-    """TMT computes both triangles: they must be the same but for rounding."""
-    skew, of = np.abs(M - M.transpose(0, 2, 1)), "its largest entry"
-    if isinstance(scale, Entries):
-        share, of = over(skew, scale.mass_matrix), "the scale of the entry"
-    else:
-        share = skew.max(axis=(1, 2)) / np.abs(M).max(axis=(1, 2))
+def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray | None = None) -> None:
+    """TMT computes both triangles: they must be the same but for rounding. scale: of each entry; None: the largest entry."""
+    of = "its largest entry" if scale is None else "the scale of the entry"
+    skew = over(np.abs(M - M.transpose(0, 2, 1)), np.abs(M).max(axis=(1, 2), keepdims=True) if scale is None else scale)
     what = f"TMT: Mbar - Mbar' over {of}"
-    result.check("random states", what, share.max(), FACTOR * EPS, "", rounding=True)
+    result.check("random states", what, skew.max(), FACTOR * EPS, "", rounding=True)
 
 
-def check_definiteness(result: Result, label: str, M: np.ndarray, scale: Entries | Numbers) -> None:
+def check_definiteness(result: Result, label: str, M: np.ndarray, in_units: bool = False) -> None:
     """Mbar is positive definite beyond doubt: its least eigenvalue over its largest, the least of all states.
 
-    Where entries have scales, and perhaps units, of their own: of Mbar in units of its diagonal.
+    in_units: of Mbar in units of its diagonal, where its entries are kg and kg m2.
     """
-    named = "Mbar"
-    if isinstance(scale, Entries):
-        root = np.sqrt(np.maximum(np.einsum("sii->si", M), 0.0))
-        with np.errstate(all="ignore"):
-            M, named = M / (root[:, :, None] * root[:, None, :]), "Mbar in units of its diagonal"
-    values = np.linalg.eigvalsh(M) if np.isfinite(M).all() else np.full((1, 1), np.nan)
+    named = "Mbar in units of its diagonal" if in_units else "Mbar"
+    values = np.linalg.eigvalsh(scaled_by_diagonal(M) if in_units else M)
     what = f"{label}: least eigenvalue of {named} over the largest"
     result.check("random states", what, (values[:, 0] / values[:, -1]).min(), FACTOR * EPS, "", rule="at least")
+
+
+def scaled_by_diagonal(M: np.ndarray) -> np.ndarray:
+    """M_ij / sqrt(M_ii M_jj), whose diagonal is 1; as it is where a diagonal entry is not positive: that is not definite."""
+    diagonal = np.einsum("sii->si", M)
+    root = np.sqrt(np.where((diagonal > 0.0).all(axis=1, keepdims=True), diagonal, 1.0))
+    return M / (root[:, :, None] * root[:, None, :])
 
 
 def check_conditioning(result: Result, robot: Robot, label: str, value: float, worst: np.ndarray) -> None:

@@ -1,8 +1,8 @@
-"""Scales of tolerances of every quantity: of any robot each entry's own; of hinges with stated numbers one for each state.
+"""Scales of tolerances of every quantity: of any robot each entry's own; of stated hinges one number for each state.
 
-Entries of a robot that is read from a file have units of their own (kg beside kg m2, N beside N m), and sizes: one number for all of them would hide
-errors of the small ones. The scale of an entry is the sum of the absolute values of the terms that are added up in it, as each
-may be where it is largest: with L the largest distance from the origin that a centre of mass can have,
+Entries have units of their own (kg beside kg m2, N beside N m), and sizes: one number for all would hide errors of small ones.
+The scale of an entry is the sum of the absolute values of the terms that are added up in it, as each may be where it is largest:
+with L the largest distance from the origin that a centre of mass can have at that state,
 
     a column of T_b     t = L of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
     of B_b              u = 1 of a hinge or ball, 0 of a slide

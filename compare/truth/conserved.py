@@ -75,7 +75,7 @@ class Conserved(NamedTuple):
 
 
 def conserved(tree: tmt.Tree) -> tuple[Conserved, ...]:
-    """The momenta that a tree conserves; none where a ball has rotors that differ between its axes: they are not turned with it."""
+    """The momenta that a tree conserves; no angular one where a ball's rotors differ between its axes: they do not turn."""
     free = tree.kind[:4] == FREE and tree.parent[:4] == (-1, 0, 1, 2)
     name = tree.hinge_names[0]
     if not free and tree.kind[0] != "ball":
