@@ -37,6 +37,17 @@ def test_parts_of_a_free_joint(parts, rng):
     assert_locked(reading, [f"float {part}" for part in parts] + ["joint 1", "shoulder"], rng)
 
 
+def test_a_class_of_the_file_does_not_reach_the_parts_of_a_free_joint(rng):
+    classes = '<default><joint ref="20" springref="10" range="5 30" limited="true" springdamper="1 0.5" damping="0.2"/></default>'
+    body = (
+        '<body euler="30 0 0"><joint name="float" type="free" springdamper="0 0"/><geom type="box" size="0.1 0.2 0.3"/>'
+    )
+    more = '<body pos="0.3 0 0"><joint name="k"/><geom size="0.1" pos="0.2 0 0"/></body></body>'
+    reading = read(mjcf(body + more, classes))
+    for names in (["float x"], ["float turn"], ["float y", "k"]):
+        assert_locked(reading, names, rng)
+
+
 def test_random_joints_of_random_files(rng):
     for _ in range(8):
         reading = read(random_mjcf(rng))

@@ -17,6 +17,13 @@ import numpy as np
 from .joints import joint_name, kind_of, parts_of
 from .rotors import rotors
 
+NO_DEFAULTS = {  # of a joint that is added: a class of the file may have others
+    "ref": 0.0,
+    "springref": 0.0,
+    "springdamper": np.zeros(2),
+    "limited": mujoco.mjtLimited.mjLIMITED_FALSE,
+    "range": np.zeros(2),
+}
 ALIGNED, BY_COMPILER = mujoco.mjtAlignFree.mjALIGNFREE_TRUE, mujoco.mjtAlignFree.mjALIGNFREE_AUTO
 
 
@@ -63,13 +70,15 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     whole = with_names(spec)  # anchors, axes and frames as they are after defaults, degrees and nested frames
     parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
     clear(spec, {*positions, *parted}, bare)
-    rests = {}
+    keep_springs(spec, whole)
+    rests, elements = {}, {joint.name: joint for joint in spec.joints}
     for name, parts in parted.items():
-        rests |= part(spec, whole, name, parts)
+        rests |= part(spec, whole, elements[name], parts)
     if parted:
         whole = spec.compile()
     for body in spec.bodies:
-        joints = [whole.joint(joint.name) for joint in body.joints]
+        elements = {joint.name: joint for joint in body.joints}
+        joints = [whole.joint(name) for name in elements]
         if not {joint.name for joint in joints} & set(positions):
             continue
         number = joints[0].bodyid[0]
@@ -92,13 +101,13 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
         body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
         body.pos, body.quat = frame
         for name, pos, axis in moved:
-            joint = spec.joint(name)
+            joint = elements[name]
             if joint.frame is not None:
                 joint.set_frame(body.add_frame())
             joint.pos, joint.axis = pos, axis
         for joint in joints:
             if joint.name in positions:
-                spec.delete(spec.joint(joint.name))
+                spec.delete(elements[joint.name])
     model = spec.compile()
     for name, rest in rests.items():
         if name not in positions:
@@ -128,13 +137,24 @@ def clear(spec: mujoco.MjSpec, locked: set, bare: bool) -> None:
         spec.delete(element)
 
 
+def keep_springs(spec: mujoco.MjSpec, whole: mujoco.MjModel) -> None:
+    """Give joints whose springs and dampers the compiler chooses by the inertia the numbers that it chose for the whole model."""
+    for joint in spec.joints:
+        if np.any(joint.springdamper):
+            known = whole.joint(joint.name)
+            for name, value in (("stiffness", known.stiffness[0]), ("damping", known.damping[0])):
+                given = getattr(joint, name)
+                setattr(joint, name, [value, *np.atleast_1d(given)[1:]] if np.ndim(given) else value)
+            joint.springdamper = np.zeros(2)
+
+
 def free_joints(model: mujoco.MjModel) -> list[str]:
     return [joint_name(model, j) for j in range(model.njnt) if kind_of(model, j) == "free"]
 
 
-def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, name: str, parts: list[str]) -> dict:
+def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, free, parts: list[str]) -> dict:
     """Put three slides and a ball in the place of a free joint; where their springs rest, by their names."""
-    free, old = spec.joint(name), whole.joint(name)
+    name, old = free.name, whole.joint(free.name)
     body, start = free.parent, old.qposadr[0]
     if aligns(free):
         raise ValueError(
@@ -150,7 +170,7 @@ def part(spec: mujoco.MjSpec, whole: mujoco.MjModel, name: str, parts: list[str]
     spec.delete(free)
     kinds = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
     for part, kind, axis in zip(parts, kinds, [*np.eye(3), np.eye(3)[2]]):
-        body.add_joint(name=part, type=kind, axis=axis, pos=np.zeros(3), **values)
+        body.add_joint(name=part, type=kind, axis=axis, pos=np.zeros(3), **NO_DEFAULTS, **values)
     rest = whole.qpos_spring[start : start + 7]
     return dict(zip(parts, (rest[0:1], rest[1:2], rest[2:3], rest[3:7])))
 
