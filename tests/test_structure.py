@@ -27,7 +27,17 @@ DIRECTIONS = {
     "setup": {"case", "states", "robots", "engines"},
     "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots", "setup"},
     "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
-    "__main__": {"case", "engines", "reference", "scene_file", "process", "report", "setup", "experiment", "experiments"},
+    "__main__": {
+        "case",
+        "engines",
+        "reference",
+        "scene_file",
+        "process",
+        "report",
+        "setup",
+        "experiment",
+        "experiments",
+    },
 }
 
 
