@@ -49,9 +49,7 @@ def plain_balls(tree):
 @pytest.mark.parametrize("seed", range(6))
 def test_the_method_is_lagranges_equations_for_every_kind_of_joint(seed):
     rng = np.random.default_rng(seed)
-    tree = plain_balls(
-        tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide", "ball", "free")[: 3 + seed % 2])
-    )
+    tree = plain_balls(tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide", "ball", "free")[: 3 + seed % 2]))
     q, qd, _ = random_state(rng, tree)
     expected = lagrange(tree, q, qd)
     M, h, spring = (np.array(values, dtype=float) for values in expected)
@@ -229,7 +227,7 @@ def test_a_quaternion_that_is_none_is_refused_by_name():
     tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball", "free"))
     q = np.array(tree.zero)
     q[3] = 1.1
-    with pytest.raises(ValueError, match="q of 'ball3' is .*; a quaternion w, x, y, z of length 1 is expected"):
+    with pytest.raises(ValueError, match=r"q of 'ball3' is .*; a quaternion w, x, y, z of length 1 is expected"):
         tmt.mass_matrix(q, tree)
     with pytest.raises(
         ValueError, match=r"q has shape \(6,\); \(..., 7\) is expected, one number per slide, four per ball"

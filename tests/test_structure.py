@@ -14,7 +14,8 @@ FILES = sorted((ROOT / "compare").rglob("*.py"))
 
 # what each part of compare may import of the others; of its own part: anything that makes no circle
 DIRECTIONS = {
-    "case": {"tmt"},
+    "coordinates": {"tmt"},
+    "case": {"tmt", "coordinates"},
     "states": {"tmt", "robots", "case"},
     "robots": {"tmt", "case"},
     "scene_file": {"case", "robots"},
