@@ -17,7 +17,7 @@ from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import Reference, committed, references
 from ...truth.smallest import reduced
-from . import accuracy, advice, evaluations, targets
+from . import accuracy, advice, evaluations, targets, tumbling
 from .floors import floor
 from .settings import coarsest_steps, estimated, followed, left_out, methods, regular_of, scenes_of, settings_of, MOST_SECONDS
 
@@ -97,6 +97,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     fixed = [method for method in taking if not method.adaptive]
     falling = names if whole else [regular.name]
     result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete=whole or not timed)
+    if timed and setup.robot.coordinates.has_balls:
+        result.tables["speed_orders"] += tumbling.orders(result, setup.engines)
     schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
     accuracy.check_same_schemes(result, floors, schemes)
     accuracy.check_smallest_errors(result, floors)
@@ -126,9 +128,11 @@ def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Seq
     result.tables["what_should_i_use"] = advice.advice(result.rows, list(floors), floors)
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
-    aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
-    result.tables["speed_targets"] = aims
-    result.notes += [*sentences, *spread_in_words(spread), PARTS, *targets.aims_in_words(aims)]
+    result.notes += [*sentences, *spread_in_words(spread), PARTS]
+    if not setup.robot.is_read:  # of a file nothing was aimed at
+        aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
+        result.tables["speed_targets"] = aims
+        result.notes += targets.aims_in_words(aims)
     result.notes += accuracy.smaller_models_in_words(result.rows)
 
 
