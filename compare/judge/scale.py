@@ -14,18 +14,26 @@ EPS = float(np.finfo(float).eps)
 FACTOR = 64
 
 
-def reaches(tree: tmt.Tree) -> np.ndarray:
-    """Largest distance of each centre of mass from the origin, m: lengths added along the tree, shape (m,)."""
-    to_hinge = []
-    for parent, offset in zip(tree.parent, tree.offset):
-        to_hinge.append((to_hinge[parent] if parent >= 0 else 0.0) + np.linalg.norm(offset))
-    to_hinge.append(0.0)  # of the world, hinge -1
-    return np.array([to_hinge[hinge] + np.linalg.norm(com) for hinge, com in zip(tree.body_hinge, tree.com)])
+def reaches(tree: tmt.Tree, q: ArrayLike | None = None) -> np.ndarray:
+    """Largest distance of each centre of mass from the origin, m: lengths added along the tree, shape (m,).
+
+    q: positions (..., nq), then the shape is (..., m), and what slides have moved is added; without it they are at their reference.
+    """
+    q = np.array(tree.zero) if q is None else np.asarray(q, float)
+    to_joint = []
+    for i, (kind, at, _) in enumerate(tree.coordinates.joints):
+        moved = np.abs(q[..., at.start] - tree.reference[i]) if kind == "slide" else np.zeros(q.shape[:-1])
+        before = to_joint[tree.parent[i]] if tree.parent[i] >= 0 else 0.0
+        to_joint.append(before + np.linalg.norm(tree.offset[i]) + moved)
+    to_joint.append(np.zeros(q.shape[:-1]))  # of the world, joint -1
+    bodies = zip(tree.body_hinge, tree.com)
+    return np.stack([to_joint[joint] + np.linalg.norm(com) for joint, com in bodies], axis=-1)
 
 
-def gravity_scale(tree: tmt.Tree) -> float:
-    """Sum of m g reach, N m or J."""
-    return float(np.linalg.norm(tree.gravity) * np.dot(tree.mass, reaches(tree)))
+def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndarray:
+    """Sum of m g reach, N m or J; at positions q (..., nq) of slides with their reach there, (...)."""
+    sums = np.linalg.norm(tree.gravity) * (reaches(tree, q) @ np.array(tree.mass))
+    return float(sums) if q is None else sums
 
 
 def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
@@ -38,7 +46,7 @@ def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
     newton = np.einsum("sbci,b,sbc->si", np.abs(T), tree.mass, np.abs(v_conv))
     euler = np.einsum("sbci,sbc->si", np.abs(B), moments)
-    return (newton + euler).max(axis=1) + gravity_scale(tree)
+    return (newton + euler).max(axis=1) + gravity_scale(tree, q)
 
 
 def mass_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
@@ -60,3 +68,11 @@ def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: Ar
     eigenvalues = np.linalg.eigvalsh(tmt.mass_matrix(q, tree))
     size = force / eigenvalues[:, 0] if size is None else size
     return (eigenvalues[:, -1] * size + force) / eigenvalues[:, 0]
+
+
+def spring_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
+    """k (|q| + |rest|) of the springs, N m or N, (..., nv): of a ball, whose turn is at most half a one, k times pi."""
+    scale = np.zeros((*q.shape[:-1], tree.coordinates.nv))
+    for k, (kind, at, by) in zip(tree.stiffness, tree.coordinates.joints):
+        scale[..., by] = k * (np.pi if kind == "ball" else np.abs(q[..., at]) + np.abs(tree.rest[at.start]))
+    return scale

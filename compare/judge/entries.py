@@ -1,0 +1,149 @@
+"""Scales of tolerances of any robot, each entry's own; of a robot of stated hinges one number for each state.
+
+Entries of a robot have units of their own (kg beside kg m2, N beside N m), and sizes: one number for all of them would hide
+errors of the small ones. The scale of an entry is the sum of the absolute values of the terms that are added up in it, as each
+may be where it is largest: with L the largest distance from the origin that a centre of mass can have,
+
+    a column of T_b     t = L of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
+    of B_b              u = 1 of a hinge or ball, 0 of a slide
+    speeds              S = sum of |rates| that turn the body, V of those that slide it, w = L S + V
+    Mbar_ij             sum of m t_i t_j + |I| u_i u_j, and the armature
+    h_i                 sum of t_i m (2 S w + g) + u_i (m V^2 + |I| S^2)
+
+and where a system is solved, errors of eps in Mbar and in the forces go through |Mbar^-1|, entry by entry: no condition number,
+which would depend on the units.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import tmt
+from tmt.singular import mass_matrices
+
+from .scale import (
+    acceleration_scale,
+    bias_scale,
+    condition,
+    gravity_scale,
+    mass_scale,
+    reaches,
+    spring_scale,
+)
+
+
+class Entries:
+    """Scales at states q (states, nq), qd (states, nv), each of the shape of its quantity, or of one that broadcasts to it."""
+
+    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: ArrayLike = 0.0):
+        self.tree, self.q = tree, q
+        self.qd = np.broadcast_to(qd, (len(q), tree.coordinates.nv))
+        self.mass, self.inertia = np.array(tree.mass), np.linalg.norm(tree.inertia, 2, axis=(1, 2))
+        self.length = reaches(tree, q).max(axis=1)  # (states,)
+        moved = [tree.moves(b) for b in range(len(tree.mass))]
+        kinds, moved = np.array(per_speed(tree, tree.kind)), np.array([per_speed(tree, which) for which in moved])
+        self.slides, self.turns = moved & (kinds == "slide"), moved & (kinds != "slide")  # (m, nv)
+        self.spin, self.slip = np.abs(self.qd) @ self.turns.T, np.abs(self.qd) @ self.slides.T  # S and V, (states, m)
+        self.speed = self.length[:, None] * self.spin + self.slip
+
+    @cached_property
+    def positions(self) -> np.ndarray:
+        return self.length[:, None, None]
+
+    @cached_property
+    def T(self) -> np.ndarray:
+        return (self.slides + self.length[:, None, None] * self.turns)[:, :, None, :]
+
+    @cached_property
+    def B(self) -> np.ndarray:
+        return np.ones((1, 1, 1, 1))
+
+    @cached_property
+    def angular_velocities(self) -> np.ndarray:
+        return self.spin[:, :, None]
+
+    @cached_property
+    def v_conv(self) -> np.ndarray:
+        return (2.0 * self.spin * self.speed)[:, :, None]
+
+    @cached_property
+    def w_conv(self) -> np.ndarray:
+        return (self.spin**2)[:, :, None]
+
+    @cached_property
+    def mass_matrix(self) -> np.ndarray:
+        m, I, s, u = self.mass[:, None], self.inertia[:, None], self.slides.astype(float), self.turns.astype(float)
+        L = self.length[:, None, None]
+        fixed = s.T @ (m * s) + u.T @ (I * u) + np.diag(self.tree.armature)
+        crossed = s.T @ (m * u)
+        return fixed + L * (crossed + crossed.T) + L**2 * (u.T @ (m * u))
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Of the torque that balances gravity, N m or N, (states, nv)."""
+        g = float(np.linalg.norm(self.tree.gravity))
+        return g * (self.mass @ self.slides + self.length[:, None] * (self.mass @ self.turns))
+
+    @cached_property
+    def holding(self) -> np.ndarray:
+        """Of the torque that holds gravity and springs."""
+        return self.weight + spring_scale(self.tree, self.q)
+
+    @cached_property
+    def bias(self) -> np.ndarray:
+        newton = self.mass * 2.0 * self.spin * self.speed
+        euler = self.mass * self.slip**2 + self.inertia * self.spin**2
+        turned = self.length[:, None] * (newton @ self.turns) + euler @ self.turns
+        return newton @ self.slides + turned + self.weight
+
+    @cached_property
+    def potential_energy(self) -> np.ndarray:
+        """J, (states,): m g L, and k (|q| + |rest|)^2 / 2."""
+        g, springs = float(np.linalg.norm(self.tree.gravity)), spring_scale(self.tree, self.q)
+        stiffness = np.array(per_speed(self.tree, self.tree.stiffness))
+        stretched = np.divide(springs**2, stiffness, out=np.zeros_like(springs), where=stiffness > 0.0)
+        return g * self.length * self.mass.sum() + stretched.sum(axis=1) / 2.0
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        speeds = np.abs(self.qd)
+        return self.potential_energy + np.einsum("si,sij,sj->s", speeds, self.mass_matrix, speeds) / 2.0
+
+    @cached_property
+    def M(self) -> np.ndarray:
+        return mass_matrices(self.tree, self.q)
+
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """|Mbar^-1|, entry by entry."""
+        return np.abs(np.linalg.inv(self.M))
+
+    def force(self, tau: ArrayLike = 0.0) -> np.ndarray:
+        """Of Mbar qdd = tau - D qd - k (q - rest) - h, N m or N, (states, nv)."""
+        drag = np.array(self.tree.damping) * np.abs(self.qd)
+        return self.bias + np.abs(tau) + drag + spring_scale(self.tree, self.q)
+
+    def residual(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of Mbar qdd and the forces together; a factorization of Mbar has terms up to sqrt(Mbar_ii Mbar_jj)."""
+        root = np.sqrt(np.einsum("sii->si", self.M))
+        sizes = self.mass_matrix + root[:, :, None] * root[:, None, :]
+        return np.einsum("sij,sj->si", sizes, np.abs(qdd)) + force
+
+    def acceleration(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of qdd where errors of eps in Mbar and in the forces go through |Mbar^-1|, (states, nv)."""
+        return np.einsum("sij,sj->si", self.inverse, self.residual(force, np.broadcast_to(qdd, force.shape)))
+
+    def closing(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of a force found by one engine for another's qdd, N m or N, (states, nv)."""
+        through = np.einsum("sij,sj->si", np.abs(self.M), self.acceleration(force, qdd))
+        return through + self.residual(force, np.broadcast_to(qdd, force.shape))
+
+    def power(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of the rate of the energy at an engine's qdd, W, (states,)."""
+        return np.einsum("si,si->s", self.closing(force, qdd), np.abs(self.qd))
+
+
+def per_speed(tree: tmt.Tree, values) -> list:
+    """One value for each speed, (nv,), of one for each joint."""
+    return [value for value, joint in zip(values, tree.coordinates.joints) for _ in range(joint.qd.stop - joint.qd.start)]
