@@ -265,7 +265,7 @@ def _kinds(values, n) -> tuple:
     """The kinds of the joints; hinges where none is given."""
     listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim == 1)
     kinds = tuple(values) if listed else (None,)
-    if not kinds:
+    if isinstance(values, (list, tuple)) and not kinds:
         return ("hinge",) * n
     if len(kinds) != n or not all(isinstance(kind, str) and kind in KINDS for kind in kinds):
         raise ValueError(f"Tree.kind is {shown(values)}; {n} of {', '.join(KINDS)} are expected")
