@@ -97,7 +97,7 @@ def growth(
     The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled on the way so that it may grow without limit. NaN from where
     the run has diverged.
     """
-    product, scale = np.eye(2 * qd.shape[1]), 0.0
+    product, scale = np.eye(2 * q.shape[1]), 0.0
     finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
     result = np.full((len(q) - 1) // every + 1, np.nan)
     result[0] = 0.0

@@ -60,7 +60,7 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
     good = np.where(finite[:, None], q, 0.0), np.where(finite[:, None], qd, 0.0)
     kinetic = tmt.energy(q[0], qd[0], case.tree) - tmt.potential_energy(q[0], case.tree)
     with np.errstate(over="ignore", invalid="ignore"):  # of a run that is about to end
-        energy = tmt.energy(*good, case.tree) - case.coordinates.difference(good[0], q[0]) @ case.tau
+        energy = tmt.energy(*good, case.tree) - (good[0] - q[0]) @ case.tau
         bad = ~finite | ~(energy - energy[0] <= 2.0 * gravity_scale(case.robot.tree) + kinetic)
     return float(t[bad][0]) if bad.any() else None
 
