@@ -21,7 +21,8 @@ NEARER = slice(3, 7)  # of the settings: coarse ones that come near the referenc
 IN_LOOPS, TRACED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: of tmt's compiled loops, of its straight-line code, of MuJoCo
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
-LEAST_SETTINGS = 3  # a method that has fewer of them in that time is left out
+LEAST_SETTINGS = 3  # of any method, whatever they take
+SLOWEST = 0.5  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
 
 
 def scenes_of(robot: Robot) -> list[Case]:
@@ -92,7 +93,7 @@ def too_slow(method: Method, robot: Robot) -> str | None:
         return None
     case = regular_of(robot)
     seconds = coarsest_steps(case) * estimated(method, case.tree)
-    if seconds * 2 ** (LEAST_SETTINGS - 1) <= MOST_SECONDS["full"]:
+    if seconds <= SLOWEST:
         return None
     return f"with {robot.coordinates.nv} speeds its coarsest run alone would take about {seconds:.1g} s"
 
