@@ -5,6 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
+import tmt
+
 from ...case import SEED, Case, Coordinates
 from ...judge.check import Result, closest, largest
 from ...judge.scale import EPS, FACTOR, bias_scale, mass_scale
@@ -41,7 +43,7 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
                 found.setdefault((quantity, pair), []).append((apart, scale))
         counts = {
             "operations_whole": operations(robot.tree),
-            "operations_locked_at_zero": operations(robot.tree.lock(dict.fromkeys(locked, 0.0))),
+            "operations_locked_at_zero": operations(robot.tree.lock(at_zero(robot.tree, locked))),
             "operations_locked_at_angles": operations(case.tree),
         }
         units = WITH_SLIDES if "slide" in coordinates.all_kinds else BLOCK_UNITS
@@ -67,6 +69,12 @@ def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
         if kind == "hinge":
             posture[at] = np.degrees(posture[at])
     return tuple(posture)
+
+
+def at_zero(tree: tmt.Tree, names: Sequence[str]) -> dict[str, float | tuple]:
+    """The reference positions of some joints of a Tree by their names."""
+    places = dict(zip(tree.hinge_names, tree.coordinates.joints))
+    return {name: tree.zero[places[name].q] if places[name].kind == "ball" else tree.zero[places[name].q.start] for name in names}
 
 
 def words_of(locked: Sequence[str]) -> str:
