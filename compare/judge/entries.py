@@ -146,4 +146,6 @@ class Entries:
 
 def per_speed(tree: tmt.Tree, values) -> list:
     """One value for each speed, (nv,), of one for each joint."""
-    return [value for value, joint in zip(values, tree.coordinates.joints) for _ in range(joint.qd.stop - joint.qd.start)]
+    return [
+        value for value, joint in zip(values, tree.coordinates.joints) for _ in range(joint.qd.stop - joint.qd.start)
+    ]
