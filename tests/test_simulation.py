@@ -129,7 +129,7 @@ def test_in_a_batch_each_run_says_why_it_ended(rng, monkeypatch):
     lanes = tmt.simulate(BENT, qd, REST, 0.01, 30)
     assert np.array_equal(lanes.ended, single.ended)
     large = tmt.simulate(BENT, qd, REST, 0.01, 30, model=tmt.ARM)
-    monkeypatch.setattr(kernels, "TRACED", 2)
+    monkeypatch.setattr(kernels, "LONGEST", 0)
     large = tmt.simulate(BENT, qd, REST, 0.01, 30)
     assert np.array_equal(large.ended != None, single.ended != None)  # noqa: E711
 

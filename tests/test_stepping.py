@@ -16,12 +16,15 @@ BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
 # order, stages, and what else holds
 KNOWN = {
-    "rk4": (4, 4, {"lanes", "loop"}),
-    "dopri8": (8, 12, {"lanes", "loop"}),
+    "rk4": (4, 4, {"lanes"}),
+    "rk4_mean_speed": (2, 4, {"lanes"}),
+    "dopri8": (8, 12, {"lanes"}),
     "dopri8_adaptive": (8, 12, {"adaptive"}),
-    "explicit_euler": (1, 1, {"lanes", "loop"}),
+    "explicit_euler": (1, 1, {"lanes"}),
     "semi_implicit_euler": (1, 1, {"lanes", "damps_implicitly"}),
     "implicit": (1, 1, {"lanes", "damps_implicitly"}),
+    "implicitfast": (1, 1, {"lanes", "damps_implicitly"}),
+    "discrete": (1, 1, {"lanes", "damps_implicitly"}),
     "implicit_midpoint": (2, 1, {"solves_stages"}),
     "gauss_legendre_4": (4, 2, {"solves_stages"}),
 }
@@ -39,6 +42,7 @@ def said(stepping) -> tuple:
 def test_methods_say_what_they_can():
     assert {name: said(stepping) for name, stepping in METHODS.items()} == KNOWN
     assert all(method_named(name) is stepping for name, stepping in METHODS.items())
+    assert all(stepping.loop.startswith("run_") for stepping in METHODS.values())
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -94,7 +98,7 @@ class Talking:
 
     def __init__(self, name, *lacking):
         known = METHODS[name]
-        for part in {"slope", "step", "attempt", "start", "newton", "finish", "A", "b", *FIELDS} - {*lacking}:
+        for part in {"slope", "step", "attempt", "start", "newton", "finish", "looped", *FIELDS} - {*lacking}:
             if hasattr(known, part):
                 setattr(self, part, getattr(known, part))
 
@@ -139,9 +143,10 @@ def test_another_step_is_not_followed_by_the_loop_of_the_tableau(monkeypatch):
     monkeypatch.setitem(METHODS, "longer", Longer(rk4.order, rk4.A, rk4.b, rk4.c))
     expected = tmt.simulate(BENT, REST, REST, 0.02, 10).q
     assert rk4.loop and not METHODS["longer"].loop
-    for hinges in (kernels.TRACED, 0):
-        monkeypatch.setattr(kernels, "TRACED", hinges)
-        assert np.allclose(tmt.simulate(BENT, REST, REST, 0.01, 10, "longer").q, expected, rtol=0, atol=1e-12)
+    assert np.allclose(tmt.simulate(BENT, REST, REST, 0.01, 10, "longer").q, expected, rtol=0, atol=1e-12)
+    monkeypatch.setattr(kernels, "LONGEST", 0)
+    with pytest.raises(ValueError, match="'longer' has no loop"):
+        tmt.simulate(BENT, REST, REST, 0.01, 10, "longer")
 
 
 class Changed(Plain):
@@ -174,7 +179,8 @@ class Failing(Midpoint):
         (Changed(order=True), "its order is True, where a whole number"),
         (Changed(stages=1.5), "its stages is 1.5, where a whole number"),
         (Changed(adaptive=True), "its adaptive is True, but it has no attempt"),
-        (Changed(loop=True, A=((),)), "its loop is True, but it has no b"),
+        (Changed(loop="run_tableau"), "its loop is run_tableau, but it has no looped"),
+        (Changed(loop=True), "its loop is True, where a name is expected"),
         (Talking("implicit_midpoint", "newton"), "its solves_stages is True, but it has no newton"),
         (Talking("implicit_midpoint", "stages"), "does not say how many they are"),
         (Failing(), "its stages cannot be counted, as its step of one hinge fails: RuntimeError"),

@@ -6,6 +6,7 @@ It does what composite.py says; the loops themselves are in loops.py.
 
 from collections.abc import Callable
 from functools import lru_cache, partial
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -82,3 +83,24 @@ def stepper(tree, stepping) -> Callable:
     run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty(0, np.int8))
     loop.disable_compile()
     return run
+
+
+def evaluator(tree, dynamics: bool) -> SimpleNamespace:
+    """each, lanes, chain and rate of a Tree, as in kernels.evaluator; dynamics: of qdd, else of Mbar and h."""
+    loops, numbers = compiled(), arrays(tree)
+    nq, nv = tree.coordinates.nq, tree.coordinates.nv
+    m = nv if dynamics else nv * (nv + 3) // 2
+    sizes = nq, nv, nv, m
+    loops.each(numbers, dynamics, *(np.empty((0, size)) for size in sizes))
+    loops.lanes(numbers, dynamics, *(np.empty((size, 0)) for size in sizes))
+    loops.chain(numbers, dynamics, m, np.array(tree.zero), np.zeros(nv), np.zeros(nv), 0)
+    found = {name: partial(getattr(loops, name), numbers, dynamics) for name in ("each", "lanes")}
+    found["chain"] = partial(loops.chain, numbers, dynamics, m)
+    used = [loops.each, loops.lanes, loops.chain]
+    if dynamics:
+        loops.rate(numbers, np.array([*tree.zero, *[0.0] * nv]), np.zeros(nv))
+        found["rate"] = partial(loops.rate, numbers)
+        used.append(loops.rate)
+    for loop in used:
+        loop.disable_compile()
+    return SimpleNamespace(**found)

@@ -127,8 +127,14 @@ class OfTree:
 def case_of(tree: tmt.Tree, locked=None, damping=0.0, gravity=True):
     """A case of a Tree, as far as MuJoCo's engine asks it; tree is that without the locked joints."""
     scene = SimpleNamespace(gravity=gravity, damping=damping)
-    names = tree.hinge_names
-    return SimpleNamespace(tree=tree, locked=locked or {}, scene=scene, joints=names, coordinates=OfTree(tree))
+    return SimpleNamespace(
+        tree=tree,
+        locked=locked or {},
+        scene=scene,
+        added_damping=np.full(len(tree.axis), damping),
+        joints=tree.hinge_names,
+        coordinates=OfTree(tree),
+    )
 
 
 def random_state(tree: tmt.Tree, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -147,6 +147,7 @@ def test_what_else_changes_a_motion_is_switched_off_by_name(name, rng):
     )
     reading = compared(text, rng)
     assert [row.names for row in reading.features if row.feature == "other"] == [(name,)]
+    assert engine(reading).of(case_of(reading.tree)).model.opt.enableflags == 0
     for integrator in ("Euler", "implicit", "RK4"):
         assert np.array_equal(run_of(text, integrator), run_of(without, integrator))
 

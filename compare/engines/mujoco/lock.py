@@ -70,6 +70,7 @@ def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> muj
     whole = with_names(spec)  # anchors, axes and frames as they are after defaults, degrees and nested frames
     parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
     clear(spec, {*positions, *parted}, bare)
+    keep_springs(spec, whole)
     rests, elements = {}, {joint.name: joint for joint in spec.joints}
     for name, parts in parted.items():
         rests |= part(spec, whole, elements[name], parts)
@@ -134,6 +135,17 @@ def clear(spec: mujoco.MjSpec, locked: set, bare: bool) -> None:
     gone += [*spec.tendons, *spec.tuples] if bare else []
     for element in gone:
         spec.delete(element)
+
+
+def keep_springs(spec: mujoco.MjSpec, whole: mujoco.MjModel) -> None:
+    """Give joints whose springs and dampers the compiler chooses by the inertia the numbers that it chose for the whole model."""
+    for joint in spec.joints:
+        if np.any(joint.springdamper):
+            known = whole.joint(joint.name)
+            for name, value in (("stiffness", known.stiffness[0]), ("damping", known.damping[0])):
+                given = getattr(joint, name)
+                setattr(joint, name, [value, *np.atleast_1d(given)[1:]] if np.ndim(given) else value)
+            joint.springdamper = np.zeros(2)
 
 
 def free_joints(model: mujoco.MjModel) -> list[str]:

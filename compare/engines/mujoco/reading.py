@@ -169,13 +169,9 @@ def carriers(model: mujoco.MjModel, joints: Mapping) -> list[int]:
 
 
 def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
-    """The positions of the keyframes by their names, or `key 0`; quaternions of length 1."""
-    found = {}
-    for number in range(model.nkey):
-        qpos = model.key_qpos[number].copy()
-        mujoco.mj_normalizeQuat(model, qpos)
-        found[own_name(model.key(number).name, "key", number)] = qpos
-    return found
+    """The positions of the keyframes by their names, or `key 0`; the compiler has given quaternions length 1."""
+    names = [own_name(model.key(number).name, "key", number) for number in range(model.nkey)]
+    return {name: qpos.copy() for name, qpos in zip(names, model.key_qpos)}
 
 
 def own_model_name(model: mujoco.MjModel) -> str:
