@@ -18,7 +18,7 @@ from contextlib import suppress
 
 from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
-from .process.streams import readable
+from .process.streams import in_one_line
 
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 EXAMPLES = """examples:
@@ -35,7 +35,7 @@ exit status: 0 all checks pass; 1 a check failed; 2 the request could not be car
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        self.exit(2, f"{self.prog}: {' '.join(readable(message).split())}\n")
+        self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
 
 
 def not_empty(text: str) -> str:
@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         line = f"cannot go on: {described(error)}"
     interrupt.settle()
     with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
-        print(" ".join(f"{parser.prog}: {readable(line)}".split()), file=sys.stderr, flush=True)
+        print(in_one_line(" ".join(f"{parser.prog}: {line}".split())), file=sys.stderr, flush=True)
     return 2
 
 

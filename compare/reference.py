@@ -29,7 +29,7 @@ class Reference(NamedTuple):
     @property
     def compared(self) -> str:
         """What agrees or does not."""
-        return "The two models" if self.kind == "arm" else "tmt's equations and MuJoCo"
+        return "The two models" if self.kind == "arm" else "TMT and MuJoCo"
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -7,7 +7,11 @@ from .case import TORQUES, Case, Scene, are_numbers, shorten
 from .robots import Robot
 
 KEYS = ("name", "posture", "q", "speed", "torque", "gravity", "damping", "locked", "duration", "dt")
-UNITS = {"q": "deg", "speed": "deg/s", "torque": "N m"}
+UNITS = {  # of what is given for each joint: of hinges, slides and balls
+    "q": {"hinge": "deg", "slide": "m", "ball": "quaternions"},
+    "speed": {"hinge": "deg/s", "slide": "m/s", "ball": "deg/s"},
+    "torque": {"hinge": "N m", "slide": "N", "ball": "N m"},
+}
 WORDS = {"torque": TORQUES}
 STEPS = 64  # of a scene that states no dt
 
@@ -19,7 +23,8 @@ class SceneError(ValueError):
 def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     """The scenes of a file, of a robot: angles in deg, speeds in deg/s, torques in N m, damping in N m s/rad, times in s.
 
-    Each needs a name; it starts at rest with all joints at zero, free, if nothing else is said. SceneError for a file that
+    Of slides m, m/s and N; of a ball a quaternion w, x, y, z, and three speeds and torques. Each needs a name; it starts at rest
+    with all joints at their reference, free, if nothing else is said. SceneError for a file that
     cannot be read, an unknown key, a value that cannot be, a name that is given twice.
     """
     try:
@@ -61,15 +66,13 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
     values = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
     for key, value in values.items():
         if key == "posture" and not isinstance(value, str):
-            raise SceneError(
-                f"{where}: posture is {shorten(repr(value))}; one of {', '.join(robot.postures)} is expected"
-            )
-        if (
-            key in UNITS
-            and value not in WORDS.get(key, ())
-            and not (are_numbers(value) and len(value) == len(robot.joints))
-        ):
-            count = f"{len(robot.joints)} numbers, one per joint ({', '.join(robot.joints)}), in {UNITS[key]}"
+            raise SceneError(f"{where}: posture is {shorten(repr(value))}; one of {', '.join(robot.poses)} is expected")
+        if key not in UNITS or value in WORDS.get(key, ()):
+            continue
+        each = robot.coordinates.positions if key == "q" else robot.coordinates.speeds
+        if not (are_numbers(value) and len(value) == len(each)):
+            units = ", ".join(dict.fromkeys(UNITS[key][kind] for kind in robot.tree.kind))
+            count = f"{len(each)} numbers, one per joint ({', '.join(each)}), in {units}"
             accepted = f"free, hold, or {count}" if key == "torque" else count
             raise SceneError(f"{where}: {key} is {shorten(repr(entry[key]))}; {accepted} is expected")
     if "q" in values:

@@ -89,9 +89,7 @@ def test_numbers_of_steps(steps):
 
 
 def test_unknown_method_and_model():
-    with pytest.raises(
-        ValueError, match="unknown method 'rk5'; known are rk4, rk4_mean_speed, dopri8"
-    ):
+    with pytest.raises(ValueError, match="unknown method 'rk5'; known are rk4, rk4_mean_speed, dopri8"):
         tmt.simulate(REST, REST, REST, 0.1, 1, "rk5")
     with pytest.raises(ValueError, match="unknown method"):
         tmt.simulate(REST, REST, REST, 0.1, 1, ["rk4"])

@@ -52,6 +52,9 @@ def tree_of_kinds(rng, bodies=4, along_axes=False, kinds=("hinge", "slide", "bal
         before = -1 if b == 0 else int(rng.choice([-1, *body_hinge]))
         others = [name for name in kinds if name != "free"]
         chosen = ["free"] if "free" in kinds and b == 0 else list(rng.choice(others, rng.integers(1, 3)))
+        chosen = (
+            chosen if chosen[1:] != ["ball"] or chosen[0] != "ball" else ["slide", "ball"]
+        )  # two in one body are singular
         for name in ["slide", "slide", "slide", "ball"] if chosen == ["free"] else chosen:
             parent.append(before)
             before = len(parent) - 1

@@ -138,7 +138,7 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 
 @_quantity
 def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Potential energy V of weight and springs, J, shape (...): zero with every CoM at the height of the origin and springs at rest.
+    """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin, and springs at rest.
 
     q: joint positions (..., nq), rad.
     """

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from .tree import shown
+from .values import shown
 
 NOT_ASKED = np.zeros(0, np.int8)  # where nobody wants to know why runs ended
 

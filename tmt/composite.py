@@ -8,7 +8,8 @@ point x accelerates by a + P x, and force and moment of the distribution are
 
 Virtual power asks for the component of n along each axis only: h_i = axis_i . n_i, with f and n summed over all that joint
 i carries, gravity as an acceleration -g of the world; along a slide for that of f. Column i of Mbar is the same for
-omegad = axis_i (of a slide a = axis_i), all else 0, and the distribution of the whole subtree. These are the sums of the assignment's part e in another order.
+omegad = axis_i (of a slide a = axis_i), all else 0, and the distribution of the whole subtree. These are the sums of the
+assignment's part e in another order.
 """
 
 from fractions import Fraction

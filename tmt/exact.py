@@ -12,7 +12,8 @@ NUMBERS = ("offset", "damping", "mass", "com", "inertia", "gravity", "armature",
 def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
     """What the method asks of a Tree, each number made by `number` from its double; directions have length 1 in all digits.
 
-    number: mpmath.mpf or Decimal. Turns about an axis that is a little longer than 1 would not be turns, and regrouped sums
+    number: mpmath.mpf, or what lifts a float into a trace. Turns about an axis that is a little longer than 1 would not be
+    turns, and regrouped sums
     would differ from the literal ones by that.
     """
 

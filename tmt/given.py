@@ -11,7 +11,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .tree import CLOSE_TO_ONE, Tree, real_numbers, shown
+from .lock import CLOSE_TO_ONE
+from .tree import Tree
+from .values import real_numbers, shown
 
 
 def quantity(function: Callable) -> Callable:
@@ -101,7 +103,8 @@ def paths(runs, steps, nq, nv) -> tuple[np.ndarray, np.ndarray]:
     except MemoryError:
         size = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
         raise ValueError(
-            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would take {size} of memory, more than there is"
+            f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would take {size} of "
+            "memory, more than there is"
         ) from None
 
 

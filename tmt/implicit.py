@@ -14,26 +14,9 @@ from .coordinates import FLAT, normalized, product
 from .dual import Dual, jacobian, seeded, unit_vectors
 from .space import solve_any
 from .stepping import Method, checked_sums, checked_tableau
-from .trace import Tape
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not being found
 CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
-
-STEP = '''
-def step({state}, {torque}, dt):
-    """The state one dt later and how often Newton's method was applied; NaN where it does not find the stages."""
-    {unknown}, = start({state}, {torque}, dt)
-    for used in range(1, {iterations} + 1):
-        {change}, = newton({state}, {torque}, dt, {unknown})
-        {update}
-        size = max(0.0, {unknown_sizes})
-        change = max(0.0, {change_sizes})
-        if change <= {close!r} * (1.0 + size):
-            return finish({state}, dt, {unknown}) + (used,)
-        if not math.isfinite(size):
-            break
-    return ({nothing}, used)
-'''
 
 
 @dataclass(frozen=True)
@@ -151,7 +134,7 @@ class ImplicitRungeKutta(Method):
         return solve_any(matrix, right)
 
     def turned(self, q, qd, dt, a, joints):
-        """Of each stage {l: [for each stage j: {m: d theta_m / d a_jl}]}: how balls turn with the accelerations of their speeds l."""
+        """How balls turn with the accelerations of speeds l: each stage's {l: [of each stage j {m: d theta_m / d a_jl}]}."""
         n, s = len(qd), range(self.stages)
         values = [state for state, _ in self.stage_states(q, qd, dt, a, joints)]
         result = [{} for _ in s]
@@ -219,59 +202,3 @@ def largest(values) -> float:
         return plain(value.value) if isinstance(value, Dual) else np.max(np.abs(value))
 
     return float(np.max([plain(value) for value in values]))
-
-
-def step_source(tree, stepping, terms) -> str:
-    """Source of the compiled `step` of an implicit method: straight-line code inside, Newton's loop around it.
-
-    terms: the form of the dynamics that is traced.
-    """
-    joints, nq, n = tree.coordinates, tree.coordinates.nq, tree.coordinates.nv
-    place = joints if joints.balls else FLAT
-
-    def fresh():
-        tape = Tape()
-        sizes = {"q": nq, "qd": n, "tau": n, "a": n * stepping.stages}
-        q, qd, tau, a = (tape.inputs(*(f"{name}{i}" for i in range(size))) for name, size in sizes.items())
-        return tape, q, qd, tau, tape.inputs("dt")[0], a
-
-    tape, q, qd, tau, dt, _ = fresh()
-    value = stepping.slope(tree, q, qd, tau, dt, terms)
-    rows = jacobian(lambda x: stepping.slope(tree, x[:nq], x[nq:], tau, dt, terms), [*q, *qd], directions(place, q, n))
-    outputs = [*value, *(entry for row in rows for entry in row)]
-    functions = [tape.function("slope_and_jacobian", [*q, *qd, *tau, dt], outputs)]
-
-    tape, q, qd, tau, dt, a = fresh()
-
-    def called(q, qd):
-        found = tape.call("slope_and_jacobian", [*q, *qd, *tau, dt], n + 2 * n * n)
-        rows = [found[n + 2 * n * k : n + 2 * n * (k + 1)] for k in range(n)]
-        return found[:n], [row[:n] for row in rows], [row[n:] for row in rows]
-
-    change = stepping.newton(called, q, qd, dt, a, place)
-    functions.append(tape.function("newton", [*q, *qd, *tau, dt, *a], change))
-    tape, q, qd, tau, dt, _ = fresh()
-    functions.append(tape.function("start", [*q, *qd, *tau, dt], stepping.start(called, q, qd, dt, place)))
-    tape, q, qd, tau, dt, a = fresh()
-    new_q, new_qd = stepping.finish(q, qd, dt, a, place)
-    functions.append(tape.function("finish", [*q, *qd, dt, *a], [*new_q, *new_qd]))
-
-    count = len(a)
-
-    def list_of(pattern, count=count):
-        return ", ".join(pattern.format(i=i) for i in range(count))
-
-    step = STEP.format(
-        state=", ".join([list_of("q{i}", nq), list_of("qd{i}", n)]),
-        torque=list_of("tau{i}", n),
-        unknown=list_of("a{i}"),
-        iterations=ITERATIONS,
-        change=list_of("d{i}"),
-        update="; ".join(f"a{i} += d{i}" for i in range(count)),
-        unknown_sizes=list_of("abs(a{i})"),
-        change_sizes=list_of("abs(d{i})"),
-        close=CLOSE,
-        nothing=list_of("np.nan", nq + n),
-    )
-    texts = [*(function.text for function in functions), step]
-    return "\n\n".join('@njit(error_model="numpy")\n' + text.lstrip("\n") for text in texts)

@@ -16,7 +16,8 @@ from .methods import METHODS, method_named
 from .source import LANES as LANES
 from .source import evaluator_source, lanes_source, run_source, slope_code
 from .trace import Code
-from .tree import Tree, shown
+from .tree import Tree
+from .values import shown
 
 LONGEST = 14_000  # lines of straight-line code that are compiled, which takes half a minute; beyond, the loops of generic.py are
 INLINED = 0.15  # what a line costs each time it is put in the place of a call, beside 1 where it stands
@@ -28,10 +29,10 @@ WORTH = 10_000_000  # steps of all runs together from which lanes are worth thei
 def stepper(tree: Tree, method_name: str) -> Callable:
     """Compiled `run(q, qd, tau, dt)` of a Tree and one of METHODS: fills the paths q and qd from their first states.
 
-    q, qd: (runs, steps + 1, nq and nv), of which [:, 0] is given; tau (runs, nv); all contiguous, float64; rad, s, N m. It returns how
-    often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its tolerance too:
-    `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is filled with why each run ended, see templates.
-    Where straight-line code would take long to compile, the loop over any tree follows the method, if it has one.
+    q, qd: (runs, steps + 1, nq and nv), of which [:, 0] is given; tau (runs, nv); all contiguous, float64; rad, s, N m. It
+    returns how often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its
+    tolerance too: `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is filled with why each run ended,
+    see templates. Where straight-line code would take long to compile, the loop over any tree follows the method, if it has one.
     """
     checked_model(tree)
     stepping = method_named(method_name)
@@ -59,7 +60,9 @@ def _cost(tree, stepping):
     with_derivatives = stepping.solves_stages or getattr(stepping, "implicit_bias", False)
     if slope * (3 if with_derivatives else 1) > LONGEST:  # not worth its tracing
         return math.inf
-    return _run_source(tree, stepping).count("\n") + INLINED * slope * (0 if stepping.solves_stages else stepping.stages)
+    return _run_source(tree, stepping).count("\n") + INLINED * slope * (
+        0 if stepping.solves_stages else stepping.stages
+    )
 
 
 @lru_cache(maxsize=256)
@@ -80,9 +83,7 @@ def _stepper(tree, stepping):
 
 @lru_cache(maxsize=64)
 def _loop_stepper(tree, stepping):
-    return checked_run(
-        generic.stepper(tree, stepping), tree.coordinates.nq, tree.coordinates.nv, stepping.adaptive
-    )
+    return checked_run(generic.stepper(tree, stepping), tree.coordinates.nq, tree.coordinates.nv, stepping.adaptive)
 
 
 def lane_stepper(tree: Tree, method_name: str) -> Callable:
@@ -157,5 +158,9 @@ def _clear(caches):
         cached.cache_clear()
 
 
-for _public, *_cached in ((stepper, _stepper, _loop_stepper, _run_source, _cost), (lane_stepper, _lane_stepper), (evaluator, _evaluator)):
+for _public, *_cached in (
+    (stepper, _stepper, _loop_stepper, _run_source, _cost),
+    (lane_stepper, _lane_stepper),
+    (evaluator, _evaluator, _loop_evaluator),
+):
     _public.cache_clear = partial(_clear, _cached)

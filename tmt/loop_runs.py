@@ -10,7 +10,7 @@ import numpy as np
 from .loops import BALL, HINGE, TINY, forward_dynamics, mass_matrix_and_bias, reduced_force
 from .machine_code import compiled
 from .sine import LIMIT
-from .templates import NEWTON, OVERFLOW, SMALL, TURNED
+from .templates import OVERFLOW, SMALL, TURNED
 
 NUDGE = 1e-100
 

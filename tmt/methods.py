@@ -16,7 +16,7 @@ from .implicit import ImplicitRungeKutta
 from .method import bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
 from .stepping import Method, checked_sums, checked_tableau, completed, stepped
-from .tree import shown
+from .values import shown
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,9 @@ class AdaptiveRungeKutta(RungeKutta):
 
 @dataclass(frozen=True)
 class SemiImplicitEuler(Method):
-    """qd+ = qd + dt a, then q+ = q moved by dt qd+, with (Mbar + dt D [+ dt dh/dqd] [+ dt^2 k]) a = tau - D qd - k (q - rest) - h [- dt k qd].
+    """qd+ = qd + dt a, then q+ = q moved by dt qd+, with a from the linear system
+
+        (Mbar + dt D [+ dt dh/dqd] [+ dt^2 k]) a = tau - D qd - k (q - rest) - h [- dt k qd].
 
     Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `lone_bodies`, which have no other
     body on them or under them; `implicit_springs`: so are springs. What MuJoCo calls Euler (none of these), implicit (the bias),

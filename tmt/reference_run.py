@@ -54,7 +54,7 @@ def slope(tree) -> Callable:
     tape, coordinates = Tape(Decimal), tree.coordinates
     sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
     q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(count))) for name, count in sizes.items())
-    tree = exact_tree(tree, Decimal)
+    tree = exact_tree(tree, tape.lift)
     slopes = [*coordinates.component_rates(q, qd), *acceleration(tree, q, qd, tau)]
     code = tape.function("slope", [*q, *qd, *tau], slopes)
     scope = {"sincos": sincos, "sqrt": sqrt, "arctan": arctan, "fma": lambda a, b, c: a * b + c, **code.constants}

@@ -45,11 +45,11 @@ def simulate(
 ) -> Motion:  # fmt: skip
     """Motion under constant torque: t (steps+1,) s, q (..., steps+1, nq) and qd (..., steps+1, nv), rad and rad/s.
 
-    q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1; method: a key of
-    METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units
-    of 1 + |value|. A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad,
-    Mbar is singular, Newton's method does not find the stages of an implicit method, or an adaptive method would need
-    steps below 1e-9 dt: `ended` of the result says which. Assignment, part i.
+    q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1;
+    method: a key of METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of
+    each, in units of 1 + |value|. A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by
+    2^49 rad, Mbar is singular, Newton's method does not find the stages of an implicit method, or an adaptive method would
+    need steps below 1e-9 dt: `ended` of the result says which. Assignment, part i.
     """
     stepping = method_named(method)
     steps, dt = given.whole("steps", steps), given.positive("dt", dt, "a step in s")

@@ -6,6 +6,7 @@ no larger than its rounding is zero.
 
 import math
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +18,7 @@ APART = 1e-3  # sine of the angle between two axes that are clearly not parallel
 
 
 def scales(tree) -> np.ndarray:
-    """The largest value that each Mbar_ii can have, kg m2, (nv,): with all that the joint carries stretched out, slides by 1 m."""
+    """The largest value of each Mbar_ii, kg m2, (nv,): with all that the joint carries stretched out, slides by 1 m."""
     sums, joints = np.array(tree.armature), tree.coordinates.joints
     for mass, com, inertia, joint in zip(tree.mass, tree.com, tree.inertia, tree.body_hinge):
         reach = math.hypot(*com)
@@ -58,7 +59,7 @@ def never(tree) -> bool:
                 continue
         if sliding:
             axes = np.array([tree.axis[joints[joint].qd.start] for joint in sliding])
-            in_a_row = all(tree.parent[outer] == inner for outer, inner in zip(sliding, sliding[1:]))
+            in_a_row = all(tree.parent[outer] == inner for outer, inner in pairwise(sliding))
             clear = mass > CLEAR * max(size[joints[joint].qd.start] for joint in sliding)
             if not (clear and in_a_row and np.linalg.svd(axes)[1].min() > APART and len(sliding) <= 3):
                 continue

@@ -1,7 +1,7 @@
 """The source of compiled modules: straight-line code that is traced, in the loops of templates.py."""
 
 from . import composite
-from .implicit import step_source
+from .implicit_source import step_source
 from .method import acceleration
 from .templates import (
     ADAPTIVE,
@@ -19,7 +19,7 @@ from .templates import (
     TURNED,
 )
 from .trace import Code, Tape
-from .tree import shown
+from .values import shown
 
 LANES = 32  # states in a block
 

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from .method import acceleration, mass_matrix_and_bias
-from .tree import real_numbers, shown
+from .values import real_numbers, shown
 
 
 class Method:
@@ -17,7 +17,7 @@ class Method:
 
     `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it asks
     `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's own `slope`. For a tree
-    with balls it is given their coordinates too (see coordinates.py), `step(slope, q, qd, dt, joints)`: q has more numbers than qd.
+    with balls it is given their coordinates too (see coordinates.py), `step(slope, q, qd, dt, joints)`: q is longer than qd.
     """
 
     order = 1  # the error of a run falls with dt to this power

@@ -146,8 +146,8 @@ class Tape:
     def function(self, name, inputs, outputs) -> Code:
         """Source of `name(inputs) -> outputs`.
 
-        It takes sines from sincos(x) -> (sin x, cos x), roots from sqrt, arc tangents from arctan, and a product that only goes into a sum from fma(a, b, c) = a b + c,
-        rounded once: so every compiler does the same arithmetic.
+        It takes sines from sincos(x) -> (sin x, cos x), roots from sqrt, arc tangents from arctan, and a product that only goes
+        into a sum from fma(a, b, c) = a b + c, rounded once: so every compiler does the same arithmetic.
         """
         outputs = [self.lift(o) for o in outputs]
         order = self.needed(outputs)

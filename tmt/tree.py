@@ -1,18 +1,16 @@
 """A kinematic tree of joints that carry rigid bodies, as plain numbers."""
 
 import math
-import reprlib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from . import singular
 from .coordinates import KINDS, Coordinates, coordinates_of
-from .space import IDENTITY, ZERO, Matrix, Vector, rotation, turn_of
+from .lock import CLOSE_TO_ONE, locked
+from .values import names, numbers_of, shown
 
-
-CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
 OPTIONAL = ("reference", "armature", "stiffness", "rest")  # fields that may be left out
 
 
@@ -52,7 +50,7 @@ class Tree:
 
     def __post_init__(self):
         for name in ("hinge_names", "body_names"):
-            object.__setattr__(self, name, _names(name, getattr(self, name)))
+            object.__setattr__(self, name, names(name, getattr(self, name)))
         n, m = len(self.hinge_names), len(self.body_names)
         object.__setattr__(self, "kind", _kinds(self.kind, n))
         nq, nv = self.coordinates.nq, self.coordinates.nv
@@ -65,7 +63,7 @@ class Tree:
             value = getattr(self, name)
             if name in OPTIONAL and isinstance(value, tuple | list) and not value:
                 value = self.zero if name == "rest" else (0.0,) * shape[0]
-            object.__setattr__(self, name, _numbers(name, value, shape))
+            object.__setattr__(self, name, numbers_of(name, value, shape))
         if n == 0 or m == 0:
             raise ValueError("a Tree needs at least one joint and one body")
         for name, hinges, before in (("parent", self.parent, range(n)), ("body_hinge", self.body_hinge, [n] * m)):
@@ -94,7 +92,12 @@ class Tree:
         singular.check_tree(self)
 
     def __repr__(self):
-        return f"Tree({', '.join(f'{field.name}={getattr(self, field.name)}' for field in fields(self))})"
+        """The fields, without those that may be left out and say nothing."""
+        n, nv = len(self.parent), len(self.axis)
+        nothing, plain = (0.0,) * n, {"kind": ("hinge",) * n, "armature": (0.0,) * nv, "rest": self.zero}
+        plain |= {"stiffness": nothing, "reference": nothing}
+        said = {field.name: getattr(self, field.name) for field in fields(self)}
+        return f"Tree({', '.join(f'{name}={value}' for name, value in said.items() if value != plain.get(name))})"
 
     @property
     def coordinates(self) -> Coordinates:
@@ -127,63 +130,7 @@ class Tree:
         their reference. A joint locked there rounds nothing. Raises ValueError for an unknown joint, a position that is none,
         or if no joint is left.
         """
-        names, joints = self.hinge_names, self.coordinates.joints
-        if not isinstance(angles, Mapping):
-            raise ValueError(
-                f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected"
-            )
-        if unknown := [name for name in angles if name not in names]:
-            raise ValueError(f"there is no hinge {shown(unknown[0])} to lock; the hinges are {', '.join(names)}")
-        if len(angles) == len(names):
-            raise ValueError(f"all hinges ({', '.join(names)}) are locked; at least one must be free")
-        locked = {name: _position(self.kind[names.index(name)], value) for name, value in angles.items()}
-        free = [i for i, name in enumerate(names) if name not in locked]
-
-        # of each joint's frame: the free joint that carries it now, and where it is in the frame of that one
-        frames = []
-
-        def frame(joint):
-            return frames[joint] if joint >= 0 else (-1, ZERO, IDENTITY)
-
-        for i, name in enumerate(names):
-            carrier, origin, turn = frame(self.parent[i])
-            if i in free:
-                frames.append((free.index(i), ZERO, turn))
-            else:
-                shift, turned = self._placed(i, locked[name])
-                frames.append((carrier, _moved(origin, turn, shift), turn if turned is None else turn @ turned))
-
-        before = {i: frame(self.parent[i]) for i in free}
-        carried = [frame(joint) for joint in self.body_hinge]
-        at = [k for i in free for k in range(*joints[i].q.indices(len(self.rest)))]
-        by = [(i, k) for i in free for k in range(*joints[i].qd.indices(len(self.axis)))]
-        return replace(
-            self,
-            hinge_names=[names[i] for i in free],
-            parent=[before[i][0] for i in free],
-            offset=[tuple(_moved(*before[i][1:], self.offset[i])) for i in free],
-            axis=[tuple(_moved(ZERO, before[i][2], self.axis[k])) for i, k in by],
-            damping=[self.damping[k] for _, k in by],
-            body_hinge=[carrier for carrier, _, _ in carried],
-            com=[tuple(_moved(origin, turn, com)) for com, (_, origin, turn) in zip(self.com, carried)],
-            inertia=[_turned(turn, inertia) for inertia, (_, _, turn) in zip(self.inertia, carried)],
-            kind=[self.kind[i] for i in free],
-            armature=[self.armature[k] for _, k in by],
-            stiffness=[self.stiffness[i] for i in free],
-            rest=[self.rest[k] for k in at],
-            reference=[self.reference[i] for i in free],
-        )
-
-    def _placed(self, i, position):
-        """Where joint i at a position puts the frame that it carries, in the parent's frame: origin, and turn if there is one."""
-        kind, _, by = self.coordinates.joints[i]
-        if kind == "ball":
-            own = Matrix(self.axis[by]).transposed
-            return self.offset[i], own @ turn_of(position) @ own.transposed if any(position[1:]) else None
-        off, axis = position - self.reference[i], self.axis[by.start]
-        if kind == "slide" and off:
-            return Vector(*self.offset[i]) + Vector(*axis) * off, None
-        return self.offset[i], rotation(axis, off) if off and kind == "hinge" else None
+        return locked(self, angles)
 
     def moves(self, body: int) -> list[bool]:
         """Which of the n joints move the body: those on its path to the world."""
@@ -195,72 +142,6 @@ class Tree:
         return on_path
 
 
-def _moved(origin, turn, point):
-    """A point of a frame in the axes and from the origin of the one that carries it."""
-    return origin + (turn @ Vector(*point) if turn is not IDENTITY else Vector(*point))
-
-
-def _turned(turn, inertia):
-    """A tensor in the axes of the frame that carries it, symmetric."""
-    if turn is IDENTITY:
-        return inertia
-    tensor = np.array([list(row) for row in turn @ Matrix(inertia) @ turn.transposed])
-    return (tensor + tensor.T) / 2.0
-
-
-def shown(value) -> str:
-    """What was given, in one short line."""
-    try:
-        return " ".join(reprlib.repr(value).split())
-    except Exception:  # a repr that fails, an int of too many digits
-        return f"a {type(value).__name__}"
-
-
-def real_numbers(values) -> np.ndarray | None:
-    """The values as an array of float, None if they are anything else but real numbers: truth values, masked ones, text."""
-    try:
-        if _masked(values):
-            return None
-        array = np.asarray(values)
-        return array.astype(float) if array.dtype.kind in "fiu" else None
-    except MemoryError:
-        raise
-    except Exception:  # whatever the conversion of a user's own object raises
-        return None
-
-
-def _masked(values) -> bool:
-    """Whether an entry is masked: NumPy would ignore the mask."""
-    if isinstance(values, (list, tuple)):
-        return any(_masked(value) for value in values if not isinstance(value, float))
-    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.getmaskarray(values).any())
-
-
-def _names(field, values):
-    """The values as a tuple of different strings that can stand in a line."""
-    listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim == 1)
-    names = tuple(values) if listed else (None,)
-    if not all(isinstance(name, str) and name.isprintable() for name in names) or len(set(names)) < len(names):
-        raise ValueError(f"Tree.{field} is {shown(values)}; different names are expected")
-    return tuple(map(str, names))
-
-
-def _numbers(name, values, shape):
-    """The values as nested tuples of float, after a check of their shape."""
-    array = real_numbers(values)
-    if array is None:
-        raise ValueError(f"Tree.{name} is {shown(values)}; numbers of shape {shape} are expected")
-    if array.shape != shape:
-        raise ValueError(f"Tree.{name} has shape {array.shape}; {shape} is expected")
-    if not np.isfinite(array).all():
-        raise ValueError(f"Tree.{name} is {shown(values)}; finite numbers are expected")
-
-    def nested(item):
-        return tuple(map(nested, item)) if isinstance(item, list) else item
-
-    return nested(array.tolist())
-
-
 def _kinds(values, n) -> tuple:
     """The kinds of the joints; hinges where none is given."""
     listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim == 1)
@@ -270,14 +151,6 @@ def _kinds(values, n) -> tuple:
     if len(kinds) != n or not all(isinstance(kind, str) and kind in KINDS for kind in kinds):
         raise ValueError(f"Tree.kind is {shown(values)}; {n} of {', '.join(KINDS)} are expected")
     return tuple(map(str, kinds))
-
-
-def _position(kind, value):
-    """A position that is given for one joint: a float, or a quaternion."""
-    (position,) = _numbers("lock", [value], (1, 4) if kind == "ball" else (1,))
-    if kind == "ball" and abs(math.hypot(*position) - 1.0) > CLOSE_TO_ONE:
-        raise ValueError(f"lock is given {shown(value)}; a quaternion of length 1 is expected")
-    return position
 
 
 def _check_ball(i, axes, reference, rest):

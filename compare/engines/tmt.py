@@ -13,7 +13,6 @@ from tmt.simulation import reasons
 from ..case import Case
 from . import GRID, Method, Motion, Prepared, Setting
 
-
 # schemes of MuJoCo that differ from others for some robots alone, which have balls, lone bodies or springs
 FOR_SOME = ("rk4_mean_speed", "implicitfast", "discrete")
 

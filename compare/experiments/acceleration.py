@@ -11,9 +11,12 @@ from tmt.dual import seeded
 
 from ..engines import LABELS
 from ..judge.check import Result
-from ..judge.scale import acceleration_scale, bias_scale, condition, gravity_scale, mass_scale
+from ..judge.entries import has_own_scales, scales, unit
+from ..judge.scale import gravity_scale
+from ..judge.words import listed
 from ..robots import Robot
 from ..setup import Setup
+from ..truth.conserved import conserved
 
 TITLE = "Accelerations: the same equations in motion?"
 
@@ -23,16 +26,32 @@ def claim(robot: Robot) -> str:
     of, constant = (
         ("torque", "is constant") if not any(robot.tree.damping) else ("torque and damping", "changes by damping alone")
     )
+    if has_own_scales(robot.tree, robot.is_read):
+        words = {"row": f"the momentum along the first joint ({robot.joints[0]})", "linear": "the linear momentum",
+                 "angular": "the angular momentum"}  # fmt: skip
+        kept = listed([words[momentum.kind] for momentum in conserved(robot.tree)])
+    else:
+        kept = "the angular momentum about the first hinge"
+    kept = f"; and without gravity and torque {kept} {constant}" if kept else ""
     return (
         "Bias and accelerations agree at random states under random torque; the acceleration of one engine put into the "
         f"inverse dynamics of the other gives the torque back; energy agrees with MuJoCo's; the power of the {of} is the "
-        f"rate of the energy; and without gravity and torque the angular momentum about the first hinge {constant}."
+        f"rate of the energy{kept}."
     )
 
 
 def tolerance(robot: Robot) -> str:
     """By what the claim is judged, with the robot's own scale."""
     damping, drag = (", |D rates|", " plus |D rates|") if any(robot.tree.damping) else ("", "")
+    if has_own_scales(robot.tree, robot.is_read):
+        springs = ", k (|q| + |rest|)" if robot.tree.has_springs else ""
+        return (
+            "64 eps x scale, each entry its own. With F_i the sum of the absolute convective, Euler and gravity terms of a "
+            f"joint{damping}{springs} and |tau|, where each is largest, and R = |terms of Mbar| |qdd| + F: bias its own terms; "
+            "accelerations |Mbar^-1| R; inverse dynamics |Mbar| |Mbar^-1| R + R, entry by entry; power the same times |rates|; "
+            "momenta the same without gravity and torque; energy the sum of m g L, of k (|q| + |rest|)^2 / 2, and of half the "
+            "terms of Mbar times |rates| twice."
+        )
     return (
         f"With S the sum of the absolute convective, Euler and gravity terms{damping} and |tau|: bias 64 eps x S; accelerations "
         "64 eps x (cond(Mbar) + 1) x |Mbar^-1| S; inverse dynamics 64 eps x cond(Mbar) x S; power the same times the sum of "
@@ -43,63 +62,69 @@ def tolerance(robot: Robot) -> str:
 
 def rows(setup: Setup) -> Result:
     """Each quantity at the named postures and at random states."""
-    result, tree = Result("acceleration"), setup.robot.tree
+    result, tree, is_read = Result("acceleration"), setup.robot.tree, setup.robot.is_read
     dynamics = ours, theirs = tuple(setup.compared().values())
-    weightless = setup.compared(setup.robot.case("no gravity", gravity=False))
+    still = setup.robot.case("no gravity", gravity=False)
+    weightless, momenta = setup.compared(still), conserved(tree)
     damping = np.array(tree.damping)
     work, lost = ("tau.qd", "") if not damping.any() else ("(tau - D qd).qd", " + D qd")
+    torques, rates = unit(tree, "N m", "N"), unit(tree, "rad/s2", "m/s2")
     for sample in (setup.named, setup.random):
         q, qd, tau = sample.q, sample.qd, sample.tau
-        cond = condition(tree, q)
         drag = damping * qd
-        bias = bias_scale(tree, q, qd)
-        force = bias + np.abs(tau).max(axis=1) + np.abs(drag).max(axis=1)
-        speed = np.abs(qd).sum(axis=1)
+        scale = scales(tree, is_read, q, qd)
+        force = scale.force(tau)
         qdd, engine_qdd = (d.acceleration(q, qd, tau) for d in dynamics)
-        M = ours.mass_matrix(q)
+        M, springs = ours.mass_matrix(q), tmt.spring_torque(q, tree) if tree.has_springs else 0.0
 
-        result.agree(sample, "bias", "N m", ours.bias(q, qd), theirs.bias(q, qd), bias, truth="bias")
-        result.agree(sample, "qdd", "rad/s2", qdd, engine_qdd, acceleration_scale(tree, q, force), truth="acceleration")
-        back = np.einsum("sij,sj->si", M, engine_qdd) + ours.bias(q, qd) + drag
-        result.agree(sample, "tau from MuJoCo's qdd by TMT", "N m", back, tau, cond * force)
-        result.agree(sample, "tau from TMT's qdd by mj_inverse", "N m", tau, theirs.inverse(q, qd, qdd), cond * force)
+        result.agree(sample, "bias", torques, ours.bias(q, qd), theirs.bias(q, qd), scale.bias, truth="bias")
+        result.agree(sample, "qdd", rates, qdd, engine_qdd, scale.acceleration(force, qdd), truth="acceleration")
+        back, closing = (
+            np.einsum("sij,sj->si", M, engine_qdd) + ours.bias(q, qd) + drag + springs,
+            scale.closing(force, qdd),
+        )
+        result.agree(sample, "tau from MuJoCo's qdd by TMT", torques, back, tau, closing)
+        result.agree(sample, "tau from TMT's qdd by mj_inverse", torques, tau, theirs.inverse(q, qd, qdd), closing)
 
-        kinetic = np.einsum("si,sij,sj->s", np.abs(qd), np.abs(M), np.abs(qd)) / 2
-        size = gravity_scale(tree) + kinetic
-        result.agree(sample, "energy", "J", ours.energy(q, qd), theirs.energy(q, qd), size, truth="energy")
+        result.agree(sample, "energy", "J", ours.energy(q, qd), theirs.energy(q, qd), scale.energy, truth="energy")
         potential = ours.potential_energy(q), theirs.potential_energy(q)
-        result.agree(sample, "potential energy", "J", *potential, gravity_scale(tree), truth="potential_energy")
+        result.agree(sample, "potential energy", "J", *potential, scale.potential_energy, truth="potential_energy")
 
         power = np.einsum("si,si->s", tau - drag, qd)
         for label, accelerations in (("TMT", qdd), ("MuJoCo", engine_qdd)):
-            gained = rate(partial(total_energy, tree), q, qd, accelerations)
-            result.agree(sample, f"dE/dt - {work} at {label}'s qdd", "W", gained, power, cond * force * speed)
+            gained = rate(partial(total_energy, tree), tree, q, qd, accelerations)
+            result.agree(sample, f"dE/dt - {work} at {label}'s qdd", "W", gained, power, scale.power(force, qdd))
 
-        # p is Mbar times the rates, its rate of change quadratic in them
-        force = mass_scale(tree, q) * speed**2 + np.abs(drag).max(axis=1)
+        scale = scales(still.tree, is_read, q, qd)
         for name, engine in weightless.items():
-            change = rate(partial(first_momentum, tree), q, qd, engine.acceleration(q, qd, np.zeros_like(q)))
-            quantity = f"dp_{setup.robot.joints[0]}/dt{lost} at {LABELS[name]}'s qdd, no gravity"
-            result.agree(sample, quantity, "N m", change, -drag[:, 0], cond * force)
+            accelerations = engine.acceleration(q, qd, np.zeros_like(qd))
+            size = scale.change(accelerations)
+            for momentum in momenta:
+                change = np.stack(rate(momentum.momentum, tree, q, qd, accelerations), axis=-1)
+                quantity = f"d{momentum.name}/dt{lost} at {LABELS[name]}'s qdd, no gravity"
+                loss = momentum.effect(q, -drag - springs)
+                result.agree(sample, quantity, momentum.unit, change, loss, momentum.size(q, size))
+        result.notes += sample.notes
+    if len(momenta) == 0 or momenta[-1].kind == "linear":
+        result.notes.append(
+            f"The rotors of {setup.robot.joints[0]} differ between its axes: the angular momentum is left out."
+        )
     return result
 
 
-def rate(quantity: Callable, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """Time derivative of quantity(q, qd) along the motion, exact by dual numbers, (states,)."""
-    state = seeded([*q.T, *qd.T], [*qd.T, *qdd.T])
-    return quantity(state[: q.shape[1]], state[q.shape[1] :]).slope
+def rate(quantity: Callable, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray | list:
+    """Time derivative of quantity(q, qd) along the motion, exact by dual numbers, (states,); of several a list."""
+    rates = tree.coordinates.component_rates(q.T, qd.T)
+    state = seeded([*q.T, *qd.T], [*rates, *qdd.T])
+    found = quantity(state[: q.shape[1]], state[q.shape[1] :])
+    return [part.slope for part in found] if isinstance(found, list) else found.slope
 
 
 def total_energy(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
     """Potential and kinetic energy over any scalars, J."""
     parts = method.bodies(tree, q, qd)
-    return method.potential(parts, tree.gravity) + method.kinetic(parts, qd)
-
-
-def first_momentum(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
-    """The first row of Mbar qd over any scalars: angular momentum about the first hinge, whose axis is fixed, N m s."""
-    first_row = method.mass_matrix(method.bodies(tree, q, qd))[0]
-    return sum(m * v for m, v in zip(first_row, qd))
+    own = method.potential(parts, tree.gravity) + method.spring_energy(tree, q)
+    return own + method.kinetic(parts, qd, tree.armature)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

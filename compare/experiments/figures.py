@@ -1,130 +1,20 @@
-"""Figures of the experiments that are one file: the sketch, differences, the condition number, holding torques.
+"""Figures of the experiments that are one file: differences, the condition number, holding torques.
 
 Each function returns (file name, figure, caption).
 """
 
-from collections.abc import Sequence
-
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-import tmt
-from tmt import method
-
 from ..engines import LABELS
 from ..judge.check import Result
+from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR, gravity_scale
-from ..judge.words import listed
-from ..report.style import BLUE, GREY, ORANGE, RED, WIDTH, file_name, joint_lines
+from ..report.style import BLUE, LINES, ORANGE, RED, WIDTH, plain
 from ..robots import Robot
 
 ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
-ELEVATION, AZIMUTH = 20.0, -70.0  # deg, from where the sketch is seen
-CENTRED = {"ha": "center", "va": "center"}
-_E, _A = np.radians([ELEVATION, AZIMUTH])
-RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
-UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
-
-
-def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
-    """The robot with its hinge axes in two postures, from the method's own frames."""
-    poses = {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
-    parts = {name: (chains(robot, q), tmt.com_positions(q, robot.tree)) for name, q in poses.items()}
-    size = max(np.ptp(np.concatenate([*lines, coms]), axis=0).max() for lines, coms in parts.values()) or 1.0  # m
-    arrows = {name: axes(robot, q, 0.57 * size) for name, q in poses.items()}
-    tips = [arrow.sum(axis=1) for arrow in arrows.values()]
-    drawn = np.concatenate([*tips, *(part for lines, coms in parts.values() for part in (*lines, coms))])
-    half, middle = 0.55 * np.ptp(drawn, axis=0).max(), (drawn.max(axis=0) + drawn.min(axis=0)) / 2
-    fontsize = 13 if all(len(robot.symbol(joint)) <= 2 for joint in robot.joints) else 9
-    fig = Figure(figsize=(WIDTH, 3.9))
-    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.95, wspace=0.05)
-    for k, (name, (lines, coms)) in enumerate(parts.items()):
-        ax = fig.add_subplot(1, len(poses), k + 1, projection="3d", facecolor="none")
-        for line in lines:
-            ax.plot(*line.T, color=(GREY, 0.6), linewidth=6, solid_capstyle="round")
-        for joint, (origin, axis) in zip(robot.joints, arrows[name]):
-            colour = joint_lines(robot)[joint][0]
-            ax.quiver(*origin, *axis, color=colour, linewidth=2, arrow_length_ratio=0.2)
-            ax.text(*(origin + 1.3 * axis), robot.symbol(joint), color=colour, fontsize=fontsize, **CENTRED)
-        for number, com in enumerate(coms, start=1):
-            ax.scatter(*com, color="black", s=25, depthshade=False)
-            ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
-        if robot.landmarks:
-            names, (chain,) = robot.landmarks(poses[name]), lines
-            for text, point, (right, up) in zip(names, chain, label_directions(chain, arrows[name])):
-                side = {"ha": "left" if right > 0.0 else "right", "va": "bottom" if up > 0.5 else "center"}
-                ax.text(*(point + 0.1 * size * (right * RIGHTWARD + up * UPWARD)), text, color=GREY, fontsize=8, **side)
-        ax.set(title=f"{name}: ({', '.join(f'{a:g}' for a in np.degrees(poses[name]))})°")
-        ax.set(**{f"{which}label": f"{axis}, m" for which, axis in zip("xyz", robot.axes)})
-        ax.set(**{f"{which}lim": (centre - half, centre + half) for which, centre in zip("xyz", middle)})
-        for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-            axis.set_major_locator(matplotlib.ticker.MaxNLocator(4, steps=[1, 2, 5, 10]))
-        ax.view_init(elev=ELEVATION, azim=AZIMUTH)
-        ax.set_box_aspect((1, 1, 1), zoom=1.1)
-    bodies = [f"the {body} ({number})" for number, body in enumerate(robot.tree.body_names, start=1)]
-    caption = (
-        f"The {robot.name} and its hinges, drawn from the method's own kinematics: {', then '.join(hinges(robot))}. Dots: "
-        f"centres of mass of {listed(bodies)}."
-    )
-    return file_name(robot.name), fig, caption
-
-
-def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
-    """The lines of a robot at joint angles q, rad: points in m, (k, 3) each.
-
-    Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move.
-    """
-    if robot.landmarks:
-        return [np.array(list(robot.landmarks(q).values()))]
-    tree = robot.tree
-    origins = np.array([list(frame.origin) for frame in method.joint_frames(tree, q.tolist())], dtype=float)
-    links = [np.stack([origins[parent], origins[joint]]) for joint, parent in enumerate(tree.parent) if parent >= 0]
-    ends = [
-        np.stack([origins[joint], com])
-        for joint, com in zip(tree.body_hinge, tmt.com_positions(q, tree))
-        if joint >= 0 and joint not in tree.parent
-    ]
-    return links + ends
-
-
-def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:
-    """Origin and axis of each hinge at joint angles q, rad: (n, 2, 3), m, the axes of this length."""
-    frames = method.joint_frames(robot.tree, q.tolist())
-    return np.array([[list(frame.origin), [length * c for c in frame.axes[0]]] for frame in frames], dtype=float)
-
-
-def label_directions(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
-    """Where on paper the labels of a chain's points, (k, 3) m, stand free: to the right and up, (k, 2), of length 1.
-
-    Away from the links and from the arrows, (n, 2, 3), that meet in the point; to the left if these are balanced.
-    """
-    away = np.tile(-0.01 * RIGHTWARD, (len(chain), 1))
-    links = np.diff(chain, axis=0)
-    links /= np.maximum(np.linalg.norm(links, axis=1), 1e-12)[:, None]
-    away[:-1] -= links
-    away[1:] += links
-    for origin, axis in arrows:
-        away -= np.isclose(chain, origin).all(axis=1)[:, None] * axis / np.linalg.norm(axis)
-    on_paper = away @ np.stack([RIGHTWARD, UPWARD], axis=1)
-    return on_paper / np.linalg.norm(on_paper, axis=1)[:, None]
-
-
-def hinges(robot: Robot) -> list[str]:
-    """What each hinge turns about and where it is at zero, in words, in their order."""
-    rest = robot.posture()
-    landmarks = robot.landmarks(rest) if robot.landmarks else {"origin": np.zeros(3)}
-    words = []
-    for joint, frame in zip(robot.joints, method.joint_frames(robot.tree, rest.tolist())):
-        axis, origin = ([float(v) + 0.0 for v in vector] for vector in (frame.axes[0], frame.origin))
-        about = "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else triple(axis)
-        near = (f"at the {name}" for name, point in landmarks.items() if np.allclose(point, origin))
-        words.append(f"{robot.symbol(joint)} about {about} {next(near, f'at {triple(origin)} m')}")
-    return words
-
-
-def triple(values: Sequence[float]) -> str:
-    return f"({', '.join(f'{v:.3g}' for v in values)})"
+SHOWN_POSTURES = 8  # in one figure
 
 
 def draw_distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
@@ -187,34 +77,47 @@ def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
 
 
 def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
-    """Holding torques at the named postures."""
-    postures = result.curves["postures"]
+    """Holding torques at the named postures: of more than six joints the six that need most, of the first eight postures."""
+    kept, speeds = result.curves["postures"], robot.coordinates.speeds
+    postures = dict(list(kept.items())[:SHOWN_POSTURES])
+    most = np.max([np.abs(of["tmt"]) for of in postures.values()], axis=0)
+    shown = sorted(np.argsort(-most, kind="stable")[: len(LINES)])
     fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
     ax = fig.subplots()
-    places, width = np.arange(len(postures)), 0.78 / len(robot.joints)
-    for i, (joint, (colour, _)) in enumerate(joint_lines(robot).items()):
-        ours, theirs = (np.array([of[name][i] for of in postures.values()]) for name in ("tmt", "mujoco"))
-        x = places + width * (i - (len(robot.joints) - 1) / 2)
-        ax.bar(x, ours, width=0.92 * width, color=(colour, 0.75), label=f"{robot.symbol(joint)}, TMT")
-        mark = {"markersize": 50 * width, "markeredgewidth": 2, "label": "MuJoCo" if i == 0 else None}
+    places, width, labels = np.arange(len(postures)), 0.78 / len(shown), []
+    for i, k in enumerate(shown):
+        ours, theirs = (np.array([of[name][k] for of in postures.values()]) for name in ("tmt", "mujoco"))
+        x = places + width * (i - (len(shown) - 1) / 2)
+        labels.append(f"{plain(robot.symbol(speeds[k]))}, TMT")
+        ax.bar(x, ours, width=0.92 * width, color=(LINES[i % len(LINES)][0], 0.75), label=labels[-1])
+        mark = {"markersize": min(50 * width, 20), "markeredgewidth": 2, "label": "MuJoCo" if i == 0 else None}
         ax.plot(x, theirs, "_", color="black", **mark)
     ax.axhline(0.0, color="black", linewidth=0.8)
-    ax.set_xticks(places, postures)
-    ax.set(ylabel="holding torque, N m")
-    fig.legend(loc="outside upper center", ncols=min(len(robot.joints) + 1, 6))
-    apart = max(np.abs(of["tmt"] - of["mujoco"]).max() for of in postures.values())
+    ax.set_xticks(places, [plain(name) for name in postures])
+    ax.set(ylabel=f"holding torque, {unit(robot.tree, 'N m', 'N')}")
+    columns = 100 // (8 + max(map(len, labels)))  # that a page has room for
+    fig.legend(loc="outside upper center", ncols=max(1, min(len(shown) + 1, 6, columns)))
+    apart = max(np.abs(of["tmt"] - of["mujoco"]).max() for of in kept.values())
+    which = "each named posture" if len(postures) == len(kept) else f"the first {len(postures)} of {len(kept)} postures"
+    of = "" if len(shown) == len(speeds) else f", at the {len(shown)} of {len(speeds)} joints that need most"
+    springs = " with its springs" if robot.tree.has_springs else ""
     caption = (
-        f"Torque that holds each named posture: TMT (bars) and MuJoCo (black marks), at most {apart:.1e} N m apart. "
-        + needless(postures, robot)
+        f"Torque that holds {which}{springs}{of}: TMT (bars) and MuJoCo (black marks), at most {apart:.1e} "
+        f"{unit(robot.tree, 'N m', 'N')} apart. " + needless(kept, robot)
     )
     return "gravity_postures", fig, caption
 
 
 def needless(postures: dict, robot: Robot) -> str:
     """Which postures need no torque, but for rounding, in both engines or in one, in words."""
-    zero = FACTOR * EPS * gravity_scale(robot.tree)
+    zero = {
+        posture: FACTOR * EPS * scales(robot.tree, robot.is_read, robot.poses[posture][None]).holding
+        if has_own_scales(robot.tree, robot.is_read)
+        else FACTOR * EPS * gravity_scale(robot.tree)
+        for posture in postures
+    }
     rest = {
-        name: [posture for posture, of in postures.items() if np.abs(of[name]).max() <= zero]
+        name: [posture for posture, of in postures.items() if (np.abs(of[name]) <= zero[posture]).all()]
         for name in ("tmt", "mujoco")
     }
     words = [

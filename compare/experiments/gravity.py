@@ -5,24 +5,32 @@ from functools import partial
 
 import numpy as np
 
+import tmt
+
+from ..case import Coordinates
 from ..judge.check import Result
-from ..judge.scale import acceleration_scale, gravity_scale
+from ..judge.entries import Entries, has_own_scales, per_speed, scales, unit
+from ..judge.scale import gravity_scale, spring_scale
 from ..robots import Robot
 from ..setup import Setup
 
 TITLE = "Gravity balance: do both hold the model with the same torque?"
+MOST_ENERGIES = 150_000  # of one engine, at random states
 
 
 def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
+    springs = "; with the springs mj_inverse's at rest" if robot.tree.has_springs else ""
     return (
-        "TMT's holding torque is MuJoCo's qfrc_bias at rest; in both it is the gradient of the engine's own potential "
+        f"TMT's holding torque is MuJoCo's qfrc_bias at rest{springs}; in both it is the gradient of the engine's own potential "
         f"energy; and TMT's torque, given to MuJoCo, leaves the {robot.name} at rest."
     )
 
 
 def tolerance(robot: Robot) -> str:
     """By what the claim is judged, with the robot's own scale."""
+    if has_own_scales(robot.tree, robot.is_read):
+        return own_tolerance(robot.tree)
     scale = gravity_scale(robot.tree)
     return (
         f"Torques: 64 eps x {scale:.2f} N m, the sum of m g reach. Accelerations left: 64 eps x (cond(Mbar) + 1) x "
@@ -32,33 +40,92 @@ def tolerance(robot: Robot) -> str:
     )
 
 
-def gradient(potential_energy: Callable, q: np.ndarray) -> np.ndarray:
-    """dV/dq of hinges by the rule above, N m, (states, n), from V of angles q, (..., n) rad."""
-    quarter = np.pi / 2 * np.eye(q.shape[1])
-    return (potential_energy(q[:, None] + quarter) - potential_energy(q[:, None] - quarter)) / 2
+def own_tolerance(tree: tmt.Tree) -> str:
+    """The same where each entry has its own scale."""
+    of_springs = " + k (|q| + |rest|)" if tree.has_springs else ""
+    rules = ["D_i = (V(q_i + 90 deg) - V(q_i - 90 deg)) / 2 of a hinge or a ball's turn about an axis of its own"]
+    if tree.has_springs:
+        rules[0] += ", and with a spring of a hinge D_i + (1 - pi / 2) (V(q_i + 360 deg) - V(q_i - 360 deg)) / (4 pi)"
+    rules += ["(V(q_i + 1 m) - V(q_i - 1 m)) / 2 m of a slide"] * ("slide" in tree.kind)
+    return (
+        f"Torques: 64 eps x F_i, each joint's own: m g L{of_springs}, of a slide m g{of_springs}, summed over the bodies that it "
+        "moves; L is the largest distance from the origin that a centre of mass can have at that state. Accelerations left: "
+        "64 eps x |Mbar^-1| F, entry by entry. The gradient is exact, not a small difference: "
+        f"dV/dq_i = {'; '.join(rules)}. Its scale is the potential energy's, the largest of those that it is made of."
+    )
+
+
+def gradient(potential_energy: Callable, q: np.ndarray, tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray]:
+    """dV/dq by the rules above, N m or N, (states, nv), and for which of the speeds they are exact, (nv,).
+
+    potential_energy: V, J, of positions (..., nq). q: (states, nq). In an angle V is a + b cos + c sin, and a spring's k x^2 / 2:
+    a turn ahead less a turn back leaves 4 pi k x alone. In a slide's length V is quadratic. That of a ball's spring is neither.
+    """
+    coordinates = Coordinates(tree.hinge_names, tree.kind)
+    kinds, stiffness = np.array(per_speed(tree, tree.kind)), np.array(per_speed(tree, tree.stiffness))
+    exact = (kinds != "ball") | (stiffness == 0.0)
+
+    def difference(steps):
+        """V at one step forward less V at one back, along each speed."""
+        moves = np.diag(steps)
+        ahead, behind = (coordinates.move(q[:, None], sign * moves) for sign in (1.0, -1.0))
+        return potential_energy(ahead) - potential_energy(behind)
+
+    quarter = difference(np.where(kinds == "slide", 1.0, np.pi / 2)) / 2
+    sprung = (kinds == "hinge") & (stiffness > 0.0)
+    if sprung.any():
+        springs = difference(np.where(sprung, 2 * np.pi, 0.0)) / (4 * np.pi)
+        quarter = quarter + (1.0 - np.pi / 2) * springs * sprung
+    return quarter, exact
 
 
 def rows(setup: Setup) -> Result:
     """Torques at each named posture and at random ones, their gradients, and TMT's torque given to MuJoCo."""
-    result, tree = Result("gravity"), setup.robot.tree
-    tmt, mujoco = setup.compared().values()
-    scale = gravity_scale(tree)
+    result, tree, is_read = Result("gravity"), setup.robot.tree, setup.robot.is_read
+    ours, theirs = setup.compared().values()
+    units, rates = unit(tree, "N m", "N"), unit(tree, "rad/s2", "m/s2")
     for sample in (*setup.named.each(), setup.random):
-        q = sample.q
-        ours, theirs = tmt.gravity_balance(q), mujoco.gravity_balance(q)
-        result.agree(sample, "holding torque", "N m", ours, theirs, scale, truth="gravity_balance")
+        q, scale = sample.q, scales(tree, is_read, sample.q)
+        held = ours.gravity_balance(q), theirs.gravity_balance(q)
+        result.agree(sample, "holding torque", units, *held, scale.weight, truth="gravity_balance")
+        if tree.has_springs:
+            held = held[0] + tmt.spring_torque(q, tree), theirs.inverse(q, 0.0, 0.0)
+            result.agree(sample, "holding torque, springs too", units, *held, scale.holding)
         if sample is not setup.random:
-            result.curves.setdefault("postures", {})[sample.name] = {"tmt": ours[0], "mujoco": theirs[0]}
-        result.agree(sample, "TMT: torque - dV/dq", "N m", ours, gradient(tmt.potential_energy, q), scale)
-        result.agree(sample, "MuJoCo: torque - dV/dq", "N m", gradient(mujoco.potential_energy, q), theirs, scale)
+            postures = result.curves.setdefault("postures", {})
+            postures[sample.name] = {"tmt": held[0][0], "mujoco": held[1][0]}
+        few = slice(max(1, MOST_ENERGIES // (2 * tree.coordinates.nv)))  # each takes two energies for each speed
+        part = sample.first(few.stop)
+        size = gradient_scale(tree, part.q) if has_own_scales(tree, is_read) else scale.potential_energy
+        for label, engine, torque in (("TMT", ours, held[0]), ("MuJoCo", theirs, held[1])):
+            found, exact = gradient(engine.potential_energy, part.q, tree)
+            if exact.any():
+                pair = (torque[few][:, exact], found[:, exact])
+                of = size[:, exact] if np.ndim(size) else size
+                result.agree(part, f"{label}: torque - dV/dq", units, *(pair if label == "TMT" else pair[::-1]), of)
+    result.notes += [note for sample in (setup.named, setup.random) for note in sample.notes]
+    if not exact.all():
+        result.notes.append("The gradient of V is left out for balls with a spring: there is no exact rule for it.")
 
     for sample in (setup.named, setup.random):
-        q = sample.q
-        at_rest = np.zeros_like(q)  # given to TMT, MuJoCo's torque would leave the same number with the other sign
-        left = mujoco.acceleration(q, at_rest, tmt.gravity_balance(q))
-        allowed = acceleration_scale(tree, q, scale)
-        result.agree(sample, "qdd of MuJoCo under TMT's torque", "rad/s2", at_rest, left, allowed)
+        q, scale = sample.q, scales(tree, is_read, sample.q)
+        # given to TMT, MuJoCo's torque would leave the same number with the other sign
+        at_rest = np.zeros((len(q), tree.coordinates.nv))
+        torque = ours.gravity_balance(q) + (tmt.spring_torque(q, tree) if tree.has_springs else 0.0)
+        left = theirs.acceleration(q, at_rest, torque)
+        allowed = scale.acceleration(scale.holding, 0.0)
+        result.agree(sample, "qdd of MuJoCo under TMT's torque", rates, at_rest, left, allowed)
     return result
+
+
+def gradient_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
+    """Of differences of V, each by one step along one speed, (states, nv) J."""
+    stiffness = np.array(per_speed(tree, tree.stiffness))
+    slides = np.array(per_speed(tree, tree.kind)) == "slide"
+    stretch = np.divide(spring_scale(tree, q), stiffness, out=np.zeros((len(q), len(slides))), where=stiffness > 0.0)
+    stretched = stiffness * (stretch + np.where(slides, 1.0, 2 * np.pi)) ** 2 / 2
+    lifted = slides * float(np.linalg.norm(tree.gravity)) * sum(tree.mass)
+    return Entries(tree, q).potential_energy[:, None] + stretched + lifted
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

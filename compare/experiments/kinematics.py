@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from ..judge.check import Result
+from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import reaches
 from ..robots import Robot
 from ..setup import Setup
@@ -15,8 +16,9 @@ TITLE = "Kinematics: do the bodies move alike?"
 
 def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
+    positions = "hinge angles" if set(robot.tree.kind) == {"hinge"} else "joints' positions"
     return (
-        "Every quantity between the hinge angles and the equations of motion has a counterpart in MuJoCo, so that a wrong "
+        f"Every quantity between the {positions} and the equations of motion has a counterpart in MuJoCo, so that a wrong "
         "one can be named: x_b and omega_b (xipos, cvel), T_b and B_b (mj_jacBodyCom, its rotation turned into body axes), "
         "and both convective terms (mj_jacDot times the rates)."
     )
@@ -24,6 +26,12 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """By what the claim is judged, with the robot's own scale."""
+    if has_own_scales(robot.tree, robot.is_read):
+        return (
+            "64 eps x scale, each entry its own. With L the largest distance from the origin that a centre of mass can have at "
+            "that state, S the sum of |rates| of the hinges and balls that move a body, V that of its slides: lengths L; T_b: L "
+            "of a hinge or ball, 1 of a slide; B_b: 1; angular velocity S; convective terms 2 S (L S + V) and S^2."
+        )
     reach = reaches(robot.tree).max()
     return (
         f"64 eps x scale. Lengths and T_b: the largest distance from the {origin_in_words(robot)}, {reach:.2f} m. B_b: 1. "
@@ -39,25 +47,26 @@ def origin_in_words(robot: Robot) -> str:
 
 def rows(setup: Setup) -> Result:
     """Six quantities at the named postures and at random states."""
-    result = Result("kinematics")
+    result, tree = Result("kinematics"), setup.robot.tree
     engines = tuple(setup.compared().values())
-    reach = reaches(setup.robot.tree).max()
+    per_speed = unit(tree, "m/rad", "m/m")
     for sample in (setup.named, setup.random):
         q, qd = sample.q, sample.qd
-        speed = abs(qd).sum(axis=1)
+        scale = scales(tree, setup.robot.is_read, q, qd)
         T, B = zip(*(dynamics.jacobians(q) for dynamics in engines))
         v_conv, w_conv = zip(*(dynamics.convective_terms(q, qd) for dynamics in engines))
         x = [dynamics.com_positions(q) for dynamics in engines]
         omega = [dynamics.angular_velocities(q, qd) for dynamics in engines]
-        for quantity, unit, (ours, theirs), scale, truth in (
-            ("x_b", "m", x, reach, "com_positions"),
-            ("omega_b", "rad/s", omega, speed, "angular_velocities"),
-            ("T_b", "m/rad", T, reach, "T"),
-            ("B_b", "", B, 1.0, "B"),
-            ("v_conv", "m/s2", v_conv, reach * speed**2, "v_conv"),
-            ("w_conv", "rad/s2", w_conv, speed**2, "w_conv"),
+        for quantity, of, (ours, theirs), size, truth in (
+            ("x_b", "m", x, scale.positions, "com_positions"),
+            ("omega_b", "rad/s", omega, scale.angular_velocities, "angular_velocities"),
+            ("T_b", per_speed, T, scale.T, "T"),
+            ("B_b", "", B, scale.B, "B"),
+            ("v_conv", "m/s2", v_conv, scale.v_conv, "v_conv"),
+            ("w_conv", "rad/s2", w_conv, scale.w_conv, "w_conv"),
         ):
-            result.agree(sample, quantity, unit, ours, theirs, scale, truth=truth)
+            result.agree(sample, quantity, of, ours, theirs, size, truth=truth)
+        result.notes += sample.notes
     return result
 
 

@@ -9,8 +9,9 @@ from scipy.optimize import minimize
 import tmt
 
 from ..engines import LABELS
-from ..judge.check import Result
-from ..judge.scale import EPS, FACTOR, mass_scale
+from ..judge.check import Result, over
+from ..judge.entries import has_own_scales, scales, unit
+from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from ..setup import Setup
 
@@ -32,6 +33,13 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
+    if has_own_scales(robot.tree, robot.is_read):
+        return (
+            "64 eps x scale, each entry its own: the sum over the bodies of m t_i t_j + |I| u_i u_j, and the armature; t = L of "
+            "a hinge or ball that moves the body, 1 of a slide, and u = 1 and 0; L is the largest distance from the origin "
+            "that a centre of mass can have at that state. Definite: the smallest eigenvalue of Mbar, in units of its diagonal, "
+            "is at least 64 eps of the largest."
+        )
     text = (
         "64 eps x the largest entry of Mbar at that state. Definite: the smallest eigenvalue is at least 64 eps of the "
         "largest."
@@ -76,21 +84,25 @@ def worst_condition(robot: Robot, mass_matrix: Callable) -> tuple:
 def rows(setup: Setup) -> Result:
     """Agreement at each named posture and at random states; symmetry, definiteness, conditioning."""
     result, robot, compared = Result("mass"), setup.robot, setup.compared()
+    own = has_own_scales(robot.tree, robot.is_read)
+    units = " or ".join(dict.fromkeys([unit(robot.tree, "kg m2", "kg m"), unit(robot.tree, "kg m2", "kg")]))
     for sample in (*setup.named.each(), setup.random):
-        ours, theirs = (dynamics.mass_matrix(sample.q) for dynamics in compared.values())
-        result.agree(sample, "Mbar", "kg m2", ours, theirs, mass_scale(robot.tree, sample.q), truth="mass_matrix")
-    check_symmetry(result, compared["tmt"].mass_matrix(setup.random.q))  # MuJoCo's is one triangle written twice
+        M = {name: dynamics.mass_matrix(sample.q) for name, dynamics in compared.items()}
+        scale = scales(robot.tree, robot.is_read, sample.q)
+        result.agree(sample, "Mbar", units, *M.values(), scale.mass_matrix, truth="mass_matrix")
+    check_symmetry(result, M["tmt"], scale.mass_matrix if own else None)  # MuJoCo's is one triangle written twice
     for name, dynamics in compared.items():
-        check_definiteness(result, LABELS[name], dynamics.mass_matrix(setup.random.q))
+        check_definiteness(result, LABELS[name], M[name], in_units=own)
         if robot.conditioning:
             value, worst = worst_condition(robot, dynamics.mass_matrix)
             mirrored = float(np.linalg.cond(dynamics.mass_matrix(at_angles(robot, worst * [-1.0, 1.0]))))
             check_conditioning(result, robot, LABELS[name], value, worst)
             result.curves.setdefault("worst", {})[name] = (value, worst, mirrored)
+    result.notes += [note for sample in (setup.named, setup.random) for note in sample.notes]
     if robot.conditioning:
         degrees = setup.of(3.0, 3.0, 15.0)
         result.curves["condition"] = condition_grid(robot, compared["tmt"].mass_matrix, degrees)
-    else:
+    elif not robot.is_read:
         result.notes.append(
             f"Nothing is stated of where the condition number of Mbar of the {robot.name} is largest: that is neither checked "
             "nor drawn."
@@ -98,18 +110,30 @@ def rows(setup: Setup) -> Result:
     return result
 
 
-def check_symmetry(result: Result, M: np.ndarray) -> None:
-    """TMT computes both triangles: they must be the same but for rounding."""
-    skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2)) / np.abs(M).max(axis=(1, 2))
-    what = "TMT: Mbar - Mbar' over its largest entry"
+def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray | None = None) -> None:
+    """TMT computes both triangles: they must be the same but for rounding. scale: of each entry; None: the largest entry."""
+    of = "its largest entry" if scale is None else "the scale of the entry"
+    skew = over(np.abs(M - M.transpose(0, 2, 1)), np.abs(M).max(axis=(1, 2), keepdims=True) if scale is None else scale)
+    what = f"TMT: Mbar - Mbar' over {of}"
     result.check("random states", what, skew.max(), FACTOR * EPS, "", rounding=True)
 
 
-def check_definiteness(result: Result, label: str, M: np.ndarray) -> None:
-    """Mbar is positive definite beyond doubt: its least eigenvalue over its largest, the least of all states."""
-    values = np.linalg.eigvalsh(M)
-    what = f"{label}: least eigenvalue of Mbar over the largest"
+def check_definiteness(result: Result, label: str, M: np.ndarray, in_units: bool = False) -> None:
+    """Mbar is positive definite beyond doubt: its least eigenvalue over its largest, the least of all states.
+
+    in_units: of Mbar in units of its diagonal, where its entries are kg and kg m2.
+    """
+    named = "Mbar in units of its diagonal" if in_units else "Mbar"
+    values = np.linalg.eigvalsh(scaled_by_diagonal(M) if in_units else M)
+    what = f"{label}: least eigenvalue of {named} over the largest"
     result.check("random states", what, (values[:, 0] / values[:, -1]).min(), FACTOR * EPS, "", rule="at least")
+
+
+def scaled_by_diagonal(M: np.ndarray) -> np.ndarray:
+    """M_ij / sqrt(M_ii M_jj), whose diagonal is 1; as it is where a diagonal entry is not positive: that is not definite."""
+    diagonal = np.einsum("sii->si", M)
+    root = np.sqrt(np.where((diagonal > 0.0).all(axis=1, keepdims=True), diagonal, 1.0))
+    return M / (root[:, :, None] * root[:, None, :])
 
 
 def check_conditioning(result: Result, robot: Robot, label: str, value: float, worst: np.ndarray) -> None:

@@ -90,28 +90,29 @@ class Result:
     def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, truth=None) -> None:
         """A row and a check: the worst difference of the two engines over the states, the closest to its tolerance.
 
-        tmt_values, mujoco_values: (states, ...); scale: a number or (states,); truth: the name of a field of
-        tmt.reference.Truth, for one more check of each engine: its distance from the exact value, 64 eps x scale too.
+        tmt_values, mujoco_values: (states, ...); scale: a number or (states,), or of as many dimensions as the values, a
+        scale for each entry; truth: the name of a field of tmt.reference.Truth, for one more check of each engine that has an
+        exact state: its distance from the exact value, 64 eps x scale too.
         """
         states = len(sample.q)
-        scale = np.broadcast_to(scale, states)
-        tolerance = FACTOR * EPS * scale
-        apart = {"TMT to MuJoCo": largest(np.subtract(tmt_values, mujoco_values))}
-        if truth:
-            known = sample.truth(truth)
+        pairs = {"TMT to MuJoCo": np.abs(np.subtract(tmt_values, mujoco_values))}
+        known = sample.truth(truth) if truth else ()
+        if len(known):
             for engine, values in (("TMT", tmt_values), ("MuJoCo", mujoco_values)):
-                apart[f"{engine} to exact"] = largest(distance(values[: len(known)], known))
-        in_eps = {name: over(d, EPS * scale[: len(d)]) for name, d in apart.items()}
-        difference = apart["TMT to MuJoCo"]
+                pairs[f"{engine} to exact"] = distance(values[: len(known)], known)
+        apart = {name: worst_of_each(differences, scale) for name, differences in pairs.items()}
+        in_eps = {name: over(d, EPS * s) for name, (d, s) in apart.items()}
+        difference, scale = apart["TMT to MuJoCo"]
 
-        def check_closest(quantity, difference):
+        def check_closest(quantity, difference, scale):
             """A check of the state that comes closest to its tolerance, and which one that is."""
-            (k,) = closest(difference, tolerance[: len(difference)])
+            tolerance = FACTOR * EPS * scale
+            (k,) = closest(difference, tolerance)
             return self.check(sample.name, quantity, difference[k], tolerance[k], unit, sample.describe(k), True), k
 
-        check, worst = check_closest(quantity, difference)
+        check, worst = check_closest(quantity, difference, scale)
         for name in list(apart)[1:]:
-            check_closest(f"{quantity}, {name}", apart[name])
+            check_closest(f"{quantity}, {name}", *apart[name])
         self.rows.append(
             {
                 "scene": sample.name,
@@ -124,8 +125,8 @@ class Result:
                 "difference_over_bar": check.over_tolerance,
                 "scale": scale[worst],
                 "difference_eps": in_eps["TMT to MuJoCo"].max(),
-                "tmt_from_exact_eps": in_eps["TMT to exact"].max() if truth else None,
-                "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if truth else None,
+                "tmt_from_exact_eps": in_eps["TMT to exact"].max() if len(known) else None,
+                "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if len(known) else None,
                 "exact_states": len(known) if truth else None,
                 "worst_state": check.note,
                 "worst_q": all_digits(sample.q[worst]),
@@ -157,6 +158,21 @@ def over(difference: np.ndarray, scale: np.ndarray) -> np.ndarray:
 def all_digits(values: Iterable[float]) -> str:
     """Numbers with all their digits, for whoever wants to see a state again."""
     return " ".join(repr(float(v)) for v in values)
+
+
+def worst_of_each(differences: np.ndarray, scale: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Of each state the difference that is closest to its tolerance, and its scale, (states,) each.
+
+    differences: (states, ...); scale: a number or (states,), or of as many dimensions as the differences, and of more states.
+    """
+    states = len(differences)
+    if np.ndim(scale) < 2:
+        return largest(differences), np.broadcast_to(scale, max(states, np.size(scale)))[:states]
+    scale = scale[:states] if len(scale) > 1 else scale
+    differences, scale = (a.reshape(states, -1) for a in np.broadcast_arrays(np.abs(differences), scale))
+    share = np.where(np.isfinite(differences), over(differences, scale), np.inf)
+    entry = np.arange(states), share.argmax(axis=1)
+    return differences[entry], scale[entry]
 
 
 def largest(values: ArrayLike) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""Scales of tolerances of any robot, each entry's own; of a robot of stated hinges one number for each state.
+"""Scales of tolerances of every quantity: of any robot each entry's own; of stated hinges one number for each state.
 
-Entries of a robot have units of their own (kg beside kg m2, N beside N m), and sizes: one number for all of them would hide
-errors of the small ones. The scale of an entry is the sum of the absolute values of the terms that are added up in it, as each
-may be where it is largest: with L the largest distance from the origin that a centre of mass can have,
+Entries have units of their own (kg beside kg m2, N beside N m), and sizes: one number for all would hide errors of small ones.
+The scale of an entry is the sum of the absolute values of the terms that are added up in it, as each may be where it is largest:
+with L the largest distance from the origin that a centre of mass can have at that state,
 
     a column of T_b     t = L of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
     of B_b              u = 1 of a hinge or ball, 0 of a slide
@@ -14,7 +14,9 @@ and where a system is solved, errors of eps in Mbar and in the forces go through
 which would depend on the units.
 """
 
+from collections.abc import Iterable
 from functools import cached_property
+from itertools import chain, repeat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +33,74 @@ from .scale import (
     reaches,
     spring_scale,
 )
+
+
+def has_own_scales(tree: tmt.Tree, is_read: bool) -> bool:
+    """Whether each entry has its own scale: not with stated hinges that have nothing else. is_read: the numbers are a file's."""
+    return is_read or set(tree.kind) != {"hinge"} or tree.has_springs or any(tree.armature)
+
+
+def scales(tree: tmt.Tree, is_read: bool, q: np.ndarray, qd: ArrayLike = 0.0) -> "Entries | Numbers":
+    """The scales of a robot at states q (states, nq), qd (states, nv). is_read: its numbers are those of a file."""
+    return (Entries if has_own_scales(tree, is_read) else Numbers)(tree, q, qd)
+
+
+def unit(tree: tmt.Tree, of_hinge: str, of_slide: str) -> str:
+    """The unit of a quantity whose entries have one for hinges and balls and one for slides: those that are there."""
+    kinds = set(tree.kind)
+    return " or ".join([of_hinge] * (kinds != {"slide"}) + [of_slide] * ("slide" in kinds))
+
+
+class Numbers:
+    """Scales of hinges at states q, qd (states, n): a number, or (states,). Norms take the place of entries."""
+
+    B = 1.0
+
+    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: ArrayLike = 0.0):
+        self.tree, self.q, self.qd = tree, q, np.broadcast_to(qd, q.shape)
+        self.drag = np.abs(np.array(tree.damping) * self.qd).max(axis=1)
+        self.angular_velocities = np.abs(self.qd).sum(axis=1)
+        self.positions = self.T = reaches(tree).max()
+        self.v_conv, self.w_conv = self.positions * self.angular_velocities**2, self.angular_velocities**2
+        self.potential_energy = self.weight = self.holding = gravity_scale(tree)
+
+    @cached_property
+    def mass_matrix(self) -> np.ndarray:
+        return mass_scale(self.tree, self.q)
+
+    @cached_property
+    def bias(self) -> np.ndarray:
+        return bias_scale(self.tree, self.q, self.qd)
+
+    @cached_property
+    def condition(self) -> np.ndarray:
+        return condition(self.tree, self.q)
+
+    @cached_property
+    def energy(self) -> np.ndarray:
+        speeds = np.abs(self.qd)
+        M = np.abs(tmt.mass_matrix(self.q, self.tree))
+        return self.potential_energy + np.einsum("si,sij,sj->s", speeds, M, speeds) / 2
+
+    def force(self, tau: np.ndarray) -> np.ndarray:
+        """Of Mbar qdd = tau - D qd - h, N m, (states,)."""
+        return self.bias + np.abs(tau).max(axis=1) + self.drag
+
+    def acceleration(self, force: ArrayLike, qdd: ArrayLike) -> np.ndarray:
+        """Of qdd, whatever it is: its bound |Mbar^-1| force stands for it."""
+        return acceleration_scale(self.tree, self.q, force)
+
+    def closing(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of a torque found by one engine for another's qdd, N m, (states,)."""
+        return self.condition * force
+
+    def power(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
+        """Of the rate of the energy at an engine's qdd, W, (states,)."""
+        return self.closing(force, qdd) * self.angular_velocities
+
+    def change(self, qdd: ArrayLike) -> np.ndarray:
+        """Of the rate of Mbar qd without gravity and torque, N m, (states,): quadratic in the rates."""
+        return self.condition * (self.mass_matrix * self.angular_velocities**2 + self.drag)
 
 
 class Entries:
@@ -143,7 +213,14 @@ class Entries:
         """Of the rate of the energy at an engine's qdd, W, (states,)."""
         return np.einsum("si,si->s", self.closing(force, qdd), np.abs(self.qd))
 
+    def change(self, qdd: ArrayLike) -> np.ndarray:
+        """Of the rate of Mbar qd without torque at an engine's qdd, N m or N, (states, nv)."""
+        return self.closing(self.force(), qdd)
 
-def per_speed(tree: tmt.Tree, values) -> list:
+
+def per_speed(tree: tmt.Tree, values: Iterable) -> list:
     """One value for each speed, (nv,), of one for each joint."""
-    return [value for value, joint in zip(values, tree.coordinates.joints) for _ in range(joint.qd.stop - joint.qd.start)]
+    joints = tree.coordinates.joints
+    return list(
+        chain.from_iterable(repeat(value, 3 if joint.kind == "ball" else 1) for value, joint in zip(values, joints))
+    )

@@ -17,7 +17,7 @@ FACTOR = 64
 def reaches(tree: tmt.Tree, q: ArrayLike | None = None) -> np.ndarray:
     """Largest distance of each centre of mass from the origin, m: lengths added along the tree, shape (m,).
 
-    q: positions (..., nq), then the shape is (..., m), and what slides have moved is added; without it they are at their reference.
+    q: positions (..., nq); with them the shape is (..., m), and what slides have moved is added. Without, these are at rest.
     """
     q = np.array(tree.zero) if q is None else np.asarray(q, float)
     to_joint = []

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 import tmt
+from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
 
 from ..case import Coordinates, Scene
 from . import Robot
@@ -71,8 +72,9 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[S
     start, q: the posture, its name and position (nq,); dt: s, of the file.
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
-    inverse = np.linalg.pinv(tmt.mass_matrix(q, tree), hermitian=True)
-    accelerations = inverse @ -(tmt.gravity_balance(q, tree) + tmt.spring_torque(q, tree))
+    mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
+    inverse = np.linalg.pinv(mass_matrix, hermitian=True)
+    accelerations = inverse @ -(weight + tmt.spring_torque(q, tree))
     added = added_damping(inverse, accelerations)
     rests = np.abs(accelerations).max() < STILL
     going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * (3 if kind == "ball" else 1))}

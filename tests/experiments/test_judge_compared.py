@@ -26,6 +26,7 @@ class Off:
 
     def __init__(self, mujoco, quantity, place=None, weightless=False):
         self.mujoco, self.changed, self.weightless = mujoco, (quantity, place), weightless
+        self.methods = mujoco.methods
 
     def of(self, case):
         dynamics = self.mujoco.of(case)

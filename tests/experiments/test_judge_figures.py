@@ -13,6 +13,7 @@ from compare.engines.mujoco import load, parse
 from compare.experiment import Setup, engines
 from compare.experiments import acceleration, gravity, kinematics, mass, parameters
 from compare.experiments import figures as draw
+from compare.experiments import figures_sketch as sketch
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 
@@ -86,15 +87,15 @@ def test_the_grid_of_condition_numbers_has_the_first_joint_along_its_rows():
 
 
 def test_the_sketch_says_where_each_hinge_is():
-    assert draw.hinges(ARM) == ["α about y at the shoulder", "β about x at the shoulder", "γ about y at the elbow"]
+    assert sketch.hinges(ARM) == ["α about y at the shoulder", "β about x at the shoulder", "γ about y at the elbow"]
     other = dataclasses.replace(tmt.ARM, axis=((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.8)))
-    assert draw.hinges(dataclasses.replace(ARM, tree=other))[2] == "γ about (0, 0.6, 0.8) at the elbow"
+    assert sketch.hinges(dataclasses.replace(ARM, tree=other))[2] == "γ about (0, 0.6, 0.8) at the elbow"
     moved = dataclasses.replace(tmt.ARM, offset=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.2)))
-    assert draw.hinges(dataclasses.replace(ARM, tree=moved))[2] == "γ about y at (0, 0, -0.2) m"
+    assert sketch.hinges(dataclasses.replace(ARM, tree=moved))[2] == "γ about y at (0, 0, -0.2) m"
 
 
 def test_the_sketch_of_the_arm_names_its_landmarks_and_shows_both_postures():
-    name, fig, caption = draw.draw_sketch(ARM)
+    name, fig, caption = sketch.draw_sketch(ARM)
     assert name == "arm" and caption.startswith("The arm and its hinges, drawn from")
     assert caption.endswith("Dots: centres of mass of the upper arm (1) and the forearm (2).")
     assert [ax.get_title() for ax in fig.axes] == ["zero: (0, 0, 0)°", "ball catch: (-70, 70, -30)°"]
@@ -106,7 +107,7 @@ def test_the_sketch_of_the_arm_names_its_landmarks_and_shows_both_postures():
 
 def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
     robot = crane(tmp_path)
-    name, fig, caption = draw.draw_sketch(robot)
+    name, fig, caption = sketch.draw_sketch(robot)
     assert name == "crane" and [ax.get_title().split(":")[0] for ax in fig.axes] == ["down", "raised"]
     assert (
         "swing about x at the origin, then lift about y at the origin, then bend about y at (0, 0, -0.4) m" in caption
@@ -114,15 +115,15 @@ def test_the_sketch_of_a_robot_without_landmarks_follows_its_tree(tmp_path):
     assert caption.endswith(
         "centres of mass of the foot (1), the boom (2), the jib (3), the hook (4) and the weight (5)."
     )
-    lines = draw.chains(robot, np.zeros(4))
+    lines = sketch.chains(robot, np.zeros(4))
     ends = [[0, 0, 0], [0, 0, -0.4], [0, 0, 0.3], [0, 0.01, -0.55], [0.03, 0, -0.7], [0, 0.05, 0.22]]
     assert np.allclose([line[1] for line in lines], ends, rtol=0.0, atol=1e-15)
 
 
 def test_labels_stand_away_from_what_meets_in_a_point():
     chain = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, -2.0]])
-    arrow = np.array([[chain[1], draw.RIGHTWARD]])
-    first, middle, last = draw.label_directions(chain, arrow)
+    arrow = np.array([[chain[1], sketch.RIGHTWARD]])
+    first, middle, last = sketch.label_directions(chain, arrow)
     assert first[1] > 0.9 and last[1] < -0.9  # beyond the ends of the chain
     assert middle[0] == pytest.approx(-1.0)  # on the other side of the arrow
     assert np.allclose(np.linalg.norm([first, middle, last], axis=1), 1.0)

@@ -54,8 +54,8 @@ IN_THE_MJCF = {
 IN_THE_METHOD = {
     "Rb for Rb'": ("to_body = frame.turn.transposed", "to_body = frame.turn", ["kinematics omega_b", "kinematics B_b"]),
     "rotations in the wrong order": (
-        "p.turn @ rotation(tree.axis[i], q[i])",
-        "rotation(tree.axis[i], q[i]) @ p.turn",
+        "p.turn @ rotation(tree.axis[by.start], q[at.start] - tree.reference[i])",
+        "rotation(tree.axis[by.start], q[at.start] - tree.reference[i]) @ p.turn",
         ["kinematics x_b"],
     ),
     "centripetal term missing": (

@@ -35,7 +35,7 @@ def test_results_say_what_was_found(tmp_path):
     second = CAUSE | {"text": "com x of forearm: stated 3"}
     write(tmp_path, verdict.Report(sections, ARM, {"command": "c"}, text, [CAUSE, second]))
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
-    assert set(results) == {"passed", "checks", "causes", "skipped", "provenance"}
+    assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
     assert results["passed"] is False and results["skipped"] == []
     assert [check["passed"] for check in results["checks"]] == [True, False]
     assert set(results["checks"][0]) == {

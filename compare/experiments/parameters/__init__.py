@@ -168,6 +168,6 @@ def component(k: int, count: int) -> str:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from ..figures import draw_sketch  # matplotlib is for the process that draws
+    from ..figures_sketch import draw_sketch  # matplotlib is for the process that draws
 
     yield partial(draw_sketch, robot)

@@ -1,0 +1,93 @@
+"""A Tree with some joints locked."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from .space import IDENTITY, ZERO, Matrix, Vector, rotation, turn_of
+from .values import numbers_of, shown
+
+CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
+
+
+def locked(tree, angles: Mapping):
+    """What Tree.lock says."""
+    names, joints = tree.hinge_names, tree.coordinates.joints
+    if not isinstance(angles, Mapping):
+        raise ValueError(f"lock is given {shown(angles)}; a dict of angles in rad by the names of hinges is expected")
+    if unknown := [name for name in angles if name not in names]:
+        raise ValueError(f"there is no hinge {shown(unknown[0])} to lock; the hinges are {', '.join(names)}")
+    if len(angles) == len(names):
+        raise ValueError(f"all hinges ({', '.join(names)}) are locked; at least one must be free")
+    held = {name: _position(tree.kind[names.index(name)], value) for name, value in angles.items()}
+    free = [i for i, name in enumerate(names) if name not in held]
+
+    # of each joint's frame: the free joint that carries it now, and where it is in the frame of that one
+    frames = []
+
+    def frame(joint):
+        return frames[joint] if joint >= 0 else (-1, ZERO, IDENTITY)
+
+    for i, name in enumerate(names):
+        carrier, origin, turn = frame(tree.parent[i])
+        if i in free:
+            frames.append((free.index(i), ZERO, turn))
+        else:
+            shift, turned = _placed(tree, i, held[name])
+            frames.append((carrier, _moved(origin, turn, shift), turn if turned is None else turn @ turned))
+
+    before = {i: frame(tree.parent[i]) for i in free}
+    carried = [frame(joint) for joint in tree.body_hinge]
+    at = [k for i in free for k in range(*joints[i].q.indices(len(tree.rest)))]
+    by = [(i, k) for i in free for k in range(*joints[i].qd.indices(len(tree.axis)))]
+    return replace(
+        tree,
+        hinge_names=[names[i] for i in free],
+        parent=[before[i][0] for i in free],
+        offset=[tuple(_moved(*before[i][1:], tree.offset[i])) for i in free],
+        axis=[tuple(_moved(ZERO, before[i][2], tree.axis[k])) for i, k in by],
+        damping=[tree.damping[k] for _, k in by],
+        body_hinge=[carrier for carrier, _, _ in carried],
+        com=[tuple(_moved(origin, turn, com)) for com, (_, origin, turn) in zip(tree.com, carried)],
+        inertia=[_turned(turn, inertia) for inertia, (_, _, turn) in zip(tree.inertia, carried)],
+        kind=[tree.kind[i] for i in free],
+        armature=[tree.armature[k] for _, k in by],
+        stiffness=[tree.stiffness[i] for i in free],
+        rest=[tree.rest[k] for k in at],
+        reference=[tree.reference[i] for i in free],
+    )
+
+
+def _placed(tree, i, position):
+    """Where joint i at a position puts the frame that it carries, in the parent's frame: origin, and turn if there is one."""
+    kind, _, by = tree.coordinates.joints[i]
+    if kind == "ball":
+        own = Matrix(tree.axis[by]).transposed
+        return tree.offset[i], own @ turn_of(position) @ own.transposed if any(position[1:]) else None
+    off, axis = position - tree.reference[i], tree.axis[by.start]
+    if kind == "slide" and off:
+        return Vector(*tree.offset[i]) + Vector(*axis) * off, None
+    return tree.offset[i], rotation(axis, off) if off and kind == "hinge" else None
+
+
+def _moved(origin, turn, point):
+    """A point of a frame in the axes and from the origin of the one that carries it."""
+    return origin + (turn @ Vector(*point) if turn is not IDENTITY else Vector(*point))
+
+
+def _turned(turn, inertia):
+    """A tensor in the axes of the frame that carries it, symmetric."""
+    if turn is IDENTITY:
+        return inertia
+    tensor = np.array([list(row) for row in turn @ Matrix(inertia) @ turn.transposed])
+    return (tensor + tensor.T) / 2.0
+
+
+def _position(kind, value):
+    """A position that is given for one joint: a float, or a quaternion."""
+    (position,) = numbers_of("lock", [value], (1, 4) if kind == "ball" else (1,))
+    if kind == "ball" and abs(math.hypot(*position) - 1.0) > CLOSE_TO_ONE:
+        raise ValueError(f"lock is given {shown(value)}; a quaternion of length 1 is expected")
+    return position
