@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from . import dop853
+from . import derivatives, dop853
 from .coordinates import FLAT
 from .dual import seeded
 from .implicit import ImplicitRungeKutta
@@ -53,7 +53,12 @@ class RungeKutta(Method):
 
     def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
         """The matrix of the linear system for the slope: Mbar."""
-        return terms(tree, q, [0.0] * len(q))[0]
+        return terms(tree, q, [0.0] * len(tree.axis))[0]
+
+    def residual(self, tree, a, q, qd, tau, dt, terms=mass_matrix_and_bias):
+        """Mbar a - Qbar (nv,): zero where a is the slope, and linear in a."""
+        M, h = terms(tree, q, qd)
+        return left_over(M, a, reduced_force(tree, h, q, qd, tau))
 
     def step(self, slope, q, qd, dt, joints=FLAT):
         """The state (q, qd) one dt later, from `slope(q, qd)` at each stage."""
@@ -145,6 +150,25 @@ class SemiImplicitEuler(Method):
             ]
         return matrix
 
+    def residual(self, tree, a, q, qd, tau, dt, terms=mass_matrix_and_bias):
+        """What a leaves of the linear system above, (nv,): zero where it is the slope, and linear in a.
+
+        dh/dqd a is (h(qd + a) - h(qd - a)) / 2, as h is quadratic in the speeds.
+        """
+        M, h = terms(tree, q, qd)
+        force = reduced_force(tree, h, q, qd, tau)
+        held = [dt * d for d in tree.damping]
+        if self.implicit_springs and tree.has_springs:
+            stiffness = by_speed(tree, tree.stiffness)
+            force = [f - dt * k * v for f, k, v in zip(force, stiffness, qd)]
+            held = [x + dt * dt * k for x, k in zip(held, stiffness)]
+        left = [x + d * y for x, d, y in zip(left_over(M, a, force), held, a)]
+        own = set(range(len(qd))) if self.implicit_bias else lone_speeds(tree) if self.lone_bodies else ()
+        if own:
+            ahead, behind = (terms(tree, q, [v + sign * x for v, x in zip(qd, a)])[1] for sign in (1.0, -1.0))
+            left = [x + 0.5 * dt * (ahead[i] - behind[i]) if i in own else x for i, x in enumerate(left)]
+        return left
+
     def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
         """a from the linear system above."""
         force = reduced_force(tree, terms(tree, q, qd)[1], q, qd, tau)
@@ -156,6 +180,11 @@ class SemiImplicitEuler(Method):
         """The state (q, qd) one dt later."""
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
         return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
+
+
+def left_over(M, a, force) -> list:
+    """M a - force."""
+    return [sum((m * x for m, x in zip(row, a)), f * -1.0) for row, f in zip(M, force)]
 
 
 def by_speed(tree, of_joints) -> list:
@@ -211,6 +240,11 @@ def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
     """
     joints, nq, nv = tree.coordinates, tree.coordinates.nq, tree.coordinates.nv
     batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
+    if nv > FEW_SPEEDS and derivatives.has_residual(stepping):
+        rows = [np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd)]
+        each = np.broadcast_to(dt, batch).reshape(-1)
+        found = derivatives.amplification(stepping, tree, *rows, [float(t) for t in tau], each)
+        return found.reshape(*batch, 2 * nv, 2 * nv)
     start = [np.broadcast_to(values, (*batch, np.shape(values)[-1])) for values in (q, qd)]
     start = [values[..., i] for values in start for i in range(values.shape[-1])]
     directions = np.eye(2 * nv).reshape(2 * nv, 2 * nv, *(1 for _ in batch))  # component, direction, state
@@ -227,6 +261,7 @@ CLASSICAL = (  # Kutta (1901): A, b, c
     (0.0, 0.5, 0.5, 1.0),
 )
 ROOT = 3**0.5 / 6
+FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 METHODS = {
     "rk4": RungeKutta(4, *CLASSICAL),  # the assignment's part i
     "rk4_mean_speed": RungeKutta(2, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles

@@ -4,12 +4,12 @@ import numpy as np
 
 import tmt
 
-from ..case import Case
+from ..case import Case, Coordinates
 from .check import Result
-from .scale import gravity_scale
+from .scale import EPS, FACTOR, gravity_scale
 
-LEFT = 0.1  # rad: a held model that is so far from its posture has left it
-MOVES = 0.1  # rad: a run without a torque that holds shows nothing if it moves less
+LEFT = 0.1  # rad or m: a held model that is so far from its posture has left it
+MOVES = 0.1  # rad or m: a run without a torque that holds shows nothing if it moves less
 ORDER_MARGIN = 0.15  # of an order that is measured
 COARSE_STEP, STABLE_SO_LONG = (
     0.01,
@@ -28,41 +28,86 @@ def required_time(case: Case, scheme: str, dt: float) -> float:
     return judged if scheme == "rk4" or dt < COARSE_STEP else min(judged, STABLE_SO_LONG)
 
 
-def check_movement(result: Result, where: str, moved: float) -> None:
-    """A run without a torque that holds moves, rad: one that stays shows nothing."""
-    result.check(where, "movement", moved, MOVES, "rad", rule="at least")
+def unit_of(coordinates: Coordinates) -> str:
+    """The unit of the movements of all joints: rad, m, or rad or m."""
+    return " or ".join(sorted(set(coordinates.units), reverse=True))
 
 
-def deviation(q: np.ndarray, start: np.ndarray) -> float:
-    """The largest deviation of any joint of a run from where it started, rad; inf if the run diverged."""
-    away = np.abs(q - start).max()
+def check_movement(result: Result, where: str, moved: float, unit: str = "rad") -> None:
+    """A run without a torque that holds moves, rad or m: one that stays shows nothing."""
+    result.check(where, "movement", moved, MOVES, unit, rule="at least")
+
+
+def moved_from(q: np.ndarray, start: np.ndarray, coordinates: Coordinates | None = None) -> np.ndarray:
+    """How far positions are from a start, as movements without signs; without coordinates no joint is a ball."""
+    return np.abs(q - start if coordinates is None else coordinates.difference(q, start))
+
+
+def deviation(q: np.ndarray, start: np.ndarray, coordinates: Coordinates | None = None) -> float:
+    """The largest deviation of any joint of a run from where it started, rad or m; inf if the run diverged."""
+    away = moved_from(q, start, coordinates).max()
     return float(away) if np.isfinite(away) else np.inf
 
 
-def deviation_alive(q: np.ndarray, start: np.ndarray) -> float:
-    """The same, rad, of a run as long as it has not diverged."""
-    return float(np.nanmax(np.abs(q - start)))
+def deviation_alive(q: np.ndarray, start: np.ndarray, coordinates: Coordinates | None = None) -> float:
+    """The same, rad or m, of a run as long as it has not diverged."""
+    return float(np.nanmax(moved_from(q, start, coordinates)))
 
 
-def departure(t: np.ndarray, q: np.ndarray) -> float | None:
-    """The time at which a joint is first 0.1 rad from where it started; None: never."""
-    away = ~(np.abs(q - q[0]).max(axis=1) <= LEFT)  # a run that is no number has left too
+def departure(t: np.ndarray, q: np.ndarray, coordinates: Coordinates | None = None) -> float | None:
+    """The time at which a joint is first 0.1 rad, or m, from where it started; None: never."""
+    away = ~(moved_from(q, q[0], coordinates).max(axis=1) <= LEFT)  # a run that is no number has left too
     return float(t[away][0]) if away.any() else None
 
 
 def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> float | None:
     """The first time at which a run of a case has stopped, is not finite, or is beyond its physical energy; None: never.
 
-    Energy less the work of the constant torque cannot grow, on the stated robot. The bound is a gain of its whole potential
-    range, twice the sum of m g reach, and of the kinetic energy at the start.
+    Energy less the work of the constant torque cannot grow, on the stated robot. The bound is a gain of all energy that its
+    motion can exchange: see `exchanged`.
     """
     finite = np.isfinite(np.concatenate([q, qd], axis=1)).all(axis=1)
-    good = np.where(finite[:, None], q, 0.0), np.where(finite[:, None], qd, 0.0)
-    kinetic = tmt.energy(q[0], qd[0], case.tree) - tmt.potential_energy(q[0], case.tree)
+    good = (
+        np.where(finite[:, None], q, case.q if case.coordinates.has_balls else 0.0),
+        np.where(finite[:, None], qd, 0.0),
+    )
     with np.errstate(over="ignore", invalid="ignore"):  # of a run that is about to end
-        energy = tmt.energy(*good, case.tree) - (good[0] - q[0]) @ case.tau
-        bad = ~finite | ~(energy - energy[0] <= 2.0 * gravity_scale(case.robot.tree) + kinetic)
+        done = work(case, good[0])
+        energy = tmt.energy(*good, case.tree) - done
+        bad = ~finite | ~(energy - energy[0] <= exchanged(case, good[0], done))
     return float(t[bad][0]) if bad.any() else None
+
+
+def work(case: Case, q: np.ndarray) -> np.ndarray:
+    """The work of the constant torque along a run, J, (times,).
+
+    At hinges and slides it is that of the way from the start. A ball's torque is constant in axes that turn with it, and its work
+    no function of the position: it is added up over the movements from state to state.
+    """
+    if not case.coordinates.has_balls:
+        return (q - q[0]) @ case.tau
+    if not case.tau.any():
+        return np.zeros(len(q))
+    return np.append(0.0, np.cumsum(case.coordinates.difference(q[1:], q[:-1]) @ case.tau))
+
+
+def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
+    """The energy that the motion of a case can have exchanged up to each state of a run, J, (times,).
+
+    It starts with a kinetic energy and with that of its springs, and can gain the whole potential range of the stated robot,
+    twice the sum of m g reach. No reach bounds what slides and a torque do: where that is more, it is the most work of the torque,
+    and the weight times the way along the slides. `done`: the work of the torque. Any may have 64 eps of 1 J for each inertia
+    and stiffness of 1.
+    """
+    tree, coordinates = case.tree, case.coordinates
+    has = 2.0 * gravity_scale(case.robot.tree) + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
+    if tree.has_springs:
+        has = has + tmt.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
+    slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
+    weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
+    gone = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
+    nothing = FACTOR * EPS * (np.trace(tmt.mass_matrix(q[0], tree)) + np.sum(tree.stiffness))
+    return np.maximum(has, np.maximum.accumulate(np.abs(done) + gone)) + nothing
 
 
 def number_or_none(number: float | None) -> float | None:

@@ -6,7 +6,7 @@ from functools import partial
 from ...engines import one_of_each_scheme
 from ...judge.check import Result
 from ...judge.rounding import NARROW
-from ...judge.run import MOVES
+from ...judge.run import MOVES, unit_of
 from ...robots import Robot
 from ...setup import Setup
 from . import drift, errors, horizon, sentences
@@ -19,6 +19,13 @@ FEW_EXACT_STEPS = 8  # with many digits, in a small run
 
 def claim(robot: Robot) -> str:
     """What is claimed."""
+    if robot.is_read:
+        return (
+            "For every integrator of MuJoCo the same scheme stands on the TMT side, as the notes say; integrators that are one "
+            "scheme here agree with it alike. implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is "
+            "the classical one. The two agree in the derivative at recorded states, in one step from each of them, and in the "
+            "open-loop run as long as rounding allows."
+        )
     of_rk4 = "the assignment's" if robot.claims else "the classical one"
     return (
         "For every integrator of MuJoCo the same scheme stands on the TMT side (Euler, implicitfast and discrete are one "
@@ -31,6 +38,8 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """What the differences are compared with."""
+    if robot.is_read:
+        return of_file(robot)
     return (
         "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
         "the sum of the absolute terms of the force, and 8 eps of the sums of the step. Open loop: a band computed along the "
@@ -39,6 +48,21 @@ def tolerance(robot: Robot) -> str:
         f"diverged; each scene states how long that must be. A free run must move by {MOVES:g} rad. A run has diverged if it "
         f"stops, is not finite, or has gained more energy than the stated {robot.name}'s whole potential range and the kinetic "
         "energy at the start. Where one diverges while the band is narrow, the other must do so at the same step."
+    )
+
+
+def of_file(robot: Robot) -> str:
+    """The same for a robot from a file."""
+    unit = unit_of(robot.coordinates)
+    ball = "; of a ball 32 eps of a turn, as quaternions are multiplied" if robot.coordinates.has_balls else ""
+    return (
+        "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
+        f"the sum of the absolute terms of the force, and 8 eps of the sums of the step{ball}. Open loop: a band computed along "
+        "the run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's own "
+        f"steps. Judged while the band of the positions is below {NARROW:g} {unit} and no run has diverged. A run has diverged if "
+        f"it stops, is not finite, or has gained more energy than the {robot.name}'s motion can have exchanged: its whole "
+        "potential range with the energy of speeds and springs at the start, or, where that is more, the work of the torque and "
+        "of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same step."
     )
 
 
@@ -53,7 +77,7 @@ def begin(setup: Setup) -> None:
     schemes = [method.scheme for method in one_of_each_scheme(setup.engines["mujoco"])]
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = setup.of(cases, [], cases)
-    duration, steps = setup.of(horizon.GROWTH_RUN, horizon.GROWTH_RUN, horizon.SHORT_GROWTH_RUN)
+    duration, steps = horizon.growth_run(setup.robot, grown, setup.size == "small")
     of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
         "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer), cases),

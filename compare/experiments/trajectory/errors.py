@@ -15,7 +15,7 @@ def errors_when_held(result: Result, robot: Robot) -> dict[str, tuple]:
     The largest angle over the run; None of a run that has diverged.
     """
     return {
-        case.name: tuple(number_or_none(deviation(curve[name][0], curve[name][0][0])) for name in ("tmt", "mujoco"))
+        case.name: tuple(deviations(case, curve).values())
         for case, curve in coarsest_runs(result, robot)
         if case.is_held
     }
@@ -31,6 +31,12 @@ def errors_when_free(result: Result, robot: Robot) -> dict[str, tuple]:
             of_run = (true.error(curve[name][0], joints).max() for name in ("tmt", "mujoco"))
             errors[case.name] = tuple(map(number_or_none, of_run))
     return errors
+
+
+def deviations(case: Case, curve: dict) -> dict[str, float | None]:
+    """How far the runs of both engines go from where they start, rad or m; None of a run that has diverged."""
+    paths = {name: curve[name][0] for name in ("tmt", "mujoco")}
+    return {name: number_or_none(deviation(q, q[0], case.coordinates)) for name, q in paths.items()}
 
 
 def coarsest_runs(result: Result, robot: Robot) -> Iterator[tuple[Case, dict]]:

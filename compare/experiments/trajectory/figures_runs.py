@@ -11,29 +11,64 @@ from matplotlib.ticker import MaxNLocator
 from ...case import Case
 from ...engines import LABELS
 from ...judge.check import Result
-from ...judge.run import step_in_words
+from ...judge.run import moved_from, step_in_words, unit_of
 from ...judge.words import capital
-from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, joint_lines
+from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, plain
 from .drift import DRIFT_DURATION, found_order
-from .horizon import GROWN_EARLY, power
+from .horizon import early, power
 from .leaving import left_in_words
 from .sentences import agreement, rad
 
 SCHEME_LINES = dict(zip(("semi_implicit_euler", "implicit", "rk4"), LINES))  # colour and dash
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEGEND_COLUMNS = 4  # of a legend
+MOST_LINES = len(LINES)  # of joints in a panel
 
 
-def over_time(ax: Axes, t: np.ndarray, ours: np.ndarray, theirs: np.ndarray, case: Case) -> None:
-    """Joint angles or rates against time: lines for TMT, up to 65 marks for MuJoCo."""
+def over_time(
+    ax: Axes, t: np.ndarray, ours: np.ndarray, theirs: np.ndarray, case: Case, shown: Sequence[int] | None = None
+) -> None:
+    """Positions or speeds, (times, nv), against time: lines for TMT, up to 65 marks for MuJoCo; shown: which, None: all."""
     every = slice(None, None, max(1, len(t) // 64))
     marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
-    lines = joint_lines(case.robot)
-    for i, joint in enumerate(case.joints):
-        colour, dash = lines[joint]
-        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{case.robot.symbol(joint)}, TMT")
+    names, all_names = case.coordinates.speeds, case.robot.coordinates.speeds
+    few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
+    for k, i in enumerate(range(len(names)) if shown is None else shown):
+        colour, dash = LINES[all_names.index(names[i]) if few else k]
+        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{plain(symbol(case, i))}, TMT")
         ax.plot(t[every], theirs[every, i], color=colour, clip_on=False, **marks)
     ax.plot([], [], color="black", label="MuJoCo", **marks)
+
+
+def symbol(case: Case, i: int) -> str:
+    """How the joint of a movement is written."""
+    name = case.coordinates.speeds[i]
+    return case.robot.symbol(name)
+
+
+def drawn(case: Case, q: np.ndarray) -> np.ndarray:
+    """Positions as they are drawn, (times, nv): of a ball the movement from the start."""
+    coordinates = case.coordinates
+    if not coordinates.has_balls:
+        return q
+    values = coordinates.difference(q, q[0])
+    for kind, at, by in coordinates.places.joints:
+        if kind != "ball":
+            values[:, by] = q[:, at]
+    return values
+
+
+def worst(case: Case, columns: Sequence[dict]) -> list[int]:
+    """The movements that are drawn, in their order: all, or of many those in which the engines differ most while judged."""
+    count = case.coordinates.nv
+    if count <= MOST_LINES:
+        return list(range(count))
+    largest = np.zeros(count)
+    for c in columns:
+        judged = c["t"] <= c["judged_until_s"]
+        off = moved_from(c["tmt"][0][judged], c["mujoco"][0][judged], case.coordinates)
+        largest = np.fmax(largest, off.max(axis=0))
+    return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())
 
 
 def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str]:
@@ -51,7 +86,7 @@ def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str
         f"dt = {end}/{len(curve['t']) - 1} s. In {end} s the {case.robot.name} of TMT {left_in_words(curve['left']['tmt'])}, "
         f"that of MuJoCo {left_in_words(curve['left']['mujoco'])}. "
         f"The true motion is rest: of that TMT is at most {rad(ours)} off, MuJoCo {rad(theirs)}; while judged, to "
-        f"{curve['judged_until_s']:.2f} s, they are {agreement(curve):.1e} rad apart."
+        f"{curve['judged_until_s']:.2f} s, they are {agreement(curve, case):.1e} rad apart."
     )
     return f"assignment_figure_{number}", fig, caption
 
@@ -61,8 +96,9 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     of_case = [key for key in result.curves["runs"] if key[0] == case.name]
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
     columns = [result.curves["runs"][key] for key in of_case if key[-1] == steps]
+    shown, unit = worst(case, columns), unit_of(case.coordinates)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
-    lines_of_legend = -(-(len(case.joints) + 4) // LEGEND_COLUMNS)
+    lines_of_legend = -(-(len(shown) + 4) // LEGEND_COLUMNS)
     fig.subplots_adjust(
         left=0.105, right=0.985, bottom=0.075, top=(93 - 3 * lines_of_legend) / 100, hspace=0.12, wspace=0.08
     )
@@ -70,11 +106,13 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     until = []
     for column, c in zip(axes.T, columns):
         for row, ax in enumerate(column[:2]):
-            over_time(ax, c["t"], c["tmt"][row], c["mujoco"][row], case)
+            paths = [c[name][row] for name in ("tmt", "mujoco")]
+            over_time(ax, c["t"], *(paths if row else (drawn(case, q) for q in paths)), case, shown)
             ax.ticklabel_format(axis="y", scilimits=(-2, 3))
-        column[0].set_title(f"{c['integrator']}, {step_in_words(case, steps)}")
-        difference = np.abs(c["tmt"][0] - c["mujoco"][0]).max(axis=1)
-        ulp = np.abs(c["tmt"][0] - c["ulp"]).max(axis=1)
+        step = step_in_words(case, steps)
+        column[0].set_title(f"{c['integrator']}, {step}" if len(columns) < 4 else f"{c['integrator']}\n{step}")
+        difference = moved_from(c["tmt"][0], c["mujoco"][0], case.coordinates).max(axis=1)
+        ulp = moved_from(c["tmt"][0], c["ulp"], case.coordinates).max(axis=1)
         band = np.where(c["band"] < 1e3, c["band"], np.nan)
         lines = column[2]
         lines.semilogy(
@@ -90,30 +128,39 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
         if len(f"{case.duration:g}") > 2:  # the last number of a column would meet the first of the next
             lines.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))
         until.append(f"{c['integrator']} to {c['judged_until_s']:.2f} s")
-    for ax, label in zip(axes[:, 0], ("angle, rad", "rate, rad/s", "angle: difference, rad")):
+    place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
+    per = " or ".join(f"{one}/s" for one in unit.split(" or "))
+    for ax, label in zip(axes[:, 0], (f"{place}, {unit}", f"{speed}, {per}", f"{place}: difference, {unit}")):
         ax.set_ylabel(label)
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
     fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=LEGEND_COLUMNS)
-    return file_name("trajectory", case.name), fig, run_caption(result, case, until)
+    return file_name("trajectory", case.name), fig, run_caption(result, case, until, len(shown))
 
 
-def run_caption(result: Result, case: Case, until: Sequence[str]) -> str:
+def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) -> str:
     """How far the engines are apart in a scene, how far from the true motion, and what diverges."""
     rows = [row for row in result.rows if row["scene"] == case.name and row["level"] == "open loop"]
     diverged = [row for row in rows if row["diverged_at_s"] is not None]
     ended = sorted({f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in diverged})
     used = [row["difference_over_band"] for row in rows if row["difference_over_band"] is not None]
     most = f"at most {max(used):.1e}" if used else "no measured part"
-    errors = result.curves["errors"].get(case.name)
+    errors, unit = result.curves["errors"].get(case.name), unit_of(case.coordinates)
+    count = case.coordinates.nv
     return (
         f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
-            f"With {case.steps} steps of RK4 TMT is {rad(errors[0])} and MuJoCo {rad(errors[1])} from the true motion. "
+            f"With {case.steps} steps of RK4 TMT is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true motion. "
             if errors
             else ""
         )
         + (f"MuJoCo's run diverged: {', '.join(ended)}. " if ended else "")
+        + (
+            f"Of {count} positions and speeds the {shown} are shown in which the engines' positions differ most while judged. "
+            if shown < count
+            else ""
+        )
+        + ("Of a ball the turn from its start is drawn, in its own axes. " if case.coordinates.has_balls else "")
         + f"Differences of exactly zero are drawn at {DRAWN_ZERO:g}."
     )
 
@@ -190,12 +237,12 @@ def draw_growth(result: Result) -> tuple[str, Figure, str]:
         ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")
         ax.text(0.5, digits + 0.8, text, fontsize=8)
     ax.set(xlabel="time, s", ylabel="log10 of the growth", xlim=(0, t[-1]), ylim=(-20, 65))
-    early = int(np.searchsorted(t, GROWN_EARLY))
+    soon = early(t)
     each = "; ".join(
-        f"{name}: {power(curves[name][early], 1)} and {power(curves[name][-1], 0)}" for name in reversed(ends)
+        f"{name}: {power(curves[name][soon], 1)} and {power(curves[name][-1], 0)}" for name in reversed(ends)
     )
     caption = (
-        f"How much a small difference of the state grows in {t[early]:g} s and in {t[-1]:g} s: {each}. Where a curve crosses a "
+        f"How much a small difference of the state grows in {t[soon]:g} s and in {t[-1]:g} s: {each}. Where a curve crosses a "
         "dotted line, numbers of so many digits know nothing of the state."
     )
     return "trajectory_growth", fig, caption

@@ -14,10 +14,13 @@ from ...judge.check import Result, closest
 from ...judge.rounding import growth
 from ...judge.run import step_in_words
 from ...judge.words import listed
+from ...robots import Robot
+from .runs import affordable
 
 GROWTH_EVERY = 16  # steps between two recorded values of a growth
 GROWTH_RUN = (60.0, 6144)  # s and steps of RK4, for the growth of errors
 SHORT_GROWTH_RUN = (10.0, 512)  # of a small run
+GROWTH_STEPS_OF_A_FILE = 2048  # of RK4, as long as the shortest step of its scenes; or as many as can be afforded
 GROWN_EARLY = 5.0  # s: the other time at which a growth is reported
 CARRIED = {16: "doubles (16 digits)", 30: "30 digits"}
 MOST_EXACT_STEPS = 64  # of a run with many digits
@@ -32,6 +35,20 @@ def grown(case: Case, engines: Mapping[str, Engine], duration: float, steps: int
         return growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_EVERY)
 
 
+def growth_run(robot: Robot, cases: Sequence[Case], small: bool) -> tuple[float, int]:
+    """Over what time the growth of errors is followed, s, and with how many steps."""
+    if not (robot.is_read and cases):
+        return SHORT_GROWTH_RUN if small else GROWTH_RUN
+    most = 128 if small else min([GROWTH_STEPS_OF_A_FILE, *(affordable(case) for case in cases)])
+    steps = max(1, most // GROWTH_EVERY) * GROWTH_EVERY
+    return steps * min(case.scene.dt for case in cases), steps
+
+
+def early(t: np.ndarray) -> int:
+    """Which of the times is the other one at which a growth is reported: 5 s, or half of a shorter time."""
+    return int(np.searchsorted(t, min(GROWN_EARLY, t[-1] / 2)))
+
+
 def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, duration: float, steps: int) -> None:
     """log10 of the growth of a small difference over 5 s and the whole time, scene by scene, and in words."""
     t = np.linspace(0.0, duration, steps // GROWTH_EVERY + 1)
@@ -42,8 +59,8 @@ def growth_of_errors(result: Result, cases: Sequence[Case], curves: Iterable, du
 
 def growth_in_words(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> list[str]:
     """How much small differences have grown after 5 s and at the end, and which scenes have a horizon."""
-    early = int(np.searchsorted(t, GROWN_EARLY))
-    each = "; ".join(f"{name}: {power(g[early], 1)} and {power(g[-1], 1)}" for name, g in curves.items())
+    soon = early(t)
+    each = "; ".join(f"{name}: {power(g[soon], 1)} and {power(g[-1], 1)}" for name, g in curves.items())
     horizons = {name: {digits: reach(t, g, digits) for digits in CARRIED} for name, g in curves.items()}
     found = [
         f"{name}: {' and '.join(time_in_words(t, curves[name], at[digits]) + ' for ' + text for digits, text in CARRIED.items())}"
@@ -56,7 +73,7 @@ def growth_in_words(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> list[str
     none = f"No scene has a horizon within {least:g} s: nowhere does a difference of the last digit grow to 1 rad"
     none += f"; but of {listed(at_once)} nothing is known, for the run diverges at once." if at_once else "."
     return [
-        f"Growth of a small difference of the state over {t[early]:g} s and {t[-1]:g} s (RK4, exact Jacobians): {each}.",
+        f"Growth of a small difference of the state over {t[soon]:g} s and {t[-1]:g} s (RK4, exact Jacobians): {each}.",
         f"These have a horizon, beyond which a run depends on its last digits and on the step: {'; '.join(found)}."
         if found
         else none,
@@ -92,12 +109,26 @@ def many_digits(result: Result, cases: Sequence[Case], runs: Iterable[dict]) -> 
     for case, of_case in zip(cases, runs):
         for scheme, exact in of_case.items():
             curve, dt = result.curves["runs"][(case.name, scheme, case.steps)], case.duration / case.steps
-            last = min(round(curve["judged_until_s"] / dt), len(exact) - 1)
+            every = curve["every"]  # steps between two states of the band
+            last = min(round(curve["judged_until_s"] / dt), len(exact) - 1) // every
+            states = slice(0, last * every + 1, every)
             off = {
-                name: distance(curve[name][0][: last + 1], exact[: last + 1]).max(axis=1) for name in ("tmt", "mujoco")
+                name: distance_of(case, curve[name][0][states], exact[states]).max(axis=1) for name in ("tmt", "mujoco")
             }
             where = f"{case.name}, {curve['integrator']}, {step_in_words(case, case.steps)}"
-            check_digits(result, where, off, curve["band"][: last + 1], dt)
+            check_digits(result, where, off, curve["band"][: last + 1], every * dt)
+
+
+def distance_of(case: Case, q: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    """How far positions are from exact ones, as movements without signs, (states, nv)."""
+    if not case.coordinates.has_balls:
+        return distance(q, exact)
+    pairs = zip(q, exact)
+    with mpmath.workdps(DIGITS):
+        off = [
+            case.tree.coordinates.difference([mpmath.mpf(float(x)) for x in one], list(other)) for one, other in pairs
+        ]
+        return np.abs(np.array(off, dtype=float))
 
 
 def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: float) -> None:
@@ -113,13 +144,13 @@ def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: fl
 
 
 def exact_runs(case: Case, schemes: Sequence[str], most: int = MOST_EXACT_STEPS) -> dict[str, np.ndarray]:
-    """Joint angles of each scheme on mpmath numbers, over at most so many of the scene's own steps."""
+    """Positions of each scheme on mpmath numbers, over at most so many of the scene's own steps."""
     dt, steps = case.duration / case.steps, min(most, case.steps)
     return {scheme: exact_run(case, scheme, steps, dt) for scheme in schemes}
 
 
 def exact_run(case: Case, scheme: str, steps: int, dt: float) -> np.ndarray:
-    """Joint angles of the same scheme on mpmath numbers, from the same doubles: (steps + 1, n), fewer if it diverges."""
+    """Positions of the same scheme on mpmath numbers, from the same doubles: (steps + 1, nq), fewer if it diverges."""
     with mpmath.workdps(DIGITS):
         q, v, tau = ([mpmath.mpf(float(a)) for a in values] for values in (*case.start, case.tau))
         dt, path = mpmath.mpf(dt), [q]

@@ -4,14 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-import tmt
-from tmt.methods import METHODS
+from tmt.methods import METHODS, amplification
 
 from ...case import Case
 from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
-from ...judge.run import LEFT
-from ...truth.linear import stiffness
+from ...judge.run import LEFT, unit_of
 
 NO_TIME = 1e-6  # s: a step in which nothing moves
 STEADY = 1e-3  # per second: a slower growth is none in these runs
@@ -19,7 +17,7 @@ NEAR_PREDICTION = 2  # steps: so near the time that is predicted from rounding, 
 
 
 def accelerations_left(case: Case, engines: Mapping[str, Engine]) -> dict[str, np.ndarray]:
-    """The acceleration that each engine finds at the start under the torque that is to hold, rad/s2, (n,)."""
+    """The acceleration that each engine finds at the start under the torque that is to hold, rad/s2, (nv,)."""
     ours, theirs = compared(engines, case).values()
     return {
         "tmt": ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
@@ -36,20 +34,18 @@ def allowed(case: Case) -> float:
 def linear_map(case: Case) -> tuple[np.ndarray, np.ndarray]:
     """J and G of x+ = J x + G a: one step of RK4 of the linear motion about the start, pushed by a constant a, rad/s2.
 
-    x: deviations of angles and rates; J (2n, 2n), G (2n, n). xdd = -Mbar^-1 (K x + D xd) + a.
+    x: deviations of positions, as movements, and of speeds; J (2 nv, 2 nv), G (2 nv, nv). A = dxd/dx is exact: an explicit step
+    of Euler's method of 1 s is 1 + A.
     """
-    n, dt = len(case.joints), case.duration / case.steps
-    inverse = np.linalg.inv(tmt.mass_matrix(case.q, case.tree))
-    A = np.zeros((2 * n, 2 * n))
-    A[:n, n:] = np.eye(n)
-    A[n:] = -inverse @ np.hstack([stiffness(case.tree, case.q), np.diag(case.tree.damping)])
+    n, dt = case.coordinates.nv, case.duration / case.steps
+    A = amplification(METHODS["explicit_euler"], case.tree, case.q, case.v, case.tau, 1.0) - np.eye(2 * n)
     Z = dt * A
     pushed = dt * (np.eye(2 * n) + Z / 2 + Z @ Z / 6 + Z @ Z @ Z / 24)
     return np.eye(2 * n) + A @ pushed, pushed[:, n:]
 
 
 def predicted_leaving(case: Case, push: np.ndarray) -> float | None:
-    """When the linear map has the robot 0.1 rad away under a constant push, rad/s2: s; None: not in this scene."""
+    """When the linear map has the robot 0.1 rad, or m, away under a constant push, rad/s2: s; None: not in this scene."""
     J, G = linear_map(case)
     state = np.zeros(len(J))
     for k in range(1, case.steps + 1):
@@ -63,7 +59,8 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
     """A sentence for each engine: what the torque leaves, what becomes of it, when the robot left, and what the cause is."""
     J, _ = linear_map(case)
     rate = np.log(np.abs(np.linalg.eigvals(J)).max()) / (case.duration / case.steps)
-    may = allowed(case)
+    may, unit = allowed(case), unit_of(case.coordinates)
+    per = " or ".join(f"{one}/s2" for one in unit.split(" or "))
     grows = f"small deviations grow by up to e^{rate:.1f} per second" if rate > STEADY else "no small deviation grow"
     sentences = [f"The linear map of RK4 lets {grows}."]
     for name, push in accelerations_left(case, engines).items():
@@ -72,19 +69,21 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
             continue
         size, at = float(np.abs(push).max()), predicted_leaving(case, push)
         away = (
-            f"be {LEFT} rad away at {at:.2f} s" if at is not None else f"stay within {LEFT} rad for {case.duration:g} s"
+            f"be {LEFT} {unit} away at {at:.2f} s"
+            if at is not None
+            else f"stay within {LEFT} {unit} for {case.duration:g} s"
         )
         why = cause_in_words(case, size, may, at, left[name])
         sentences.append(
-            f"{LABELS[name]}: the torque leaves an acceleration of {size:.1e} rad/s2 (rounding allows {may:.1e}); by that map "
-            f"alone the {case.robot.name} would {away}; it {left_in_words(left[name])}{why}."
+            f"{LABELS[name]}: the torque leaves an acceleration of {size:.1e} {per} (rounding allows {may:.1e}); by that map "
+            f"alone the {case.robot.name} would {away}; it {left_in_words(left[name], unit)}{why}."
         )
     return sentences
 
 
-def left_in_words(left: float | None) -> str:
+def left_in_words(left: float | None, unit: str = "rad") -> str:
     """Whether and when a held robot left."""
-    return f"stays within {LEFT} rad" if left is None else f"is {LEFT} rad away at {left:.2f} s"
+    return f"stays within {LEFT} {unit}" if left is None else f"is {LEFT} {unit} away at {left:.2f} s"
 
 
 def cause_in_words(case: Case, size: float, may: float, at: float | None, left: float | None) -> str:

@@ -1,12 +1,14 @@
 """The rules of a run: until when it is judged, how close the engines must be, how they end."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...case import Coordinates
 from ...judge.check import Result, closest
 from ...judge.rounding import NARROW
+from ...judge.run import unit_of
 
 
 def ends_first(ends: Mapping[str, float | None]) -> float:
@@ -44,7 +46,7 @@ def check_level(
     result: Result,
     where: str,
     about: dict,
-    joints: Sequence[str],
+    coordinates: Coordinates,
     difference: np.ndarray,
     tolerance: ArrayLike,
     times: np.ndarray,
@@ -52,15 +54,19 @@ def check_level(
 ) -> None:
     """A row and a check: the component and state of the recorded ones that come closest to their tolerance.
 
-    about, ending: the first and the last columns of the row; difference: (states, n) rad/s2, or (states, 2n) rad and rad/s;
+    about, ending: the first and the last columns of the row; difference: (states, nv) rad/s2, or (states, 2 nv) rad and rad/s;
     tolerance: the same, or of a shape that stands for it; times: of the states, s.
     """
-    level, n = about["level"], len(joints)
+    level, n = about["level"], coordinates.nv
     difference = np.abs(difference)
     tolerance = np.broadcast_to(tolerance, difference.shape)
     k, i = closest(difference, tolerance)
-    unit, largest_unit = ("rad/s2",) * 2 if level == "derivative" else (("rad", "rad/s")[i // n], "rad")
-    place = f"{joints[i % n]} at t = {times[k]:.3f} s"
+    per = "/s2" if level == "derivative" else ("", "/s")[i // n]
+    unit = coordinates.units[i % n] + per
+    largest_unit = " or ".join(
+        one + (per if level == "derivative" else "") for one in unit_of(coordinates).split(" or ")
+    )
+    place = f"{coordinates.speeds[i % n]} at t = {times[k]:.3f} s"
     check = result.check(where, f"{level}, TMT to MuJoCo", difference[k, i], tolerance[k, i], unit, place, True)
     result.rows.append(
         about

@@ -7,15 +7,17 @@ import numpy as np
 
 from tmt.methods import METHODS
 
-from ...case import Case
+from ...case import Case, Coordinates
 from ...engines import Dynamics, Engine, Method, compared
 from ...judge.check import Result
 from ...judge.rounding import band, slope_rounding, step_rounding
-from ...judge.run import check_movement, departure, deviation_alive, diverged_at, required_time, step_in_words
+from ...judge.run import check_movement, departure, deviation_alive, diverged_at, required_time, step_in_words, unit_of
 from ...truth.smallest import reduced
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
 STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
+MOST_ENTRIES = 2_700_000  # of the Jacobians of all steps of a run: they take the time
+RECORDED = 128  # states of a run that are compared: one for each of the scene's own steps, or fewer
 HALF_TURN = (
     np.pi
 )  # rad: the bound of a step's rounding is of first order in dt, and none for a step that turns a joint farther
@@ -25,21 +27,40 @@ class TmtSide(NamedTuple):
     """What TMT gives of one case with one scheme and step; states are recorded at the scene's own steps."""
 
     t: np.ndarray  # (steps + 1,) s
-    q: np.ndarray  # (steps + 1, n) rad
-    v: np.ndarray
-    width: np.ndarray  # (recorded, 2n): the band of rounding
+    q: np.ndarray  # (steps + 1, nq) rad
+    v: np.ndarray  # (steps + 1, nv)
+    width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
     ended: float | None  # s: when it diverged
     states: list  # the recorded q and v before that
-    derivative: np.ndarray  # (states, n) rad/s2
+    derivative: np.ndarray  # (states, nv) rad/s2
     derivative_tolerance: np.ndarray  # (states,)
-    stepped: np.ndarray  # (states, 2n): one step from each
-    step_tolerance: np.ndarray
-    ulp: np.ndarray  # (steps + 1, n): angles of the run that starts one ulp away
+    stepped: list  # q and v one step from each of the states
+    step_tolerance: np.ndarray  # (states, 2 nv)
+    ulp: np.ndarray  # (steps + 1, nq): positions of the run that starts one ulp away
+
+
+def affordable(case: Case) -> int:
+    """The steps of a run up to which its band is computed: a Jacobian has (2 nv)^2 entries."""
+    return MOST_ENTRIES // (2 * case.coordinates.nv) ** 2
 
 
 def counts(case: Case, finer: Sequence[int]) -> list[int]:
-    """The numbers of steps of a case's runs: multiples of its own; at most 8192, its own excepted."""
-    return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= STEPS_AT_MOST]
+    """The numbers of steps of a case's runs: multiples of its own; at most 8192 and what is affordable, its own excepted."""
+    most = min(STEPS_AT_MOST, affordable(case))
+    return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= most]
+
+
+def recorded(case: Case) -> int:
+    """How many states of a run are compared, its start excepted: those of its own steps, or every second, fourth ... of them."""
+    count = case.steps
+    while count > RECORDED and count % 2 == 0:
+        count //= 2
+    return count
+
+
+def apart(coordinates: Coordinates, one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+    """How far states (q, v) are from others: movements and speeds, (..., 2 nv)."""
+    return np.concatenate([coordinates.difference(one[0], other[0]), one[1] - other[1]], axis=-1)
 
 
 def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], known: dict | None = None) -> Result:
@@ -49,8 +70,8 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
     several engines.
     """
     result, known = Result("trajectory"), {} if known is None else known
-    if case not in known:
-        known[case] = reduced(case)
+    if case not in known:  # what joints a scene of a robot from a file needs is not asked here
+        known[case] = None if case.robot.is_read else reduced(case)
     schemes = {}
     for method in engines["mujoco"].methods.values():
         schemes.setdefault(method.scheme, []).append(method)
@@ -74,7 +95,7 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
 def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide:
     """TMT's side of a case: the run, its band, and the two other levels at its recorded states."""
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
-    dt, every = case.duration / steps, steps // case.steps
+    dt, every = case.duration / steps, steps // recorded(case)
     t, q, v, *_ = dynamics.run(*case.start, tau, dt, steps, scheme)
     ended = diverged_at(case, t, q, v)
     alive = t[::every] < (np.inf if ended is None else ended)
@@ -82,7 +103,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     one_ulp_away = (np.nextafter(start, np.inf) for start in case.start)
     return TmtSide(
         t, q, v,
-        band(stepping, tree, q, v, tau, dt, every),
+        band(stepping, tree, q, v, tau, dt, every, affordable(case)),
         ended,
         states,
         dynamics.acceleration(*states, tau),
@@ -100,9 +121,10 @@ def compare_runs(
 
     Noted is from how many of the recorded states a step is too long to be compared alone.
     """
-    tau, dt, every, n = case.tau, case.duration / steps, steps // case.steps, len(case.joints)
+    tau, dt, every, coordinates = case.tau, case.duration / steps, steps // recorded(case), case.coordinates
     t, times, first = mine.t, mine.t[::every], None
-    angle_band = mine.width[:, :n].max(axis=1)
+    angle_band = mine.width[:, : coordinates.nv].max(axis=1)
+    turning = [i for i, unit in enumerate(coordinates.units) if unit == "rad"]
     accelerations = dynamics.acceleration(*mine.states, tau)
     for method in methods:
         _, *theirs = dynamics.run(*case.start, tau, dt, steps, method.name)[:3]
@@ -115,18 +137,18 @@ def compare_runs(
             "judged_until_s": until, "required_s": required, "diverged_at_s": ends["mujoco"],
             "twin_diverged_at_s": ends["tmt"],
         }  # fmt: skip
-        slow = dt * np.abs(mine.states[1]).max(axis=1) <= HALF_TURN
+        slow = dt * np.abs(mine.states[1][:, turning]).max(axis=1, initial=0.0) <= HALF_TURN
         one = one_step(dynamics, mine.states, tau, dt, method.name)
-        apart = np.hstack([a[::every][:count] - b[::every][:count] for a, b in zip((mine.q, mine.v), theirs)])
+        judged_states = [[path[::every][:count] for path in paths] for paths in ((mine.q, mine.v), theirs)]
         alive = times[: len(mine.states[0])]
         for level, difference, tolerance, at in (
             ("derivative", mine.derivative - accelerations, mine.derivative_tolerance[:, None], alive),
-            ("one step", (mine.stepped - one)[slow], mine.step_tolerance[slow], alive[slow]),
-            ("open loop", apart, mine.width[:count], times[:count]),
+            ("one step", apart(coordinates, mine.stepped, one)[slow], mine.step_tolerance[slow], alive[slow]),
+            ("open loop", apart(coordinates, *judged_states), mine.width[:count], times[:count]),
         ):
             if not len(at):
                 continue
-            check_level(result, where, about | {"level": level}, case.joints, difference, tolerance, at, ending)
+            check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
         if not slow.all():
             result.notes.append(f"{where}: {np.sum(~slow)} of {len(slow)}")
         if required:  # a scene may leave it open
@@ -134,18 +156,22 @@ def compare_runs(
         check_divergence(result, where, ends, dt, steps, angle_band)
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)
-            check_movement(result, where, min(deviation_alive(path[before], case.q) for path in (mine.q, theirs[0])))
+            moved = min(deviation_alive(path[before], case.q, coordinates) for path in (mine.q, theirs[0]))
+            check_movement(result, where, moved, unit_of(coordinates))
         if first is None:
             first = method, theirs
             result.curves[(case.name, method.scheme, steps)] = {
                 "integrator": method.name, "t": t, "every": every, "tmt": [mine.q, mine.v], "mujoco": theirs,
                 "band": angle_band, "ulp": mine.ulp, "judged_until_s": until, "ended": ends,
-                "left": {"tmt": departure(t, mine.q), "mujoco": departure(t, theirs[0])},
+                "left": {"tmt": departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
             }  # fmt: skip
         else:
             check_same_bits(result, where, first[0].name, first[1], theirs)
 
 
-def one_step(dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str) -> np.ndarray:
-    """Angles and rates one step after each of the states, (states, 2n)."""
-    return dynamics.run(*states, tau, dt, 1, method).states[:, 1]
+def one_step(
+    dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
+) -> list[np.ndarray]:
+    """q and v one step after each of the states."""
+    motion = dynamics.run(*states, tau, dt, 1, method)
+    return [motion.q[:, 1], motion.v[:, 1]]

@@ -8,12 +8,14 @@ from tmt.methods import METHODS
 
 from ...case import Case
 from ...engines import LABELS, Engine
+from ...engines.mujoco.flags import INTEGRATORS
 from ...judge.check import Result
-from ...judge.run import deviation, number_or_none
+from ...judge.run import moved_from, unit_of
 from ...judge.words import capital
 from ...robots import Robot
+from .errors import deviations
 from .leaving import causes_in_words, left_in_words
-from .runs import STEPS_AT_MOST, counts
+from .runs import STEPS_AT_MOST, affordable, counts
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
 
@@ -27,6 +29,7 @@ def notes(result: Result, robot: Robot, engines: Mapping[str, Engine], finer: Se
         *of_errors(runs, result.curves["errors"], cases),
         *of_first_order(runs, cases),
         f"MuJoCo's integrators here: {', '.join(engines['mujoco'].methods)}.",
+        *of_schemes(robot, engines["mujoco"]),
         *of_left_out([cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], finer),
     ]
 
@@ -35,18 +38,33 @@ def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     """What a run of a held posture says, of what is claimed of it if it is."""
     claims = case.robot.claims.of_scenes if case.robot.claims else {}
     about = f"Claim: {claims[case.name]}. Here" if case.name in claims else capital(case.name)
-    moved = {name: number_or_none(deviation(curve[name][0], curve[name][0][0])) for name in ("tmt", "mujoco")}
-    by = " and ".join(f"{LABELS[name]}'s {rad(value)}" for name, value in moved.items())
+    unit = unit_of(case.coordinates)
+    by = " and ".join(f"{LABELS[name]}'s {rad(value, unit)}" for name, value in deviations(case, curve).items())
     return (
         f"{about}, under TMT's torque, in {case.duration:g} s TMT's {case.robot.name} "
-        f"{left_in_words(curve['left']['tmt'])}, MuJoCo's {left_in_words(curve['left']['mujoco'])}; the farthest is {by}. "
-        + " ".join(causes_in_words(case, engines, curve["left"]))
+        f"{left_in_words(curve['left']['tmt'], unit)}, MuJoCo's {left_in_words(curve['left']['mujoco'], unit)}; the farthest is "
+        f"{by}. " + " ".join(causes_in_words(case, engines, curve["left"]))
     )
 
 
-def rad(value: float | None) -> str:
-    """An angle in words; None: the run has diverged."""
-    return "no number (it diverged)" if value is None else f"{value:.1e} rad"
+def of_schemes(robot: Robot, mujoco: Engine) -> list[str]:
+    """Which integrators are which scheme, of a robot from a file; and which is left out."""
+    if not robot.is_read:
+        return []
+    schemes, methods = {}, mujoco.methods
+    for method in methods.values():
+        schemes.setdefault(method.scheme, []).append(method.name)
+    said = [f"{' and '.join(names)}: {scheme}" for scheme, names in schemes.items()]
+    lacking = [name for name in INTEGRATORS if name not in methods]
+    return [
+        f"Their schemes in tmt, for this {robot.name}: {'; '.join(said)}.",
+        *(f"No scheme in tmt is that of MuJoCo's {name} for this {robot.name}: it is left out." for name in lacking),
+    ]
+
+
+def rad(value: float | None, unit: str = "rad") -> str:
+    """A movement in words; None: the run has diverged."""
+    return "no number (it diverged)" if value is None else f"{value:.1e} {unit}"
 
 
 def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
@@ -59,10 +77,11 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
     lines, says_nothing = [], []
     for name, (ours, theirs) in found.items():
         curve = runs[name, "rk4", cases[name].steps]
-        apart = agreement(curve)
+        case = cases[name]
+        apart, unit = agreement(curve, case), unit_of(case.coordinates)
         true = "rest" if cases[name].is_held else "more than 20 digits"
         lines.append(
-            f"{name} (true: {true}): TMT {rad(ours)}, MuJoCo {rad(theirs)}, apart {apart:.1e} rad in the "
+            f"{name} (true: {true}): TMT {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {apart:.1e} {unit} in the "
             f"{curve['judged_until_s']:.2f} s that are judged"
         )
         if None not in (ours, theirs) and max(ours, theirs) > SAYS_NOTHING * apart:
@@ -78,10 +97,11 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
     ]
 
 
-def agreement(curve: dict) -> float:
-    """How far the engines are apart while they are judged, rad."""
+def agreement(curve: dict, case: Case) -> float:
+    """How far the engines are apart while they are judged, rad or m."""
     last = int(np.searchsorted(curve["t"], curve["judged_until_s"] * (1 + 1e-9), side="right"))
-    return float(np.abs(curve["tmt"][0][:last] - curve["mujoco"][0][:last])[:: curve["every"]].max())
+    states = slice(0, last, curve["every"])
+    return float(moved_from(curve["tmt"][0][states], curve["mujoco"][0][states], case.coordinates).max())
 
 
 def of_first_order(runs: dict, cases: Mapping[str, Case]) -> list[str]:
@@ -118,13 +138,21 @@ def ends_in_words(ended: Mapping[str, float | None]) -> str:
 
 
 def of_left_out(cases: Sequence[Case], finer: Sequence[int]) -> list[str]:
-    """Which scenes are followed with fewer step sizes than others."""
-    names = [case.name for case in cases if len(counts(case, finer)) < len(finer)]
-    return (
-        [f"Runs of more than {STEPS_AT_MOST} steps, finer than a scene's own, are left out: {', '.join(names)}."]
-        if names
-        else []
-    )
+    """Which scenes are followed with fewer step sizes than others, and which are judged for fewer steps than they have."""
+    left_out, said = {}, []
+    for case in cases:
+        if len(counts(case, finer)) < len(finer):
+            left_out.setdefault(min(STEPS_AT_MOST, affordable(case)), []).append(case.name)
+    for most, names in left_out.items():
+        said.append(f"Runs of more than {most} steps, finer than a scene's own, are left out: {', '.join(names)}.")
+    long = {case.name: affordable(case) for case in cases if case.steps > affordable(case)}
+    if long:
+        which = "; ".join(f"{name}: {most} steps" for name, most in long.items())
+        said.append(
+            "The band of rounding asks for a Jacobian of each step, and these scenes are judged for no more steps than can be "
+            f"afforded: {which}."
+        )
+    return said
 
 
 def the_same(values: Iterable) -> object:

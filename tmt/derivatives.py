@@ -1,0 +1,68 @@
+"""Derivatives of a step for many states of a tree of many joints: of the slope by those of the linear system that gives it.
+
+A slope a solves residual(a, x) = 0, which is linear in a, see `residual` of the methods; so da/dx = -A^-1 dresidual/dx at fixed a,
+A = dresidual/da. Then dual numbers need not go through the solution, nor through derivatives of derivatives.
+"""
+
+import numpy as np
+
+from . import composite
+from .dual import Dual, seeded
+from .stepping import stepped
+
+PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
+
+
+def has_residual(stepping) -> bool:
+    """Whether a method says what a slope leaves of its linear system; not if its slope is another than that."""
+    return any("residual" in vars(kind) for kind in up_to_slope(type(stepping)))
+
+
+def up_to_slope(kind):
+    """The classes of an object down to the one that decides its slope."""
+    for base in kind.__mro__:
+        yield base
+        if "slope" in vars(base):
+            return
+
+
+def linear_system(
+    stepping, tree, q, qd, tau, dt, terms=composite.mass_matrix_and_bias
+) -> tuple[np.ndarray, np.ndarray]:
+    """A (states, nv, nv) and the force (states, nv) of A a = force, at states given by their components."""
+    n, zero = len(qd), 0.0 * qd[0]
+    a = seeded([zero] * n, np.eye(n)[..., None])
+    left = stepping.residual(tree, a, q, qd, tau, dt, terms)
+    A = np.array([np.broadcast_to(row.slope, (n, *zero.shape)) for row in left])
+    force = np.array([np.broadcast_to(row.value, zero.shape) for row in left])
+    return A.transpose(2, 0, 1), -force.T
+
+
+def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
+    """d(q, qd)+/d(q, qd) of one step for movements of q, (states, 2 nv, 2 nv). q (states, nq), qd (states, nv), dt (states,)."""
+    size = max(1, PART // qd.shape[1])
+    parts = [slice(k, k + size) for k in range(0, len(qd), size)]
+    return np.concatenate([of_part(stepping, tree, q[part], qd[part], tau, dt[part]) for part in parts])
+
+
+def of_part(stepping, tree, q, qd, tau, dt):
+    """The same of a few states."""
+    joints, nv, nq = tree.coordinates, qd.shape[1], q.shape[1]
+    start = [*q.T.copy(), *qd.T.copy()]
+    directions = np.eye(2 * nv)[..., None]  # component, direction, state
+    state = seeded(start, [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]])
+    level = state[0].level
+
+    def slope(q, qd):
+        values = [[x.value if isinstance(x, Dual) else x for x in part] for part in (q, qd)]
+        A, force = linear_system(stepping, tree, *values, tau, dt)
+        a = np.linalg.solve(A, force[..., None])[..., 0].T.copy()
+        left = stepping.residual(tree, list(a), q, qd, tau, dt, composite.mass_matrix_and_bias)
+        rows = np.array([np.broadcast_to(x.slope, (2 * nv, a.shape[1])) for x in left])
+        slopes = -np.linalg.solve(A, rows.transpose(2, 0, 1)).transpose(1, 2, 0)
+        return [Dual(value, one, level) for value, one in zip(a, slopes.copy())]
+
+    new_q, new_qd = stepped(stepping, tree, slope, state[:nq], state[nq:], dt)
+    moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
+    slopes = [np.broadcast_to(one, (2 * nv, len(dt))) for one in (*moved, *(x.slope for x in new_qd))]
+    return np.array(slopes).transpose(2, 0, 1)
