@@ -66,9 +66,7 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
     values = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
     for key, value in values.items():
         if key == "posture" and not isinstance(value, str):
-            raise SceneError(
-                f"{where}: posture is {shorten(repr(value))}; one of {', '.join(robot.poses)} is expected"
-            )
+            raise SceneError(f"{where}: posture is {shorten(repr(value))}; one of {', '.join(robot.poses)} is expected")
         if key not in UNITS or value in WORDS.get(key, ()):
             continue
         each = robot.coordinates.positions if key == "q" else robot.coordinates.speeds
