@@ -15,6 +15,7 @@ from compare.report.files import write
 from compare.report.verdict import Report, verdict
 from compare.robots.arm import ARM
 
+BALL = '<body><joint type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
 XML = ARM.mjcf.read_text(encoding="utf-8")
 
 
@@ -43,8 +44,7 @@ def test_any_other_and_whoever_asks_for_it_with_tmts_equations(asked, path):
 
 
 @pytest.mark.parametrize("text", [
-    XML.replace('name="gamma"', 'name="wrist"'),
-    XML.replace("<worldbody>", '<worldbody><body><joint type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'),
+    XML.replace('name="gamma"', 'name="wrist"'), XML.replace("<worldbody>", f"<worldbody>{BALL}"),
 ])  # fmt: skip
 def test_one_other_joint_makes_another_robot(tmp_path, text):
     path = tmp_path / "other.xml"
