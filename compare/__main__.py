@@ -140,7 +140,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 origin = provenance.provenance(command, robot.mjcf, reference.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 make = Setup.quick if options.quick else Setup
-                setup = make(robot, engines(mujoco), **of_run)
+                setup = make(robot, engines(mujoco, robot.tree), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]

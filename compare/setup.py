@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
+from tmt import Tree
+
 from . import states as samples
 from .case import Case
 from .engines import Dynamics, Engine, compared
@@ -16,9 +18,9 @@ from .robots import Robot
 T = TypeVar("T")
 
 
-def engines(mujoco: Engine) -> dict[str, Engine]:
-    """All engines by their names; some may be unavailable."""
-    return {engine.name: engine for engine in (mujoco, Tmt(), Scipy(), Heyoka())}
+def engines(mujoco: Engine, tree: Tree | None = None) -> dict[str, Engine]:
+    """All engines by their names; some may be unavailable, by what they cannot do with a robot's tree."""
+    return {engine.name: engine for engine in (mujoco, Tmt(), Scipy(), Heyoka(tree))}
 
 
 def nothing(*_: object) -> None:

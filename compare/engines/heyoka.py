@@ -16,6 +16,7 @@ from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .scipy import as_far_as_it_goes, each
 from .tmt import TmtDynamics
 
+MOST_JOINTS = 3  # it compiles anew for each tolerance and torque: one of seven hinges took 50 s each time
 FULL = 1e-15  # tolerance: all digits of a double
 
 
@@ -25,9 +26,16 @@ class Heyoka:
     name = "heyoka"
     methods: ClassVar[Mapping[str, Method]] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
+    def __init__(self, tree: Tree | None = None):
+        self.tree = tree  # of the robot, None: one that it can take
+
     def unavailable(self) -> str | None:
         if find_spec("heyoka") is None:
             return "heyoka is not installed; the extra `taylor` brings it, on Linux"
+        if self.tree and self.tree.coordinates.balls:
+            return "its expressions are written for hinges and slides, and there are balls"
+        if self.tree and len(self.tree.hinge_names) > MOST_JOINTS:
+            return f"it compiles anew for each tolerance, which would take minutes for more than {MOST_JOINTS} joints"
         return None
 
     def of(self, case: Case) -> "HeyokaDynamics":
@@ -76,7 +84,7 @@ class HeyokaDynamics(TmtDynamics):
 
         def read(outcome):
             why, *_, steps, _, path = outcome
-            q, v, ended = as_far_as_it_goes(t, path, start, f"heyoka stops: {why}")
+            q, v, ended = as_far_as_it_goes(t, path, start, f"heyoka stops: {why}", len(start) // 2)
             return Motion(t, q, v, None, ended, int(steps))
 
         return run, read

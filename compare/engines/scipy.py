@@ -74,7 +74,7 @@ class ScipyDynamics(TmtDynamics):
         from scipy.integrate import solve_ivp
 
         rate, tolerance = self.rate(), DEFAULT if tolerance is None else tolerance
-        start, torque, nothing = np.concatenate([q, v]), np.array(tau, float), np.zeros(2 * len(q))
+        start, torque, nothing = np.concatenate([q, v]), np.array(tau, float), np.zeros(len(q) + len(v))
         options = {"rtol": max(tolerance, LEAST_RELATIVE), "atol": tolerance}
 
         def slope(time, y):
@@ -98,8 +98,10 @@ class ScipyDynamics(TmtDynamics):
             if not isinstance(solution, NotFinite):
                 found, evaluations = solution.y.T, int(solution.nfev)
                 why = why if solution.success else solution.message
-            q, v, ended = as_far_as_it_goes(t, found, start, why)
-            return Motion(t, q, v, evaluations, ended)
+            path, path_v, ended = as_far_as_it_goes(t, found, start, why, len(q))
+            for ball in self.coordinates.places.balls:
+                path[:, ball.q] /= np.linalg.norm(path[:, ball.q], axis=1, keepdims=True)
+            return Motion(t, path, path_v, evaluations, ended)
 
         return run, read
 
@@ -109,18 +111,18 @@ class NotFinite(ArithmeticError):
 
 
 def as_far_as_it_goes(
-    t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str
+    t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str, nq: int
 ) -> tuple[np.ndarray, np.ndarray, str | None]:
     """q and v at the times t, NaN from where a run has no finite state any more, and why and when that is, or None.
 
-    found: (times reached, 2n), the states of a run that may have ended early; start: (2n,), its first.
+    found: (times reached, nq + nv), the states of a run that may have ended early; start: (nq + nv,), its first.
     """
     path = np.full((len(t), start.size), np.nan)
     path[: len(found)], path[0] = found, start
     finite = np.isfinite(path).all(axis=1)
     path[np.cumsum(~finite) > 0] = np.nan
     ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"
-    return *np.split(path, 2, axis=1), ended
+    return path[:, :nq], path[:, nq:], ended
 
 
 def each(solved: Callable[..., Motion], q: np.ndarray, v: np.ndarray, tau: np.ndarray, *more) -> Motion:
