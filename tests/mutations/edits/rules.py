@@ -41,9 +41,9 @@ EDITS = (
     Edit("judge.check", "Result.agree", "in_eps['TMT to exact'].max() if truth else None",
          "in_eps['MuJoCo to exact'].max() if truth else None", "the distances from the exact values are exchanged"),
     Edit("states", "Sample.truths", "slice(self.exact_states)", "slice(1)", "one state is compared with its exact value"),
-    Edit("states", "random", "robot.case().coordinates.random(rng, states)", "np.zeros((states, len(robot.joints)))",
+    Edit("states", "random", "robot.coordinates.random(rng, states, robot.ranges)", "np.zeros((states, len(robot.joints)))",
          "every random state is zero"),
-    Edit("states", "named", "len(q)", "1", "of the named postures one is compared with its exact value"),
+    Edit("states", "named", "len(q)", "1", "of the named postures one is compared with its exact value", nth=2),
     # scales
     Edit("judge.scale", "reaches", "to_hinge[hinge] + np.linalg.norm(com)", "100.0 * (to_hinge[hinge] + np.linalg.norm(com))",
          "reaches x 100"),
