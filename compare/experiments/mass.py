@@ -89,7 +89,7 @@ def rows(setup: Setup) -> Result:
     for sample in (*setup.named.each(), setup.random):
         M = {name: dynamics.mass_matrix(sample.q) for name, dynamics in compared.items()}
         scale = scales(robot.tree, robot.is_read, sample.q)
-        result.agree(sample, "Mbar", units, *M.values(), scale.mass_matrix, truth="mass_matrix")
+        result.agree(sample, "Mbar", units, M["tmt"], M["mujoco"], scale.mass_matrix, truth="mass_matrix")
     check_symmetry(result, M["tmt"], scale.mass_matrix if own else None)  # MuJoCo's is one triangle written twice
     for name, dynamics in compared.items():
         check_definiteness(result, LABELS[name], M[name], in_units=own)
