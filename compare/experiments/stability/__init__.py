@@ -93,6 +93,7 @@ def begin(setup: Setup) -> None:
         robots = about(robot.claims and (full or not setup.is_quick), (robot,))
         return setup.map(partial(function, engines, **more), robots)
 
+    let_go = about(seen.free and (every or not setup.is_quick), (seen.free,))
     mapped = about(every and seen.centre, of(each, (), each[:3]))
     minutes = list(product(about(every and seen.free, of(each, (), methods)), (coarse, long_runs.FINE_STEP)))
     resonant = about(every and seen.swinging, of(near, near[:2], near))
@@ -109,8 +110,8 @@ def begin(setup: Setup) -> None:
         "finer": claimed(claims.finer_steps, full=False, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))),
         "printed": claimed(claims.printed_torque, counts=of(claims.PRINTED_COUNTS, claims.PRINTED_COUNTS, (64, 256))),
         "kept": claimed(beyond.kept, full=False, counts=of(beyond.COUNTS_WITHIN, (), beyond.COUNTS_WITHIN[::7])),
-        "reset": ask(failure.own_reset, about(seen.free, (seen.free,))),
-        "gain": ask(failure.silent_gain, about(seen.free, (seen.free,))),
+        "reset": ask(failure.own_reset, let_go),
+        "gain": ask(failure.silent_gain, let_go),
         "maps": maps,
         "map": (mapped, ask(limits.map_of_growth, mapped, at=seen.centre, dts=maps["map"]["x"], steps=steps)),
         "near": (resonant, ask(failure.edge_growth, resonant, at=seen.centre, swings=maps["near"]["x"],

@@ -1,6 +1,7 @@
 """Failures that a linear limit does not foresee, or that an engine does not report."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -74,6 +75,7 @@ def observed(case: Case, t: np.ndarray, run: dict) -> dict:
     }  # fmt: skip
 
 
+@lru_cache(maxsize=16)
 def potential_range(case: Case) -> float:
     """The highest less the lowest potential, J: what the named postures lead to, joint by joint to where it is extreme."""
     starts = np.array([case.robot.posture(name) for name in named(case.robot)])

@@ -10,7 +10,7 @@ from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from ...robots import Robot
 from .choice import coarsest_case, step_text
-from .departure import DEPARTURE_TOLERANCE, late, near
+from .departure import DEPARTURE_TOLERANCE, late, near_row
 from .figures_limits import look
 from .subjects import subjects_of
 
@@ -53,7 +53,7 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
     rate = max(row["real_per_s"] for row in result.tables["stability_modes"] if row["scene"] == saddle)
     both = [row for row in rows if None not in (row["observed_s"], row["predicted_s"])]
-    close = sum(abs(late(row)) <= near(row["dt_s"]) for row in both)
+    close = sum(abs(late(row)) <= near_row(row) for row in both)
     caption = (
         f"How long the {robot.name} stays at {saddle}. Lines: first crossing of {LEFT:g} rad by each method's own linear map, "
         "its angles rounded to doubles; the fastest mode alone gives a slope of "
