@@ -145,11 +145,12 @@ def bent_by(at: Held) -> float:
 def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
     """Rows for tables/departure.csv: every method that is led and every perturbation at one dt, from one saddle."""
     values, vectors = at.modes
-    n, steps = at.nv, round(LONGEST_DEPARTURE / dt)
+    n = at.nv
     shape = vectors[:n, 0].real / np.abs(vectors[:n, 0]).max()
     rows, allowed = [], {"allowed_s": near(dt) + bent_by(at)} if at.case.robot.is_read else {}
     for method in (method for method in methods if is_led(at, method.scheme, dt)):
         own = own_torque(method, engines, at)
+        steps = round(LONGEST_DEPARTURE / dt)
         sizes = [(size, size * shape, own) for size in PERTURBATIONS]
         # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
         push = at.mass_matrix @ shape * values[0].real ** 2
@@ -159,11 +160,13 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
         if at.case.robot.is_read:
             sizes = [(size, *more) for size, *more in sizes if not_lost(at, size)]
         starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
+        off = residual(method, engines, at, torques)
+        expected = predicted(at, method.scheme, dt, [moved for _, moved, _ in sizes], off)
+        if allowed and None not in expected:
+            steps = min(steps, round((max(expected) + 2.0 * allowed["allowed_s"]) / dt))
         with np.errstate(over="ignore", invalid="ignore"):
             dynamics = engines[method.engine].of(at.case)
             motion = dynamics.run(at.moved(starts), np.zeros_like(starts), torques, dt, steps, method.name)
-        off = residual(method, engines, at, torques)
-        expected = predicted(at, method.scheme, dt, [moved for _, moved, _ in sizes], off)
         for (size, moved, _), time, path in zip(sizes, expected, motion.q):
             rows.append({
                 "scene": at.name + ("" if moved.any() else ", torque off"), "engine": method.engine,

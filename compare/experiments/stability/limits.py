@@ -13,10 +13,6 @@ from .choice import damped, who
 
 LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
-MOST_OF_A_QUARTER = {
-    False: 20_000,
-    True: 2500,
-}  # steps of a quarter of a run, however slow a mode swings; of a file's robot
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
 GROWTH_MARGIN = 1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
@@ -143,14 +139,14 @@ def shares(
 
 
 def quarter_of(at: Held, dt: float, steps: int) -> int:
-    """A quarter of a run of at least so many steps: it holds a swing of the slowest mode."""
+    """A quarter of a run of at least so many steps: it holds a swing of the slowest mode.
+
+    Of a robot that is read from a file, some mode of which may be very slow, a quarter of so many steps.
+    """
     swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
-    return max(
-        steps // 4,
-        min(MOST_OF_A_QUARTER[at.case.robot.is_read], int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
-        if len(swings)
-        else 0,
-    )
+    if at.case.robot.is_read or not len(swings):
+        return steps // 4
+    return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
 
 
 def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
@@ -167,10 +163,15 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
 
 
 def grows(early: np.ndarray, late: np.ndarray) -> bool:
-    """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run."""
+    """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run.
+
+    What has grown far may come to an end, or back: so early growth counts too.
+    """
     if not np.isfinite(late).all():
         return True
-    return bool(((late > GROWTH_ALLOWED) | ((late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED))).any())
+    return bool(
+        ((np.maximum(early, late) > GROWTH_ALLOWED) | ((late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED))).any()
+    )
 
 
 def growth_per_step(method: Method, engines: Mapping[str, Engine], at: Held, dt: float) -> dict:
