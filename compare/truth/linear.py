@@ -10,7 +10,7 @@ import tmt
 from tmt import METHODS, composite, method
 from tmt.dual import seeded
 from tmt.implicit import ImplicitRungeKutta
-from tmt.methods import RungeKutta, SemiImplicitEuler, amplification, by_speed, square
+from tmt.methods import RungeKutta, SemiImplicitEuler, amplification, by_speed
 
 from ..case import SEED, Case, Coordinates
 
@@ -311,9 +311,14 @@ class Held:
 
 def growth_of(stepping, z: np.ndarray) -> np.ndarray:
     """What a step of a Runge-Kutta method makes of 1 where y' = lambda y, for z = lambda dt of any shape."""
-    A = square(stepping.A) if type(stepping) is RungeKutta else np.array(stepping.A)
-    stages = np.linalg.solve(np.eye(len(A)) - z[..., None, None] * A, np.ones((len(A), 1)))[..., 0]
-    return 1.0 + z * (stages @ np.array(stepping.b))
+    if type(stepping) is ImplicitRungeKutta:
+        A = np.eye(len(stepping.b)) - z[..., None, None] * np.array(stepping.A)
+        stages = np.linalg.solve(A, np.ones((len(stepping.b), 1)))[..., 0]
+        return 1.0 + z * (stages @ np.array(stepping.b))
+    stages = []
+    for row in stepping.A:
+        stages.append(1.0 + z * sum(a * stage for a, stage in zip(row, stages) if a))
+    return 1.0 + z * sum(b * stage for b, stage in zip(stepping.b, stages) if b)
 
 
 def floats(tree: tmt.Tree) -> bool:
