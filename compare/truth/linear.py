@@ -219,6 +219,7 @@ class Held:
         """
         if np.ndim(dt):
             return self.linear_step(METHODS[name], np.asarray(dt, float))
+        dt = float(dt)
         if (METHODS[name], dt) not in self.steps:  # the same step is asked for many perturbations
             self.steps[METHODS[name], dt] = self.step(name, np.array([dt]))[0]
         return self.steps[METHODS[name], dt]

@@ -44,7 +44,8 @@ def tolerance(robot: Robot) -> str:
         "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
         "max|J| / 1e-6. Limits: the largest dt at which no mode of the equations of motion grows by more than 0.1 % from the "
         f"second to the last quarter of a run from 1e-6 rad ({run}), found by bisection {sought}, within 0.1 % of the predicted "
-        "dt. Growth: 0.1 % over all steps. Departure (a hinge 0.1 rad away): within one step or 0.03 s"
+        f"dt. Growth: 0.1 % over all steps. Departure (a {choice.joint_of(robot)} 0.1 {choice.unit_of(robot)} away): within one "
+        "step or 0.03 s"
         + (", and what forces that are not linear may add," if robot.is_read else "")
         + " of the first crossing of the method's linear map, whose angles are rounded to doubles at each step; where the map "
         "stays, the run stays."
@@ -136,8 +137,9 @@ def rows(setup: Setup) -> Result:
     work = setup.background.pop("stability")
     seen, methods = work["subjects"], methods_of(setup)
     robot = seen.robot
+    result.curves["looked at"] = seen.names
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
-    check_equilibria(result, robot, setup)
+    check_equilibria(result, setup)
     limits.check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
     departure.check_departures(result, [row for part in work["departure"] for row in part] + falls)
@@ -166,16 +168,15 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     # matplotlib is for the process that draws
     from . import figures_claims, figures_departure, figures_failure, figures_limits
 
-    tables, curves, seen = result.tables, result.curves, subjects_of(robot)
-    robot = seen.robot
-    falls = [row for row in tables.get("departure", ()) if seen.marginal and row["scene"] == seen.marginal.name]
-    left = seen.saddle and any(row["scene"] == seen.saddle.name for row in tables.get("departure", ()))
+    tables, curves, looked_at = result.tables, result.curves, result.curves["looked at"]
+    falls = [row for row in tables.get("departure", ()) if row["scene"] == looked_at["marginal"]]
+    left = any(row["scene"] == looked_at["saddle"] for row in tables.get("departure", ()))
     drawn = {
-        figures_limits.draw_limits: bool(seen.centre),
+        figures_limits.draw_limits: bool(looked_at["centres"]),
         figures_limits.draw_regions: True,
         figures_departure.draw_departure: left,
         figures_claims.draw_torques: "stability_torques" in tables,
-        figures_failure.draw_silent: "silent" in curves,
+        figures_failure.draw_silent: "silent" in curves and (not robot.is_read or failure.is_silent(curves["silent"])),
         figures_limits.draw_growth_map: curves["map"]["grown"],
         figures_failure.draw_edge: curves["edge"]["grown"],
         figures_claims.draw_finer_steps: "stability_finer_steps" in tables,

@@ -86,6 +86,16 @@ def dampings_of(robot: Robot) -> tuple[float, ...]:
     return DAMPINGS[:1] if robot.is_read else DAMPINGS
 
 
+def unit_of(robot: Robot) -> str:
+    """The unit of movements."""
+    return " or ".join(dict.fromkeys(robot.coordinates.units))
+
+
+def joint_of(robot: Robot) -> str:
+    """What the joints are called."""
+    return "hinge" if set(robot.tree.kind) == {"hinge"} else "joint"
+
+
 def damped(robot: Robot, damping: float) -> str:
     """What damping is added, N m s/rad, in words."""
     if damping:

@@ -12,7 +12,7 @@ from ...judge.check import Result
 from ...judge.run import LEFT, departure
 from ...judge.scale import EPS, gravity_scale
 from ...truth.linear import NEGLIGIBLE, Held
-from .choice import who
+from .choice import unit_of, who
 
 LONGEST_DEPARTURE = 12.0  # s
 INSTANT = 1e-6  # s
@@ -87,7 +87,7 @@ def predicted(
     longest: float = LONGEST_DEPARTURE,
     rounded: bool = True,
 ) -> list[float | None]:
-    """When the method's own linear map has a joint 0.1 rad away, s, for each of many starts; None: not within `longest`.
+    """When the method's own linear map has a joint 0.1 rad or m away, s, for each of many starts; None: not within `longest`.
 
     moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (k, n) N m. The map
     carries all modes of the state about the equilibrium that this torque moves. rounded: each new angle is rounded to a
@@ -147,6 +147,7 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
     values, vectors = at.modes
     n = at.nv
     shape = vectors[:n, 0].real / np.abs(vectors[:n, 0]).max()
+    column = "perturbation_" + unit_of(at.case.robot).replace(" ", "_")
     rows, allowed = [], {"allowed_s": near(dt) + bent_by(at)} if at.case.robot.is_read else {}
     for method in (method for method in methods if is_led(at, method.scheme, dt)):
         own = own_torque(method, engines, at)
@@ -170,7 +171,7 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
         for (size, moved, _), time, path in zip(sizes, expected, motion.q):
             rows.append({
                 "scene": at.name + ("" if moved.any() else ", torque off"), "engine": method.engine,
-                "method": method.name, "dt_s": dt, "perturbation_rad": size, "predicted_s": time,
+                "method": method.name, "dt_s": dt, column: size, "predicted_s": time,
                 "observed_s": departure(motion.t, at.away(path)), **allowed,
             })  # fmt: skip
     return rows
@@ -183,7 +184,7 @@ def check_departures(result: Result, rows: list[dict]) -> None:
     result.tables.setdefault("departure", []).extend(rows)
     for row in rows:
         check_row(
-            result, f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s, {row['perturbation_rad']:.0e} rad", row
+            result, f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s, {size_of(row):.0e} {unit_in(row)}", row
         )
     result.notes.append(departures_in_words(rows))
 
@@ -197,6 +198,18 @@ def not_led_in_words(at: Held, methods: tuple[Method, ...], dts: Iterable[float]
         f"Departures from {at.name} are not compared where a step lets another mode grow faster than that of the saddle, for "
         f"then rounding decides: {'; '.join(found)}."
     ]
+
+
+def unit_in(row: dict) -> str:
+    """The unit of a row's perturbation."""
+    return (
+        next(name for name in row if name.startswith("perturbation_")).removeprefix("perturbation_").replace("_", " ")
+    )
+
+
+def size_of(row: dict) -> float:
+    """A row's perturbation, in that unit."""
+    return next(value for name, value in row.items() if name.startswith("perturbation_"))
 
 
 def late(row: dict) -> float | None:
@@ -229,7 +242,7 @@ def departures_in_words(rows: list[dict]) -> str:
         text += (
             f", {close} of these within one step or {DEPARTURE_TOLERANCE:g} s; the largest difference is "
             f"{abs(late(worst)):.3f} s ({worst['scene']}, {who(worst)}, dt = {worst['dt_s']:.4g} s, "
-            f"{worst['perturbation_rad']:g} rad)"
+            f"{size_of(worst):g} {unit_in(worst)})"
         )
         fine = [abs(late(row)) for row in both if row["dt_s"] < coarsest]
         text += f", and {max(fine):.3f} s at steps below {coarsest:.4g} s" if fine else ""

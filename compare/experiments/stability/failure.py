@@ -168,6 +168,11 @@ def check_silent(result: Result, reset: dict, gain: dict) -> None:
     result.curves["silent"] = {"reset": reset, "gain": gain}
 
 
+def is_silent(runs: Mapping[str, dict]) -> bool:
+    """Whether one of the two runs fails."""
+    return any(run["since_s"] is not None for run in runs.values())
+
+
 def reset_in_words(reset: dict) -> str:
     """Whether MuJoCo starts a run again by itself, and what gives that away."""
     case = reset["case"]
