@@ -14,6 +14,7 @@ from .choice import damped, who
 LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
+FAR = 1e4  # fold, of what has left the reach of a linear motion
 GROWTH_MARGIN = 1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
 CRITERION = "no mode grows from the second to the last quarter of a run"
@@ -165,13 +166,12 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
 def grows(early: np.ndarray, late: np.ndarray) -> bool:
     """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run.
 
-    What has grown far may come to an end, or back: so early growth counts too.
+    What has grown far early may come back: it is out of the reach of a linear motion.
     """
     if not np.isfinite(late).all():
         return True
-    return bool(
-        ((np.maximum(early, late) > GROWTH_ALLOWED) | ((late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED))).any()
-    )
+    still = (late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED)
+    return bool(((early > FAR) | (late > GROWTH_ALLOWED) | still).any())
 
 
 def growth_per_step(method: Method, engines: Mapping[str, Engine], at: Held, dt: float) -> dict:
