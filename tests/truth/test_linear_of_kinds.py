@@ -7,7 +7,9 @@ from models import PATHS, random_tree
 import tmt
 from compare.engines.mujoco import reading
 from compare.robots.file import robot_of
-from compare.truth.linear import floats, held, named, stiffness
+from compare.truth.derivative import stiffness
+from compare.truth.linear import floats, held
+from compare.truth.postures import posture_names
 from compare.truth.rest import at_rest
 from tmt import METHODS
 from tmt.methods import amplification
@@ -32,7 +34,7 @@ def robots():
 
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "random"])
 def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(robots, name):
-    at = held(robots[name], named(robots[name])[0])
+    at = held(robots[name], posture_names(robots[name])[0])
     n, nudge, ends = at.nv, 1e-6 * np.eye(at.nv), []
     for sign in (1.0, -1.0):
         by_q = tmt.acceleration(at.moved(sign * nudge), np.zeros((n, n)), np.tile(at.tau, (n, 1)), at.tree)
@@ -46,7 +48,7 @@ def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(robots, n
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball"])
 @pytest.mark.parametrize("method", FIXED)
 def test_a_step_is_the_amplification_of_the_methods_own_step(robots, name, method):
-    at = held(robots[name], named(robots[name])[0])
+    at = held(robots[name], posture_names(robots[name])[0])
     if METHODS[method].solves_stages and at.tree.coordinates.balls:
         at = held(robots["pendulum"], "qpos0")
     for dt in (1e-3, 0.05):

@@ -11,7 +11,7 @@ from ...judge.check import Result
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import held
-from . import beyond, choice, claims, departure, failure, falling, limits, long_runs
+from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs
 from .choice import dampings_of
 from .claims_judged import check_claims
 from .equilibria import check_equilibria, planes
@@ -44,8 +44,8 @@ def tolerance(robot: Robot) -> str:
         "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
         "max|J| / 1e-6. Limits: the largest dt at which no mode of the equations of motion grows by more than 0.1 % from the "
         f"second to the last quarter of a run from 1e-6 rad ({run}), found by bisection {sought}, within 0.1 % of the predicted "
-        f"dt. Growth: 0.1 % over all steps. Departure (a {choice.joint_of(robot)} 0.1 {choice.unit_of(robot)} away): within one "
-        "step or 0.03 s"
+        f"dt. Growth: 0.1 % over all steps. Departure (a {choice.joint_of(robot)} 0.1 {choice.unit_of_movements(robot)} away): "
+        "within one step or 0.03 s"
         + (", and what forces that are not linear may add," if robot.is_read else "")
         + " of the first crossing of the method's linear map, whose angles are rounded to doubles at each step; where the map "
         "stays, the run stays."
@@ -116,9 +116,9 @@ def begin(setup: Setup) -> None:
         "reset": ask(failure.own_reset, let_go),
         "gain": ask(failure.silent_gain, let_go),
         "maps": maps,
-        "map": (mapped, ask(limits.map_of_growth, mapped, at=seen.centre, dts=maps["map"]["x"], steps=steps)),
+        "map": (mapped, ask(growth.map_of_growth, mapped, at=seen.centre, dts=maps["map"]["x"], steps=steps)),
         "near": (resonant, ask(failure.edge_growth, resonant, at=seen.centre, swings=maps["near"]["x"],
-                               sizes=[limits.LINEAR_DEVIATION, failure.LARGE_DEVIATION])),
+                               sizes=[growth.LINEAR_DEVIATION, failure.LARGE_DEVIATION])),
         "edge": (tongues, ask(failure.edge_growth, tongues, at=seen.centre, sizes=maps["edge"]["y"], swings=maps["edge"]["x"],
                               steps=steps)),
         "minutes": ask(long_runs.long_run, *([pair[k] for pair in minutes] for k in (0, 1)), case=seen.free,

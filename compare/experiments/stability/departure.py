@@ -1,21 +1,18 @@
 """How long a held posture is kept: departure from a saddle, under a small push and a small torque, in runs and predicted."""
 
 from collections.abc import Iterable, Mapping
-from itertools import product
 
 import numpy as np
-
-import tmt
 
 from ...engines import Engine, Method
 from ...judge.check import Result
 from ...judge.run import LEFT, departure
 from ...judge.scale import EPS, gravity_scale
 from ...truth.linear import NEGLIGIBLE, Held
-from .choice import unit_of, who
+from .choice import unit_of_movements, who
+from .torques import offset, own_torque, residual
 
 LONGEST_DEPARTURE = 12.0  # s
-INSTANT = 1e-6  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
 # rad, as the error of torque that moves the equilibrium as far; less is a few ulps
 TORQUE_ERRORS = (1e-13, 1e-14, 3e-15)
@@ -28,54 +25,6 @@ DEPARTURE_SCHEMES = (
     "gauss_legendre_4",
     "explicit_euler",
 )
-MOST_VARIED = 5  # joints, whose torques are varied in all combinations
-
-
-def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.ndarray:
-    """The torque under which the compiled arithmetic of an engine gives no acceleration at all at the posture, (n,) N m.
-
-    MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the one whose
-    residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
-    """
-    if method.engine == "mujoco":
-        own = engines["mujoco"].of(at.case).gravity_balance(at.q)
-        return own + tmt.spring_torque(at.q, at.tree) if at.tree.has_springs else own
-    tau = variants(at.tau, 2)
-    return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
-
-
-def residual(method: Method, engines: Mapping[str, Engine], at: Held, tau: np.ndarray) -> np.ndarray:
-    """The torque by which tau, (..., n) N m, fails to hold the posture in the arithmetic of an engine, to less than an ulp.
-
-    Read from the first step of a method, which is so short that nothing moves: Mbar qd / dt.
-    """
-    start = at.moved(np.zeros_like(tau))
-    motion = engines[method.engine].of(at.case).run(start, np.zeros_like(tau), tau, INSTANT, 1, method.name)
-    return motion.v[..., 1, :] @ at.mass_matrix / INSTANT
-
-
-def variants(tau: np.ndarray, reach: int = 1) -> np.ndarray:
-    """The torques within so many ulps of each component, (k, n) N m; the one in the middle is tau itself.
-
-    (2 reach + 1)^n of them, 27 for one ulp of three joints; of more than five joints one component differs at a time.
-    """
-    ulps = range(-reach, reach + 1)
-    if len(tau) <= MOST_VARIED:
-        away = np.array(list(product(ulps, repeat=len(tau))))
-    else:
-        single = [k * unit for k in ulps if k for unit in np.eye(len(tau))]
-        away = np.array([*single[: len(single) // 2], np.zeros(len(tau)), *single[len(single) // 2 :]])
-    return tau + away * np.spacing(np.abs(tau))
-
-
-def offset(at: Held, off: np.ndarray) -> np.ndarray:
-    """How far the posture is from the equilibrium of the held torque plus a small torque, rad and N m (k, n).
-
-    A torque along a mode without stiffness has no equilibrium, and is too small to matter.
-    """
-    n = at.nv
-    accelerations = np.linalg.solve(at.mass_matrix, np.transpose(off))
-    return (np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2) @ accelerations).T
 
 
 def predicted(
@@ -131,15 +80,15 @@ def not_lost(at: Held, size: float) -> bool:
     return size * DEPARTURE_TOLERANCE * rate.real >= measure * EPS * gravity_scale(at.tree) / abs(rate)
 
 
-def bent_by(at: Held) -> float:
+def curved_by(at: Held) -> float:
     """How far a departure may be from that of the linear map because forces are not linear over 0.1 rad, s.
 
     By the second derivative of the force along the mode, relative to the linear force 0.1 rad away, over the rate.
     """
     n, rate = at.nv, at.modes[0][0]
     shape = at.shapes[:n, 0].real
-    bent = np.linalg.solve(at.mass_matrix, at.curvature(shape)) * LEFT**2 / 2
-    return float(np.abs(bent).max() / (abs(rate) ** 2 * LEFT) / rate.real)
+    curved = np.linalg.solve(at.mass_matrix, at.curvature(shape)) * LEFT**2 / 2
+    return float(np.abs(curved).max() / (abs(rate) ** 2 * LEFT) / rate.real)
 
 
 def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
@@ -147,8 +96,8 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
     values, vectors = at.modes
     n = at.nv
     shape = vectors[:n, 0].real / np.abs(vectors[:n, 0]).max()
-    column = "perturbation_" + unit_of(at.case.robot).replace(" ", "_")
-    rows, allowed = [], {"allowed_s": near(dt) + bent_by(at)} if at.case.robot.is_read else {}
+    column = "perturbation_" + unit_of_movements(at.case.robot).replace(" ", "_")
+    rows, allowed = [], {"allowed_s": near(dt) + curved_by(at)} if at.case.robot.is_read else {}
     for method in (method for method in methods if is_led(at, method.scheme, dt)):
         own = own_torque(method, engines, at)
         steps = round(LONGEST_DEPARTURE / dt)

@@ -12,7 +12,9 @@ from ...judge.scale import EPS, FACTOR
 from ...judge.words import capital
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.linear import Held, held, named, region
+from ...truth.linear import Held, held
+from ...truth.postures import posture_names
+from ...truth.steps import region
 from .choice import coarsest_case, dampings_of
 from .subjects import Subjects, places, subjects_of
 
@@ -29,7 +31,7 @@ def check_equilibria(result: Result, setup: Setup) -> None:
     """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
     robot, mujoco, table = subjects_of(setup.robot).robot, setup.engines["mujoco"], []
     usual = (FINE_AMPLIFICATION, coarsest_case(robot).scene.dt)
-    for name in named(robot):
+    for name in posture_names(robot):
         at = held(robot, name)
         values = at.modes[0]
         table += [

@@ -14,9 +14,11 @@ from ...judge.check import Result
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
 from ...robots import Robot
-from ...truth.linear import Held, named
+from ...truth.linear import Held
+from ...truth.postures import posture_names
 from .choice import fraction
-from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth_in_run, stiffest
+from .growth import GROWTH_STEPS, LINEAR_DEVIATION, growth_in_run, stiffest
+from .limits import GROWTH_ALLOWED
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
 RESONANT_SWINGS = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
@@ -78,7 +80,7 @@ def observed(case: Case, t: np.ndarray, run: dict) -> dict:
 @lru_cache(maxsize=16)
 def potential_range(case: Case) -> float:
     """The highest less the lowest potential, J: what the named postures lead to, joint by joint to where it is extreme."""
-    starts = np.array([case.robot.posture(name) for name in named(case.robot)])
+    starts = np.array([case.robot.posture(name) for name in posture_names(case.robot)])
     return highest_potential(case.tree, starts, 1.0) + highest_potential(case.tree, starts, -1.0)
 
 

@@ -9,7 +9,7 @@ from ...judge.run import LEFT, number_or_nan
 from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from ...robots import Robot
-from .choice import coarsest_case, joint_of, step_text, unit_of
+from .choice import coarsest_case, joint_of, step_text, unit_of_movements
 from .departure import DEPARTURE_TOLERANCE, late, near_row, size_of
 from .figures_limits import look
 
@@ -21,7 +21,7 @@ ENGINE_LOOKS = {"tmt": (BLUE, "o"), "mujoco": (ORANGE, "s")}
 
 def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Time to leave a saddle against the size of the perturbation, with the predicted slope."""
-    unit = unit_of(robot)
+    unit = unit_of_movements(robot)
     saddle, coarse = result.curves["looked at"]["saddle"], coarsest_case(robot)
     rows = [row for row in result.tables["departure"] if row["scene"] in (saddle, f"{saddle}, torque off")]
     steps = sorted({row["dt_s"] for row in rows}, reverse=True)

@@ -12,7 +12,7 @@ from ...robots import Robot
 from .choice import coarsest_case, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
 from .figures_limits import look
-from .limits import LINEAR_DEVIATION
+from .growth import LINEAR_DEVIATION
 
 
 def draw_edge(result: Result, robot: Robot) -> tuple[str, Figure, str]:

@@ -10,7 +10,8 @@ from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
 from .choice import coarsest_case, damped, fraction
 from .departure import span
-from .limits import LINEAR_DEVIATION, apart
+from .growth import LINEAR_DEVIATION
+from .limits import apart
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),

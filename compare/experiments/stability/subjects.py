@@ -11,11 +11,12 @@ import numpy as np
 from ...case import Case
 from ...judge.words import capital
 from ...robots import Robot
-from ...truth.linear import Held, all_of_kind, all_that_stay, floats, held, named, of_kind
+from ...truth.linear import Held, floats, held
+from ...truth.postures import all_of_kind, all_that_stay, of_kind, posture_names
 from ...truth.rest import at_rest
 from .choice import DAMPINGS, free_motion
 from .falling import without_law
-from .limits import stiffest
+from .growth import stiffest
 
 MOST_POSTURES = 6  # named postures that are looked at, the first
 MANY = 7  # speeds, beyond which the runs of a file's robot are at one such posture
@@ -108,10 +109,12 @@ def looked_at(robot: Robot) -> tuple[Robot, list[str]]:
 
     Of a file's robot, whose postures are seldom at rest without torque, also the one to which it sinks from the first of them.
     """
-    names, notes = named(robot), []
+    names, notes = posture_names(robot), []
     if len(names) > MOST_POSTURES:
         names = names[:MOST_POSTURES]
-        notes.append(f"Of {len(named(robot))} named postures the first {len(names)} are looked at: {', '.join(names)}.")
+        notes.append(
+            f"Of {len(posture_names(robot))} named postures the first {len(names)} are looked at: {', '.join(names)}."
+        )
         postures, positions = ({n: of[n] for n in names if n in of} for of in (robot.postures, robot.positions))
         robot = replace(robot, postures=postures, positions=positions)
     if not robot.is_read:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from judged import BOTH, only
 
-from compare.experiments.stability import departure, falling, figures_departure
+from compare.experiments.stability import departure, falling, figures_departure, torques
 from compare.experiments.stability.subjects import subjects_of
 from compare.judge import run
 from compare.robots.arm import ARM
@@ -68,7 +68,7 @@ def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
 @pytest.mark.parametrize("joints, reach, count", [(3, 1, 27), (4, 2, 625), (5, 1, 243), (6, 1, 13), (9, 2, 37)])
 def test_torques_within_some_ulps_are_bounded_in_number(joints, reach, count):
     tau = np.linspace(-3.0, 5.0, joints)
-    found = departure.variants(tau, reach)
+    found = torques.variants(tau, reach)
     assert found.shape == (count, joints) and (found[count // 2] == tau).all()
     away = np.abs(found - tau) / np.spacing(np.abs(tau))
     assert len({tuple(row) for row in found}) == count and (away.max(axis=0) == reach).all()

@@ -10,7 +10,8 @@ from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import engines
-from compare.truth.linear import held, named
+from compare.truth.linear import held
+from compare.truth.postures import posture_names
 
 SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
   <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body></worldbody>{keys}</mujoco>"""
@@ -27,13 +28,13 @@ def read(source):
 def test_of_many_keyframes_the_first_are_looked_at_and_named():
     keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
     robot, _ = read(SWING.format(keys=f"<keyframe>{keys}</keyframe>"))
-    assert len(named(robot)) > MOST_POSTURES
+    assert len(posture_names(robot)) > MOST_POSTURES
     seen = subjects_of(robot)
     first = [f"k{i}" for i in range(MOST_POSTURES)]
-    assert named(seen.robot) == (*first, "at rest") and seen.centres[-1] == "at rest"
+    assert posture_names(seen.robot) == (*first, "at rest") and seen.centres[-1] == "at rest"
     assert any(f"the first {MOST_POSTURES} are looked at: {', '.join(first)}." in text for text in seen.left_out)
     assert not np.abs(held(seen.robot, "at rest").tau).max() > 1e-6
-    assert named(subjects_of(ARM).robot) == tuple(ARM.postures)
+    assert posture_names(subjects_of(ARM).robot) == tuple(ARM.postures)
 
 
 @pytest.mark.parametrize("name, words", [
