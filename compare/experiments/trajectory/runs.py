@@ -17,7 +17,7 @@ from .rules import check_divergence, check_level, check_same_bits, ends_first, j
 
 STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
 MOST_ENTRIES = 2_700_000  # of the Jacobians of all steps of a run: they take the time
-RECORDED = 128  # states of a run that are compared: one for each of the scene's own steps, or fewer
+RECORDED = 64  # states of a run that are compared: one for each of the scene's own steps, or fewer
 HALF_TURN = (
     np.pi
 )  # rad: the bound of a step's rounding is of first order in dt, and none for a step that turns a joint farther
