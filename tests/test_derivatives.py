@@ -32,7 +32,7 @@ def test_a_slope_leaves_nothing_of_its_linear_system(name):
     A, force = derivatives.linear_system(stepping, TREE, *state)
     matrix = stepping.matrix(TREE, *state[:2], 0.01)
     assert A.transpose(1, 2, 0) == pytest.approx(np.array([[x + 0.0 * a[0] for x in row] for row in matrix]), abs=1e-11)
-    assert np.linalg.solve(A, force[..., None])[..., 0].T == pytest.approx(np.array(a), rel=1e-9)
+    assert pytest.approx(np.array(a), rel=1e-9) == np.linalg.solve(A, force[..., None])[..., 0].T
 
 
 def test_many_states_are_the_same_as_each_alone(monkeypatch):

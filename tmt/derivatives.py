@@ -1,7 +1,7 @@
 """Derivatives of a step for many states of a tree of many joints: of the slope by those of the linear system that gives it.
 
-A slope a solves residual(a, x) = 0, which is linear in a, see `residual` of the methods; so da/dx = -A^-1 dresidual/dx at fixed a,
-A = dresidual/da. Then dual numbers need not go through the solution, nor through derivatives of derivatives.
+A slope a solves residual(a, x) = 0, which is linear in a, see `residual` of the methods; so da/dx = -A^-1 dresidual/dx at fixed
+a, with A = dresidual/da. Then dual numbers need not go through the solution, nor through derivatives of derivatives.
 """
 
 import numpy as np
