@@ -22,7 +22,7 @@ def claim(robot: Robot) -> str:
     if robot.is_read:
         return (
             "For every integrator of MuJoCo the same scheme stands on the TMT side, as the notes say; integrators that are one "
-            "scheme here agree with it alike. implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is "
+            "scheme here give the same bits. implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is "
             "the classical one. The two agree in the derivative at recorded states, in one step from each of them, and in the "
             "open-loop run as long as rounding allows."
         )
@@ -60,9 +60,10 @@ def of_file(robot: Robot) -> str:
         f"the sum of the absolute terms of the force, and 8 eps of the sums of the step{ball}. Open loop: a band computed along "
         "the run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's "
         f"own steps. Judged while the band of the positions is below {NARROW:g} {unit} and no run has diverged. A run has "
-        f"diverged if it stops, is not finite, or has gained more energy than the {robot.name}'s motion can have exchanged: its whole "
-        "potential range with the energy of speeds and springs at the start, or, where that is more, the work of the torque and "
-        "of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same step."
+        f"diverged if it stops, is not finite, or has gained more energy than the {robot.name}'s motion can have exchanged: "
+        "the whole potential range with the energy of speeds and springs at the start, or, where that is more, the work of the "
+        "torque and of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same "
+        "step."
     )
 
 

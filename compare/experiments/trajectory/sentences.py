@@ -13,7 +13,7 @@ from ...judge.check import Result
 from ...judge.run import moved_from, unit_of
 from ...judge.words import capital
 from ...robots import Robot
-from .errors import deviations
+from .errors import coarsest_run, deviations
 from .leaving import causes_in_words, left_in_words
 from .runs import MOST_ENTRIES, STEPS_AT_MOST, affordable, counts
 
@@ -25,9 +25,9 @@ def notes(
 ) -> list[str]:
     """All of them, of the runs that these engines have given."""
     runs, cases = result.curves["runs"], {case.name: case for case in robot.cases}
-    held = [case for case in robot.cases if case.is_held and (case.name, "rk4", case.steps) in runs]
+    held = [(case, curve) for case in robot.cases if case.is_held and (curve := coarsest_run(runs, case))]
     return [
-        *(of_held(case, engines, runs[case.name, "rk4", case.steps]) for case in held),
+        *(of_held(case, engines, curve) for case, curve in held),
         *of_errors(runs, result.curves["errors"], cases),
         *of_first_order(runs, cases),
         f"MuJoCo's integrators here: {', '.join(engines['mujoco'].methods)}.",
@@ -80,7 +80,7 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
         return []
     lines, says_nothing = [], []
     for name, (ours, theirs) in found.items():
-        curve = runs[name, "rk4", cases[name].steps]
+        curve = coarsest_run(runs, cases[name])
         case = cases[name]
         apart, unit = agreement(curve, case), unit_of(case.coordinates)
         true = "rest" if cases[name].is_held else "more than 20 digits"
