@@ -14,16 +14,13 @@ PART = 4096  # states times speeds that are taken at once: more do not stay in t
 
 
 def has_residual(stepping) -> bool:
-    """Whether a method says what a slope leaves of its linear system; not if its slope is another than that."""
-    return any("residual" in vars(kind) for kind in up_to_slope(type(stepping)))
-
-
-def up_to_slope(kind):
-    """The classes of an object down to the one that decides its slope."""
-    for base in kind.__mro__:
-        yield base
-        if "slope" in vars(base):
-            return
+    """Whether a method says what a slope leaves of its linear system; not if its slope, or the matrix, is another since."""
+    for kind in type(stepping).__mro__:
+        if "residual" in vars(kind):
+            return True
+        if {"slope", "matrix"} & vars(kind).keys():
+            return False
+    return False
 
 
 def linear_system(

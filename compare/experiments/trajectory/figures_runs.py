@@ -100,7 +100,12 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     lines_of_legend = -(-(len(shown) + 4) // LEGEND_COLUMNS)
     fig.subplots_adjust(
-        left=0.105, right=0.985, bottom=0.075, top=(93 - 3 * lines_of_legend) / 100, hspace=0.12, wspace=0.08
+        left=0.105,
+        right=0.985,
+        bottom=0.075,
+        top=(93 - 3 * lines_of_legend - 2 * (len(columns) > 3)) / 100,
+        hspace=0.12,
+        wspace=0.08,
     )
     axes = fig.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
     until = []
@@ -132,7 +137,14 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
         until.append(f"{c['integrator']} to {c['judged_until_s']:.2f} s")
     place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
     per = " or ".join(f"{one}/s" for one in unit.split(" or "))
-    for ax, label in zip(axes[:, 0], (f"{place}, {unit}", f"{speed}, {per}", f"{place}: difference, {unit}")):
+    for ax, label in zip(
+        axes[:, 0],
+        (
+            f"{place}, {unit}",
+            f"{speed}, {per}",
+            f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}",
+        ),
+    ):
         ax.set_ylabel(label)
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
     fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=LEGEND_COLUMNS)
