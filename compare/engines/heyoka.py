@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tmt import Tree, composite
+from tmt import Tree, composite, kernels
 from tmt.method import acceleration
 from tmt.space import arctan, cos, sin, sqrt
 
@@ -17,6 +17,9 @@ from .scipy import as_far_as_it_goes, each
 from .tmt import TmtDynamics
 
 FULL = 1e-15  # tolerance: all digits of a double
+# of the accelerations: heyoka's compilation takes longer than in proportion, 15 s for 290 of them, 266 s for 2479
+MOST_OPERATIONS = 600
+MOST_JOINTS = 12  # up to which the operations are counted
 
 
 class Heyoka:
@@ -29,6 +32,14 @@ class Heyoka:
         if find_spec("heyoka") is None:
             return "heyoka is not installed; the extra `taylor` brings it, on Linux"
         return None
+
+    def too_long(self, tree: Tree) -> str | None:
+        """Why the compilation for a Tree would take minutes, or None."""
+        many = f"with {len(tree.axis)} speeds its compilation would take minutes"
+        if len(tree.axis) > MOST_JOINTS:
+            return many
+        count = kernels.slope_source(tree, "rk4").operations
+        return None if count <= MOST_OPERATIONS else f"{many}: its equations have {count} operations"
 
     def of(self, case: Case) -> "HeyokaDynamics":
         return HeyokaDynamics(case)

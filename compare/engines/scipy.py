@@ -78,7 +78,7 @@ class ScipyDynamics(TmtDynamics):
         options = {"rtol": max(tolerance, LEAST_RELATIVE), "atol": tolerance}
 
         def slope(time, y):
-            result = rate(y, torque)
+            result = rate(np.ascontiguousarray(y), torque)  # Radau gives columns of a matrix
             if result @ nothing != 0.0:  # solve_ivp would try ever smaller steps without end
                 raise NotFinite(time)
             return result

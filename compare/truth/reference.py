@@ -1,7 +1,8 @@
 """The runs with many digits that errors are measured against: a table, made anew where a number of the model has changed.
 
 How many digits are right is seen by halving the step: each run stands in the table with the largest difference from a run with
-half as many steps, which bounds the error of the coarser of the two.
+half as many steps, which bounds the error of the coarser of the two. The robot of a file has a run in doubles instead, of order
+8, whose digits are seen in the same way.
 """
 
 import csv
@@ -16,10 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+import tmt
 from tmt.cache import own_file
 from tmt.reference_run import trajectory
 
-from ..case import Case
+from ..case import Case, Coordinates
 
 TABLE = Path(__file__).with_name("reference.csv")
 RECORDS = 64  # of a run, and its start
@@ -31,6 +33,7 @@ UNUSABLE = (
     ValueError,
     csv.Error,
 )  # of a cache folder: none, not the user's own; or of what is in it
+DOUBLES, MOST_DOUBLINGS = "dopri8", 5  # the method of a run in doubles; how often its steps are doubled at most
 ABOUT = ["scene", "key", "steps", "halving_difference", "t_s"]
 
 
@@ -38,14 +41,19 @@ class Reference(NamedTuple):
     """One run: every number as the sum of two doubles."""
 
     t: np.ndarray  # (65,) s
-    high: np.ndarray  # (65, 2 n) rad, rad/s
-    low: np.ndarray  # (65, 2 n)
+    high: np.ndarray  # (65, nq + nv) rad, rad/s
+    low: np.ndarray  # (65, nq + nv)
     halving: float  # largest difference from the run with half the steps
     steps: int
+    coordinates: Coordinates | None = None  # of a run in doubles; None: of hinges, with many digits
 
     def error(self, q: np.ndarray, joints: Sequence[int]) -> np.ndarray:
-        """The largest error of the angles q (65, m) of m joints by their places at each time, rad, (65,)."""
-        return np.abs((q - self.high[:, joints]) - self.low[:, joints]).max(axis=1)
+        """The largest error of the positions q (65, ...) of some joints by their places at each time, rad or m, (65,)."""
+        if self.coordinates is None:
+            return np.abs((q - self.high[:, joints]) - self.low[:, joints]).max(axis=1)
+        whole = self.coordinates
+        part = Coordinates(*(tuple(names[i] for i in joints) for names in (whole.names, whole.all_kinds)))
+        return np.abs(part.difference(q, self.high[:, [k for i in joints for k in range(*whole.places.joints[i].q.indices(whole.nq))]])).max(axis=1)
 
 
 def columns(case: Case) -> list[str]:
@@ -60,7 +68,12 @@ def key(case: Case) -> str:
 
 
 def references(cases: Sequence[Case], map: Callable = map, progress: Callable = print) -> dict[str, Reference]:
-    """Each case's reference by its name: from the committed table, else from the user's cache folder, else computed, and kept."""
+    """Each case's reference by its name: from the committed table, else from the user's cache folder, else computed, and kept.
+
+    Of the robot of a file a run in doubles: what an evaluation with many digits costs has no bound there.
+    """
+    known = {case.name: in_doubles(case) for case in cases if case.robot.is_read}
+    cases = [case for case in cases if case.name not in known]
     rows = read_table(TABLE)
     for case in cases:
         if key(case) not in rows:
@@ -73,7 +86,35 @@ def references(cases: Sequence[Case], map: Callable = map, progress: Callable = 
         rows[key(case)] = made
         with suppress(*UNUSABLE):
             write_table(cache_file(case), made)
-    return {case.name: reference(rows[key(case)]) for case in cases}
+    return known | {case.name: reference(rows[key(case)]) for case in cases}
+
+
+def in_doubles(case: Case) -> Reference:
+    """A run in doubles by tmt's method of order 8: twice the steps as long as two runs come nearer to each other.
+
+    ValueError if none reaches the end of the scene.
+    """
+    count, found = -(-case.steps // RECORDS) * RECORDS, []
+    before = after = None
+    for _ in range(MOST_DOUBLINGS + 1):
+        after = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)
+        every = count // RECORDS
+        after = after.q[::every], after.qd[::every]
+        if before is not None:
+            apart = case.coordinates.difference(after[0], before[0]), after[1] - before[1]
+            found.append((np.abs(np.concatenate(apart, axis=1)).max(), after, count))
+            if len(found) > 1 and not found[-1][0] < found[-2][0] / 2.0:
+                break
+        before, count = after, 2 * count
+    apart, path, count = min(found, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
+    if not np.isfinite(apart):
+        raise ValueError(
+            f"scene {case.name!r}: runs with up to {count} steps of {DOUBLES} do not reach its end; a slower start or a "
+            "shorter scene is expected"
+        )
+    high = np.concatenate(path, axis=1)
+    times = np.linspace(0.0, case.duration, RECORDS + 1)
+    return Reference(times, high, np.zeros_like(high), float(apart), count, case.coordinates)
 
 
 def committed(case: Case) -> Reference | None:

@@ -35,21 +35,27 @@ class Needed(NamedTuple):
 def needed(case: Case) -> Needed:
     """Which joints of the case its motion needs."""
     tree = case.tree
-    names = case.joints
-    moves = {name: f"{name} has a speed at the start" for name, rate in zip(names, case.v) if rate}
+    names, coordinates = case.joints, case.coordinates
+    joints = dict(zip(names, coordinates.places.joints))
+    units = {name: coordinates.units[joint.qd.start] for name, joint in joints.items()}
+    moves = {name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])}
     undecided = ()
     while still := tuple(name for name in names if name not in moves and name not in undecided):
         when = "at the start" if len(still) == len(names) else "when the others move"
         largest = dict.fromkeys(still, 0.0)
         rng = np.random.default_rng(SEED)
         for _ in range(TRIALS):
-            q, qd = rng.uniform(-np.pi, np.pi, len(names)), rng.uniform(-10.0, 10.0, len(names))
-            for name, value in exact_accelerations(case, tree, still, q, qd).items():
-                largest[name] = max(largest[name], abs(value))
-        found = {name: f"{name} accelerates by {float(a):.2g} rad/s2 {when}" for name, a in largest.items() if a > ZERO}
+            (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
+            for name, values in exact_accelerations(case, tree, still, q, qd).items():
+                largest[name] = max(largest[name], *map(abs, values))
+        found = {
+            name: f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
+            for name, a in largest.items()
+            if a > ZERO
+        }
         moves |= found
         if not found:
-            unfolded = tuple(name for name, number in folded(case, tree, still).items() if number != 0.0)
+            unfolded = tuple(name for name, parts in folded(case, tree, still).items() if any(n != 0.0 for n in parts))
             if not unfolded:
                 break
             undecided += unfolded
@@ -57,19 +63,22 @@ def needed(case: Case) -> Needed:
 
 
 def accelerations(case: Case, tree: Tree, still: Sequence[str], scalar: Callable, q: Sequence, qd: Sequence) -> dict:
-    """Accelerations of the joints in `still`, at their start and at rest, the others at q, qd: by name, over any scalar.
+    """Accelerations of the joints in `still`, at their start and at rest, the others at q, qd: tuples by name, over any scalar.
 
-    A torque that holds is the model's own bias at the start, over the same scalar: not its rounded value.
+    A torque that holds is the model's own bias (and springs) at the start, over the same scalar: not its rounded value.
     """
-    start = [scalar(float(angle)) for angle in case.q]
-    q = [s if name in still else v for name, s, v in zip(tree.hinge_names, start, q)]
-    qd = [scalar(0.0) if name in still else v for name, v in zip(tree.hinge_names, qd)]
+    start = [scalar(float(value)) for value in case.q]
+    q, qd, joints = list(q), list(qd), dict(zip(case.joints, tree.coordinates.joints))
+    for name in still:
+        _, at, by = joints[name]
+        q[at], qd[by] = start[at], [scalar(0.0)] * len(qd[by])
     if case.scene.torque == "hold":
         tau = method.bias(method.bodies(tree, start), tree.gravity)
+        tau = [h + spring for h, spring in zip(tau, method.spring_torque(tree, start))] if tree.has_springs else tau
     else:
         tau = [scalar(float(torque)) for torque in case.tau]
-    by_name = dict(zip(tree.hinge_names, method.acceleration(tree, q, qd, tau)))
-    return {name: by_name[name] for name in still}
+    found = method.acceleration(tree, q, qd, tau)
+    return {name: tuple(found[joints[name].qd]) for name in still}
 
 
 def exact_accelerations(case: Case, tree: Tree, still: Sequence[str], q: np.ndarray, qd: np.ndarray) -> dict:
@@ -81,9 +90,10 @@ def exact_accelerations(case: Case, tree: Tree, still: Sequence[str], q: np.ndar
 
 def folded(case: Case, tree: Tree, still: Sequence[str]) -> dict:
     """The numbers to which the traced accelerations fold; None where one remains an expression."""
-    tape = Tape()
-    q, qd = (tape.inputs(*(f"{name}{i}" for i in range(len(tree.parent)))) for name in ("q", "qd"))
-    return {name: tape.lift(a).number for name, a in accelerations(case, tree, still, tape.lift, q, qd).items()}
+    tape, sizes = Tape(), {"q": tree.coordinates.nq, "qd": tree.coordinates.nv}
+    q, qd = (tape.inputs(*(f"{name}{i}" for i in range(count))) for name, count in sizes.items())
+    found = accelerations(case, tree, still, tape.lift, q, qd)
+    return {name: tuple(tape.lift(a).number for a in parts) for name, parts in found.items()}
 
 
 def reduced(case: Case, need: Needed | None = None) -> Case | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 
-from ...case import Case
+from ...case import Case, Coordinates
 from ...engines import Setting
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR, contacts, with_additions
 from ...judge.check import Result
@@ -45,7 +45,7 @@ def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
         touching[name, integrator], _ = contacts(models[name], *rest, dt, timed, integrator)
         if name.startswith(CAPSULES) and contacts(models[name], *fallen)[1]:
             pushed.add((name, integrator))
-    result.tables["cost_in_mujoco"] = cost_rows(seconds, paths, touching)
+    result.tables["cost_in_mujoco"] = cost_rows(seconds, paths, touching, case.coordinates)
     check_bits(result, f"{case.name}, {step_in_words(case, FALL_STEPS)}", result.tables["cost_in_mujoco"], pushed)
     if not pushed:
         result.notes.append(f"{case.name}: the floor that is in reach pushes no joint, nor does anything else.")
@@ -59,6 +59,8 @@ def fall_case(robot: Robot) -> Case:
     falls = [case for case in robot.cases if case.is_free and case.scene.gravity and not case.locked]
     regular = [case for case in falls if "regular" in case.scene.tags]
     case = (regular + falls + [robot.case("let go", posture=next(iter(robot.postures), ()))])[0]
+    if robot.is_read:  # its own step, with which it is stable
+        return case.changed(duration=FALL_STEPS * case.scene.dt, judged=None)
     return case.changed(duration=FALL_TIME, dt=FALL_TIME / FALL_STEPS, judged=None)
 
 
@@ -77,16 +79,19 @@ def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
 
 
 def cost_rows(
-    seconds: Mapping[tuple, float], paths: Mapping[tuple, np.ndarray], touching: Mapping[tuple, float]
+    seconds: Mapping[tuple, float],
+    paths: Mapping[tuple, np.ndarray],
+    touching: Mapping[tuple, float],
+    coordinates: Coordinates,
 ) -> list[dict]:
     """The rows, by integrator, from what is known of each (addition, integrator).
 
-    seconds: of a timed run; paths: (steps + 1, 2 n), rad and rad/s; touching: contacts in a step.
+    seconds: of a timed run; paths: (steps + 1, nq + nv); touching: contacts in a step.
     """
     rows = []
     for name, integrator in sorted(paths, key=lambda key: TWO_INTEGRATORS.index(key[1])):
         path, minimal = paths[name, integrator], paths[MINIMAL, integrator]
-        apart = np.abs(path - minimal)[:, : path.shape[1] // 2].max()
+        apart = np.abs(coordinates.difference(path[:, : coordinates.nq], minimal[:, : coordinates.nq])).max()
         taken = seconds[name, integrator]
         rows.append(
             {
@@ -95,7 +100,7 @@ def cost_rows(
                 "ns_per_step": 1e9 * taken / TIMED_STEPS["mujoco"],
                 "ratio": taken / seconds[MINIMAL, integrator],
                 "contacts_per_step": touching[name, integrator],
-                "same_bits": np.array_equal(path, minimal),
+                "same_bits": np.array_equal(path, minimal, equal_nan=True),
                 "max_difference_rad": float(apart) if np.isfinite(apart) else None,
             }
         )

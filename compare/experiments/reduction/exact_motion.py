@@ -25,6 +25,7 @@ ROUNDED = 1e-11  # rad: smaller errors are not those of the method alone
 IN_TABLE = 16  # of the SWING_STEPS, those that the table has
 AMPLITUDES = (0.16, 0.08, 0.04, 0.02, 0.01)  # rad, each half of the one before
 OSCILLATION, MOST_TURNED = 5.0, 60.0  # s; rad, by which the fastest mode may turn in it at most
+MOST_MODES = 12  # hinges: runs of more take long
 OSCILLATION_STEPS, LESS_FINE = 8192, 1024  # at which the error of RK4 is far below that of the linear modes
 
 
@@ -34,7 +35,8 @@ OSCILLATION_STEPS, LESS_FINE = 8192, 1024  # at which the error of RK4 is far be
 def swings(result: Result, setup: Setup, cases: Sequence[Case]) -> None:
     """Each case in which one joint is free, a physical pendulum, against its elliptic function."""
     for case in cases:
-        if len(case.joints) == 1 and case.is_free and case.scene.gravity and not any(case.tree.damping):
+        tree, alone = case.tree, len(case.joints) == 1 and case.coordinates.all_kinds == ("hinge",)
+        if alone and case.is_free and case.scene.gravity and not any(tree.damping) and not tree.has_springs:
             t = np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
             exact = elliptic(case, t)
             if reason := not_compared(case, exact):
@@ -128,7 +130,7 @@ def small_oscillations(
     robot, tree = setup.robot, setup.robot.tree
     posture = equilibrium(robot)
     if posture is None:
-        why = "its damping" if any(tree.damping) else "no named posture is stable without a torque"
+        why = not_linear(tree) or "no named posture is stable without a torque"
         result.notes.append(f"Small oscillations of the {robot.name} are not compared with its linear modes: {why}.")
         return
     q, rest, away = robot.posture(posture), np.zeros(len(robot.joints)), np.ones(len(robot.joints))
@@ -159,15 +161,25 @@ def small_oscillations(
 def equilibrium(robot: Robot) -> str | None:
     """The named posture that needs no torque and is stable, the one of least potential energy; None: there is none.
 
-    None of a robot with damping too, whose modes decay.
+    None of a robot whose modes are not those of `truth.linear` either.
     """
     tree = robot.tree
-    if any(tree.damping):
+    if not_linear(tree):
         return None
-    torques = {name: np.abs(tmt.gravity_balance(robot.posture(name), tree)).max() for name in robot.postures}
+    names = [*robot.postures, *robot.positions]
+    torques = {name: np.abs(tmt.gravity_balance(robot.posture(name), tree)).max() for name in names}
     rest = [name for name, torque in torques.items() if torque <= FACTOR * EPS * gravity_scale(tree)]
     stable = [name for name in rest if held(robot, name).kind == "centre"]
     return min(stable, key=lambda name: float(tmt.potential_energy(robot.posture(name), tree)), default=None)
+
+
+def not_linear(tree: tmt.Tree) -> str | None:
+    """Why small oscillations of a Tree are not compared with its linear modes, or None."""
+    if any(tree.damping):
+        return "its damping"
+    if set(tree.kind) != {"hinge"} or tree.has_springs:
+        return "it has other joints than hinges, or springs"
+    return f"it has {len(tree.axis)} joints" if len(tree.axis) > MOST_MODES else None
 
 
 def odd(tree: tmt.Tree, q: np.ndarray) -> bool:

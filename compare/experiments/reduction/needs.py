@@ -7,15 +7,18 @@ import numpy as np
 import tmt
 from tmt.reference import DIGITS
 
-from ...case import Case
+from ...case import Case, Coordinates
 from ...engines import LABELS
 from ...judge.check import Result, closest
 from ...judge.rounding import NARROW, band
-from ...judge.run import check_movement, deviation, required_time, step_in_words
+from ...judge.run import check_movement, deviation, required_time, step_in_words, unit_of
 from ...judge.words import capital
 from ...setup import Setup
 from ...truth.smallest import Needed, needed, reduced
-from .times import FINER_RUNS, TWO_INTEGRATORS, method_of, scheme_of
+from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
+
+
+MOST_SPEEDS = 12  # of the robot of a file, whose runs are compared within a band of rounding
 
 
 def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str] = TWO_INTEGRATORS) -> list:
@@ -28,7 +31,12 @@ def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str]
         models.append((case.name, None if stays else smaller or case))
     result.curves["needs"][case.name] = {"locked": case.scene.locked, "stays": need.stays}
     result.notes.append(need_in_words(case, need))
-    if smaller or stays:
+    if (smaller or stays) and case.robot.is_read and case.coordinates.nv > MOST_SPEEDS:
+        result.notes.append(
+            f"{case.name}: runs of the smaller and the whole model are not compared, as a band of rounding of so many joints "
+            "takes long; trajectory compares both engines in this scene."
+        )
+    elif smaller or stays:
         for integrator in integrators:
             compare_smaller(result, case, smaller, setup, integrator)
     return models
@@ -44,12 +52,13 @@ def need_in_words(case: Case, need: Needed) -> str:
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (
-            f"{case.name}: no hinge and no integrator. At the start and at rest every acceleration folds to 0{torque}, and is "
+            f"{case.name}: no {joint_word(case)} and no integrator. At the start and at rest every acceleration folds to 0{torque}, and is "
             f"0 with {DIGITS} digits: the exact solution stays."
         )
     declared = f" ({' and '.join(locked)} declared locked)" if locked else ""
     if not need.stays:
-        count = "the one hinge that is free" if len(names) == 1 else f"all {len(names)} hinges"
+        one = joint_word(case)
+        count = f"the one {one} that is free" if len(names) == 1 else f"all {len(names)} {one}s"
         return f"{case.name}: {count}{declared}. {why}."
     left, stays = (" and ".join(some) for some in ([name for name in names if name not in need.stays], need.stays))
     never, vanish = "never moves: at its start and at rest its acceleration folds", "and is"
@@ -61,40 +70,59 @@ def need_in_words(case: Case, need: Needed) -> str:
     )
 
 
+def joint_word(case: Case) -> str:
+    """What its joints are called: hinges, where there is nothing else."""
+    return "hinge" if set(case.robot.coordinates.all_kinds) == {"hinge"} else "joint"
+
+
 def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Setup, integrator: str) -> None:
     """Runs of the case and of the smaller one (None: it stays), by the same method, within the band of rounding."""
-    scheme, n, steps = scheme_of(setup.engines, integrator), len(case.joints), FINER_RUNS * case.steps
-    dt = case.duration / steps
+    scheme, every = scheme_of(setup.engines, integrator), finer(case)
+    steps, coordinates = every * case.steps, case.coordinates
+    dt, nq, nv, unit = case.duration / steps, coordinates.nq, coordinates.nv, unit_of(coordinates)
     paths = states_of_run(case, setup, integrator)
     references = states_of_run(smaller, setup, integrator) if smaller else dict.fromkeys(paths)
-    width = band(tmt.METHODS[scheme], case.tree, *np.split(paths["tmt"], 2, axis=1), case.tau, dt, FINER_RUNS)
-    t = dt * FINER_RUNS * np.arange(len(width))
+    of_tmt = paths["tmt"][:, :nq], paths["tmt"][:, nq:]
+    width = band(tmt.METHODS[scheme], case.tree, *of_tmt, case.tau, dt, every)
+    t = dt * every * np.arange(len(width))
     until = None
     for engine, path in paths.items():
         where = f"{case.name}, {LABELS[engine]}, {integrator}, {step_in_words(case, steps)}"
         reference = np.tile(np.concatenate(case.start), (steps + 1, 1))
         if smaller:
-            free = [case.joints.index(name) for name in smaller.joints]
-            reference[:, free + [n + i for i in free]] = references[engine]
+            reference[:, free_places(case, smaller)] = references[engine]
             if "own" not in case.scene.tags:  # of a user's own nothing is expected
-                check_movement(result, where, deviation(path[:, :n], path[0, :n]))
-        apart = np.abs(path - reference)[::FINER_RUNS]
-        until = check_smaller(result, where, case.joints, t, apart, width, required_time(case, scheme, dt))
-        result.curves["apart"][case.name, engine, integrator] = float(apart[t <= until, :n].max())
+                check_movement(result, where, deviation(path[:, :nq], path[0, :nq], coordinates))
+        apart = np.concatenate(
+            [coordinates.difference(path[:, :nq], reference[:, :nq]), path[:, nq:] - reference[:, nq:]], axis=1
+        )
+        apart = np.abs(apart)[::every]
+        until = check_smaller(result, where, coordinates, t, apart, width, required_time(case, scheme, dt))
+        result.curves["apart"][case.name, engine, integrator] = float(apart[t <= until, :nv].max())
     if not smaller:
         moved = {LABELS[engine]: result.curves["apart"][case.name, engine, integrator] for engine in paths}
-        words = " and ".join(f"that of {engine} by {m:.1e} rad" if np.isfinite(m) else f"{engine} diverges"
+        words = " and ".join(f"that of {engine} by {m:.1e} {unit}" if np.isfinite(m) else f"{engine} diverges"
                              for engine, m in moved.items())  # fmt: skip
+        largest = "angle" if unit == "rad" else "movement"
         result.notes.append(
-            f"{case.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the largest angle "
-            f"moves: {words}."
+            f"{case.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the largest {largest} "
+            f"{'moves' if unit == 'rad' else 'is'}: {words}."
         )
+
+
+def free_places(case: Case, smaller: Case) -> list[int]:
+    """Where the positions and speeds of the smaller case stand among those of the whole one."""
+    whole, nq = dict(zip(case.joints, case.coordinates.places.joints)), case.coordinates.nq
+    joints = [whole[name] for name in smaller.joints]
+    return [i for joint in joints for i in range(joint.q.start, joint.q.stop)] + [
+        nq + i for joint in joints for i in range(joint.qd.start, joint.qd.stop)
+    ]
 
 
 def check_smaller(
     result: Result,
     where: str,
-    joints: Sequence[str],
+    coordinates: Coordinates,
     t: np.ndarray,
     apart: np.ndarray,
     width: np.ndarray,
@@ -102,13 +130,13 @@ def check_smaller(
 ) -> float:
     """Checks: the runs stay within the band of rounding while it is narrow, and that is long enough; until when, s.
 
-    apart, width: (times, 2 n), rad and rad/s, the distance of the smaller model's run from the whole one's, and the band.
+    apart, width: (times, 2 nv), movements and speeds, the distance of the smaller model's run from the whole one's, and the band.
     """
-    n = len(joints)
+    n = coordinates.nv
     judged = np.cumsum(~(width[:, :n].max(axis=1) < NARROW)) == 0
     apart, width = apart[judged], width[judged]
     k, i = closest(apart, width)
-    place, unit = f"{joints[i % n]} at t = {t[k]:.3f} s", ("rad", "rad/s")[i // n]
+    place, unit = f"{coordinates.speeds[i % n]} at t = {t[k]:.3f} s", coordinates.units[i % n] + ("", "/s")[i // n]
     result.check(where, "smallest model to whole", apart[k, i], width[k, i], unit, place, True)
     until = float(t[judged][-1])
     result.check(where, "time judged", until, required, "s", rule="at least")
@@ -116,8 +144,8 @@ def check_smaller(
 
 
 def states_of_run(case: Case, setup: Setup, integrator: str) -> dict[str, np.ndarray]:
-    """Positions and speeds of the case's joints by engine, each (steps + 1, 2 n)."""
-    steps, paths = FINER_RUNS * case.steps, {}
+    """Positions and speeds of the case's joints by engine, each (steps + 1, nq + nv)."""
+    steps, paths = finer(case) * case.steps, {}
     for engine, dynamics in setup.compared(case).items():
         method = method_of(setup.engines, integrator, engine)
         paths[engine] = dynamics.run(*case.start, case.tau, case.duration / steps, steps, method).states

@@ -5,47 +5,76 @@ from itertools import combinations
 
 import numpy as np
 
-from ...case import SEED, Case
+import tmt
+
+from ...case import SEED, Case, Coordinates
 from ...judge.check import Result, closest, largest
 from ...judge.scale import EPS, FACTOR, bias_scale, mass_scale
 from ...setup import Setup
 from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
-MOST_SUBSETS = 126  # all of seven joints; of more joints so many are chosen at random
+ALL_SUBSETS, RANDOM_SUBSETS = 6, 20  # joints up to which all subsets are locked; of more each alone and so many at random
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
+WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}  # of a robot that has slides
 
 
 def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     """A check and a row of a table for each subset, quantity and pair of models, over random angles and states."""
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)
-    for locked in subsets(robot.joints):
+    coordinates, many = robot.coordinates, len(robot.joints) > ALL_SUBSETS
+    sets, states = subsets(robot.joints), STATES_OF_SUBSET
+    if many:
+        angles, states = 1, setup.of(STATES_OF_SUBSET, 4, 2)
+        sets = sets[:: setup.of(1, 3, 6)]
+        chosen = "each joint alone and" if setup.size == "full" else "of each joint alone and"
+        result.notes.append(
+            f"Of the subsets of {len(robot.joints)} joints {len(sets)} are locked, {chosen} {RANDOM_SUBSETS} chosen at random"
+            f"{'' if setup.size == 'full' else ' every so many'}."
+        )
+    for locked in sets:
         found = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
-            q = robot.case().coordinates.random(rng, STATES_OF_SUBSET)
-            v = rng.uniform(-10.0, 10.0, q.shape)
-            case = robot.case(words_of(locked), posture=tuple(np.degrees(q[0])), locked=locked)
+            q = coordinates.random(rng, states)
+            v = rng.uniform(-10.0, 10.0, (states, coordinates.nv))
+            case = robot.case(words_of(locked), posture=posture_of(coordinates, q[0]), locked=locked)
             for quantity, pair, apart, scale in differences(setup, case, q, v):
                 found.setdefault((quantity, pair), []).append((apart, scale))
         counts = {
             "operations_whole": operations(robot.tree),
-            "operations_locked_at_zero": operations(robot.tree.lock(dict.fromkeys(locked, 0.0))),
+            "operations_locked_at_zero": operations(robot.tree.lock(at_zero(robot.tree, locked))),
             "operations_locked_at_angles": operations(case.tree),
         }
+        units = WITH_SLIDES if "slide" in coordinates.all_kinds else BLOCK_UNITS
         for (quantity, pair), arrays in found.items():
-            check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts)
+            check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts, units[quantity])
 
 
 def subsets(joints: Sequence[str]) -> list[tuple[str, ...]]:
-    """The sets of joints to be locked, the small ones first: all but none and all, or so many of them chosen at random."""
-    if 2 ** len(joints) - 2 <= MOST_SUBSETS:
+    """The sets of joints to be locked, the small ones first: all but none and all; of many joints each alone and 20 at random."""
+    if len(joints) <= ALL_SUBSETS:
         return [names for count in range(1, len(joints)) for names in combinations(joints, count)]
-    rng, chosen = np.random.default_rng(SEED), {}
-    while len(chosen) < MOST_SUBSETS:
-        places = rng.choice(len(joints), rng.integers(1, len(joints)), replace=False)
+    rng, chosen = np.random.default_rng(SEED), {(name,): None for name in joints}
+    while len(chosen) < len(joints) + RANDOM_SUBSETS:
+        places = rng.choice(len(joints), rng.integers(2, len(joints)), replace=False)
         chosen[tuple(joints[i] for i in sorted(places))] = None
     return sorted(chosen, key=len)
+
+
+def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
+    """A position (nq,) as a scene has it: hinges in deg."""
+    posture = np.array(q, dtype=float)
+    for kind, at, _ in coordinates.places.joints:
+        if kind == "hinge":
+            posture[at] = np.degrees(posture[at])
+    return tuple(posture)
+
+
+def at_zero(tree: tmt.Tree, names: Sequence[str]) -> dict[str, float | tuple]:
+    """The reference positions of some joints of a Tree by their names."""
+    places = dict(zip(tree.hinge_names, tree.coordinates.joints))
+    return {name: tree.zero[places[name].q] if places[name].kind == "ball" else tree.zero[places[name].q.start] for name in names}
 
 
 def words_of(locked: Sequence[str]) -> str:
@@ -59,12 +88,13 @@ def check_blocks(
     pair: str,
     apart: np.ndarray,
     scale: np.ndarray,
-    counts: Mapping[str, int],
+    counts: Mapping[str, int | None],
+    unit: str | None = None,
 ) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
     (worst,) = closest(apart, tolerance)
-    unit, name = BLOCK_UNITS[quantity], f"{quantity}, {pair}"
+    unit, name = unit or BLOCK_UNITS[quantity], f"{quantity}, {pair}"
     check = result.check(words_of(locked), name, apart[worst], tolerance[worst], unit, rounding=True)
     result.tables["reduction_subsets"].append(
         {
@@ -83,11 +113,13 @@ def check_blocks(
 def differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Iterator[tuple]:
     """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it."""
     joints, tree = setup.robot.joints, setup.robot.tree
-    free = [i for i, name in enumerate(joints) if name in case.joints]
+    places = dict(zip(joints, setup.robot.coordinates.places.joints))
     q, v = q.copy(), v.copy()
-    for name, angle in case.locked.items():
-        q[:, joints.index(name)], v[:, joints.index(name)] = angle, 0.0
-    block, state = np.ix_(range(len(q)), free, free), (q[:, free], v[:, free])
+    for name, position in case.locked.items():
+        q[:, places[name].q], v[:, places[name].qd] = position, 0.0
+    free_q = [i for name in case.joints for i in range(places[name].q.start, places[name].q.stop)]
+    free = [i for name in case.joints for i in range(places[name].qd.start, places[name].qd.stop)]
+    block, state = np.ix_(range(len(q)), free, free), (q[:, free_q], v[:, free])
     whole, left = setup.compared(), setup.compared(case)
     of_whole = {
         "Mbar": [whole[name].mass_matrix(q)[block] for name in ("tmt", "mujoco")],

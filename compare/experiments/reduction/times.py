@@ -6,6 +6,7 @@ from functools import lru_cache
 import tmt
 from tmt.kernels import slope_source
 
+from ...case import Case
 from ...engines import Engine, Setting, same_scheme
 from ...judge.check import Result
 from ...judge.timing import fastest
@@ -13,7 +14,13 @@ from ...setup import Setup
 
 TWO_INTEGRATORS = ("Euler", "RK4")  # of MuJoCo, a cheap and an accurate one, with the same schemes in tmt
 TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a timed run: it passes between the interruptions of a busy machine
-FINER_RUNS = 16  # steps of a run for each of the case's own
+FINER_RUNS = 16  # steps of a run for each of the case's own, which are coarse; those of a file's robot are fine already
+MOST_TRACED = 12  # speeds up to which operations are counted
+
+
+def finer(case: Case) -> int:
+    """How many steps of a run there are for each of the case's own."""
+    return 1 if case.robot.is_read else FINER_RUNS
 
 
 def method_of(engines: Mapping[str, Engine], integrator: str, name: str) -> str:
@@ -33,7 +40,7 @@ def time_models(result: Result, models: Sequence[tuple], setup: Setup, rounds: i
         for integrator in TWO_INTEGRATORS if case else ():
             for engine, dynamics in setup.compared(case).items():
                 steps = TIMED_STEPS[engine]
-                setting = Setting(case.duration / case.steps / FINER_RUNS * steps, steps)
+                setting = Setting(case.duration / case.steps / finer(case) * steps, steps)
                 method = method_of(setup.engines, integrator, engine)
                 call, _ = dynamics.prepare(*case.start, case.tau, setting, method)
                 calls[name, case.joints, engine, integrator] = call
@@ -68,6 +75,6 @@ def time_rows(
 
 
 @lru_cache
-def operations(tree: tmt.Tree, method: str = "rk4") -> int:
-    """Operations of one evaluation of the accelerations in the compiled code of a tree and a method."""
-    return slope_source(tree, method)[1]
+def operations(tree: tmt.Tree, method: str = "rk4") -> int | None:
+    """Operations of one evaluation of the accelerations in straight-line code of a tree and a method; None: of many joints."""
+    return slope_source(tree, method)[1] if len(tree.axis) <= MOST_TRACED else None

@@ -6,21 +6,20 @@ from functools import partial
 import numpy as np
 
 import tmt
-from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import COMPARED, GRID, LABELS, Dynamics, Engine, Method, Setting
+from ...engines import COMPARED, GRID, LABELS, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
-from ...judge.rounding import growth
 from ...judge.run import diverged_at
-from ...judge.scale import EPS, FACTOR
+from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import Reference, committed, references
 from ...truth.smallest import reduced
-from . import accuracy, advice, evaluations, targets
-from .settings import coarsest_steps, followed, methods, regular_of, scenes_of, settings_of, taking_part
+from . import accuracy, advice, evaluations, targets, tumbling
+from .floors import floor
+from .settings import coarsest_steps, estimated, followed, left_out, methods, regular_of, scenes_of, settings_of, MOST_SECONDS
 
 TITLE = "Speed against accuracy"
 PARTS = (
@@ -93,10 +92,15 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.curves |= {"floors": floors, "regular": regular.name}
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
-    taking = [m for m in methods(setup.engines, setup.size, which) if whole or m.engine in COMPARED]
+    taking = methods(setup.engines, setup.size, which, setup.robot)
+    taking = [method for method in taking if whole or method.engine in COMPARED]
     fixed = [method for method in taking if not method.adaptive]
     falling = names if whole else [regular.name]
-    result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete=whole or not timed)
+    # the steps of a robot of many joints may be too few for that
+    complete = (whole or not timed) and not setup.robot.is_read
+    result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete)
+    if timed and setup.robot.coordinates.has_balls:
+        result.tables["speed_orders"] += tumbling.orders(result, setup.engines)
     schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
     accuracy.check_same_schemes(result, floors, schemes)
     accuracy.check_smallest_errors(result, floors)
@@ -110,9 +114,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     if timed:
         absent = unavailable(setup, names)
         result.rows += absent
-        result.notes += dict.fromkeys(
-            f"{LABELS.get(row['engine'], row['engine'])} takes no part: {row['why_not']}." for row in absent
-        )
+        result.notes += dict.fromkeys(absent_in_words(row, setup.engines) for row in absent)
     result.rows = [{name: row.get(name) for name in COLUMNS} for row in result.rows]
     return result
 
@@ -128,24 +130,31 @@ def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Seq
     result.tables["what_should_i_use"] = advice.advice(result.rows, list(floors), floors)
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
-    aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
-    result.tables["speed_targets"] = aims
-    result.notes += [*sentences, *spread_in_words(spread), PARTS, *targets.aims_in_words(aims)]
+    result.notes += [*sentences, *spread_in_words(spread), PARTS]
+    if not setup.robot.is_read:  # of a file nothing was aimed at
+        aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
+        result.tables["speed_targets"] = aims
+        result.notes += targets.aims_in_words(aims)
     result.notes += accuracy.smaller_models_in_words(result.rows)
 
 
 def unavailable(setup: Setup, names: Sequence[str]) -> list[dict]:
-    """A row for each scene and each engine that cannot take part: its methods, and why; no numbers."""
-    absent = {
-        engine: reason
-        for engine in taking_part(setup.engines, setup.size).values()
-        if (reason := engine.unavailable()) is not None
-    }
+    """A row for each scene, each engine that cannot take part and why: with its methods that are left out; no numbers."""
+    groups = {}
+    for (engine, method), reason in left_out(setup.engines, setup.size, setup.robot).items():
+        groups.setdefault((engine, reason), []).append(method)
     return [
-        {"scene": name, "engine": engine.name, "method": ", ".join(engine.methods), "why_not": reason}
+        {"scene": name, "engine": engine, "method": ", ".join(out), "why_not": reason}
         for name in names
-        for engine, reason in absent.items()
+        for (engine, reason), out in groups.items()
     ]
+
+
+def absent_in_words(row: dict, engines: Mapping[str, Engine]) -> str:
+    """Who takes no part and why, in a sentence."""
+    whole = row["method"] == ", ".join(engines[row["engine"]].methods)
+    who = LABELS.get(row["engine"], row["engine"])
+    return f"{who if whole else row['engine'] + ' ' + row['method']} takes no part: {row['why_not']}."
 
 
 def rows_of_scene(
@@ -155,19 +164,24 @@ def rows_of_scene(
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
     found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
-    taking = methods(engines, size, which)
+    taking = methods(engines, size, which, case.robot)
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
             found.append(row_of_run(case, case, engines, method, setting, reference))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
-            if accuracy.gained_nothing(now, work, best, last, left):
+            if accuracy.gained_nothing(now, work, best, last, left) or too_long(method, case, work, size):
                 break
             best, last = min(best, now), work
-    smaller = reduced(case)
+    smaller = None if case.robot.is_read else reduced(case)
     few = [method for method in taking if smaller and (method.engine, method.name) in SMALLER]
     setting = Setting(case.duration, SMALLER_STEPS)
     return found + [row_of_run(smaller, case, engines, method, setting, reference) for method in few], left
+
+
+def too_long(method: Method, case: Case, work: int, size: str) -> bool:
+    """Whether the next tolerance of a method that chooses its own steps would take too long with the robot of a file."""
+    return case.robot.is_read and method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2.0
 
 
 def row_of_run(
@@ -175,7 +189,10 @@ def row_of_run(
 ) -> dict:
     """A row: one run of a scene, or of the smaller model that has the motion of the whole one."""
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
-    true = np.split(reference.high, 2, axis=1)
+    places, nq = whole.coordinates.places, whole.coordinates.nq
+    free = [[k for i in joints for k in range(*getattr(places.joints[i], part).indices(size))]
+            for part, size in (("q", nq), ("qd", places.nv))]  # fmt: skip
+    true = reference.high[:, :nq], reference.high[:, nq:]
     energy = tmt.energy(*true, tree)
     run, read = engines[method.engine].of(case).prepare(*case.start, case.tau, setting, method.name)
     with np.errstate(all="ignore"):
@@ -183,8 +200,8 @@ def row_of_run(
         ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
         error = reference.error(motion.q, joints)
         states = [part.copy() for part in true]
-        for state, part in zip(states, (motion.q, motion.v)):
-            state[:, joints] = 0.0 if ended else part
+        for state, part, own in zip(states, (motion.q, motion.v), free):
+            state[:, own] = 0.0 if ended else part
         off = np.abs(tmt.energy(*states, tree) - energy).max()
     return {
         "scene": case.name, "engine": method.engine, "method": method.name,
@@ -195,22 +212,6 @@ def row_of_run(
         "early": float(error[reference.t <= advice.EARLY].max()), "run": (case, method, setting),
         "whole": None if case is whole else whole.name,
     }  # fmt: skip
-
-
-def floor(case: Case, dynamics: Dynamics) -> float:
-    """What rounding leaves of the angles: eps times the largest growth of a small difference up to each time, rad.
-
-    dynamics: tmt's, whose RK4 is run with 1024 steps, or as many as the scene needs to be followed at all; ValueError if it
-    cannot be.
-    """
-    first = 16 * GRID * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (16 * GRID)))
-    for steps in (first, 4 * first, 16 * first):
-        dt = case.duration / steps
-        motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
-        if np.isfinite(motion.q).all():
-            growths = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, 16)
-            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
-    raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")
 
 
 def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:

@@ -1,14 +1,15 @@
 """What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 import tmt
 from tmt import generic, kernels, method
+from tmt.methods import METHODS
 
-from ...case import SEED, Case
+from ...case import SEED, Case, Coordinates
 from ...judge import timing
 from ...setup import Setup
 from .settings import coarsest_steps, regular_of
@@ -17,8 +18,12 @@ STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
 TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
 MOST_CALLS = 100_000  # of the same in a call that is timed
+MOST_NUMBERS = 10_000_000  # of the results of many states, of a robot of many joints
+MOST_LITERAL = 3000  # operations of the literal form, up to which its straight-line code is compiled
+MOST_SPEEDS = 12  # up to which the literal form is timed in Python
 FORWARD, TERMS, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
+LOOP = "generic compiled loop"
 WAITING, EACH, IN_LANES = "traced kernel, each waits for the last", "traced kernel", "lanes"
 
 
@@ -27,8 +32,10 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
     from ...engines.mujoco.calls import MinimalCalls  # here, for numba takes its time
 
     rng = np.random.default_rng([SEED, 2])
-    most, tree = setup.of(max(STATES), 10_000, 1000), setup.robot.tree
-    states = rng.uniform(-3.0, 3.0, (3, most, len(tree.parent)))
+    tree = setup.robot.tree
+    numbers = [count for count in STATES[: setup.of(3, 2, 2)]]
+    numbers[-1] = min(setup.of(max(STATES), 1000, 1000), most_states(tree))
+    states = states_of(setup.robot.coordinates, rng, setup.of(max(numbers), 10_000, 1000))
     first = [np.ascontiguousarray(a[0]) for a in states]
     repeated, missing = {}, MinimalCalls.unavailable()
     if missing is None:
@@ -37,14 +44,51 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
     repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(tree, first)}
     calls = {key: counted(loop) for key, loop in repeated.items()}
     with ThreadPoolExecutor(2) as pool:
-        for count in STATES[: setup.of(3, 2, 2)]:
-            for key, run in of_many_states(tree, states[:, :count], pool).items():
+        for count in numbers:
+            for key, run in of_many_states(tree, [a[:count] for a in states], pool).items():
                 calls[key] = again(run, CALLS // count, count)
         taken = timing.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
-    operations = [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
     overhead = simulate_overhead(regular_of(setup.robot))
-    return evaluation_rows(nanoseconds), costs_in_words(nanoseconds, overhead, operations, setup.robot.name, missing)
+    words = costs_in_words(nanoseconds, overhead, operations(tree), setup.robot.name, missing)
+    return evaluation_rows(nanoseconds), words + left_out_in_words(tree)
+
+
+def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) -> list[np.ndarray]:
+    """Random positions (count, nq), speeds and torques (count, nv)."""
+    if set(coordinates.all_kinds) == {"hinge"}:
+        return list(rng.uniform(-3.0, 3.0, (3, count, coordinates.nv)))
+    return [coordinates.random(rng, count), *rng.uniform(-3.0, 3.0, (2, count, coordinates.nv))]
+
+
+def most_states(tree: tmt.Tree) -> int:
+    """How many states are evaluated at once at most, a power of ten."""
+    n = len(tree.axis)
+    return int(10.0 ** np.floor(np.log10(MOST_NUMBERS / (n * (n + 3) // 2))))
+
+
+def operations(tree: tmt.Tree) -> list[int] | None:
+    """Of the straight-line code of the literal and of the composite form; None: none is made for so many joints."""
+    if not kernels.is_evaluated_straight(tree):
+        return None
+    return [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
+
+
+def literal_is_compiled(tree: tmt.Tree) -> bool:
+    """Whether the literal form of a tree is short enough for its compilation."""
+    return kernels.is_evaluated_straight(tree) and operations(tree)[0] <= MOST_LITERAL
+
+
+def left_out_in_words(tree: tmt.Tree) -> list[str]:
+    """What is not timed, and why, in sentences."""
+    if not kernels.is_evaluated_straight(tree):
+        return [
+            f"Straight-line code for {len(tree.axis)} speeds would take too long to compile: the loop over any tree takes its "
+            "place, and neither the kernel nor the literal form is timed."
+        ]
+    if not literal_is_compiled(tree):
+        return [f"The literal form is not compiled: its {operations(tree)[0]} operations would take too long."]
+    return []
 
 
 def per_state(counts: dict, times: list[list[float]]) -> dict:
@@ -76,40 +120,47 @@ def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
 
 def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
-    (q, qd, tau), n = state, len(tree.parent)
+    (q, qd, tau), n = state, len(tree.axis)
     floats = [a.tolist() for a in state]
-    forward = kernels.evaluator(tree, FORWARD)
-    literal = kernels.evaluator(tree, FORWARD, method.mass_matrix_and_bias, "library_sincos")
-    library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
-    terms = kernels.evaluator(tree, TERMS)
     arrays, out, M, h = generic.arrays(tree), np.empty(n), np.empty((n, n)), np.empty(n)
-    path = np.zeros((2, 1, MOST_CALLS + 1, n))
-    path[:, 0, 0] = q, qd
-    run = kernels.stepper(tree, "rk4")
+    run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_NUMBERS // n)
+    paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
+    paths[0][0, 0], paths[1][0, 0] = q, qd
 
     def plain(count):
         for _ in range(count):
             method.acceleration(tree, *floats)
 
     def steps(count):
-        run(path[0, :, : count + 1].copy(), path[1, :, : count + 1].copy(), tau[None], 1e-4)
+        count = min(count, most)
+        run(*(path[:, : count + 1].copy() for path in paths), tau[None], 1e-4)
 
-    yield FORWARD, "literal, Python floats", plain
+    if n <= MOST_SPEEDS:
+        yield FORWARD, "literal, Python floats", plain
     loops = generic.compiled()
-    yield FORWARD, "generic compiled loop", lambda count: loops.repeat_forward_dynamics(arrays, q, qd, tau, out, count)
-    yield TERMS, "generic compiled loop", lambda count: loops.repeat_mass_matrix_and_bias(arrays, q, qd, M, h, count)
-    yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
+    yield FORWARD, LOOP, lambda count: loops.repeat_forward_dynamics(arrays, q, qd, tau, out, count)
+    yield TERMS, LOOP, lambda count: loops.repeat_mass_matrix_and_bias(arrays, q, qd, M, h, count)
+    if not kernels.is_evaluated_straight(tree):
+        yield RK4_STEP, LOOP, steps
+        return
+    forward, terms = kernels.evaluator(tree, FORWARD), kernels.evaluator(tree, TERMS)
+    library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
+    if literal_is_compiled(tree):
+        literal = kernels.evaluator(tree, FORWARD, method.mass_matrix_and_bias, "library_sincos")
+        yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
     yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
     yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)
     yield TERMS, WAITING, lambda count: terms.chain(q, qd, tau, count)
     yield RK4_STEP, EACH, steps
 
 
-def of_many_states(tree: tmt.Tree, states: np.ndarray, pool: ThreadPoolExecutor) -> dict:
-    """{(quantity, implementation, states, threads): run} for many states of shape (3, N, n); memory is bounded by them."""
+def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoolExecutor) -> dict:
+    """{(quantity, implementation, states, threads): run} for many states, (N, nq and nv); memory is bounded by them."""
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
-    count, n = q.shape
+    count, n = qd.shape
     runs = {}
+    if not kernels.is_evaluated_straight(tree):
+        return runs
     for quantity, columns in ((FORWARD, n), (TERMS, n * (n + 3) // 2)):
         compiled, out = kernels.evaluator(tree, quantity), np.ones((count, columns))
         wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
@@ -124,11 +175,14 @@ def of_many_states(tree: tmt.Tree, states: np.ndarray, pool: ThreadPoolExecutor)
             runs[quantity, IN_LANES, count, 2] = both
     if count == 1:  # a call from Python for one state: what it costs is the call
         return runs
-    if count <= 1000:
+    if count <= 1000 and n <= MOST_SPEEDS:
         runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.acceleration(q, qd, tau, tree)
+    if not kernels.is_traced(tree, METHODS["rk4"]):
+        return runs
     in_lanes = count // kernels.LANES * kernels.LANES
-    paths = np.zeros((2, in_lanes, 2, n))
-    paths[:, :, 0] = q[:in_lanes], qd[:in_lanes]
+    paths = [np.zeros((in_lanes, 2, part.shape[1])) for part in (q, qd)]
+    for path, part in zip(paths, (q, qd)):
+        path[:, 0] = part[:in_lanes]
     step, step_lanes = kernels.stepper(tree, "rk4"), kernels.lane_stepper(tree, "rk4")
     runs[RK4_STEP, EACH, count, 1] = lambda: step(*paths, tau[:in_lanes], 1e-3)
     runs[RK4_STEP, IN_LANES, count, 1] = lambda: step_lanes(*paths, tau[:in_lanes], 1e-3)
@@ -138,14 +192,15 @@ def of_many_states(tree: tmt.Tree, states: np.ndarray, pool: ThreadPoolExecutor)
 def simulate_overhead(case: Case) -> tuple[float, float, int]:
     """Seconds of tmt.simulate with the coarsest steps of RK4 of a scene, and of its compiled loop; how many steps."""
     steps = coarsest_steps(case)
-    dt, path = case.duration / steps, np.zeros((2, 1, steps + 1, len(case.q)))
-    path[:, 0, 0] = case.start
+    dt, paths = case.duration / steps, [np.zeros((1, steps + 1, len(part))) for part in case.start]
+    for path, part in zip(paths, case.start):
+        path[0, 0] = part
     run = kernels.stepper(case.tree, "rk4")
     calls = {
         "call": lambda: tmt.simulate(*case.start, case.tau, dt, steps, model=case.tree),
-        "loop": lambda: run(*path, case.tau[None], dt),
+        "loop": lambda: run(*paths, case.tau[None], dt),
     }
-    times = timing.fastest(calls, 50)
+    times = timing.fastest(calls, 50)  # fewer if they take long
     return times["call"], times["loop"], steps
 
 
@@ -157,45 +212,59 @@ def lanes_in_words(by_states: dict[int, float]) -> str:
     )
 
 
-def costs_in_words(ns: dict, overhead: tuple, operations: list, name: str, missing: str | None = None) -> list[str]:
+def costs_in_words(
+    ns: dict, overhead: tuple, operations: list | None, name: str, missing: str | None = None
+) -> list[str]:
     """The ratios in words.
 
-    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form; name: of
+    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form, or None; name: of
     the robot; missing: why MuJoCo's calls were not timed, or None.
     """
-    many = sorted({key[2] for key in ns} - {1})
-    lanes = {states: ns[FORWARD, IN_LANES, states, 1] for states in many}
-    best = min(lanes, key=lanes.get)
     sentences = [f"Processor: {timing.vectors()}."]
+    lanes = {key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1}
     if missing:
         sentences.append(f"{missing}: its calls were not timed in compiled loops.")
     else:
-        whole, equal, step = (
-            ns[key, way, 1, 1] for key, way in ((FORWARD, WHOLE), (FORWARD, EQUAL), (RK4_STEP, MJ_STEP))
-        )
-        one, apart = ns[FORWARD, WAITING, 1, 1], ns[FORWARD, EACH, 1000, 1]
-        sentences.append(
-            f"Forward dynamics of the {name}: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work "
-            f"{equal:.0f} ns, the kernel {one:.1f} ns where each evaluation waits for the last ({less(whole, one)}; than the "
-            f"same work {less(equal, one)}), {apart:.1f} ns where they are independent ({less(whole, apart)}; "
-            f"{less(equal, apart)}), in lanes {lanes_in_words(lanes)} ns a state ({less(whole, lanes[best])})."
-        )
-        kernel = ns[RK4_STEP, EACH, 1, 1]
-        sentences.append(
-            f"A step of RK4: mj_step {step:.0f} ns, the kernel {kernel:.0f} ns ({less(step, kernel)}), in lanes "
-            f"{lanes_in_words({states: ns[RK4_STEP, IN_LANES, states, 1] for states in many})} ns a run."
-        )
+        sentences += beside_mujoco_in_words(ns, lanes, name)
     call, loop, steps = overhead
-    literal, composite = operations
     sentences.append(
         f"Those are compiled loops. A call of tmt.simulate with {steps} steps takes {1e6 * call:.0f} us, its loop alone "
         f"{1e6 * loop:.0f} us."
     )
+    if operations is None:
+        return sentences
+    literal, composite = operations
     sentences.append(
         f"Straight-line code of the literal method has {literal} operations, that of the composite form {composite}; the kernel "
         f"is made for this one {name}, MuJoCo for any model."
     )
     return sentences
+
+
+def beside_mujoco_in_words(ns: dict, lanes: dict[int, float], name: str) -> list[str]:
+    """The ratios of MuJoCo's times to tmt's in words. lanes: nanoseconds of forward dynamics by the number of states."""
+    whole, equal, step = (ns[key, way, 1, 1] for key, way in ((FORWARD, WHOLE), (FORWARD, EQUAL), (RK4_STEP, MJ_STEP)))
+    start = (
+        f"Forward dynamics of the {name}: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work {equal:.0f} ns, "
+    )
+    if not lanes:
+        loop, kernel = ns[FORWARD, LOOP, 1, 1], ns[RK4_STEP, LOOP, 1, 1]
+        return [
+            f"{start}tmt's compiled loop over any tree {loop:.0f} ns ({less(whole, loop)}; than the same work "
+            f"{less(equal, loop)}).",
+            f"A step of RK4: mj_step {step:.0f} ns, the loop {kernel:.0f} ns ({less(step, kernel)}).",
+        ]
+    best = min(lanes, key=lanes.get)
+    one, apart = ns[FORWARD, WAITING, 1, 1], ns[FORWARD, EACH, 1000, 1]
+    kernel = ns[RK4_STEP, EACH, 1, 1]
+    of_steps = {states: ns[RK4_STEP, IN_LANES, states, 1] for states in lanes if (RK4_STEP, IN_LANES, states, 1) in ns}
+    in_lanes = f", in lanes {lanes_in_words(of_steps)} ns a run" if of_steps else ""
+    return [
+        f"{start}the kernel {one:.1f} ns where each evaluation waits for the last ({less(whole, one)}; than the "
+        f"same work {less(equal, one)}), {apart:.1f} ns where they are independent ({less(whole, apart)}; "
+        f"{less(equal, apart)}), in lanes {lanes_in_words(lanes)} ns a state ({less(whole, lanes[best])}).",
+        f"A step of RK4: mj_step {step:.0f} ns, the kernel {kernel:.0f} ns ({less(step, kernel)}){in_lanes}.",
+    ]
 
 
 def less(slow: float, fast: float) -> str:

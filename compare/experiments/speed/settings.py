@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from tmt import Tree, kernels
 from tmt.methods import method_named
 
 from ...case import Case
@@ -16,11 +17,21 @@ EXPONENTS = {  # of the coarsest and of the finest tolerance, 10^-k
 OTHER_EXPONENTS = (2, 12)
 FEW, FEW_OTHERS = {"quick": 5, "small": 7}, 2  # settings of a run that is not full: the coarsest; of further engines
 NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
+# of the robot of a file, whose number of joints has no bound: seconds of one evaluation are about a constant times nv^1.5
+IN_LOOPS, TRACED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: of tmt's compiled loops, of its straight-line code, of MuJoCo
+ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
+MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
+LEAST_SETTINGS = 3  # of any method, whatever they take
+SLOWEST = 0.5  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
 
 
 def scenes_of(robot: Robot) -> list[Case]:
-    """The scenes that every method follows: those with the tag, and a user's own."""
-    return [case for case in robot.cases if "speed" in case.scene.tags or is_own(case)]
+    """The scenes that every method follows: those with the tag, and a user's own; a file's robot that is held shows nothing."""
+    return [
+        case
+        for case in robot.cases
+        if "speed" in case.scene.tags or (is_own(case) and not (robot.is_read and case.is_held))
+    ]
 
 
 def is_own(case: Case) -> bool:
@@ -47,28 +58,75 @@ def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
     return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
 
 
-def methods(engines: Mapping[str, Engine], size: str, which: str = "all") -> list[Method]:
+def methods(
+    engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None
+) -> list[Method]:
     """The methods of all engines that are there; "same schemes": one of MuJoCo for each scheme, and the same in tmt."""
     if which == "same schemes":
         theirs = one_of_each_scheme(engines["mujoco"])
         schemes = {method.scheme for method in theirs}
         return [*theirs, *(method for method in engines["tmt"].methods.values() if method.scheme in schemes)]
-    present = [engine for engine in taking_part(engines, size).values() if engine.unavailable() is None]
-    return [method for engine in present for method in engine.methods.values()]
+    out = left_out(engines, size, robot)
+    return [
+        method
+        for engine in taking_part(engines, size).values()
+        for method in engine.methods.values()
+        if (engine.name, method.name) not in out
+    ]
+
+
+def left_out(engines: Mapping[str, Engine], size: str, robot: Robot | None) -> dict[tuple[str, str], str]:
+    """{(engine, method): why it takes no part}: an engine is not there, or what it makes of this robot would take too long."""
+    out = {}
+    for engine in taking_part(engines, size).values():
+        too_long = getattr(engine, "too_long", lambda tree: None)
+        reason = engine.unavailable() or (robot and too_long(robot.tree))
+        for method in engine.methods.values():
+            if why := reason or (robot and too_slow(method, robot)):
+                out[engine.name, method.name] = why
+    return out
+
+
+def too_slow(method: Method, robot: Robot) -> str | None:
+    """Why a method is left out, as even its coarse steps take too long with so many joints; None: it is not."""
+    if not robot.is_read or method.adaptive:
+        return None
+    case = regular_of(robot)
+    seconds = coarsest_steps(case) * estimated(method, case.tree)
+    if seconds <= SLOWEST:
+        return None
+    return f"with {robot.coordinates.nv} speeds its coarsest run alone would take about {seconds:.1g} s"
+
+
+def estimated(method: Method, tree: Tree) -> float:
+    """Seconds of a step, or of an evaluation of a method that chooses its own steps: about, whatever the machine."""
+    n = tree.coordinates.nv
+    if method.engine == "mujoco":
+        return IN_MUJOCO * n**1.5 * (4 if method.name == "RK4" else 1)
+    if method.engine != "tmt":
+        return IN_LOOPS * n**1.5
+    stepping = method_named(method.name)
+    evaluation = (TRACED if kernels.is_traced(tree, stepping) else IN_LOOPS) * n**1.5
+    if method.adaptive:
+        return evaluation
+    return evaluation * stepping.stages * (2 * n * ITERATIONS if stepping.solves_stages else 1)
 
 
 def settings_of(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
     """With what a method follows a case, from coarse to fine."""
-    found = tolerances(method, case) if method.adaptive else halvings(method, case)
+    found = tolerances(method, case) if method.adaptive else halvings(method, case, size)
     if which == "same schemes":
         return found[NEARER] or found[-1:]
     few = FEW if method.engine in COMPARED else dict.fromkeys(FEW, FEW_OTHERS)
     return found[: few.get(size)]
 
 
-def halvings(method: Method, case: Case) -> tuple[Setting, ...]:
+def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
     """Steps that are halved and halved again: first the scene's own, or a little finer, as the times of reading ask for."""
     count, finest = coarsest_steps(case), finest_steps(method)
+    if case.robot.is_read:
+        affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
+        finest = max(min(finest, affordable), count << (LEAST_SETTINGS - 1))
     doublings = max(1, (finest // count).bit_length())
     return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
 
