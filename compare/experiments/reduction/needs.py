@@ -17,7 +17,6 @@ from ...setup import Setup
 from ...truth.smallest import Needed, needed, reduced
 from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
 
-
 MOST_SPEEDS = 12  # of the robot of a file, whose runs are compared within a band of rounding
 
 
@@ -52,8 +51,8 @@ def need_in_words(case: Case, need: Needed) -> str:
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (
-            f"{case.name}: no {joint_word(case)} and no integrator. At the start and at rest every acceleration folds to 0{torque}, and is "
-            f"0 with {DIGITS} digits: the exact solution stays."
+            f"{case.name}: no {joint_word(case)} and no integrator. At the start and at rest every acceleration folds to "
+            f"0{torque}, and is 0 with {DIGITS} digits: the exact solution stays."
         )
     declared = f" ({' and '.join(locked)} declared locked)" if locked else ""
     if not need.stays:

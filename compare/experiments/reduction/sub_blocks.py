@@ -14,7 +14,10 @@ from ...setup import Setup
 from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
-ALL_SUBSETS, RANDOM_SUBSETS = 6, 20  # joints up to which all subsets are locked; of more each alone and so many at random
+ALL_SUBSETS, RANDOM_SUBSETS = (
+    6,
+    20,
+)  # joints up to which all subsets are locked; of more each alone and so many at random
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}  # of a robot that has slides
 
@@ -74,7 +77,10 @@ def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
 def at_zero(tree: tmt.Tree, names: Sequence[str]) -> dict[str, float | tuple]:
     """The reference positions of some joints of a Tree by their names."""
     places = dict(zip(tree.hinge_names, tree.coordinates.joints))
-    return {name: tree.zero[places[name].q] if places[name].kind == "ball" else tree.zero[places[name].q.start] for name in names}
+    return {
+        name: tree.zero[places[name].q] if places[name].kind == "ball" else tree.zero[places[name].q.start]
+        for name in names
+    }
 
 
 def words_of(locked: Sequence[str]) -> str:

@@ -33,7 +33,7 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
 
     rng = np.random.default_rng([SEED, 2])
     tree = setup.robot.tree
-    numbers = [count for count in STATES[: setup.of(3, 2, 2)]]
+    numbers = list(STATES[: setup.of(3, 2, 2)])
     numbers[-1] = min(setup.of(max(STATES), 1000, 1000), most_states(tree))
     states = states_of(setup.robot.coordinates, rng, setup.of(max(numbers), 10_000, 1000))
     first = [np.ascontiguousarray(a[0]) for a in states]
@@ -217,11 +217,13 @@ def costs_in_words(
 ) -> list[str]:
     """The ratios in words.
 
-    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form, or None; name: of
-    the robot; missing: why MuJoCo's calls were not timed, or None.
+    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form, or None;
+    name: of the robot; missing: why MuJoCo's calls were not timed, or None.
     """
     sentences = [f"Processor: {timing.vectors()}."]
-    lanes = {key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1}
+    lanes = {
+        key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1
+    }
     if missing:
         sentences.append(f"{missing}: its calls were not timed in compiled loops.")
     else:
@@ -244,9 +246,8 @@ def costs_in_words(
 def beside_mujoco_in_words(ns: dict, lanes: dict[int, float], name: str) -> list[str]:
     """The ratios of MuJoCo's times to tmt's in words. lanes: nanoseconds of forward dynamics by the number of states."""
     whole, equal, step = (ns[key, way, 1, 1] for key, way in ((FORWARD, WHOLE), (FORWARD, EQUAL), (RK4_STEP, MJ_STEP)))
-    start = (
-        f"Forward dynamics of the {name}: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work {equal:.0f} ns, "
-    )
+    start = f"Forward dynamics of the {name}: mj_forward takes {whole:.0f} ns, "
+    start += f"MuJoCo's calls that do the same work {equal:.0f} ns, "
     if not lanes:
         loop, kernel = ns[FORWARD, LOOP, 1, 1], ns[RK4_STEP, LOOP, 1, 1]
         return [

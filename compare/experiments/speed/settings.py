@@ -58,9 +58,7 @@ def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
     return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
 
 
-def methods(
-    engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None
-) -> list[Method]:
+def methods(engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None) -> list[Method]:
     """The methods of all engines that are there; "same schemes": one of MuJoCo for each scheme, and the same in tmt."""
     if which == "same schemes":
         theirs = one_of_each_scheme(engines["mujoco"])
