@@ -22,6 +22,7 @@ IN_LOOPS, TRACED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: of tmt's compiled loops, of
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
 LEAST_SETTINGS = 3  # of any method, whatever they take
+QUICK_SPEEDS = 4  # up to which a quick run has methods that solve their stages
 SLOWEST = 0.5  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
 
 
@@ -80,20 +81,20 @@ def left_out(engines: Mapping[str, Engine], size: str, robot: Robot | None) -> d
         too_long = getattr(engine, "too_long", lambda tree: None)
         reason = engine.unavailable() or (robot and too_long(robot.tree))
         for method in engine.methods.values():
-            if why := reason or (robot and too_slow(method, robot)):
+            if why := reason or (robot and too_slow(method, robot, size)):
                 out[engine.name, method.name] = why
     return out
 
 
-def too_slow(method: Method, robot: Robot) -> str | None:
+def too_slow(method: Method, robot: Robot, size: str) -> str | None:
     """Why a method is left out, as even its coarse steps take too long with so many joints; None: it is not."""
     if not robot.is_read or method.adaptive:
         return None
-    case = regular_of(robot)
+    case, n = regular_of(robot), robot.coordinates.nv
+    if size == "quick" and n > QUICK_SPEEDS and method.engine == "tmt" and method_named(method.name).solves_stages:
+        return f"with {n} speeds its straight-line code takes too long for a quick run"
     seconds = coarsest_steps(case) * estimated(method, case.tree)
-    if seconds <= SLOWEST:
-        return None
-    return f"with {robot.coordinates.nv} speeds its coarsest run alone would take about {seconds:.1g} s"
+    return None if seconds <= SLOWEST else f"with {n} speeds its coarsest run alone would take about {seconds:.1g} s"
 
 
 def estimated(method: Method, tree: Tree) -> float:
@@ -104,7 +105,8 @@ def estimated(method: Method, tree: Tree) -> float:
     if method.engine != "tmt":
         return IN_LOOPS * n**1.5
     stepping = method_named(method.name)
-    evaluation = (TRACED if kernels.is_traced(tree, stepping) else IN_LOOPS) * n**1.5
+    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages
+    evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
     if method.adaptive:
         return evaluation
     return evaluation * stepping.stages * (2 * n * ITERATIONS if stepping.solves_stages else 1)
