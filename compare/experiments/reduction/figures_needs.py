@@ -12,7 +12,7 @@ from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, plain
 from ...robots import Robot
 
-FEW_JOINTS, MOST_WIDTH = 4, 8  # joints whose names stand side by side; that get more width with their number
+FEW_JOINTS, MOST_WIDTH = 3, 8  # joints whose names stand side by side; that get more width with their number
 KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
     "never moves": {"marker": "o", "color": BLUE, "mfc": "none"},

@@ -17,6 +17,7 @@ from ...setup import Setup
 from ...truth.smallest import Needed, needed, reduced
 from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
 
+FEW_SPEEDS = 6  # of the robot of a file, whose runs by both integrators are compared, of more those by the last alone
 MOST_SPEEDS = 12  # of the robot of a file, whose runs are compared within a band of rounding
 
 
@@ -36,7 +37,8 @@ def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str]
             "takes long; trajectory compares both engines in this scene."
         )
     elif smaller or stays:
-        for integrator in integrators:
+        few = case.robot.is_read and case.coordinates.nv > FEW_SPEEDS
+        for integrator in integrators[-1:] if few else integrators:
             compare_smaller(result, case, smaller, setup, integrator)
     return models
 

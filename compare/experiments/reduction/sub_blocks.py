@@ -44,11 +44,9 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
             case = robot.case(words_of(locked), posture=posture_of(coordinates, q[0]), locked=locked)
             for quantity, pair, apart, scale in differences(setup, case, q, v):
                 found.setdefault((quantity, pair), []).append((apart, scale))
-        counts = {
-            "operations_whole": operations(robot.tree),
-            "operations_locked_at_zero": operations(robot.tree.lock(at_zero(robot.tree, locked))),
-            "operations_locked_at_angles": operations(case.tree),
-        }
+        trees = robot.tree, robot.tree.lock(at_zero(robot.tree, locked)), case.tree
+        names = "operations_whole", "operations_locked_at_zero", "operations_locked_at_angles"
+        counts = {name: None if many else operations(tree) for name, tree in zip(names, trees)}
         units = WITH_SLIDES if "slide" in coordinates.all_kinds else BLOCK_UNITS
         for (quantity, pair), arrays in found.items():
             check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts, units[quantity])

@@ -108,7 +108,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     names = [case.name for case in cases]
     floors = dict(zip(names, lefts))
     unit = unit_of(setup.robot.coordinates)
-    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit}
+    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "doubles": setup.robot.is_read}
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
     taking = methods(setup.engines, setup.size, which, setup.robot)
@@ -190,7 +190,7 @@ def rows_of_scene(
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
-            found.append(row_of_run(case, case, engines, method, setting, reference))
+            found.append(row_of_run(case, case, engines, method, setting, reference, left))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
             if accuracy.gained_nothing(now, work, best, last, left) or too_long(method, case, work, size):
                 break
@@ -207,9 +207,18 @@ def too_long(method: Method, case: Case, work: int, size: str) -> bool:
 
 
 def row_of_run(
-    case: Case, whole: Case, engines: Mapping[str, Engine], method: Method, setting: Setting, reference: Reference
+    case: Case,
+    whole: Case,
+    engines: Mapping[str, Engine],
+    method: Method,
+    setting: Setting,
+    reference: Reference,
+    left: float = 0.0,
 ) -> dict:
-    """A row: one run of a scene, or of the smaller model that has the motion of the whole one."""
+    """A row: one run of a scene, or of the smaller model that has the motion of the whole one.
+
+    left: the least error that a reference in doubles shows; a smaller one is not known, and has this value.
+    """
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
     places, nq = whole.coordinates.places, whole.coordinates.nq
     free = [[k for i in joints for k in range(*getattr(places.joints[i], part).indices(size))]
@@ -221,6 +230,7 @@ def row_of_run(
         motion = read(run())
         ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
         error = reference.error(motion.q, joints)
+        error = np.maximum(error, left) if whole.robot.is_read else error
         states = [part.copy() for part in true]
         for state, part, own in zip(states, (motion.q, motion.v), free):
             state[:, own] = 0.0 if ended else part

@@ -132,7 +132,8 @@ def references_in_words(known: Mapping[str, Reference], floors: Floors, doubles:
         runs = "; ".join(f"{scene}: {known[scene].halving:.0e} ({known[scene].steps} steps)" for scene in floors)
         return [
             "The reference is a run in doubles, of order 8. It differs from the one with half the steps by so many rad, or "
-            f"per s: {runs}. Smaller errors are not known; a reference of many digits is computed for the assignment's arm."
+            f"per s: {runs}. Smaller errors are not known, and have this size, or that of rounding, in tables and figures; a "
+            "reference of many digits is computed for the assignment's arm."
         ]
     coarse = [f"{scene}: {known[scene].halving:.0e}" for scene, left in floors.items() if known[scene].halving >= left]
     if not coarse:

@@ -35,6 +35,11 @@ def unit_of(result: Result) -> str:
     return result.curves.get("unit", "rad")
 
 
+def floor_in_words(result: Result) -> str:
+    """What the least error is, in the legend."""
+    return "what is known of the reference" if result.curves.get("doubles") else "rounding: eps × growth"
+
+
 def rows_of_runs(result: Result) -> list[dict]:
     """The rows that are runs, not those of an engine that is not there."""
     return [row for row in result.rows if row["why_not"] is None]
@@ -102,7 +107,7 @@ def draw_times(result: Result, scene: str) -> tuple[str, Figure, str]:
     )  # fmt: skip
     for engine in dict.fromkeys(engine for engine, _ in by_method):
         ax.plot([], [], color=colour_of(engine), linewidth=3, label=written(engine))
-    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label="rounding: eps × growth")
+    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=floor_in_words(result))
     ax.set(xscale="log", yscale="log", xlim=(OF_DIVERGED * 3, FINE_END / 30))
     ax.set(
         xlabel=f"worst error on the way, {unit_of(result)} (finer to the right)",
@@ -152,12 +157,19 @@ def spoken(result: Result, scene: str) -> str:
     """The message of a scene: how many times faster at the errors asked for."""
     unit = unit_of(result)
     lines = [line for line in result.tables["what_should_i_use"] if line["scene"] == scene and line["ratio"]]
-    ratios = ", ".join(f"{line['ratio']:.0f} times as long for {value(line, 'target'):.0e} {unit}" for line in lines)
+    ratios = ", ".join(
+        f"{spelled(line['ratio'])} times as long for {value(line, 'target'):.0e} {unit}" for line in lines
+    )
     return (
         f"MuJoCo's cheapest setting takes {ratios} as tmt's."
         if ratios
         else "no error asked for is reached by both MuJoCo and tmt."
     )
+
+
+def spelled(ratio: float) -> str:
+    """A ratio in words: of small ones two digits."""
+    return f"{ratio:.0f}" if ratio >= 3.0 else f"{ratio:.2g}"
 
 
 def draw_evaluations(result: Result) -> tuple[str, Figure, str]:

@@ -21,9 +21,9 @@ NEARER = slice(3, 7)  # of the settings: coarse ones that come near the referenc
 IN_LOOPS, TRACED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: of tmt's compiled loops, of its straight-line code, of MuJoCo
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
-LEAST_SETTINGS = 3  # of any method, whatever they take
+LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of any method, whatever they take
 QUICK_SPEEDS = 4  # up to which a quick run has methods that solve their stages
-SLOWEST = 0.5  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
+SLOWEST = 0.6  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
 
 
 def scenes_of(robot: Robot) -> list[Case]:
@@ -91,10 +91,12 @@ def too_slow(method: Method, robot: Robot, size: str) -> str | None:
     if not robot.is_read or method.adaptive:
         return None
     case, n = regular_of(robot), robot.coordinates.nv
-    if size == "quick" and n > QUICK_SPEEDS and method.engine == "tmt" and method_named(method.name).solves_stages:
-        return f"with {n} speeds its straight-line code takes too long for a quick run"
     seconds = coarsest_steps(case) * estimated(method, case.tree)
-    return None if seconds <= SLOWEST else f"with {n} speeds its coarsest run alone would take about {seconds:.1g} s"
+    if seconds > SLOWEST:
+        return f"with {n} speeds its coarsest run alone would take about {seconds:.1g} s"
+    if size == "quick" and n > QUICK_SPEEDS and method.engine == "tmt" and method_named(method.name).solves_stages:
+        return f"with {n} speeds its code takes too long to make for a quick run"
+    return None
 
 
 def estimated(method: Method, tree: Tree) -> float:
@@ -126,7 +128,7 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
     count, finest = coarsest_steps(case), finest_steps(method)
     if case.robot.is_read:
         affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
-        finest = max(min(finest, affordable), count << (LEAST_SETTINGS - 1))
+        finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))
     doublings = max(1, (finest // count).bit_length())
     return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
 
