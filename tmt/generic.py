@@ -62,10 +62,10 @@ def arrays(tree) -> Arrays:
 
 
 def compiled():
-    """The module of the compiled loops; imported when it is first asked for, as numba takes its time."""
-    from . import loops
+    """The module of compiled evaluations; imported when it is first asked for, as numba takes its time."""
+    from . import loop_calls
 
-    return loops
+    return loop_calls
 
 
 def stepper(tree, stepping) -> Callable:

@@ -3,7 +3,8 @@
 import numpy as np
 
 from .implicit import CLOSE, ITERATIONS
-from .loop_runs import NUDGE, check, end, normalize, solve, turned, unsound
+from .loop_runs import NUDGE, solve
+from .loop_states import check, end, normalize, turned, unsound
 from .loops import BALL, forward_dynamics
 from .machine_code import compiled
 from .templates import NEWTON

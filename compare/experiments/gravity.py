@@ -48,8 +48,9 @@ def own_tolerance(tree: tmt.Tree) -> str:
         rules[0] += ", and with a spring of a hinge D_i + (1 - pi / 2) (V(q_i + 360 deg) - V(q_i - 360 deg)) / (4 pi)"
     rules += ["(V(q_i + 1 m) - V(q_i - 1 m)) / 2 m of a slide"] * ("slide" in tree.kind)
     return (
-        f"Torques: 64 eps x F_i, each joint's own: m g L{of_springs}, of a slide m g{of_springs}, summed over the bodies that it "
-        "moves; L is the largest distance from the origin that a centre of mass can have at that state. Accelerations left: "
+        f"Torques: 64 eps x F_i, each joint's own: k m g L{of_springs}, of a slide k m g{of_springs}, summed over the bodies "
+        "that it moves, each turned by k hinges and balls; L is the largest distance from the origin that a centre of mass can "
+        "have at that state. Accelerations left: "
         "64 eps x |Mbar^-1| F, entry by entry. The gradient is exact, not a small difference: "
         f"dV/dq_i = {'; '.join(rules)}. Its scale is the potential energy's, the largest of those that it is made of."
     )

@@ -30,7 +30,8 @@ def tolerance(robot: Robot) -> str:
         return (
             "64 eps x scale, each entry its own. With L the largest distance from the origin that a centre of mass can have at "
             "that state, S the sum of |rates| of the hinges and balls that move a body, V that of its slides: lengths L; T_b: L "
-            "of a hinge or ball, 1 of a slide; B_b: 1; angular velocity S; convective terms 2 S (L S + V) and S^2."
+            "of a hinge or ball, 1 of a slide; B_b: 1; angular velocity S; convective terms 2 S (L S + V) and S^2; "
+            "all times the number of hinges and balls that turn the body."
         )
     reach = reaches(robot.tree).max()
     return (

@@ -35,10 +35,10 @@ def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
     if has_own_scales(robot.tree, robot.is_read):
         return (
-            "64 eps x scale, each entry its own: the sum over the bodies of m t_i t_j + |I| u_i u_j, and the armature; t = L of "
-            "a hinge or ball that moves the body, 1 of a slide, and u = 1 and 0; L is the largest distance from the origin "
-            "that a centre of mass can have at that state. Definite: the smallest eigenvalue of Mbar, in units of its diagonal, "
-            "is at least 64 eps of the largest."
+            "64 eps x scale, each entry its own: the sum over the bodies of k (m t_i t_j + |I| u_i u_j), and the armature; t = L "
+            "of a hinge or ball that moves the body, 1 of a slide, and u = 1 and 0; k hinges and balls turn the body; L is the "
+            "largest distance from the origin that a centre of mass can have at that state. Definite: the smallest eigenvalue of "
+            "Mbar, in units of its diagonal, is at least 64 eps of the largest."
         )
     text = (
         "64 eps x the largest entry of Mbar at that state. Definite: the smallest eigenvalue is at least 64 eps of the "

@@ -12,9 +12,10 @@ from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import held
 from . import beyond, choice, claims, departure, failure, falling, limits, long_runs
+from .choice import dampings_of
 from .claims_judged import check_claims
 from .equilibria import check_equilibria, planes
-from .subjects import DAMPINGS, places, subjects_of
+from .subjects import places, subjects_of
 
 TITLE = "Stability: where methods fail"
 FINE_DEPARTURES = (1e-2, 1e-3)  # s, beside the coarsest step
@@ -35,12 +36,14 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """How far apart what is compared may be."""
+    sought = "among steps about the predicted one" if robot.is_read else "without the prediction"
     return (
         "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
         "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
         "max|J| / 1e-6. Limits: the largest dt at which no mode of the equations of motion grows by more than 0.1 % from the "
         "second to the last quarter of a run from 1e-6 rad (2000 steps, or more until a quarter holds a swing of the slowest "
-        "mode), found by bisection without the prediction, within 0.1 % of the predicted dt. Growth: 0.1 % over all steps. "
+        "mode), found by bisection "
+        f"{sought}, within 0.1 % of the predicted dt. Growth: 0.1 % over all steps. "
         "Departure (a hinge 0.1 rad away): within one step or 0.03 s of the first crossing of the method's linear map, whose "
         "angles are rounded to doubles at each step; where the map stays, the run stays."
     )
@@ -49,20 +52,24 @@ def tolerance(robot: Robot) -> str:
 def methods_of(setup: Setup) -> tuple:
     """The methods that a run of this size takes."""
     few = choice.of_schemes(setup.engines, choice.FEW_SCHEMES)
-    return setup.of(choice.all_methods(setup.engines), few, few + choice.of_schemes(setup.engines, ("implicit",)))
+    methods = setup.of(choice.all_methods(setup.engines), few, few + choice.of_schemes(setup.engines, ("implicit",)))
+    return choice.explicit(methods) if setup.robot.is_read else methods
 
 
 def begin(setup: Setup) -> None:
     """Set the runs going side by side. A quick run takes fewer methods and scenes, and no map, minute or fine step."""
-    robot, engines, of, seen = setup.robot, setup.engines, setup.of, subjects_of(setup.robot)
+    engines, of, seen = setup.engines, setup.of, subjects_of(setup.robot)
+    robot, every, added = seen.robot, not setup.robot.is_read, dampings_of(setup.robot)
     methods, each, coarse = methods_of(setup), choice.of_schemes(engines), choice.coarsest_case(robot).scene.dt
     points = of(
-        places(seen.centres, seen.saddles),
-        places(seen.centres[:1], seen.saddles[:1], DAMPINGS[:1]),
-        places(seen.centres[:1], seen.saddles[:1], DAMPINGS[:2]),
+        places(seen.centres, seen.saddles, added),
+        places(seen.centres[:1], seen.saddles[:1], added[:1]),
+        places(seen.centres[:1], seen.saddles[:1], added[:2]),
     )
     leaving = of(choice.of_schemes(engines, departure.DEPARTURE_SCHEMES), methods, methods)
     leaving_dts = tuple(dict.fromkeys(of((coarse, *FINE_DEPARTURES), (coarse,), (coarse, *FINE_DEPARTURES[:1]))))
+    if not every:
+        leaving, leaving_dts = choice.explicit(leaving), (coarse,)
     rk4, edges = claims.of_claims(engines), tuple(engines["tmt"].methods[name] for name in failure.EDGE_SCHEMES)
     near = edges + tuple(same_scheme(engines, method, "mujoco") for method in edges)
     implicit = choice.implicit_methods(engines)
@@ -86,9 +93,10 @@ def begin(setup: Setup) -> None:
         robots = about(robot.claims and (full or not setup.is_quick), (robot,))
         return setup.map(partial(function, engines, **more), robots)
 
-    mapped = about(seen.centre, of(each, (), each[:3]))
-    minutes = list(product(about(seen.free, of(each, (), methods)), (coarse, long_runs.FINE_STEP)))
-    resonant, tongues = about(seen.swinging, of(near, near[:2], near)), about(seen.swinging, of(edges, (), edges))
+    mapped = about(every and seen.centre, of(each, (), each[:3]))
+    minutes = list(product(about(every and seen.free, of(each, (), methods)), (coarse, long_runs.FINE_STEP)))
+    resonant = about(every and seen.swinging, of(near, near[:2], near))
+    tongues = about(every and seen.swinging, of(edges, (), edges))
     setup.background["stability"] = {
         "subjects": seen,
         "limits": ask(limits.limits_and_growths, [held(robot, *point) for point in points], methods=methods, steps=steps,
@@ -111,7 +119,7 @@ def begin(setup: Setup) -> None:
                               steps=steps)),
         "minutes": ask(long_runs.long_run, *([pair[k] for pair in minutes] for k in (0, 1)), case=seen.free,
                        duration=of(long_runs.MINUTE, long_runs.MINUTE, 10.0)),
-        "newton": ask(long_runs.newton, about(seen.centre, of(implicit, (), implicit)), at=seen.centre,
+        "newton": ask(long_runs.newton, about(every and seen.centre, of(implicit, (), implicit)), at=seen.centre,
                       dts=of(long_runs.NEWTON_STEPS, (), (0.1, 1.0, 100.0)),
                       steps=of(limits.GROWTH_STEPS, limits.GROWTH_STEPS, 200)),
     }  # fmt: skip
@@ -119,13 +127,14 @@ def begin(setup: Setup) -> None:
 
 def rows(setup: Setup) -> Result:
     """Equilibria; step limits and growth per step; departures; what is claimed; failures beyond the linear ones."""
-    result, robot = Result("stability"), setup.robot
+    result = Result("stability")
     if "stability" not in setup.background:
         begin(setup)
     work = setup.background.pop("stability")
     seen, methods = work["subjects"], methods_of(setup)
+    robot = seen.robot
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
-    check_equilibria(result, setup)
+    check_equilibria(result, robot, setup)
     limits.check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
     departure.check_departures(result, [row for part in work["departure"] for row in part] + falls)
@@ -136,7 +145,7 @@ def rows(setup: Setup) -> Result:
         beyond.check_kept(result, robot, found)
     for name, axes in work["maps"].items():
         result.curves[name] = {**axes, "grown": dict(zip(*work[name]))}
-    if seen.swinging:
+    if result.curves["near"]["grown"]:
         failure.check_near(result, robot, seen.centre.name, result.curves["near"])
     for reset, gain in zip(work["reset"], work["gain"]):
         failure.check_silent(result, reset, gain)
@@ -155,11 +164,13 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     from . import figures_claims, figures_departure, figures_failure, figures_limits
 
     tables, curves, seen = result.tables, result.curves, subjects_of(robot)
+    robot = seen.robot
     falls = [row for row in tables.get("departure", ()) if seen.marginal and row["scene"] == seen.marginal.name]
+    left = seen.saddle and any(row["scene"] == seen.saddle.name for row in tables.get("departure", ()))
     drawn = {
         figures_limits.draw_limits: bool(seen.centre),
         figures_limits.draw_regions: True,
-        figures_departure.draw_departure: bool(seen.saddle),
+        figures_departure.draw_departure: left,
         figures_claims.draw_torques: "stability_torques" in tables,
         figures_failure.draw_silent: "silent" in curves,
         figures_limits.draw_growth_map: curves["map"]["grown"],

@@ -10,14 +10,20 @@ from ...case import Case
 from ...engines import LABELS, Engine, Method, one_of_each_scheme
 from ...judge.scale import gravity_scale
 from ...robots import Robot
-from ...truth.linear import NEGLIGIBLE, all_of_kind, held
+from ...truth.linear import NEGLIGIBLE, all_that_stay, held
 
+DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 FEW_SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit_midpoint")  # of a quick run, by tmt's names
 
 
 def all_methods(engines: Mapping[str, Engine]) -> tuple[Method, ...]:
     """Every method of tmt and of MuJoCo whose step is fixed."""
     return tuple(m for name in ("tmt", "mujoco") for m in engines[name].methods.values() if not m.adaptive)
+
+
+def explicit(methods: Sequence[Method]) -> tuple[Method, ...]:
+    """Those whose stages solve no equation."""
+    return tuple(m for m in methods if m.engine != "tmt" or not tmt.METHODS[m.name].solves_stages)
 
 
 def of_schemes(engines: Mapping[str, Engine], schemes: Sequence[str] | None = None) -> tuple[Method, ...]:
@@ -34,8 +40,13 @@ def implicit_methods(engines: Mapping[str, Engine]) -> tuple[Method, ...]:
 
 
 def free_motion(robot: Robot) -> Case | None:
-    """The robot let go at a centre, the first at which it moves: a scene of its own if it has one; None: no centre."""
-    centres = all_of_kind(robot, "centre")
+    """The robot let go at a centre, the first at which it moves: a scene of its own if it has one; None: no centre.
+
+    Of a robot that is read from a file the first of its scenes in which it moves freely.
+    """
+    if robot.is_read:
+        return next((case for case in robot.cases if case.is_free and not np.any(case.scene.damping)), None)
+    centres = all_that_stay(robot)
     if not centres:
         return None
     least = NEGLIGIBLE * gravity_scale(robot.tree)
@@ -68,6 +79,11 @@ def step_text(case: Case, dt: float) -> str:
 def who(row: dict) -> str:
     """The engine and the method of a row."""
     return f"{LABELS[row['engine']]} {row['method']}"
+
+
+def dampings_of(robot: Robot) -> tuple[float, ...]:
+    """What damping is added, N m s/rad; a robot that is read from a file has its own alone."""
+    return DAMPINGS[:1] if robot.is_read else DAMPINGS
 
 
 def damped(robot: Robot, damping: float) -> str:

@@ -5,6 +5,8 @@ from itertools import product
 
 import numpy as np
 
+import tmt
+
 from ...engines import Engine, Method
 from ...judge.check import Result
 from ...judge.run import LEFT, departure
@@ -35,7 +37,8 @@ def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.nd
     residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
     """
     if method.engine == "mujoco":
-        return engines["mujoco"].of(at.case).gravity_balance(at.q)
+        own = engines["mujoco"].of(at.case).gravity_balance(at.q)
+        return own + tmt.spring_torque(at.q, at.tree) if at.tree.has_springs else own
     tau = variants(at.tau, 2)
     return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
 
@@ -45,7 +48,7 @@ def residual(method: Method, engines: Mapping[str, Engine], at: Held, tau: np.nd
 
     Read from the first step of a method, which is so short that nothing moves: Mbar qd / dt.
     """
-    start = at.q + np.zeros_like(tau)
+    start = at.moved(np.zeros_like(tau))
     motion = engines[method.engine].of(at.case).run(start, np.zeros_like(tau), tau, INSTANT, 1, method.name)
     return motion.v[..., 1, :] @ at.mass_matrix / INSTANT
 
@@ -69,7 +72,7 @@ def offset(at: Held, off: np.ndarray) -> np.ndarray:
 
     A torque along a mode without stiffness has no equilibrium, and is too small to matter.
     """
-    n = len(at.q)
+    n = at.nv
     accelerations = np.linalg.solve(at.mass_matrix, np.transpose(off))
     return (np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2) @ accelerations).T
 
@@ -89,14 +92,15 @@ def predicted(
     carries all modes of the state about the equilibrium that this torque moves. rounded: each new angle is rounded to a
     double, as in a run, so that what a step adds may be lost; the rates are too small for that to matter.
     """
-    change = (at.step(scheme, dt) - np.eye(2 * len(at.q))).T
-    base = at.q if rounded else np.zeros_like(at.q)
+    n = at.nv
+    change = (at.step(scheme, dt) - np.eye(2 * n)).T
+    base = at.sizes if rounded else np.zeros(n)
     start, aside = base + np.asarray(moved), offset(at, off)
     q, qd = start.copy(), np.zeros_like(start)
     times = [None] * len(start)
     for k in range(1, round(longest / dt) + 1):
         added = np.concatenate([q - base + aside, qd], axis=1) @ change
-        q, qd = q + added[:, : len(at.q)], qd + added[:, len(at.q) :]
+        q, qd = q + added[:, :n], qd + added[:, n:]
         gone = ~(np.abs(q - start).max(axis=1) <= LEFT)
         if gone.any():
             times = [k * dt if time is None and out else time for time, out in zip(times, gone)]
@@ -112,13 +116,13 @@ def is_led(at: Held, scheme: str, dt: float) -> bool:
     cannot say when the posture is left.
     """
     shape = at.fastest_growing(scheme, dt)[1]
-    return bool(np.isclose(at.rate(shape), at.modes[0][0].real, rtol=NEGLIGIBLE))
+    return bool(np.isclose(at.rate(shape), np.abs(at.modes[0][0]), rtol=NEGLIGIBLE))
 
 
 def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]) -> list[dict]:
     """Rows for tables/departure.csv: every method that is led and every perturbation at one dt, from one saddle."""
     values, vectors = at.modes
-    n, steps = len(at.q), round(LONGEST_DEPARTURE / dt)
+    n, steps = at.nv, round(LONGEST_DEPARTURE / dt)
     shape = vectors[:n, 0].real / np.abs(vectors[:n, 0]).max()
     rows = []
     for method in (method for method in methods if is_led(at, method.scheme, dt)):
@@ -126,18 +130,20 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
         sizes = [(size, size * shape, own) for size in PERTURBATIONS]
         # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
         push = at.mass_matrix @ shape * values[0].real ** 2
+        if any(at.tree.damping) or values[0].imag:
+            push = at.mass_matrix @ at.matrix[n:, :n] @ shape
         sizes += [(size, np.zeros(n), own + size * push) for size in TORQUE_ERRORS]
         starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
         with np.errstate(over="ignore", invalid="ignore"):
             dynamics = engines[method.engine].of(at.case)
-            motion = dynamics.run(at.q + starts, np.zeros_like(starts), torques, dt, steps, method.name)
+            motion = dynamics.run(at.moved(starts), np.zeros_like(starts), torques, dt, steps, method.name)
         off = residual(method, engines, at, torques)
         expected = predicted(at, method.scheme, dt, [moved for _, moved, _ in sizes], off)
         for k, ((size, _, _), time, path) in enumerate(zip(sizes, expected, motion.q)):
             rows.append({
                 "scene": at.name + (", torque off" if k >= len(PERTURBATIONS) else ""), "engine": method.engine,
                 "method": method.name, "dt_s": dt, "perturbation_rad": size, "predicted_s": time,
-                "observed_s": departure(motion.t, path),
+                "observed_s": departure(motion.t, at.away(path)),
             })  # fmt: skip
     return rows
 

@@ -12,9 +12,9 @@ from ...judge.scale import EPS, FACTOR
 from ...judge.words import capital
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.linear import Held, held, region
-from .choice import coarsest_case
-from .subjects import DAMPINGS, Subjects, places
+from ...truth.linear import Held, held, named, region
+from .choice import coarsest_case, dampings_of
+from .subjects import Subjects, places
 
 FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
     1e-2,
@@ -22,12 +22,14 @@ FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
 )  # s, of steps whose amplification is compared; the second with much damping
 
 
-def check_equilibria(result: Result, setup: Setup) -> None:
+MOST_NAMED = 6  # rates of a posture in a sentence
+
+
+def check_equilibria(result: Result, robot: Robot, setup: Setup) -> None:
     """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
-    robot, mujoco, table = setup.robot, setup.engines["mujoco"], []
-    least, some, much = DAMPINGS
+    mujoco, table = setup.engines["mujoco"], []
     usual = (FINE_AMPLIFICATION, coarsest_case(robot).scene.dt)
-    for name in robot.postures:
+    for name in named(robot):
         at = held(robot, name)
         values = at.modes[0]
         table += [
@@ -35,12 +37,12 @@ def check_equilibria(result: Result, setup: Setup) -> None:
             for k, v in enumerate(values)
         ]
         result.notes.append(kind_in_words(at))
-        for damping, steps in ((least, usual), (some, usual), (much, (DAMPED_AMPLIFICATION,))):
+        for damping, steps in zip(dampings_of(robot), (usual, usual, (DAMPED_AMPLIFICATION,))):
             at = held(robot, name, damping)
             for method, dt in product(one_of_each_scheme(mujoco), steps):
                 where = f"{name}, {method.name}, dt = {dt:.4g} s, damping {damping:g}"
                 theirs = transition(mujoco.of(at.case), at.q, at.tau, dt, method.name)
-                check_amplification(result, where, at.q, at.step(method.scheme, dt), theirs)
+                check_amplification(result, where, at, at.step(method.scheme, dt), theirs)
     result.tables["stability_modes"] = table
 
 
@@ -48,15 +50,26 @@ def kind_in_words(at: Held) -> str:
     """What a held posture is, and its modes."""
     values = at.modes[0]
     swings = [f"{v.imag:.3f} rad/s" for v in values if v.imag > 1e-3]
-    grows = [f"{v.real:.3f} per second" for v in values if v.real > 1e-3]
-    texts = [f"grows by {' and '.join(grows)}"] * bool(grows) + [f"swings at {', '.join(swings)}"] * bool(swings)
+    grows = [f"{v.real:.3f} per second" for v in values if v.real > 1e-3 and v.imag >= 0.0]
+    decays = [-v.real for v in values if v.real < -1e-3]
+    texts = [f"grows by {few(grows, ' and ')}"] * bool(grows) + [f"swings at {few(swings, ', ')}"] * bool(swings)
+    if decays and any(at.tree.damping):
+        texts.append(f"decays by {min(decays):.3g} to {max(decays):.4g} per second")
+    if at.case.robot.is_read and at.without_stiffness.any():
+        texts.append(f"{at.without_stiffness.sum()} of {len(values)} rates are zero")
     kind = at.kind if at.kind == "marginal" else f"a {at.kind}"
     return f"{capital(at.name)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
 
 
-def check_amplification(result: Result, where: str, q: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> None:
+def few(texts: Sequence[str], between: str) -> str:
+    """The first of many texts, and how many more there are."""
+    more = len(texts) - MOST_NAMED
+    return between.join(texts[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def check_amplification(result: Result, where: str, at: Held, ours: np.ndarray, theirs: np.ndarray) -> None:
     """The check of one amplification: within what rounding does to a difference quotient."""
-    allowed = FACTOR * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max() / NUDGE
+    allowed = FACTOR * EPS * (1.0 + np.abs(at.sizes).max()) * np.abs(ours).max() / NUDGE
     quantity = "amplification of one step, TMT to MuJoCo"
     result.check(where, quantity, np.abs(ours - theirs).max(), allowed, "", rounding=True)
 
@@ -73,5 +86,5 @@ def planes(result: Result, robot: Robot, subjects: Subjects, schemes: Sequence[s
     }
     result.curves["points"] = {
         (name, damping): held(robot, name, damping).modes[0]
-        for name, damping in places(subjects.centres[:1], subjects.saddles[:1], DAMPINGS[:2])
+        for name, damping in places(subjects.centres[:1], subjects.saddles[:1], dampings_of(robot)[:2])
     }

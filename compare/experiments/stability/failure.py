@@ -13,7 +13,7 @@ from ...judge.check import Result
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
 from ...robots import Robot
-from ...truth.linear import Held
+from ...truth.linear import Held, named
 from .choice import fraction
 from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth_in_run, stiffest
 
@@ -76,7 +76,7 @@ def observed(case: Case, t: np.ndarray, run: dict) -> dict:
 
 def potential_range(case: Case) -> float:
     """The highest less the lowest potential, J: what the named postures lead to, joint by joint to where it is extreme."""
-    starts = np.array([case.robot.posture(name) for name in case.robot.postures])
+    starts = np.array([case.robot.posture(name) for name in named(case.robot)])
     return highest_potential(case.tree, starts, 1.0) + highest_potential(case.tree, starts, -1.0)
 
 

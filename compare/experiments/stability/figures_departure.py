@@ -9,10 +9,10 @@ from ...judge.run import LEFT, number_or_nan
 from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from ...robots import Robot
-from ...truth.linear import of_kind
 from .choice import coarsest_case, step_text
 from .departure import DEPARTURE_TOLERANCE, late, near
 from .figures_limits import look
+from .subjects import subjects_of
 
 SCHEME_MARKS = {"rk4": "o", "explicit_euler": "v", "semi_implicit_euler": "s", "implicit": "D", "implicit_midpoint": "^",
                 "gauss_legendre_4": "P"}  # fmt: skip
@@ -22,7 +22,7 @@ ENGINE_LOOKS = {"tmt": (BLUE, "o"), "mujoco": (ORANGE, "s")}
 
 def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Time to leave a saddle against the size of the perturbation, with the predicted slope."""
-    saddle, coarse = of_kind(robot, "saddle"), coarsest_case(robot)
+    saddle, coarse = subjects_of(robot).saddle.name, coarsest_case(robot)
     rows = [row for row in result.tables["departure"] if row["scene"] in (saddle, f"{saddle}, torque off")]
     steps = sorted({row["dt_s"] for row in rows}, reverse=True)
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
@@ -66,7 +66,7 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
 
 def draw_falls(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Time to leave a marginal posture against the perturbation: the law of a cubic potential."""
-    posture = of_kind(robot, "marginal")
+    posture = subjects_of(robot).marginal.name
     rows = [row for row in result.tables["departure"] if row["scene"] == posture]
     fig = Figure(figsize=(WIDTH, 3.1), layout="constrained")
     ax = fig.subplots()

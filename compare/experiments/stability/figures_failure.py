@@ -9,11 +9,11 @@ from ...judge.check import Result
 from ...judge.words import capital
 from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH
 from ...robots import Robot
-from ...truth.linear import of_kind
 from .choice import coarsest_case, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
 from .figures_limits import look
 from .limits import LINEAR_DEVIATION
+from .subjects import subjects_of
 
 
 def draw_edge(result: Result, robot: Robot) -> tuple[str, Figure, str]:
@@ -60,9 +60,9 @@ def draw_edge(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         f"{method.label} {fold(grown[0].max())} and {fold(grown[1].max())}" for method, grown in near.items()
     )
     caption = (
-        f"The nonlinear edge at {of_kind(robot, 'centre')}. Above: growth over ω dt and the size of the perturbation; the linear "
-        f"limit is 2. Below: near √3, where a swing takes three steps. The largest growth there in {close['steps']} steps, "
-        f"from {LINEAR_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {worst}. Divergence is drawn at 1e9."
+        f"The nonlinear edge at {subjects_of(robot).centre.name}. Above: growth over ω dt and the size of the perturbation; "
+        f"the linear limit is 2. Below: near √3, where a swing takes three steps. The largest growth there in {close['steps']} "
+        f"steps, from {LINEAR_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {worst}. Divergence is drawn at 1e9."
     )
     return "stability_edge", fig, caption
 

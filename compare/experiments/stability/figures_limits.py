@@ -8,10 +8,10 @@ from ...engines import LABELS, Method
 from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
-from ...truth.linear import all_of_kind, of_kind
 from .choice import coarsest_case, damped, fraction
 from .departure import span
 from .limits import LINEAR_DEVIATION, apart
+from .subjects import subjects_of
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),
@@ -36,7 +36,7 @@ def in_print(method: Method) -> str:
 
 def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Predicted and observed limits as paired bars, scene by scene and damping by damping."""
-    rows = [row for row in result.rows if row["scene"] in all_of_kind(robot, "centre")]
+    rows = [row for row in result.rows if row["scene"] in subjects_of(robot).centres]
     panels = list(dict.fromkeys((row["scene"], row["damping"]) for row in rows))
     schemes = list(dict.fromkeys(row["method"] for row in rows if row["engine"] == "tmt"))
     columns = min(3, len(panels))
@@ -98,7 +98,7 @@ def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
 def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Eigenvalues times dt inside each method's stability region."""
     drawn, points, case = result.curves["regions"], result.curves["points"], coarsest_case(robot)
-    centre, dt = of_kind(robot, "centre"), case.scene.dt
+    centre, dt = next(iter(subjects_of(robot).centres), None), case.scene.dt
     columns = 2 if len(drawn) == 4 else 3
     lines = -(-len(drawn) // columns)
     fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
@@ -120,9 +120,10 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
             if (row["engine"], row["method"], row["scene"], row["damping"]) == ("tmt", names[0], centre, 0.0):
                 at = row["predicted_dt_s"]
                 if at is not None:
-                    swing = at * np.abs(points[centre, 0.0]).max()
-                    ax.plot(0, swing, "x", color="black", markersize=6, label=f"{centre} at its limit")
-                    outside.append(f"{swing:.3f} ({titles[names]})")
+                    values = points[centre, 0.0]
+                    z = at * values[np.argmin(np.abs(np.abs(values) - row["mode_per_s"]))]
+                    ax.plot(z.real, abs(z.imag), "x", color="black", markersize=6, label=f"{centre} at its limit")
+                    outside.append(f"{abs(z):.3f} ({titles[names]})")
         ax.axhline(0, color="black", linewidth=0.5)
         ax.axvline(0, color="black", linewidth=0.5)
         ax.set(title=titles[names], xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
@@ -141,11 +142,14 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         if not damping
     }
     real = "; ".join(f"{name}: {', '.join(f'{z:.3f}' for z in found)}" for name, found in growing.items() if found)
+    limiting, swing = "the fastest mode", "omega dt"
+    if robot.is_read:
+        limiting, swing = "the mode that a step first lets grow", "|eigenvalue| dt"
     caption = (
         "The upper half of the stability regions (grey: one step lets neither of a pair of conjugate eigenvalues "
         f"grow) with the eigenvalues of the held {robot.name} times dt = {fraction(case.duration, dt)} s. "
         + (f"Positive real parts, which grow in the exact motion too ({real}). " if real else "")
-        + (f"Crosses: the fastest mode of {centre} at the limit, omega dt = {', '.join(outside)}. " if outside else "")
+        + (f"Crosses: {limiting} of {centre} at the limit, {swing} = {', '.join(outside)}. " if outside else "")
         + "Of partitioned methods two different real eigenvalues do not have a region; their marks are a guide."
     )
     return "stability_regions", fig, caption
@@ -153,7 +157,7 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
 
 def draw_growth_map(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Growth over dt, a row for each engine and method."""
-    drawn, centre = result.curves["map"], of_kind(robot, "centre")
+    drawn, centre = result.curves["map"], subjects_of(robot).centre.name
     by_method, dts, steps, allowed = (drawn[key] for key in ("grown", "x", "steps", "allowed"))
     grown = np.array(list(by_method.values()))
     fig = Figure(figsize=(WIDTH, 0.9 + 0.27 * len(by_method)), layout="constrained")

@@ -13,11 +13,17 @@ from .choice import damped, who
 
 LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
+MOST_OF_A_QUARTER = {
+    False: 20_000,
+    True: 2500,
+}  # steps of a quarter of a run, however slow a mode swings; of a file's robot
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
 GROWTH_MARGIN = 1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
 CRITERION = "no mode grows from the second to the last quarter of a run"
 TRIED_STEPS = np.geomspace(3e-4, 1e2, 24)  # s: among which the observed limit is sought
+TRIED_ABOUT = (0.9, 0.998, 1.002, 1.1, 3.0)  # times the predicted limit
+TRIED_OF_FASTEST = (0.1, 1.0, 10.0)  # times the time in which the fastest mode moves
 BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 # relative, of the growth in all steps: the deviation reaches 1e-5 rad, and its square is not in a linear map
@@ -44,8 +50,8 @@ def limits_and_growths(
         tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
         dt = 1e-2 if predicted is None else 1.001 * predicted  # just above the limit its mode grows fastest
         _, shape, _ = at.fastest_growing(method.scheme, dt)
-        seen, observed = observed_limit(method, engines, at, steps)
-        if kind == "finite" and seen == "always_fails" and predicted < TRIED_STEPS[0]:
+        seen, observed = observed_limit(method, engines, at, steps, tried_at(at, predicted))
+        if kind == "finite" and seen == "always_fails" and predicted < tried_at(at, predicted)[0]:
             kind, predicted = seen, None  # it fails at every step that is tried
         if kind == "always_fails":
             growths += [growth_per_step(method, engines, at, dt) for dt in growth_dts]
@@ -68,22 +74,26 @@ def growth_in_run(
     steps: int = GROWTH_STEPS,
 ) -> float:
     """The largest deviation of a run over that at its start, which is size x direction, rad; inf if it diverged."""
-    dynamics, start = engines[method.engine].of(at.case), at.q + size * direction
+    dynamics, start = engines[method.engine].of(at.case), at.moved(size * direction)
     with np.errstate(over="ignore", invalid="ignore"):
-        motion = dynamics.run(start, np.zeros_like(start), at.tau, float(dt), steps, method.name)
-        return deviation(motion.q, at.q) / size
+        motion = dynamics.run(start, np.zeros(at.nv), at.tau, float(dt), steps, method.name)
+        return deviation(at.away(motion.q), 0.0) / size
 
 
 def observed_limit(
-    method: Method, engines: Mapping[str, Engine], at: Held, steps: int = GROWTH_STEPS
+    method: Method,
+    engines: Mapping[str, Engine],
+    at: Held,
+    steps: int = GROWTH_STEPS,
+    tried: Sequence[float] = TRIED_STEPS,
 ) -> tuple[str, float | None]:
     """The largest dt at which no mode of the equations of motion grows in a run, found without the prediction.
 
-    Upwards through TRIED_STEPS to the first step that fails, then by bisection; ("never_fails", None) if none does,
+    Upwards through `tried` to the first step that fails, then by bisection; ("never_fails", None) if none does,
     ("always_fails", None) if the smallest does.
     """
     low = None
-    for high in TRIED_STEPS:
+    for high in tried:
         if grows(*shares(method, engines, at, high, steps)):
             break
         low = high
@@ -97,6 +107,18 @@ def observed_limit(
     return "finite", float(low)
 
 
+def tried_at(at: Held, predicted: float | None) -> Sequence[float]:
+    """The steps through which the observed limit is sought, s: TRIED_STEPS; few about the predicted one for a file's robot.
+
+    Where none is predicted these are about the time of the fastest mode.
+    """
+    if not at.case.robot.is_read:
+        return TRIED_STEPS
+    if predicted:
+        return predicted * np.array(TRIED_ABOUT)
+    return np.array(TRIED_OF_FASTEST) / np.abs(at.modes[0]).max()
+
+
 def shares(
     method: Method, engines: Mapping[str, Engine], at: Held, dt: float, steps: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -105,19 +127,17 @@ def shares(
     All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of motion, not of
     a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that swings in it cancel.
     """
-    n = len(at.q)
-    vectors = at.modes[1]
-    vectors = vectors / vectors[np.argmax(np.abs(vectors[:n]), axis=0), np.arange(2 * n)]
+    n, vectors = at.nv, at.shapes
     quarter = quarter_of(at, dt, steps)
     start = LINEAR_DEVIATION * vectors.sum(axis=1).real / (2 * n)
     weight = np.hanning(quarter + 2)[1:-1]
     weight /= weight.sum()
     dynamics = engines[method.engine].of(at.case)
     with np.errstate(over="ignore", invalid="ignore"):
-        motion = dynamics.run(at.q + start[:n], start[n:], at.tau, float(dt), 4 * quarter, method.name)
+        motion = dynamics.run(at.moved(start[:n]), start[n:], at.tau, float(dt), 4 * quarter, method.name)
         parts = (slice(0, 1), slice(quarter + 1, 2 * quarter + 1), slice(3 * quarter + 1, None))
-        deviations = (np.concatenate([motion.q[part] - at.q, motion.v[part]], axis=1) for part in parts)
-        first, *found = (np.abs(off @ np.linalg.inv(vectors).T) ** 2 for off in deviations)
+        deviations = (np.concatenate([at.away(motion.q[part]), motion.v[part]], axis=1) for part in parts)
+        first, *found = (np.abs(off @ at.measures.T) ** 2 for off in deviations)
         early, late = (np.sqrt(weight @ part / first[0]) for part in found)
         return early, late
 
@@ -125,7 +145,12 @@ def shares(
 def quarter_of(at: Held, dt: float, steps: int) -> int:
     """A quarter of a run of at least so many steps: it holds a swing of the slowest mode."""
     swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
-    return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))) if len(swings) else 0)
+    return max(
+        steps // 4,
+        min(MOST_OF_A_QUARTER[at.case.robot.is_read], int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
+        if len(swings)
+        else 0,
+    )
 
 
 def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
@@ -152,10 +177,10 @@ def growth_per_step(method: Method, engines: Mapping[str, Engine], at: Held, dt:
     """How much the fastest-growing mode grows in one step: in a run, by its share in the deviation, and predicted."""
     predicted, shape, measure = at.fastest_growing(method.scheme, dt)
     steps = int(np.clip(np.log(TOTAL_GROWTH) / np.log(predicted), 2, MOST_GROWTH_STEPS))
-    n, start, dynamics = len(at.q), TINY_DEVIATION * shape.real, engines[method.engine].of(at.case)
+    n, start, dynamics = at.nv, TINY_DEVIATION * shape.real, engines[method.engine].of(at.case)
     with np.errstate(over="ignore", invalid="ignore"):
-        motion = dynamics.run(at.q + start[:n], start[n:], at.tau, dt, steps, method.name)
-        share = np.abs(np.concatenate([motion.q - at.q, motion.v], axis=1) @ measure)
+        motion = dynamics.run(at.moved(start[:n]), start[n:], at.tau, dt, steps, method.name)
+        share = np.abs(np.concatenate([at.away(motion.q), motion.v], axis=1) @ measure)
         total = share[-1] / share[0]
     return {
         "scene": at.name, "engine": method.engine, "method": method.name, "dt_s": dt, "mode_per_s": at.rate(shape),
@@ -175,7 +200,7 @@ def map_of_growth(
 def stiffest(at: Held) -> tuple[float, np.ndarray]:
     """Rate, rad/s, and angles (largest 1 rad) of the fastest swinging mode; a rate of 0: no mode swings."""
     values, vectors = at.modes
-    n, k = len(at.q), int(np.argmax(values.imag))
+    n, k = at.nv, int(np.argmax(values.imag))
     angles = (vectors[:n, k] / vectors[np.argmax(np.abs(vectors[:n, k])), k]).real
     return float(values[k].imag), angles / np.abs(angles).max()
 

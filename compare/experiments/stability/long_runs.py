@@ -57,10 +57,10 @@ def newton(
     method: Method, at: Held, engines: Mapping[str, Engine], dts: Sequence[float] = NEWTON_STEPS, steps: int = 2000
 ) -> list[dict]:
     """Steps of an implicit method that Newton's method finds, of so many, against dt, in small and in large motion."""
-    direction, rest, dynamics = stiffest(at)[1], np.zeros_like(at.q), engines[method.engine].of(at.case)
+    direction, rest, dynamics = stiffest(at)[1], np.zeros(at.nv), engines[method.engine].of(at.case)
     rows = []
     for motion, size in NEWTON_SIZES.items():
-        start, tau = (at.q, rest) if size is None else (at.q + size * direction, at.tau)
+        start, tau = (at.q, rest) if size is None else (at.moved(size * direction), at.tau)
         for dt in dts:
             run = dynamics.run(start, rest, tau, dt, steps, method.name)
             found = int(np.isfinite(run.q).all(axis=1).sum()) - 1

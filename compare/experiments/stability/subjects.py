@@ -1,23 +1,30 @@
 """Which postures and motions of a robot are looked at, and what is left out because it has none."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
+
+import numpy as np
 
 from ...case import Case
 from ...judge.words import capital
 from ...robots import Robot
-from ...truth.linear import Held, all_of_kind, held, of_kind
-from .choice import free_motion
+from ...truth.linear import Held, all_of_kind, all_that_stay, floats, held, named, of_kind
+from ...truth.rest import at_rest
+from .choice import DAMPINGS, free_motion
 from .falling import without_law
 from .limits import stiffest
 
-DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
+MOST_POSTURES = 6  # named postures that are looked at, the first
+REST = "at rest"  # the name of the posture at which a robot that is read from a file rests without torque
 
 
 class Subjects(NamedTuple):
     """What is looked at of a robot; None where it has none."""
 
+    robot: Robot  # with the postures that are looked at, and no others
     centres: tuple[str, ...]  # the one that stands for its kind first
     saddles: tuple[str, ...]
     centre: Held | None
@@ -28,16 +35,26 @@ class Subjects(NamedTuple):
     left_out: tuple[str, ...]  # what is left out, and why, in sentences
 
 
+@lru_cache(maxsize=64)
 def subjects_of(robot: Robot) -> Subjects:
     """What is looked at of a robot."""
-    centres, saddles = all_of_kind(robot, "centre"), all_of_kind(robot, "saddle")
+    robot, left_out = looked_at(robot)
+    centres, saddles = (tuple(names) for names in (all_that_stay(robot), all_of_kind(robot, "saddle")))
+    still = [name for name in centres if held(robot, name).without_stiffness.all()]
+    centres = tuple(name for name in centres if name not in still)
     centre, saddle = (held(robot, names[0]) if names else None for names in (centres, saddles))
     swinging = centre if centre and stiffest(centre)[0] > 0.0 else None
     name = of_kind(robot, "marginal")
-    marginal = name and held(robot, name)
+    marginal = held(robot, name) if name and not (robot.is_read and held(robot, name).stays) else None
     lawless = without_law(marginal) if marginal else None
-    none, left_out = f"None of the {robot.name}'s named postures is", []
-    if not centre:
+    none = f"None of the {robot.name}'s named postures is"
+    if still:
+        left_out.append(
+            f"At {still[0]} every rate is zero: no step is too large there, and there is no limit to look for."
+        )
+    if robot.is_read:
+        left_out += left_out_of_a_file(robot, centre or still)
+    elif not centre:
         left_out.append(
             f"{none} a centre: limits of steps at one, the map of growth, silent failures and long runs are left out."
         )
@@ -49,10 +66,63 @@ def subjects_of(robot: Robot) -> Subjects:
         left_out.append(f"{none} marginal: the law of leaving one is left out.")
     elif lawless:
         left_out.append(f"{capital(name)}, held, is marginal, but {lawless}: the law of leaving it is left out.")
-    if not robot.claims:
+    if not robot.claims and not robot.is_read:
         left_out.append(f"Nothing is claimed of the {robot.name}: there are no claims to repeat.")
-    marginal = None if lawless else marginal
-    return Subjects(centres, saddles, centre, saddle, swinging, marginal, free_motion(robot), tuple(left_out))
+    marginal, free = None if lawless else marginal, free_motion(robot)
+    if robot.is_read and (set(robot.tree.kind) != {"hinge"} or robot.tree.has_springs):
+        free = None
+        left_out.append(
+            "Silent failures are left out: they are seen by the range of the potential, which is known of hinges without "
+            "springs only."
+        )
+    return Subjects(robot, centres, saddles, centre, saddle, swinging, marginal, free, tuple(left_out))
+
+
+def left_out_of_a_file(robot: Robot, stays: object) -> list[str]:
+    """What is left out of every robot that is read from a file."""
+    words = [
+        f"The {robot.name} is read from a file, of which a report looks at modes, limits of steps, departures and silent "
+        "failures alone, with its own damping. Left out are methods that solve an equation in each step, the map of growth, the "
+        "nonlinear edge and long runs: they would take most of the time of a report."
+    ]
+    if not stays:
+        words.append(f"No posture of the {robot.name} keeps a small deviation small: limits of steps are left out.")
+    return words
+
+
+def looked_at(robot: Robot) -> tuple[Robot, list[str]]:
+    """The robot with the postures that are looked at, and what is to be said of that.
+
+    Of a file's robot, whose postures are seldom at rest without torque, also the one to which it sinks from the first of them.
+    """
+    names, notes = named(robot), []
+    if len(names) > MOST_POSTURES:
+        names = names[:MOST_POSTURES]
+        notes.append(f"Of {len(named(robot))} named postures the first {len(names)} are looked at: {', '.join(names)}.")
+        postures, positions = ({n: of[n] for n in names if n in of} for of in (robot.postures, robot.positions))
+        robot = replace(robot, postures=postures, positions=positions)
+    if not robot.is_read:
+        return robot, notes
+    if floats(robot.tree):
+        if np.any(robot.tree.gravity):
+            notes.append(
+                f"The {robot.name} has a free body, which has no rest under gravity: all that is held here is held without "
+                "gravity."
+            )
+        return robot, notes
+    found = at_rest(robot.tree, robot.posture(names[0]))
+    if found is None:
+        notes.append(f"No posture was found at which the {robot.name} rests without torque: it sinks for ever.")
+        return robot, notes
+    known = [name for name in names if np.abs(robot.coordinates.difference(found, robot.posture(name))).max() < 1e-6]
+    if not known:
+        rest = REST if REST not in names else f"{REST} without torque"
+        robot = replace(robot, positions={**robot.positions, rest: tuple(map(float, found))})
+        notes.append(
+            f"Under no torque the {robot.name} rests at a posture that was found downhill from {names[0]}; it is called "
+            f"{rest}."
+        )
+    return robot, notes
 
 
 def places(
