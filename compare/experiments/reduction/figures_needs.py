@@ -12,7 +12,7 @@ from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, plain
 from ...robots import Robot
 
-FEW_JOINTS, MOST_NAMED = 3, 12  # joints whose names stand side by side; that are named
+SIDE_BY_SIDE, MOST_TICKS = 3, 12  # joints whose names stand side by side; that are named
 MOST_WIDTH = 8  # joints that get more width with their number
 KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
@@ -25,20 +25,20 @@ TIME_MARKS = {"tmt": (-0.15, {"marker": "o", "color": GREEN}), "mujoco": (0.15, 
 def draw_needs(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Which joints each scene needs, and the time of a step of the whole and of the smallest model."""
     scenes, joints = result.curves["needs"], robot.joints
-    size, many = 9 if len(joints) <= MOST_WIDTH else 4, len(joints) > FEW_JOINTS
+    size, many = 9 if len(joints) <= MOST_WIDTH else 4, len(joints) > SIDE_BY_SIDE
     fig = Figure(figsize=(WIDTH, (1.5 if many else 0.9) + 0.36 * len(scenes)), layout="constrained")
     left, right = fig.subplots(1, 2, sharey=True, width_ratios=(min(len(joints), MOST_WIDTH), 7.2))
     for y, found in enumerate(scenes.values()):
         for x, joint in enumerate(joints):
             left.plot(x, y, markersize=size, linestyle="none", **KINDS_OF_JOINT[kind_of_joint(joint, found)])
     left.set(xlim=(-0.6, len(joints) - 0.4), ylim=(max(1, len(scenes)) - 0.5, -0.5))
-    if len(joints) <= MOST_NAMED:
+    if len(joints) <= MOST_TICKS:
         left.set_xticks(range(len(joints)), [plain(robot.symbol(joint)) for joint in joints])
     else:
         numbers = [1, *range(5, len(joints) + 1, 5)]
         left.set_xticks([number - 1 for number in numbers], [f"{number}" for number in numbers])
         left.set_xlabel("joint, in the order of the file")
-    if FEW_JOINTS < len(joints) <= MOST_NAMED:
+    if SIDE_BY_SIDE < len(joints) <= MOST_TICKS:
         left.tick_params(axis="x", labelrotation=90, labelsize=8)
     left.set_yticks(range(len(scenes)), [plain(name) for name in scenes])
     left.tick_params(length=0)

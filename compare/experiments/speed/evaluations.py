@@ -18,9 +18,9 @@ STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
 TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
 MOST_CALLS = 100_000  # of the same in a call that is timed
-MOST_NUMBERS = 10_000_000  # of the results of many states, of a robot of many joints
+MOST_RESULTS = 10_000_000  # of the results of many states, of a robot of many joints
 MOST_LITERAL = 3000  # operations of the literal form, up to which its straight-line code is compiled
-MOST_SPEEDS = 12  # up to which the literal form is timed in Python
+IN_PYTHON = 12  # up to which the literal form is timed in Python
 FORWARD, TERMS, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
 LOOP = "generic compiled loop"
@@ -64,7 +64,7 @@ def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) ->
 def most_states(tree: tmt.Tree) -> int:
     """How many states are evaluated at once at most, a power of ten."""
     n = len(tree.axis)
-    return int(10.0 ** np.floor(np.log10(MOST_NUMBERS / (n * (n + 3) // 2))))
+    return int(10.0 ** np.floor(np.log10(MOST_RESULTS / (n * (n + 3) // 2))))
 
 
 def operations(tree: tmt.Tree) -> list[int] | None:
@@ -123,7 +123,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     (q, qd, tau), n = state, len(tree.axis)
     floats = [a.tolist() for a in state]
     arrays, out, M, h = generic.arrays(tree), np.empty(n), np.empty((n, n)), np.empty(n)
-    run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_NUMBERS // n)
+    run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_RESULTS // n)
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
 
@@ -135,7 +135,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
         count = min(count, most)
         run(*(path[:, : count + 1].copy() for path in paths), tau[None], 1e-4)
 
-    if n <= MOST_SPEEDS:
+    if n <= IN_PYTHON:
         yield FORWARD, "literal, Python floats", plain
     loops = generic.compiled()
     yield FORWARD, LOOP, lambda count: loops.repeat_forward_dynamics(arrays, q, qd, tau, out, count)
@@ -175,7 +175,7 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoo
             runs[quantity, IN_LANES, count, 2] = both
     if count == 1:  # a call from Python for one state: what it costs is the call
         return runs
-    if count <= 1000 and n <= MOST_SPEEDS:
+    if count <= 1000 and n <= IN_PYTHON:
         runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.acceleration(q, qd, tau, tree)
     if not kernels.is_traced(tree, METHODS["rk4"]):
         return runs

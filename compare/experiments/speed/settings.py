@@ -15,7 +15,10 @@ EXPONENTS = {  # of the coarsest and of the finest tolerance, 10^-k
     "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 6), "LSODA": (2, 12), "Taylor": (4, 16),
 }  # fmt: skip
 OTHER_EXPONENTS = (2, 12)
-FEW, FEW_OTHERS = {"quick": 5, "small": 7}, 2  # settings of a run that is not full: the coarsest; of further engines
+FEW_SETTINGS, FEW_OTHERS = (
+    {"quick": 5, "small": 7},
+    2,
+)  # settings of a run that is not full: the coarsest; of further engines
 NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
 # of the robot of a file, whose number of joints has no bound: seconds of one evaluation are about a constant times nv^1.5
 IN_LOOPS, TRACED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: of tmt's compiled loops, of its straight-line code, of MuJoCo
@@ -23,7 +26,7 @@ ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of any method, whatever they take
 QUICK_SPEEDS = 4  # up to which a quick run has methods that solve their stages
-SLOWEST = 0.6  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
+SLOWEST_RUN = 0.6  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
 
 
 def scenes_of(robot: Robot) -> list[Case]:
@@ -92,7 +95,7 @@ def too_slow(method: Method, robot: Robot, size: str) -> str | None:
         return None
     case, n = regular_of(robot), robot.coordinates.nv
     seconds = coarsest_steps(case) * estimated(method, case.tree)
-    if seconds > SLOWEST:
+    if seconds > SLOWEST_RUN:
         return f"with {n} speeds its coarsest run alone would take about {seconds:.1g} s"
     if size == "quick" and n > QUICK_SPEEDS and method.engine == "tmt" and method_named(method.name).solves_stages:
         return f"with {n} speeds its code takes too long to make for a quick run"
@@ -119,7 +122,7 @@ def settings_of(method: Method, case: Case, size: str = "full", which: str = "al
     found = tolerances(method, case) if method.adaptive else halvings(method, case, size)
     if which == "same schemes":
         return found[NEARER] or found[-1:]
-    few = FEW if method.engine in COMPARED else dict.fromkeys(FEW, FEW_OTHERS)
+    few = FEW_SETTINGS if method.engine in COMPARED else dict.fromkeys(FEW_SETTINGS, FEW_OTHERS)
     return found[: few.get(size)]
 
 

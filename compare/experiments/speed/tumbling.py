@@ -21,8 +21,8 @@ QUATERNION, SPEEDS = (
     (0.5, 0.5, -0.5, 0.5),
     (480.0, 120.0, 360.0),
 )  # deg/s about its own axes: it tumbles, far from a steady turn
-DURATION, READ = 2.0, 8  # s; equal times at which it is read
-COARSEST, FINEST = 16, 8192  # steps, doubled again and again
+TUMBLED, READ = 2.0, 8  # s; equal times at which it is read
+FIRST_COUNT, LAST_COUNT = 16, 8192  # steps, doubled again and again
 HINGE_ORDER = {"RK4": 4}  # of MuJoCo's integrators, where all joints are hinges; of the others 1
 TEXT = """<mujoco>
   <option gravity="0 0 0"/>
@@ -53,7 +53,7 @@ def text() -> str:
 def orders(result: Result, engines: Mapping[str, Engine]) -> list[dict]:
     """Rows and checks: each method of fixed step of both engines, its order and the one measured; and a sentence in `result`."""
     case = stone().case("tumbling", posture=QUATERNION, speed=SPEEDS)
-    times = np.linspace(0.0, DURATION, READ + 1)
+    times = np.linspace(0.0, TUMBLED, READ + 1)
     _, exact = free_turning(times, MOMENTS, case.v, case.q)
     exact, table = exact.astype(float), []
     for of_body in (engines["tmt"], engine(read(text()))):
@@ -78,12 +78,12 @@ def measured(case: Case, engine: Engine, method: Method, exact: np.ndarray) -> t
 
     exact: quaternions at the times that are read.
     """
-    dynamics, regular, count = engine.of(case), [], COARSEST
-    while count <= FINEST:
-        q = dynamics.run(*case.start, case.tau, DURATION / count, count, method.name).q[:: count // READ]
+    dynamics, regular, count = engine.of(case), [], FIRST_COUNT
+    while count <= LAST_COUNT:
+        q = dynamics.run(*case.start, case.tau, TUMBLED / count, count, method.name).q[:: count // READ]
         error = np.abs(case.coordinates.difference(q, exact)).max()
         if CLEAR < error < REGULAR:
-            regular.append((DURATION / count, error))
+            regular.append((TUMBLED / count, error))
         elif regular:
             break
         count *= 2

@@ -31,7 +31,7 @@ def gripper():
 def stone():
     """A body that tumbles, and its exact quaternions at nine times."""
     case = tumbling.stone().case("tumbling", posture=tumbling.QUATERNION, speed=tumbling.SPEEDS)
-    times = np.linspace(0.0, tumbling.DURATION, tumbling.READ + 1)
+    times = np.linspace(0.0, tumbling.TUMBLED, tumbling.READ + 1)
     return case, free_turning(times, tumbling.MOMENTS, case.v, case.q)[1].astype(float)
 
 
@@ -138,7 +138,7 @@ def test_a_body_with_other_moments_shows_no_order(gripper, stone):
     """The exact motion of another body is another: nothing converges to it."""
     case, _ = stone
     _, known, _ = gripper
-    wrong = free_turning(np.linspace(0.0, tumbling.DURATION, 9), (0.03, 0.05, 0.0601), case.v, case.q)[1].astype(float)
+    wrong = free_turning(np.linspace(0.0, tumbling.TUMBLED, 9), (0.03, 0.05, 0.0601), case.v, case.q)[1].astype(float)
     found = tumbling.measured(case, known["tmt"], known["tmt"].methods["rk4"], wrong)
     assert found is None or found[0] < 0.5
 
