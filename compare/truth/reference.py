@@ -53,7 +53,9 @@ class Reference(NamedTuple):
             return np.abs((q - self.high[:, joints]) - self.low[:, joints]).max(axis=1)
         whole = self.coordinates
         part = Coordinates(*(tuple(names[i] for i in joints) for names in (whole.names, whole.all_kinds)))
-        return np.abs(part.difference(q, self.high[:, [k for i in joints for k in range(*whole.places.joints[i].q.indices(whole.nq))]])).max(axis=1)
+        places = [whole.places.joints[i].q for i in joints]
+        columns = [k for place in places for k in range(place.start, place.stop)]
+        return np.abs(part.difference(q, self.high[:, columns])).max(axis=1)
 
 
 def columns(case: Case) -> list[str]:

@@ -22,9 +22,10 @@ TITLE = "Reduction: no more model than a scene needs"
 
 def claim(robot: Robot) -> str:
     """What is claimed."""
+    one = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint"
     return (
-        "A hinge may be locked if, with it at its start value and at rest, its acceleration vanishes for all values of the "
-        "other hinges. The program finds these hinges on the expressions of the traced method, which fold to the number 0, and "
+        f"A {one} may be locked if, with it at its start value and at rest, its acceleration vanishes for all values of the "
+        f"other {one}s. The program finds these {one}s on the expressions of the traced method, which fold to the number 0, and "
         f"confirms them with {DIGITS} digits at random states. The model without them has the same motion, in both engines. A "
         "held posture needs no integrator: it stays. A single free hinge is a physical pendulum, whose angle is an elliptic "
         "function of time. And whatever else is added in MuJoCo costs time, and changes nothing unless something is touched."

@@ -11,9 +11,10 @@ from ...case import Case, Coordinates
 from ...engines import Setting
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR, contacts, with_additions
 from ...judge.check import Result
-from ...judge.run import step_in_words
+from ...judge.run import step_in_words, unit_of
 from ...judge.scale import reaches
 from ...judge.timing import fastest
+from ...judge.units import renamed
 from ...robots import Robot
 from ...setup import Setup
 from .times import TIMED_STEPS, TWO_INTEGRATORS
@@ -45,7 +46,8 @@ def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
         touching[name, integrator], _ = contacts(models[name], *rest, dt, timed, integrator)
         if name.startswith(CAPSULES) and contacts(models[name], *fallen)[1]:
             pushed.add((name, integrator))
-    result.tables["cost_in_mujoco"] = cost_rows(seconds, paths, touching, case.coordinates)
+    rows = cost_rows(seconds, paths, touching, case.coordinates)
+    result.tables["cost_in_mujoco"] = renamed(rows, unit_of(case.coordinates))
     check_bits(result, f"{case.name}, {step_in_words(case, FALL_STEPS)}", result.tables["cost_in_mujoco"], pushed)
     if not pushed:
         result.notes.append(f"{case.name}: the floor that is in reach pushes no joint, nor does anything else.")

@@ -12,6 +12,8 @@ from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, WIDTH, plain
 from ...robots import Robot
 
+SIDE_BY_SIDE, MOST_TICKS = 3, 12  # joints whose names stand side by side; that are named
+MOST_WIDTH = 8  # joints that get more width with their number
 KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
     "never moves": {"marker": "o", "color": BLUE, "mfc": "none"},
@@ -23,20 +25,29 @@ TIME_MARKS = {"tmt": (-0.15, {"marker": "o", "color": GREEN}), "mujoco": (0.15, 
 def draw_needs(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Which joints each scene needs, and the time of a step of the whole and of the smallest model."""
     scenes, joints = result.curves["needs"], robot.joints
-    fig = Figure(figsize=(WIDTH, 0.9 + 0.36 * len(scenes)), layout="constrained")
-    left, right = fig.subplots(1, 2, sharey=True, width_ratios=(len(joints), 7.2))
+    size, many = 9 if len(joints) <= MOST_WIDTH else 4, len(joints) > SIDE_BY_SIDE
+    fig = Figure(figsize=(WIDTH, (1.5 if many else 0.9) + 0.36 * len(scenes)), layout="constrained")
+    left, right = fig.subplots(1, 2, sharey=True, width_ratios=(min(len(joints), MOST_WIDTH), 7.2))
     for y, found in enumerate(scenes.values()):
         for x, joint in enumerate(joints):
-            left.plot(x, y, markersize=9, linestyle="none", **KINDS_OF_JOINT[kind_of_joint(joint, found)])
+            left.plot(x, y, markersize=size, linestyle="none", **KINDS_OF_JOINT[kind_of_joint(joint, found)])
     left.set(xlim=(-0.6, len(joints) - 0.4), ylim=(max(1, len(scenes)) - 0.5, -0.5))
-    left.set_xticks(range(len(joints)), [plain(robot.symbol(joint)) for joint in joints])
+    if len(joints) <= MOST_TICKS:
+        left.set_xticks(range(len(joints)), [plain(robot.symbol(joint)) for joint in joints])
+    else:
+        numbers = [1, *range(5, len(joints) + 1, 5)]
+        left.set_xticks([number - 1 for number in numbers], [f"{number}" for number in numbers])
+        left.set_xlabel("joint, in the order of the file")
+    if SIDE_BY_SIDE < len(joints) <= MOST_TICKS:
+        left.tick_params(axis="x", labelrotation=90, labelsize=8)
     left.set_yticks(range(len(scenes)), [plain(name) for name in scenes])
     left.tick_params(length=0)
     for y, name in enumerate(scenes):
         mark_times(right, result, name, y)
     slowest = max((row["ns_per_step"] or 0.0 for row in result.rows), default=0.0)
     right.set(xscale="log", xlabel="time of an RK4 step, ns", xlim=(15, max(100000, 10 * slowest)))
-    right.set_xticks([100, 1000, 10000], ["100", "1000", "10000"])
+    ticks = [100, 1000, 10000] if slowest < 1e5 else [100, 10**4, 10**6]
+    right.set_xticks(ticks, [f"{tick}" for tick in ticks])
     handles = [
         Line2D([], [], linestyle="none", label=kind, markersize=7, **style) for kind, style in KINDS_OF_JOINT.items()
     ]
@@ -51,9 +62,10 @@ def draw_needs(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     held = [name for name, found in scenes.items() if not found["locked"] and len(found["stays"]) == len(joints)]
     fewer = [name for name, found in scenes.items() if found["stays"] and name not in held]
     words = [f"Nothing for {'; '.join(held)}: the exact solution stays."] if held else []
-    words += [f"Fewer than all {len(joints)} hinges, proved, for {'; '.join(fewer)}."] if fewer else []
-    start = f"What each scene of the stated {robot.name} needs."
-    return "reduction_needs", fig, " ".join([start, *words, gain(result.rows, len(joints))])
+    one = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint"
+    words += [f"Fewer than all {len(joints)} {one}s, proved, for {'; '.join(fewer)}."] if fewer else []
+    start = f"What each scene of the {'' if robot.is_read else 'stated '}{robot.name} needs."
+    return "reduction_needs", fig, " ".join([start, *words, gain(result.rows, len(joints), one)])
 
 
 def kind_of_joint(joint: str, found: dict) -> str:
@@ -80,7 +92,7 @@ def mark_times(ax: Axes, result: Result, name: str, y: float) -> None:
             ax.text(smallest / 1.15, y + offset, f"×{whole / smallest:.2f}", ha="right", va="center", fontsize=8)
 
 
-def gain(rows: list[dict], joints: int) -> str:
+def gain(rows: list[dict], joints: int, one: str = "hinge") -> str:
     """The largest gain of a model with fewer joints than so many, in words."""
     smaller = [row for row in rows if row["speedup"] and row["nv"] < joints]
     best = max(smaller, key=lambda row: row["speedup"], default=None)
@@ -88,7 +100,7 @@ def gain(rows: list[dict], joints: int) -> str:
         return "No smaller model was timed."
     return (
         f"The largest gain is that of {LABELS[best['engine']]} in {best['scene']}, {best['integrator']}: with {best['nv']} of "
-        f"{joints} hinges a step takes {1 / best['speedup']:.2f} of the time of the whole model's."
+        f"{joints} {one}s a step takes {1 / best['speedup']:.2f} of the time of the whole model's."
     )
 
 

@@ -14,7 +14,10 @@ from ...setup import Setup
 from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
-ALL_SUBSETS, RANDOM_SUBSETS = 6, 20  # joints up to which all subsets are locked; of more each alone and so many at random
+ALL_SUBSETS, RANDOM_SUBSETS = (
+    6,
+    20,
+)  # joints up to which all subsets are locked; of more each alone and so many at random
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}  # of a robot that has slides
 
@@ -41,11 +44,9 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
             case = robot.case(words_of(locked), posture=posture_of(coordinates, q[0]), locked=locked)
             for quantity, pair, apart, scale in differences(setup, case, q, v):
                 found.setdefault((quantity, pair), []).append((apart, scale))
-        counts = {
-            "operations_whole": operations(robot.tree),
-            "operations_locked_at_zero": operations(robot.tree.lock(at_zero(robot.tree, locked))),
-            "operations_locked_at_angles": operations(case.tree),
-        }
+        trees = robot.tree, robot.tree.lock(at_zero(robot.tree, locked)), case.tree
+        names = "operations_whole", "operations_locked_at_zero", "operations_locked_at_angles"
+        counts = {name: None if many else operations(tree) for name, tree in zip(names, trees)}
         units = WITH_SLIDES if "slide" in coordinates.all_kinds else BLOCK_UNITS
         for (quantity, pair), arrays in found.items():
             check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts, units[quantity])
@@ -74,7 +75,10 @@ def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
 def at_zero(tree: tmt.Tree, names: Sequence[str]) -> dict[str, float | tuple]:
     """The reference positions of some joints of a Tree by their names."""
     places = dict(zip(tree.hinge_names, tree.coordinates.joints))
-    return {name: tree.zero[places[name].q] if places[name].kind == "ball" else tree.zero[places[name].q.start] for name in names}
+    return {
+        name: tree.zero[places[name].q] if places[name].kind == "ball" else tree.zero[places[name].q.start]
+        for name in names
+    }
 
 
 def words_of(locked: Sequence[str]) -> str:

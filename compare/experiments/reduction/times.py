@@ -9,7 +9,9 @@ from tmt.kernels import slope_source
 from ...case import Case
 from ...engines import Engine, Setting, same_scheme
 from ...judge.check import Result
+from ...judge.run import unit_of
 from ...judge.timing import fastest
+from ...judge.units import renamed
 from ...setup import Setup
 
 TWO_INTEGRATORS = ("Euler", "RK4")  # of MuJoCo, a cheap and an accurate one, with the same schemes in tmt
@@ -44,7 +46,8 @@ def time_models(result: Result, models: Sequence[tuple], setup: Setup, rounds: i
                 method = method_of(setup.engines, integrator, engine)
                 call, _ = dynamics.prepare(*case.start, case.tau, setting, method)
                 calls[name, case.joints, engine, integrator] = call
-    result.rows += time_rows(models, setup, fastest(calls, rounds), result.curves["apart"])
+    rows = time_rows(models, setup, fastest(calls, rounds), result.curves["apart"])
+    result.rows += renamed(rows, unit_of(setup.robot.coordinates))
 
 
 def time_rows(

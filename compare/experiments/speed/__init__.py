@@ -11,15 +11,26 @@ from ...case import Case
 from ...engines import COMPARED, GRID, LABELS, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
-from ...judge.run import diverged_at
+from ...judge.run import diverged_at, unit_of
 from ...judge.scale import FACTOR
+from ...judge.units import renamed, said
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.reference import Reference, committed, references
+from ...truth.reference import DOUBLES, Reference, committed, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets, tumbling
 from .floors import floor
-from .settings import coarsest_steps, estimated, followed, left_out, methods, regular_of, scenes_of, settings_of, MOST_SECONDS
+from .settings import (
+    MOST_SECONDS,
+    coarsest_steps,
+    estimated,
+    followed,
+    left_out,
+    methods,
+    regular_of,
+    scenes_of,
+    settings_of,
+)
 
 TITLE = "Speed against accuracy"
 PARTS = (
@@ -47,8 +58,15 @@ def tolerance(robot: Robot) -> str:
     """What errors are, and how they are judged."""
     ours = all(committed(case) for case in scenes_of(robot))
     made = "a table, made again in part by the tests" if ours else "made for what no table has, and kept"
+    runs = f"runs with many digits ({made})"
+    if robot.is_read:
+        runs = (
+            f"a run in doubles by tmt's {DOUBLES}, whose steps are halved as long as that brings two runs nearer to each other: "
+            "what is left between them, or rounding, is the smallest error that can be seen"
+        )
+    what = "angles" if unit_of(robot.coordinates) == "rad" else f"movements ({unit_of(robot.coordinates)})"
     return (
-        f"Errors are the largest of the angles on a grid of {GRID + 1} times, against runs with many digits ({made}). Checked: "
+        f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {runs}. Checked: "
         "that each method of fixed step has its order in the error of the first second, which falls "
         "regularly (of order 8 only the least, for rounding comes before its error has settled; the tests show it in many "
         f"digits); that MuJoCo and the same scheme in tmt make the same error but for rounding, {FACTOR} eps times the growth of "
@@ -89,7 +107,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.rows += [row for of_scene in of_scenes for row in of_scene]
     names = [case.name for case in cases]
     floors = dict(zip(names, lefts))
-    result.curves |= {"floors": floors, "regular": regular.name}
+    unit = unit_of(setup.robot.coordinates)
+    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "doubles": setup.robot.is_read}
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
     taking = methods(setup.engines, setup.size, which, setup.robot)
@@ -102,11 +121,11 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     if timed and setup.robot.coordinates.has_balls:
         result.tables["speed_orders"] += tumbling.orders(result, setup.engines)
     schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
-    accuracy.check_same_schemes(result, floors, schemes)
-    accuracy.check_smallest_errors(result, floors)
+    accuracy.check_same_schemes(result, floors, schemes, unit)
+    accuracy.check_smallest_errors(result, floors, unit)
     steps = {case.name: coarsest_steps(case) for case in cases}
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)
-    result.notes += accuracy.references_in_words(known, floors)
+    result.notes += accuracy.references_in_words(known, floors, setup.robot.is_read)
     result.notes += accuracy.floors_in_words(result.rows, floors)
     if timed:
         add_times(result, setup, names, of_scenes)
@@ -115,7 +134,10 @@ def rows(setup: Setup, timed: bool = True) -> Result:
         absent = unavailable(setup, names)
         result.rows += absent
         result.notes += dict.fromkeys(absent_in_words(row, setup.engines) for row in absent)
-    result.rows = [{name: row.get(name) for name in COLUMNS} for row in result.rows]
+    result.rows = renamed([{name: row.get(name) for name in COLUMNS} for row in result.rows], unit)
+    result.notes = [said(note, unit) for note in result.notes]
+    if timed:
+        result.tables["what_should_i_use"] = renamed(result.tables["what_should_i_use"], unit)
     return result
 
 
@@ -168,7 +190,7 @@ def rows_of_scene(
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
-            found.append(row_of_run(case, case, engines, method, setting, reference))
+            found.append(row_of_run(case, case, engines, method, setting, reference, left))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
             if accuracy.gained_nothing(now, work, best, last, left) or too_long(method, case, work, size):
                 break
@@ -185,9 +207,18 @@ def too_long(method: Method, case: Case, work: int, size: str) -> bool:
 
 
 def row_of_run(
-    case: Case, whole: Case, engines: Mapping[str, Engine], method: Method, setting: Setting, reference: Reference
+    case: Case,
+    whole: Case,
+    engines: Mapping[str, Engine],
+    method: Method,
+    setting: Setting,
+    reference: Reference,
+    left: float = 0.0,
 ) -> dict:
-    """A row: one run of a scene, or of the smaller model that has the motion of the whole one."""
+    """A row: one run of a scene, or of the smaller model that has the motion of the whole one.
+
+    left: the least error that a reference in doubles shows; a smaller one is not known, and has this value.
+    """
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
     places, nq = whole.coordinates.places, whole.coordinates.nq
     free = [[k for i in joints for k in range(*getattr(places.joints[i], part).indices(size))]
@@ -199,6 +230,7 @@ def row_of_run(
         motion = read(run())
         ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
         error = reference.error(motion.q, joints)
+        error = np.maximum(error, left) if whole.robot.is_read else error
         states = [part.copy() for part in true]
         for state, part, own in zip(states, (motion.q, motion.v), free):
             state[:, own] = 0.0 if ended else part

@@ -17,7 +17,7 @@ ANOTHER_MOTION = 0.1  # rad: a run that is farther off is another motion
 ALIKE = 0.01  # of an error: two that differ by less are the same in a sentence
 
 
-def check_same_schemes(result: Result, floors: Floors, schemes: Mapping[str, str]) -> None:
+def check_same_schemes(result: Result, floors: Floors, schemes: Mapping[str, str], unit: str = "rad") -> None:
     """MuJoCo's integrators and the same schemes in tmt make the same error, but for rounding.
 
     Judged where either error is below 0.1 rad: one that is not, or a run that has diverged, beside one that is, fails.
@@ -30,10 +30,10 @@ def check_same_schemes(result: Result, floors: Floors, schemes: Mapping[str, str
             difference = abs(error(row) - error(ours))
             where = f"{scene}, {method}, dt = {dt:.3g} s"
             quantity = f"the same error as tmt's {ours['method']}"
-            result.check(where, quantity, difference, FACTOR * floors[scene], "rad", rounding=True)
+            result.check(where, quantity, difference, FACTOR * floors[scene], unit, rounding=True)
 
 
-def check_smallest_errors(result: Result, floors: Floors) -> None:
+def check_smallest_errors(result: Result, floors: Floors, unit: str = "rad") -> None:
     """MuJoCo's RK4 comes as near to the reference as tmt's; and where errors stop falling, they are of the size of rounding."""
     for scene, left in floors.items():
         least = {}
@@ -42,9 +42,9 @@ def check_smallest_errors(result: Result, floors: Floors) -> None:
             least[method] = min(errors, default=np.inf)
             if stopped(errors):
                 quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
-                result.check(scene, quantity, least[method], FACTOR * left, "rad", rounding=True)
+                result.check(scene, quantity, least[method], FACTOR * left, unit, rounding=True)
         tolerance = FACTOR * left + (2.0 * least["rk4"] if np.isfinite(least["rk4"]) else 0.0)
-        result.check(scene, "smallest error of MuJoCo's RK4, beside that of tmt's rk4", least["RK4"], tolerance, "rad")
+        result.check(scene, "smallest error of MuJoCo's RK4, beside that of tmt's rk4", least["RK4"], tolerance, unit)
 
 
 def gained_nothing(found: float, work: int, best: float, last: int, left: float) -> bool:
@@ -126,8 +126,15 @@ def floors_in_words(rows: list[dict], floors: Floors) -> list[str]:
     ]
 
 
-def references_in_words(known: Mapping[str, Reference], floors: Floors) -> list[str]:
-    """Of which scenes the reference is known to fewer digits than doubles have, in words."""
+def references_in_words(known: Mapping[str, Reference], floors: Floors, doubles: bool = False) -> list[str]:
+    """Of which scenes the reference is known to fewer digits than doubles have, in words; of runs in doubles to how many."""
+    if doubles:
+        runs = "; ".join(f"{scene}: {known[scene].halving:.0e} ({known[scene].steps} steps)" for scene in floors)
+        return [
+            "The reference is a run in doubles, of order 8. It differs from the one with half the steps by so many rad, or "
+            f"per s: {runs}. Smaller errors are not known, and have this size, or that of rounding, in tables and figures; a "
+            "reference of many digits is computed for the assignment's arm."
+        ]
     coarse = [f"{scene}: {known[scene].halving:.0e}" for scene, left in floors.items() if known[scene].halving >= left]
     if not coarse:
         return []

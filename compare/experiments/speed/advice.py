@@ -92,8 +92,10 @@ def orders(result: Result, scenes: Sequence[str], methods: Sequence[Method], com
     """
     table = []
     for scene in scenes:
+        # of a reference in doubles no smaller errors are known
+        clear = max(CLEAR, NEAR_ROUNDING * result.curves["floors"][scene]) if result.curves.get("doubles") else CLEAR
         for method in methods:
-            regular = [row for row in early_runs(result, scene, method) if CLEAR < row["early"] < REGULAR]
+            regular = [row for row in early_runs(result, scene, method) if clear < row["early"] < REGULAR]
             if len(regular) < 2:
                 continue
             coarse, fine = regular[-2:]  # the finest are those to which the theory applies best

@@ -18,9 +18,9 @@ STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
 TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
 MOST_CALLS = 100_000  # of the same in a call that is timed
-MOST_NUMBERS = 10_000_000  # of the results of many states, of a robot of many joints
+MOST_RESULTS = 10_000_000  # of the results of many states, of a robot of many joints
 MOST_LITERAL = 3000  # operations of the literal form, up to which its straight-line code is compiled
-MOST_SPEEDS = 12  # up to which the literal form is timed in Python
+IN_PYTHON = 12  # up to which the literal form is timed in Python
 FORWARD, TERMS, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
 LOOP = "generic compiled loop"
@@ -33,7 +33,7 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
 
     rng = np.random.default_rng([SEED, 2])
     tree = setup.robot.tree
-    numbers = [count for count in STATES[: setup.of(3, 2, 2)]]
+    numbers = list(STATES[: setup.of(3, 2, 2)])
     numbers[-1] = min(setup.of(max(STATES), 1000, 1000), most_states(tree))
     states = states_of(setup.robot.coordinates, rng, setup.of(max(numbers), 10_000, 1000))
     first = [np.ascontiguousarray(a[0]) for a in states]
@@ -64,7 +64,7 @@ def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) ->
 def most_states(tree: tmt.Tree) -> int:
     """How many states are evaluated at once at most, a power of ten."""
     n = len(tree.axis)
-    return int(10.0 ** np.floor(np.log10(MOST_NUMBERS / (n * (n + 3) // 2))))
+    return int(10.0 ** np.floor(np.log10(MOST_RESULTS / (n * (n + 3) // 2))))
 
 
 def operations(tree: tmt.Tree) -> list[int] | None:
@@ -123,7 +123,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     (q, qd, tau), n = state, len(tree.axis)
     floats = [a.tolist() for a in state]
     arrays, out, M, h = generic.arrays(tree), np.empty(n), np.empty((n, n)), np.empty(n)
-    run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_NUMBERS // n)
+    run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_RESULTS // n)
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
 
@@ -135,7 +135,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
         count = min(count, most)
         run(*(path[:, : count + 1].copy() for path in paths), tau[None], 1e-4)
 
-    if n <= MOST_SPEEDS:
+    if n <= IN_PYTHON:
         yield FORWARD, "literal, Python floats", plain
     loops = generic.compiled()
     yield FORWARD, LOOP, lambda count: loops.repeat_forward_dynamics(arrays, q, qd, tau, out, count)
@@ -175,7 +175,7 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoo
             runs[quantity, IN_LANES, count, 2] = both
     if count == 1:  # a call from Python for one state: what it costs is the call
         return runs
-    if count <= 1000 and n <= MOST_SPEEDS:
+    if count <= 1000 and n <= IN_PYTHON:
         runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.acceleration(q, qd, tau, tree)
     if not kernels.is_traced(tree, METHODS["rk4"]):
         return runs
@@ -217,11 +217,13 @@ def costs_in_words(
 ) -> list[str]:
     """The ratios in words.
 
-    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form, or None; name: of
-    the robot; missing: why MuJoCo's calls were not timed, or None.
+    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form, or None;
+    name: of the robot; missing: why MuJoCo's calls were not timed, or None.
     """
     sentences = [f"Processor: {timing.vectors()}."]
-    lanes = {key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1}
+    lanes = {
+        key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1
+    }
     if missing:
         sentences.append(f"{missing}: its calls were not timed in compiled loops.")
     else:
@@ -244,9 +246,8 @@ def costs_in_words(
 def beside_mujoco_in_words(ns: dict, lanes: dict[int, float], name: str) -> list[str]:
     """The ratios of MuJoCo's times to tmt's in words. lanes: nanoseconds of forward dynamics by the number of states."""
     whole, equal, step = (ns[key, way, 1, 1] for key, way in ((FORWARD, WHOLE), (FORWARD, EQUAL), (RK4_STEP, MJ_STEP)))
-    start = (
-        f"Forward dynamics of the {name}: mj_forward takes {whole:.0f} ns, MuJoCo's calls that do the same work {equal:.0f} ns, "
-    )
+    start = f"Forward dynamics of the {name}: mj_forward takes {whole:.0f} ns, "
+    start += f"MuJoCo's calls that do the same work {equal:.0f} ns, "
     if not lanes:
         loop, kernel = ns[FORWARD, LOOP, 1, 1], ns[RK4_STEP, LOOP, 1, 1]
         return [

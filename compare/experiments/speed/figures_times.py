@@ -9,6 +9,7 @@ from matplotlib.patheffects import withStroke
 
 from ...engines import LABELS
 from ...judge.check import Check, Result
+from ...judge.units import value
 from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name
 
@@ -27,6 +28,16 @@ def written(engine: str) -> str:
 
 def colour_of(engine: str) -> str:
     return COLOURS.get(engine, GREY)
+
+
+def unit_of(result: Result) -> str:
+    """The unit of the errors."""
+    return result.curves.get("unit", "rad")
+
+
+def floor_in_words(result: Result) -> str:
+    """What the least error is, in the legend."""
+    return "what is known of the reference" if result.curves.get("doubles") else "rounding: eps × growth"
 
 
 def rows_of_runs(result: Result) -> list[dict]:
@@ -65,11 +76,11 @@ def marker(method: str) -> str:
 def pareto(rows: list[dict], of: str) -> list[dict]:
     """The rows that nothing beats in both error and cost, from the cheapest to the most exact."""
     front, least = [], np.inf
-    good = (r for r in rows if not r["diverged"] and r["worst_error_rad"] < NO_RESULT)
-    for row in sorted(good, key=lambda r: (r[of], r["worst_error_rad"])):
-        if row["worst_error_rad"] < least:
+    good = (r for r in rows if not r["diverged"] and value(r, "worst_error") < NO_RESULT)
+    for row in sorted(good, key=lambda r: (r[of], value(r, "worst_error"))):
+        if value(row, "worst_error") < least:
             front.append(row)
-            least = row["worst_error_rad"]
+            least = value(row, "worst_error")
     return front
 
 
@@ -96,10 +107,10 @@ def draw_times(result: Result, scene: str) -> tuple[str, Figure, str]:
     )  # fmt: skip
     for engine in dict.fromkeys(engine for engine, _ in by_method):
         ax.plot([], [], color=colour_of(engine), linewidth=3, label=written(engine))
-    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label="rounding: eps × growth")
+    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=floor_in_words(result))
     ax.set(xscale="log", yscale="log", xlim=(OF_DIVERGED * 3, FINE_END / 30))
     ax.set(
-        xlabel="worst error on the way, rad (finer to the right)",
+        xlabel=f"worst error on the way, {unit_of(result)} (finer to the right)",
         ylabel=f"time for {motion(runs_of(result, scene))} of motion, ms",
     )
     labelled(ax, ends)
@@ -117,7 +128,7 @@ def draw_times(result: Result, scene: str) -> tuple[str, Figure, str]:
 
 def visible(rows: list[dict]) -> np.ndarray:
     """The worst errors of rows, as far as the axis goes, rad."""
-    return np.clip([r["worst_error_rad"] for r in rows], FINE_END, COARSE_END)
+    return np.clip([value(r, "worst_error") for r in rows], FINE_END, COARSE_END)
 
 
 def motion(rows: list[dict]) -> str:
@@ -144,13 +155,21 @@ def labelled(ax: Axes, ends: list[list]) -> None:
 
 def spoken(result: Result, scene: str) -> str:
     """The message of a scene: how many times faster at the errors asked for."""
+    unit = unit_of(result)
     lines = [line for line in result.tables["what_should_i_use"] if line["scene"] == scene and line["ratio"]]
-    ratios = ", ".join(f"{line['ratio']:.0f} times as long for {line['target_rad']:.0e} rad" for line in lines)
+    ratios = ", ".join(
+        f"{spelled(line['ratio'])} times as long for {value(line, 'target'):.0e} {unit}" for line in lines
+    )
     return (
         f"MuJoCo's cheapest setting takes {ratios} as tmt's."
         if ratios
         else "no error asked for is reached by both MuJoCo and tmt."
     )
+
+
+def spelled(ratio: float) -> str:
+    """A ratio in words: of small ones two digits."""
+    return f"{ratio:.0f}" if ratio >= 3.0 else f"{ratio:.2g}"
 
 
 def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
@@ -160,11 +179,11 @@ def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
         for (engine, method), rows in curves(result, scene).items():
             good = [r for r in rows if not r["diverged"] and r["evaluations"]]
             if good and not (engine == "mujoco" and method in SAME_BITS):
-                errors = np.clip([r["worst_error_rad"] for r in good], FINE_END, COARSE_END)
+                errors = np.clip([value(r, "worst_error") for r in good], FINE_END, COARSE_END)
                 line(ax, engine, method, errors, [r["evaluations"] for r in good])
         ax.set(xlim=(COARSE_END * 2, 2e-16), ylim=(40, 2e6))
     fig.supylabel("evaluations of the right-hand side", fontsize=9)
-    finish(fig, axes, "worst error on the way, rad")
+    finish(fig, axes, f"worst error on the way, {unit_of(result)}")
     caption = (
         "The same errors against evaluations of the equations of motion, which do not depend on the machine. "
         f"{agreeing(result.checks)}{fewest(result, result.curves.get('regular'), 1e-9)}Of an implicit method an evaluation with "
@@ -189,11 +208,11 @@ def fewest(result: Result, scene: str, target: float) -> str:
     counts = {}
     for method in ("rk4", "dopri8"):
         rows = curves(result, scene).get(("tmt", method), [])
-        good = [r["evaluations"] for r in rows if not r["diverged"] and r["worst_error_rad"] <= target]
+        good = [r["evaluations"] for r in rows if not r["diverged"] and value(r, "worst_error") <= target]
         counts[method] = min(good, default=None)
     if None in counts.values():
         return ""
-    return f"For {target:.0e} rad ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
+    return f"For {target:.0e} {unit_of(result)} ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
 
 
 def draw_energy(result: Result) -> tuple[str, Figure, str]:

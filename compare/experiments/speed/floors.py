@@ -11,7 +11,7 @@ from ...judge.scale import EPS
 from .settings import coarsest_steps
 
 EVERY = 16  # steps of the run along which the growth is taken, for each time at which a run is read
-MOST_SPEEDS = 12  # up to which the Jacobian of every step is taken, else that of one in 16 for all of these
+EACH_STEP = 12  # up to which the Jacobian of every step is taken, else that of one in 16 for all of these
 
 
 def floor(case: Case, dynamics: Dynamics) -> float:
@@ -25,7 +25,7 @@ def floor(case: Case, dynamics: Dynamics) -> float:
         dt = case.duration / steps
         motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
         if np.isfinite(motion.q).all():
-            taken = growth if case.coordinates.nv <= MOST_SPEEDS else sampled_growth
+            taken = growth if case.coordinates.nv <= EACH_STEP else sampled_growth
             growths = taken(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, EVERY)
             return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
     raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")

@@ -15,14 +15,18 @@ EXPONENTS = {  # of the coarsest and of the finest tolerance, 10^-k
     "dopri8_adaptive": (2, 14), "RK45": (2, 12), "DOP853": (2, 13), "Radau": (2, 6), "LSODA": (2, 12), "Taylor": (4, 16),
 }  # fmt: skip
 OTHER_EXPONENTS = (2, 12)
-FEW, FEW_OTHERS = {"quick": 5, "small": 7}, 2  # settings of a run that is not full: the coarsest; of further engines
+FEW_SETTINGS, FEW_OTHERS = (
+    {"quick": 5, "small": 7},
+    2,
+)  # settings of a run that is not full: the coarsest; of further engines
 NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
 # of the robot of a file, whose number of joints has no bound: seconds of one evaluation are about a constant times nv^1.5
 IN_LOOPS, TRACED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: of tmt's compiled loops, of its straight-line code, of MuJoCo
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
-LEAST_SETTINGS = 3  # of any method, whatever they take
-SLOWEST = 0.5  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
+LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of any method, whatever they take
+QUICK_SPEEDS = 4  # up to which a quick run has methods that solve their stages
+SLOWEST_RUN = 0.6  # s: a method whose coarsest run alone takes so long, by this estimate, is left out
 
 
 def scenes_of(robot: Robot) -> list[Case]:
@@ -58,9 +62,7 @@ def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
     return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
 
 
-def methods(
-    engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None
-) -> list[Method]:
+def methods(engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None) -> list[Method]:
     """The methods of all engines that are there; "same schemes": one of MuJoCo for each scheme, and the same in tmt."""
     if which == "same schemes":
         theirs = one_of_each_scheme(engines["mujoco"])
@@ -82,20 +84,22 @@ def left_out(engines: Mapping[str, Engine], size: str, robot: Robot | None) -> d
         too_long = getattr(engine, "too_long", lambda tree: None)
         reason = engine.unavailable() or (robot and too_long(robot.tree))
         for method in engine.methods.values():
-            if why := reason or (robot and too_slow(method, robot)):
+            if why := reason or (robot and too_slow(method, robot, size)):
                 out[engine.name, method.name] = why
     return out
 
 
-def too_slow(method: Method, robot: Robot) -> str | None:
+def too_slow(method: Method, robot: Robot, size: str) -> str | None:
     """Why a method is left out, as even its coarse steps take too long with so many joints; None: it is not."""
     if not robot.is_read or method.adaptive:
         return None
-    case = regular_of(robot)
+    case, n = regular_of(robot), robot.coordinates.nv
     seconds = coarsest_steps(case) * estimated(method, case.tree)
-    if seconds <= SLOWEST:
-        return None
-    return f"with {robot.coordinates.nv} speeds its coarsest run alone would take about {seconds:.1g} s"
+    if seconds > SLOWEST_RUN:
+        return f"with {n} speeds its coarsest run alone would take about {seconds:.1g} s"
+    if size == "quick" and n > QUICK_SPEEDS and method.engine == "tmt" and method_named(method.name).solves_stages:
+        return f"with {n} speeds its code takes too long to make for a quick run"
+    return None
 
 
 def estimated(method: Method, tree: Tree) -> float:
@@ -106,7 +110,8 @@ def estimated(method: Method, tree: Tree) -> float:
     if method.engine != "tmt":
         return IN_LOOPS * n**1.5
     stepping = method_named(method.name)
-    evaluation = (TRACED if kernels.is_traced(tree, stepping) else IN_LOOPS) * n**1.5
+    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages
+    evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
     if method.adaptive:
         return evaluation
     return evaluation * stepping.stages * (2 * n * ITERATIONS if stepping.solves_stages else 1)
@@ -117,7 +122,7 @@ def settings_of(method: Method, case: Case, size: str = "full", which: str = "al
     found = tolerances(method, case) if method.adaptive else halvings(method, case, size)
     if which == "same schemes":
         return found[NEARER] or found[-1:]
-    few = FEW if method.engine in COMPARED else dict.fromkeys(FEW, FEW_OTHERS)
+    few = FEW_SETTINGS if method.engine in COMPARED else dict.fromkeys(FEW_SETTINGS, FEW_OTHERS)
     return found[: few.get(size)]
 
 
@@ -126,7 +131,7 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
     count, finest = coarsest_steps(case), finest_steps(method)
     if case.robot.is_read:
         affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
-        finest = max(min(finest, affordable), count << (LEAST_SETTINGS - 1))
+        finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))
     doublings = max(1, (finest // count).bit_length())
     return tuple(Setting(case.duration, steps=count << k) for k in range(doublings))
 

@@ -1,4 +1,4 @@
-"""The order of every method on a free asymmetric body, against Jacobi's elliptic functions: for robots whose bodies turn freely."""
+"""The order of every method on a free asymmetric body, against Jacobi's elliptic functions: for robots with balls."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,9 +17,12 @@ from .advice import CLEAR, REGULAR, check_order
 
 BODY = "free asymmetric body"
 MASS, MOMENTS = 1.0, (0.03, 0.05, 0.06)  # kg, kg m2 about the principal axes
-QUATERNION, SPEEDS = (0.5, 0.5, -0.5, 0.5), (480.0, 120.0, 360.0)  # deg/s about its own axes: it tumbles, far from a steady turn
-DURATION, READ = 2.0, 8  # s; equal times at which it is read
-COARSEST, FINEST = 16, 8192  # steps, doubled again and again
+QUATERNION, SPEEDS = (
+    (0.5, 0.5, -0.5, 0.5),
+    (480.0, 120.0, 360.0),
+)  # deg/s about its own axes: it tumbles, far from a steady turn
+TUMBLED, READ = 2.0, 8  # s; equal times at which it is read
+FIRST_COUNT, LAST_COUNT = 16, 8192  # steps, doubled again and again
 HINGE_ORDER = {"RK4": 4}  # of MuJoCo's integrators, where all joints are hinges; of the others 1
 TEXT = """<mujoco>
   <option gravity="0 0 0"/>
@@ -50,7 +53,7 @@ def text() -> str:
 def orders(result: Result, engines: Mapping[str, Engine]) -> list[dict]:
     """Rows and checks: each method of fixed step of both engines, its order and the one measured; and a sentence in `result`."""
     case = stone().case("tumbling", posture=QUATERNION, speed=SPEEDS)
-    times = np.linspace(0.0, DURATION, READ + 1)
+    times = np.linspace(0.0, TUMBLED, READ + 1)
     _, exact = free_turning(times, MOMENTS, case.v, case.q)
     exact, table = exact.astype(float), []
     for of_body in (engines["tmt"], engine(read(text()))):
@@ -75,12 +78,12 @@ def measured(case: Case, engine: Engine, method: Method, exact: np.ndarray) -> t
 
     exact: quaternions at the times that are read.
     """
-    dynamics, regular, count = engine.of(case), [], COARSEST
-    while count <= FINEST:
-        q = dynamics.run(*case.start, case.tau, DURATION / count, count, method.name).q[:: count // READ]
+    dynamics, regular, count = engine.of(case), [], FIRST_COUNT
+    while count <= LAST_COUNT:
+        q = dynamics.run(*case.start, case.tau, TUMBLED / count, count, method.name).q[:: count // READ]
         error = np.abs(case.coordinates.difference(q, exact)).max()
         if CLEAR < error < REGULAR:
-            regular.append((DURATION / count, error))
+            regular.append((TUMBLED / count, error))
         elif regular:
             break
         count *= 2
@@ -93,15 +96,17 @@ def measured(case: Case, engine: Engine, method: Method, exact: np.ndarray) -> t
 def in_words(table: list[dict]) -> str:
     """The orders in a sentence."""
     parts = []
-    for engine in dict.fromkeys(row["engine"] for row in table):
-        own = [f"{row['method']} {row['measured_order']:.2f}" for row in table if row["engine"] == engine]
-        parts.append(f"{LABELS[engine]}: {', '.join(own)}")
+    for name in dict.fromkeys(row["engine"] for row in table):
+        own = [f"{row['method']} {row['measured_order']:.2f}" for row in table if row["engine"] == name]
+        parts.append(f"{LABELS[name]}: {', '.join(own)}")
     words = (
         f"The robot has joints about which a body turns freely. The orders of the methods on a {BODY}, measured against Jacobi's "
         f"elliptic functions, are for {'; for '.join(parts)}."
     )
     lower = [
-        row for row in table if row["engine"] == "mujoco" and row["measured_order"] < HINGE_ORDER.get(row["method"], 1) - 0.5
+        row
+        for row in table
+        if row["engine"] == "mujoco" and row["measured_order"] < HINGE_ORDER.get(row["method"], 1) - 0.5
     ]
     for row in lower:
         words += (

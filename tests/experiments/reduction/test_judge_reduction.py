@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from compare import experiment
+from compare.case import Coordinates
 from compare.engines.mujoco import additions, parse
 from compare.experiments import reduction
 from compare.experiments.reduction import cost, exact_motion, needs, sub_blocks
@@ -57,7 +58,7 @@ def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, req
     t = np.arange(6.0)
     off, band = np.zeros((6, 4)), np.full((6, 4), 1e-9)
     off[4, 1], band[4, 1] = apart, width
-    found = verdicts(needs.check_smaller, "zero, free", ("alpha", "gamma"), t, off, band, required)
+    found = verdicts(needs.check_smaller, "zero, free", Coordinates(("alpha", "gamma")), t, off, band, required)
     assert found == {"smallest model to whole": within, "time judged": long_enough}
 
 

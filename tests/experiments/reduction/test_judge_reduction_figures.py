@@ -25,7 +25,7 @@ def costs_of_two():
     seconds = {
         (name, i): 128e-9 * (k + 2) * (4 if i == "RK4" else 1) for k, name in enumerate(names) for i in ("RK4", "Euler")
     }
-    return cost.cost_rows(seconds, paths, dict.fromkeys(paths, 0.0))
+    return cost.cost_rows(seconds, paths, dict.fromkeys(paths, 0.0), ARM.coordinates)
 
 
 def test_the_cost_of_an_addition_is_the_ratio_of_its_times():
