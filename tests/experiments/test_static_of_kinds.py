@@ -145,6 +145,16 @@ def test_mbar_is_symmetric_within_the_scale_of_each_entry():
 # figures
 
 
+def test_without_exact_states_the_figure_of_distances_speaks_of_the_engines_alone():
+    setup = setup_between(STONE, states=4, exact_states=0)
+    setup.named.exact_states = 0
+    for module in MODULES:
+        result = module.rows(setup)
+        (first, *_) = [figure() for figure in module.figures(result, setup.robot)]
+        assert "Against" not in first[2] and "eps apart" in first[2] and "to exact" not in str(result.checks)
+        assert {line.get_label() for line in first[1].axes[0].lines} == {"TMT to MuJoCo", "tolerance, 64 eps"}
+
+
 def test_the_sketch_counts_the_joints_of_a_large_robot_and_names_those_of_a_small_one():
     one, _ = read(PATHS["quadruped"])
     _, fig, caption = figures_sketch.draw_sketch(one)
