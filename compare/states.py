@@ -71,7 +71,7 @@ def named(robot: Robot) -> Sample:
     known, notes = of_named(robot), ()
     if known < len(q):
         notes = (
-            f"Exact values are known of {known} of the {len(q)} {name}: one of them takes about {seconds(robot):.1f} s.",
+            f"Exact values are known of {known} of the {len(q)} {name}: one of them takes about {seconds(robot):.1g} s.",
         )
     return Sample(robot.tree, name, q, speeds, torques, known, tuple(robot.poses), notes)
 
@@ -80,7 +80,7 @@ def random(robot: Robot, states: int, exact_states: int) -> Sample:
     """Random states: positions within the joints' ranges, speeds and torques within `largest_speeds_and_torques`."""
     rng, asked, exact_asked = np.random.default_rng(SEED), states, exact_states
     states = min(asked, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
-    exact_states = min(exact_asked, states, max(1, affordable(robot) - of_named(robot)))
+    exact_states = min(exact_asked, states, affordable(robot) - of_named(robot))
     notes = [f"{states:,} random states in place of {asked:,}: so many bodies and joints take long."] * (states < asked)
     if exact_states < min(exact_asked, states):
         left = f"{exact_states} random states in place of {exact_asked}"
@@ -102,8 +102,8 @@ def affordable(robot: Robot) -> int:
 
 
 def of_named(robot: Robot) -> int:
-    """How many of the named postures have exact values: all, or as many as half of the time allows, at least one."""
-    return min(len(robot.poses), max(1, affordable(robot) // 2))
+    """How many of the named postures have exact values: all, or as many as half of the time allows."""
+    return min(len(robot.poses), affordable(robot) // 2)
 
 
 def largest_speeds_and_torques(robot: Robot) -> np.ndarray:

@@ -40,6 +40,27 @@ def test_every_quantity_agrees_and_every_figure_is_drawn(source, tmp_path):
         assert "each entry its own" in module.tolerance(one) or "each joint's own" in module.tolerance(one)
 
 
+BODY = '<inertial pos="0.1 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></worldbody></mujoco>'
+EXTREME = {
+    "springs without gravity": CART.replace("0 0 -9.81", "0 0 0"),
+    "weightless by its flag": STONE.replace("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>'),
+    "far from the origin": STONE.replace('pos="0.1 0.2 1"', 'pos="1000 2000 10"'),
+    "nothing acts at rest": f'<mujoco><option gravity="0 0 0"/><worldbody><body><joint axis="0 0 1"/>{BODY}',
+    "slides alone": f'<mujoco><worldbody><body><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 1"/>{BODY}',
+    "no exact gradient": f'<mujoco><worldbody><body><joint type="ball" stiffness="3"/>{BODY}',
+}
+
+
+@pytest.mark.parametrize("name", EXTREME)
+def test_robots_whose_scales_are_zero_or_large_agree(name):
+    setup = setup_between(EXTREME[name], states=5)
+    for module in MODULES:
+        result = module.rows(setup)
+        assert [str(check) for check in result.checks if not check.passed] == []
+        assert all(figure()[2].endswith(".") for figure in module.figures(result, setup.robot))
+    assert figures_sketch.draw_sketch(setup.robot)[2].endswith(".")
+
+
 def test_the_units_of_mixed_joints_are_named():
     setup = setup_between(CART, states=3)
     units = {row["quantity"]: row["unit"] for module in MODULES for row in module.rows(setup).rows}
@@ -122,6 +143,16 @@ def test_mbar_is_symmetric_within_the_scale_of_each_entry():
 
 
 # figures
+
+
+def test_without_exact_states_the_figure_of_distances_speaks_of_the_engines_alone():
+    setup = setup_between(STONE, states=4, exact_states=0)
+    setup.named.exact_states = 0
+    for module in MODULES:
+        result = module.rows(setup)
+        (first, *_) = [figure() for figure in module.figures(result, setup.robot)]
+        assert "Against" not in first[2] and "eps apart" in first[2] and "to exact" not in str(result.checks)
+        assert {line.get_label() for line in first[1].axes[0].lines} == {"TMT to MuJoCo", "tolerance, 64 eps"}
 
 
 def test_the_sketch_counts_the_joints_of_a_large_robot_and_names_those_of_a_small_one():
