@@ -6,7 +6,7 @@ from functools import partial
 from ...engines import one_of_each_scheme
 from ...judge.check import Result
 from ...judge.rounding import NARROW
-from ...judge.run import MOVES, unit_of
+from ...judge.run import MOVES, movement_unit
 from ...robots import Robot
 from ...setup import Setup
 from . import drift, errors, horizon, sentences
@@ -53,7 +53,7 @@ def tolerance(robot: Robot) -> str:
 
 def of_file(robot: Robot) -> str:
     """The same for a robot from a file."""
-    unit = unit_of(robot.coordinates)
+    unit = movement_unit(robot.coordinates)
     ball = "; of a ball 32 eps of a turn, as quaternions are multiplied" if robot.coordinates.has_balls else ""
     return (
         "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "

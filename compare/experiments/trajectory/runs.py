@@ -11,7 +11,15 @@ from ...case import Case, Coordinates
 from ...engines import Dynamics, Engine, Method, compared
 from ...judge.check import Result
 from ...judge.rounding import band, slope_rounding, step_rounding
-from ...judge.run import check_movement, departure, deviation_alive, diverged_at, required_time, step_in_words, unit_of
+from ...judge.run import (
+    check_movement,
+    departure,
+    deviation_alive,
+    diverged_at,
+    movement_unit,
+    required_time,
+    step_in_words,
+)
 from ...truth.smallest import reduced
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
@@ -166,7 +174,7 @@ def compare_runs(
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)
             moved = min(deviation_alive(path[before], case.q, coordinates) for path in (mine.q, theirs[0]))
-            check_movement(result, where, moved, unit_of(coordinates))
+            check_movement(result, where, moved, movement_unit(coordinates))
         if first is None:
             first = method, theirs
             result.curves[(case.name, method.scheme, steps)] = {

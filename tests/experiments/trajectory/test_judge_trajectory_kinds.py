@@ -8,7 +8,7 @@ from models import chain, random_tree
 
 from compare.engines.mujoco import reading
 from compare.experiments import trajectory
-from compare.experiments.trajectory import derivative, figures_runs, horizon, leaving, runs, sentences
+from compare.experiments.trajectory import derivative, figures_lines, figures_runs, horizon, leaving, runs, sentences
 from compare.judge.check import Result
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
@@ -99,7 +99,7 @@ def test_of_many_joints_the_six_that_differ_most_are_drawn():
 def test_a_ball_is_drawn_by_its_turn_from_the_start():
     case = ROBOT.case("c", duration=1.0, dt=1 / 4)
     of_case, count = curve(case, np.zeros(case.coordinates.nv)), case.coordinates.nv
-    values = figures_runs.drawn(case, of_case["tmt"][0])
+    values = figures_lines.drawn(case, of_case["tmt"][0])
     for kind, at, by in case.coordinates.places.joints:
         if kind == "ball":
             assert values[-1, by] == pytest.approx(0.1)
