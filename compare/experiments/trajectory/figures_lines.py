@@ -45,7 +45,7 @@ def drawn(case: Case, q: np.ndarray) -> np.ndarray:
     return values
 
 
-def worst(case: Case, columns: Sequence[dict]) -> list[int]:
+def differing_most(case: Case, columns: Sequence[dict]) -> list[int]:
     """The movements that are drawn, in their order: all, or of many those in which the engines differ most while judged."""
     count = case.coordinates.nv
     if count <= MOST_LINES:

@@ -14,7 +14,7 @@ from ...judge.run import moved_from, movement_unit, step_in_words
 from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name
 from .drift import DRIFT_DURATION, found_order
-from .figures_lines import drawn, over_time, worst
+from .figures_lines import differing_most, drawn, over_time
 from .horizon import CARRIED, early, power
 from .leaving import left_in_words
 from .sentences import agreement, rad
@@ -49,7 +49,7 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     of_case = [key for key in result.curves["runs"] if key[0] == case.name]
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
     columns = [result.curves["runs"][key] for key in of_case if key[-1] == steps]
-    shown, unit = worst(case, columns), movement_unit(case.coordinates)
+    shown, unit = differing_most(case, columns), movement_unit(case.coordinates)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     lines_of_legend = -(-(len(shown) + 4) // LEGEND_COLUMNS)
     fig.subplots_adjust(

@@ -15,7 +15,7 @@ from ...judge.words import capital
 from ...robots import Robot
 from .errors import coarsest_run, deviations
 from .leaving import causes_in_words, left_in_words
-from .runs import MOST_ENTRIES, STEPS_AT_MOST, affordable, counts
+from .runs import MOST_ENTRIES, STEPS_AT_MOST, counts, steps_afforded
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
 
@@ -31,7 +31,7 @@ def notes(
         *of_errors(runs, result.curves["errors"], cases),
         *of_first_order(runs, cases),
         f"MuJoCo's integrators here: {', '.join(engines['mujoco'].methods)}.",
-        *of_schemes(robot, engines["mujoco"]),
+        *of_integrators(robot, engines["mujoco"]),
         *of_left_out(
             [cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], finer, entries
         ),
@@ -51,7 +51,7 @@ def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     )
 
 
-def of_schemes(robot: Robot, mujoco: Engine) -> list[str]:
+def of_integrators(robot: Robot, mujoco: Engine) -> list[str]:
     """Which integrators are which scheme, of a robot from a file; and which is left out."""
     if not robot.is_read:
         return []
@@ -146,10 +146,10 @@ def of_left_out(cases: Sequence[Case], finer: Sequence[int], entries: int = MOST
     left_out, said = {}, []
     for case in cases:
         if len(counts(case, finer, entries)) < len(finer):
-            left_out.setdefault(min(STEPS_AT_MOST, affordable(case, entries)), []).append(case.name)
+            left_out.setdefault(min(STEPS_AT_MOST, steps_afforded(case, entries)), []).append(case.name)
     for most, names in left_out.items():
         said.append(f"Runs of more than {most} steps, finer than a scene's own, are left out: {'; '.join(names)}.")
-    judged = {case.name: affordable(case, entries) for case in cases if case.steps > affordable(case, entries)}
+    judged = {case.name: steps_afforded(case, entries) for case in cases if case.steps > steps_afforded(case, entries)}
     if judged:
         which = "; ".join(f"{name}: {steps} steps" for name, steps in judged.items())
         said.append(
