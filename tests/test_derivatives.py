@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from trees import random_state, tree_of_kinds
 
-from tmt import METHODS, derivatives, methods
+from tmt import METHODS, derivatives
 from tmt.methods import SemiImplicitEuler, amplification
 
 TREE = tree_of_kinds(np.random.default_rng(5), bodies=3)
@@ -17,9 +17,9 @@ DESCRIBED = [name for name, method in METHODS.items() if derivatives.has_residua
 @pytest.mark.parametrize("name", DESCRIBED)
 def test_the_jacobian_of_a_step_is_that_of_dual_numbers_through_all_of_it(name, monkeypatch):
     q, qd, (tau, *_) = STATES
-    assert len(TREE.axis) > methods.FEW_SPEEDS and TREE.has_springs and TREE.coordinates.balls
+    assert len(TREE.axis) > derivatives.FEW_SPEEDS and TREE.has_springs and TREE.coordinates.balls
     found = amplification(METHODS[name], TREE, q, qd, tau, 0.01)
-    monkeypatch.setattr(methods, "FEW_SPEEDS", len(TREE.axis))
+    monkeypatch.setattr(derivatives, "FEW_SPEEDS", len(TREE.axis))
     assert found == pytest.approx(amplification(METHODS[name], TREE, q, qd, tau, 0.01), abs=1e-11, rel=1e-11)
 
 

@@ -10,7 +10,37 @@ from . import composite
 from .dual import Dual, seeded
 from .stepping import stepped
 
+FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
+
+
+def one_step(stepping, tree, q, qd, tau, dt):
+    """The state (q, qd) of a tree one dt later by a method, over any scalar."""
+    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt), q, qd, dt)
+
+
+def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
+    """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
+
+    q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or (...). At an
+    equilibrium it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual
+    numbers, all directions at once; so it holds for partitioned and implicit methods too.
+    """
+    joints, nq, nv = tree.coordinates, tree.coordinates.nq, tree.coordinates.nv
+    batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
+    if nv > FEW_SPEEDS and has_residual(stepping):
+        rows = [np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd)]
+        each = np.broadcast_to(dt, batch).reshape(-1)
+        found = in_parts(stepping, tree, *rows, [float(t) for t in tau], each)
+        return found.reshape(*batch, 2 * nv, 2 * nv)
+    start = [np.broadcast_to(values, (*batch, np.shape(values)[-1])) for values in (q, qd)]
+    start = [values[..., i] for values in start for i in range(values.shape[-1])]
+    directions = np.eye(2 * nv).reshape(2 * nv, 2 * nv, *(1 for _ in batch))  # component, direction, state
+    state = seeded(start, [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]])
+    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq:], [float(t) for t in tau], dt)
+    moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
+    slopes = [np.broadcast_to(slope, (2 * nv, *batch)) for slope in (*moved, *(x.slope for x in new_qd))]
+    return np.moveaxis(np.array(slopes), (0, 1), (-2, -1)).copy()
 
 
 def has_residual(stepping) -> bool:
@@ -35,7 +65,7 @@ def linear_system(
     return A.transpose(2, 0, 1), -force.T
 
 
-def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
+def in_parts(stepping, tree, q, qd, tau, dt) -> np.ndarray:
     """d(q, qd)+/d(q, qd) of one step for movements of q, (states, 2 nv, 2 nv). q (states, nq), qd (states, nv), dt (states,)."""
     size = max(1, PART // qd.shape[1])
     parts = [slice(k, k + size) for k in range(0, len(qd), size)]

@@ -9,13 +9,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from . import derivatives, dop853
+from . import dop853
 from .coordinates import FLAT
-from .dual import seeded
+from .derivatives import amplification as amplification
+from .derivatives import one_step as one_step
 from .implicit import ImplicitRungeKutta
 from .method import bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
-from .stepping import Method, checked_sums, checked_tableau, completed, stepped
+from .stepping import Method, checked_sums, checked_tableau, completed
 from .values import shown
 
 
@@ -32,9 +33,8 @@ class RungeKutta(Method):
     A: tuple  # row i: the weights of stages 0 .. i-1 in stage i
     b: tuple  # the weights of the stages in the step
     c: tuple  # the time of each stage in units of dt
-    mean_speed: bool = (
-        False  # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
-    )
+    # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
+    mean_speed: bool = False
 
     loop = "run_tableau"
 
@@ -145,9 +145,8 @@ class SemiImplicitEuler(Method):
         if self.implicit_bias or lone:
             rates = bias_rates(tree, q, qd, terms)
             own = range(n) if self.implicit_bias else lone
-            matrix = [
-                [matrix[i][j] + dt * rates[i][j] if i in own else matrix[i][j] for j in range(n)] for i in range(n)
-            ]
+            added = [[dt * rate if i in own else 0.0 for rate in row] for i, row in enumerate(rates)]
+            matrix = [[x + y for x, y in zip(*rows)] for rows in zip(matrix, added)]
         return matrix
 
     def residual(self, tree, a, q, qd, tau, dt, terms=mass_matrix_and_bias):
@@ -163,8 +162,7 @@ class SemiImplicitEuler(Method):
             force = [f - dt * k * v for f, k, v in zip(force, stiffness, qd)]
             held = [x + dt * dt * k for x, k in zip(held, stiffness)]
         left = [x + d * y for x, d, y in zip(left_over(M, a, force), held, a)]
-        own = set(range(len(qd))) if self.implicit_bias else lone_speeds(tree) if self.lone_bodies else ()
-        if own:
+        if own := set(range(len(qd))) if self.implicit_bias else lone_speeds(tree) if self.lone_bodies else ():
             ahead, behind = (terms(tree, q, [v + sign * x for v, x in zip(qd, a)])[1] for sign in (1.0, -1.0))
             left = [x + 0.5 * dt * (ahead[i] - behind[i]) if i in own else x for i, x in enumerate(left)]
         return left
@@ -226,42 +224,12 @@ def advance(start, dt, weights, slopes):
     return result
 
 
-def one_step(stepping, tree, q, qd, tau, dt):
-    """The state (q, qd) of a tree one dt later by a method, over any scalar."""
-    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt), q, qd, dt)
-
-
-def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
-    """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
-
-    q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or (...). At an
-    equilibrium it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual
-    numbers, all directions at once; so it holds for partitioned and implicit methods too.
-    """
-    joints, nq, nv = tree.coordinates, tree.coordinates.nq, tree.coordinates.nv
-    batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(qd)[:-1], np.shape(dt))
-    if nv > FEW_SPEEDS and derivatives.has_residual(stepping):
-        rows = [np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd)]
-        each = np.broadcast_to(dt, batch).reshape(-1)
-        found = derivatives.amplification(stepping, tree, *rows, [float(t) for t in tau], each)
-        return found.reshape(*batch, 2 * nv, 2 * nv)
-    start = [np.broadcast_to(values, (*batch, np.shape(values)[-1])) for values in (q, qd)]
-    start = [values[..., i] for values in start for i in range(values.shape[-1])]
-    directions = np.eye(2 * nv).reshape(2 * nv, 2 * nv, *(1 for _ in batch))  # component, direction, state
-    state = seeded(start, [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]])
-    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq:], [float(t) for t in tau], dt)
-    moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
-    slopes = [np.broadcast_to(slope, (2 * nv, *batch)) for slope in (*moved, *(x.slope for x in new_qd))]
-    return np.moveaxis(np.array(slopes), (0, 1), (-2, -1)).copy()
-
-
 CLASSICAL = (  # Kutta (1901): A, b, c
     ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
     (1 / 6, 1 / 3, 1 / 3, 1 / 6),
     (0.0, 0.5, 0.5, 1.0),
 )
 ROOT = 3**0.5 / 6
-FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 METHODS = {
     "rk4": RungeKutta(4, *CLASSICAL),  # the assignment's part i
     "rk4_mean_speed": RungeKutta(2, *CLASSICAL, mean_speed=True),  # of order 2 where a ball tumbles

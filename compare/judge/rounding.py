@@ -3,8 +3,7 @@
 import numpy as np
 
 from tmt import Tree
-from tmt.derivatives import has_residual, linear_system
-from tmt.methods import FEW_SPEEDS, amplification
+from tmt.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
 from tmt.stepping import Method, stepped
 
 from .scale import EPS, FACTOR, bias_scale, spring_scale

@@ -28,7 +28,7 @@ def required_time(case: Case, scheme: str, dt: float) -> float:
     return judged if scheme == "rk4" or dt < COARSE_STEP else min(judged, STABLE_SO_LONG)
 
 
-def unit_of(coordinates: Coordinates) -> str:
+def movement_unit(coordinates: Coordinates) -> str:
     """The unit of the movements of all joints: rad, m, or rad or m."""
     return " or ".join(sorted(set(coordinates.units), reverse=True))
 

@@ -5,7 +5,7 @@ import pytest
 
 import tmt
 from compare.case import Coordinates
-from compare.judge.run import departure, deviation, deviation_alive, diverged_at, number_or_none, unit_of
+from compare.judge.run import departure, deviation, deviation_alive, diverged_at, movement_unit, number_or_none
 from compare.robots import Robot
 from compare.robots.arm import ARM
 
@@ -97,7 +97,7 @@ def test_a_robot_at_rest_without_gravity_has_not_diverged_by_rounding():
     tree = alone("ball", stiffness=(8.0,), rest=unit(1.0, 0.3, -0.2, 0.1))
     case = Robot("ball", None, tree, {}, ()).case("held", posture=tree.rest, torque="hold")
     t, q, v = tmt.simulate(*case.start, case.tau, case.scene.dt, case.steps, "rk4", tree)
-    assert diverged_at(case, t, q, v) is None and unit_of(case.coordinates) == "rad"
+    assert diverged_at(case, t, q, v) is None and movement_unit(case.coordinates) == "rad"
     v[3, 0] += 1e-6
     assert diverged_at(case, t, q, v) == t[3]
 
@@ -111,4 +111,4 @@ def test_a_quaternion_and_its_negative_are_the_same_turn():
     q = np.array([unit(1.0, 0.0, 0.0, 0.0), unit(-1.0, 0.0, 0.0, -0.049), unit(1.0, 0.0, 0.0, 0.051)])
     assert deviation(q[:2], q[0], coordinates) == pytest.approx(2.0 * np.arctan(0.049))
     assert departure(np.arange(3.0), q, coordinates) == 2.0
-    assert unit_of(Coordinates(("a", "b"), ("slide", "ball"))) == "rad or m"
+    assert movement_unit(Coordinates(("a", "b"), ("slide", "ball"))) == "rad or m"

@@ -11,16 +11,14 @@ from ...case import Case, Coordinates
 from ...engines import LABELS
 from ...judge.check import Result, closest
 from ...judge.rounding import NARROW, band
-from ...judge.run import check_movement, deviation, required_time, step_in_words, unit_of
+from ...judge.run import check_movement, deviation, movement_unit, required_time, step_in_words
 from ...judge.words import capital
 from ...setup import Setup
 from ...truth.smallest import Needed, needed, reduced
 from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
 
-BOTH_INTEGRATORS = (
-    6  # of the robot of a file, whose runs by both integrators are compared, of more those by the last alone
-)
-MOST_IN_A_BAND = 12  # of the robot of a file, whose runs are compared within a band of rounding
+BOTH_INTEGRATORS = 6  # speeds of the robot of a file whose runs by both integrators are compared, of more those by the last
+MOST_IN_A_BAND = 12  # speeds of the robot of a file whose runs are compared within a band of rounding
 
 
 def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str] = TWO_INTEGRATORS) -> list:
@@ -82,7 +80,7 @@ def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Set
     """Runs of the case and of the smaller one (None: it stays), by the same method, within the band of rounding."""
     scheme, every = scheme_of(setup.engines, integrator), finer(case)
     steps, coordinates = every * case.steps, case.coordinates
-    dt, nq, nv, unit = case.duration / steps, coordinates.nq, coordinates.nv, unit_of(coordinates)
+    dt, nq, nv, unit = case.duration / steps, coordinates.nq, coordinates.nv, movement_unit(coordinates)
     paths = states_of_run(case, setup, integrator)
     references = states_of_run(smaller, setup, integrator) if smaller else dict.fromkeys(paths)
     of_tmt = paths["tmt"][:, :nq], paths["tmt"][:, nq:]

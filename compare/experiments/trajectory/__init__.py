@@ -6,7 +6,7 @@ from functools import partial
 from ...engines import one_of_each_scheme
 from ...judge.check import Result
 from ...judge.rounding import NARROW
-from ...judge.run import MOVES, unit_of
+from ...judge.run import MOVES, movement_unit
 from ...robots import Robot
 from ...setup import Setup
 from . import drift, errors, horizon, sentences
@@ -39,7 +39,7 @@ def claim(robot: Robot) -> str:
 def tolerance(robot: Robot) -> str:
     """What the differences are compared with."""
     if robot.is_read:
-        return of_file(robot)
+        return tolerance_of_file(robot)
     return (
         "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
         "the sum of the absolute terms of the force, and 8 eps of the sums of the step. Open loop: a band computed along the "
@@ -51,9 +51,9 @@ def tolerance(robot: Robot) -> str:
     )
 
 
-def of_file(robot: Robot) -> str:
+def tolerance_of_file(robot: Robot) -> str:
     """The same for a robot from a file."""
-    unit = unit_of(robot.coordinates)
+    unit = movement_unit(robot.coordinates)
     ball = "; of a ball 32 eps of a turn, as quaternions are multiplied" if robot.coordinates.has_balls else ""
     return (
         "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "

@@ -10,7 +10,7 @@ from tmt.dual import seeded
 from ...engines import Engine
 from ...engines.mujoco.linear import implicit_derivative
 from ...judge.check import Result, closest
-from ...judge.run import unit_of
+from ...judge.run import movement_unit
 from ...judge.scale import EPS, FACTOR, mass_scale
 from ...robots import Robot
 
@@ -27,7 +27,7 @@ def compare_derivatives(result: Result, robot: Robot, engines: Mapping[str, Engi
     ours = [bias_rates(case.tree, *state) + damping for state in zip(q, v)]
     theirs = [-implicit_derivative(mujoco, *state) for state in zip(q, v)]
     unit = {"rad": "N m s/rad", "m": "N s/m"}
-    units = " or ".join(unit[one] for one in unit_of(case.coordinates).split(" or "))
+    units = " or ".join(unit[one] for one in movement_unit(case.coordinates).split(" or "))
     check_derivative(result, case.tree, q, v, np.array(ours), np.array(theirs), units)
 
 

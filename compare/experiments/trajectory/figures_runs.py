@@ -4,17 +4,17 @@ from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ...case import Case
 from ...engines import LABELS
 from ...judge.check import Result
-from ...judge.run import moved_from, step_in_words, unit_of
+from ...judge.run import moved_from, movement_unit, step_in_words
 from ...judge.words import capital
-from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, plain
+from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name
 from .drift import DRIFT_DURATION, found_order
+from .figures_lines import differing_most, drawn, over_time
 from .horizon import CARRIED, early, power
 from .leaving import left_in_words
 from .sentences import agreement, rad
@@ -22,53 +22,6 @@ from .sentences import agreement, rad
 SCHEME_LINES = dict(zip(("semi_implicit_euler", "implicit", "rk4"), LINES))  # colour and dash
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEGEND_COLUMNS = 4  # of a legend
-MOST_LINES = len(LINES)  # of joints in a panel
-
-
-def over_time(
-    ax: Axes, t: np.ndarray, ours: np.ndarray, theirs: np.ndarray, case: Case, shown: Sequence[int] | None = None
-) -> None:
-    """Positions or speeds, (times, nv), against time: lines for TMT, up to 65 marks for MuJoCo; shown: which, None: all."""
-    every = slice(None, None, max(1, len(t) // 64))
-    marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
-    names, all_names = case.coordinates.speeds, case.robot.coordinates.speeds
-    few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
-    for k, i in enumerate(range(len(names)) if shown is None else shown):
-        colour, dash = LINES[all_names.index(names[i]) if few else k]
-        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{plain(symbol(case, i))}, TMT")
-        ax.plot(t[every], theirs[every, i], color=colour, clip_on=False, **marks)
-    ax.plot([], [], color="black", label="MuJoCo", **marks)
-
-
-def symbol(case: Case, i: int) -> str:
-    """How the joint of a movement is written."""
-    name = case.coordinates.speeds[i]
-    return case.robot.symbol(name)
-
-
-def drawn(case: Case, q: np.ndarray) -> np.ndarray:
-    """Positions as they are drawn, (times, nv): of a ball the movement from the start."""
-    coordinates = case.coordinates
-    if not coordinates.has_balls:
-        return q
-    values = coordinates.difference(q, q[0])
-    for kind, at, by in coordinates.places.joints:
-        if kind != "ball":
-            values[:, by] = q[:, at]
-    return values
-
-
-def worst(case: Case, columns: Sequence[dict]) -> list[int]:
-    """The movements that are drawn, in their order: all, or of many those in which the engines differ most while judged."""
-    count = case.coordinates.nv
-    if count <= MOST_LINES:
-        return list(range(count))
-    largest = np.zeros(count)
-    for c in columns:
-        judged = c["t"] <= c["judged_until_s"]
-        off = moved_from(c["tmt"][0][judged], c["mujoco"][0][judged], case.coordinates)
-        largest = np.fmax(largest, off.max(axis=0))
-    return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())
 
 
 def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str]:
@@ -96,7 +49,7 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     of_case = [key for key in result.curves["runs"] if key[0] == case.name]
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
     columns = [result.curves["runs"][key] for key in of_case if key[-1] == steps]
-    shown, unit = worst(case, columns), unit_of(case.coordinates)
+    shown, unit = differing_most(case, columns), movement_unit(case.coordinates)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     lines_of_legend = -(-(len(shown) + 4) // LEGEND_COLUMNS)
     fig.subplots_adjust(
@@ -158,7 +111,7 @@ def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) ->
     ended = sorted({f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in diverged})
     used = [row["difference_over_band"] for row in rows if row["difference_over_band"] is not None]
     most = f"at most {max(used):.1e}" if used else "no measured part"
-    errors, unit = result.curves["errors"].get(case.name), unit_of(case.coordinates)
+    errors, unit = result.curves["errors"].get(case.name), movement_unit(case.coordinates)
     count = case.coordinates.nv
     return (
         f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "

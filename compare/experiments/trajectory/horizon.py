@@ -15,7 +15,7 @@ from ...judge.rounding import growth
 from ...judge.run import step_in_words
 from ...judge.words import listed
 from ...robots import Robot
-from .runs import affordable
+from .runs import steps_afforded
 
 GROWTH_EVERY = 16  # steps between two recorded values of a growth
 GROWTH_RUN = (60.0, 6144)  # s and steps of RK4, for the growth of errors
@@ -39,7 +39,7 @@ def growth_run(robot: Robot, cases: Sequence[Case], small: bool) -> tuple[float,
     """Over what time the growth of errors is followed, s, and with how many steps."""
     if not (robot.is_read and cases):
         return SHORT_GROWTH_RUN if small else GROWTH_RUN
-    most = 128 if small else min([GROWTH_STEPS_OF_A_FILE, *(affordable(case) for case in cases)])
+    most = 128 if small else min([GROWTH_STEPS_OF_A_FILE, *(steps_afforded(case) for case in cases)])
     steps = max(1, most // GROWTH_EVERY) * GROWTH_EVERY
     return steps * min(case.scene.dt for case in cases), steps
 

@@ -9,7 +9,7 @@ from tmt.methods import METHODS, amplification
 from ...case import Case
 from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
-from ...judge.run import LEFT, unit_of
+from ...judge.run import LEFT, movement_unit
 
 NO_TIME = 1e-6  # s: a step in which nothing moves
 STEADY = 1e-3  # per second: a slower growth is none in these runs
@@ -59,7 +59,7 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
     """A sentence for each engine: what the torque leaves, what becomes of it, when the robot left, and what the cause is."""
     J, _ = linear_map(case)
     rate = np.log(np.abs(np.linalg.eigvals(J)).max()) / (case.duration / case.steps)
-    may, unit = allowed(case), unit_of(case.coordinates)
+    may, unit = allowed(case), movement_unit(case.coordinates)
     per = " or ".join(f"{one}/s2" for one in unit.split(" or "))
     grows = f"small deviations grow by up to e^{rate:.1f} per second" if rate > STEADY else "no small deviation grow"
     sentences = [f"The linear map of RK4 lets {grows}."]

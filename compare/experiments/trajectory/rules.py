@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ...case import Coordinates
 from ...judge.check import Result, closest
 from ...judge.rounding import NARROW
-from ...judge.run import unit_of
+from ...judge.run import movement_unit
 
 
 def ends_first(ends: Mapping[str, float | None]) -> float:
@@ -64,7 +64,7 @@ def check_level(
     per = "/s2" if level == "derivative" else ("", "/s")[i // n]
     unit = coordinates.units[i % n] + per
     largest_unit = " or ".join(
-        one + (per if level == "derivative" else "") for one in unit_of(coordinates).split(" or ")
+        one + (per if level == "derivative" else "") for one in movement_unit(coordinates).split(" or ")
     )
     place = f"{coordinates.speeds[i % n]} at t = {times[k]:.3f} s"
     check = result.check(where, f"{level}, TMT to MuJoCo", difference[k, i], tolerance[k, i], unit, place, True)

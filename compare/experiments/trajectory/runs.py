@@ -11,7 +11,15 @@ from ...case import Case, Coordinates
 from ...engines import Dynamics, Engine, Method, compared
 from ...judge.check import Result
 from ...judge.rounding import band, slope_rounding, step_rounding
-from ...judge.run import check_movement, departure, deviation_alive, diverged_at, required_time, step_in_words, unit_of
+from ...judge.run import (
+    check_movement,
+    departure,
+    deviation_alive,
+    diverged_at,
+    movement_unit,
+    required_time,
+    step_in_words,
+)
 from ...truth.smallest import reduced
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
@@ -42,14 +50,14 @@ class TmtSide(NamedTuple):
     ulp: np.ndarray  # (steps + 1, nq): positions of the run that starts one ulp away
 
 
-def affordable(case: Case, entries: int = MOST_ENTRIES) -> int:
+def steps_afforded(case: Case, entries: int = MOST_ENTRIES) -> int:
     """The steps of a run up to which its band is computed, if all Jacobians have so many entries: each has (2 nv)^2."""
     return entries // (2 * case.coordinates.nv) ** 2
 
 
 def counts(case: Case, finer: Sequence[int], entries: int = MOST_ENTRIES) -> list[int]:
-    """The numbers of steps of a case's runs: multiples of its own; at most 8192 and what is affordable, its own excepted."""
-    most = min(STEPS_AT_MOST, affordable(case, entries))
+    """The numbers of steps of a case's runs: multiples of its own; at most 8192 and what is steps_afforded, its own excepted."""
+    most = min(STEPS_AT_MOST, steps_afforded(case, entries))
     return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= most]
 
 
@@ -61,7 +69,7 @@ def recorded(case: Case) -> int:
     return count
 
 
-def apart(coordinates: Coordinates, one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+def off_by(coordinates: Coordinates, one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
     """How far states (q, v) are from others: movements and speeds, (..., 2 nv)."""
     return np.concatenate([coordinates.difference(one[0], other[0]), one[1] - other[1]], axis=-1)
 
@@ -76,7 +84,7 @@ def follow(
     """One case with every scheme and step size, and once by RK4 without the joints that it does not need.
 
     finer: steps as multiples of the scene's own. known: a dict in which TMT's side is kept, for whoever compares it with
-    several engines. entries: of the Jacobians of a run, see `affordable`.
+    several engines. entries: of the Jacobians of a run, see `steps_afforded`.
     """
     result, known = Result("trajectory"), {} if known is None else known
     if case not in known:  # what joints a scene of a robot from a file needs is not asked here
@@ -112,7 +120,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
     one_ulp_away = (np.nextafter(start, np.inf) for start in case.start)
     return TmtSide(
         t, q, v,
-        band(stepping, tree, q, v, tau, dt, every, affordable(case, entries)),
+        band(stepping, tree, q, v, tau, dt, every, steps_afforded(case, entries)),
         ended,
         states,
         dynamics.acceleration(*states, tau),
@@ -152,8 +160,8 @@ def compare_runs(
         alive = times[: len(mine.states[0])]
         for level, difference, tolerance, at in (
             ("derivative", mine.derivative - accelerations, mine.derivative_tolerance[:, None], alive),
-            ("one step", apart(coordinates, mine.stepped, one)[slow], mine.step_tolerance[slow], alive[slow]),
-            ("open loop", apart(coordinates, *judged_states), mine.width[:count], times[:count]),
+            ("one step", off_by(coordinates, mine.stepped, one)[slow], mine.step_tolerance[slow], alive[slow]),
+            ("open loop", off_by(coordinates, *judged_states), mine.width[:count], times[:count]),
         ):
             if not len(at):
                 continue
@@ -166,7 +174,7 @@ def compare_runs(
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)
             moved = min(deviation_alive(path[before], case.q, coordinates) for path in (mine.q, theirs[0]))
-            check_movement(result, where, moved, unit_of(coordinates))
+            check_movement(result, where, moved, movement_unit(coordinates))
         if first is None:
             first = method, theirs
             result.curves[(case.name, method.scheme, steps)] = {

@@ -10,12 +10,12 @@ from ...case import Case
 from ...engines import LABELS, Engine
 from ...engines.mujoco.flags import INTEGRATORS
 from ...judge.check import Result
-from ...judge.run import moved_from, unit_of
+from ...judge.run import moved_from, movement_unit
 from ...judge.words import capital
 from ...robots import Robot
 from .errors import coarsest_run, deviations
 from .leaving import causes_in_words, left_in_words
-from .runs import MOST_ENTRIES, STEPS_AT_MOST, affordable, counts
+from .runs import MOST_ENTRIES, STEPS_AT_MOST, counts, steps_afforded
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
 
@@ -31,7 +31,7 @@ def notes(
         *of_errors(runs, result.curves["errors"], cases),
         *of_first_order(runs, cases),
         f"MuJoCo's integrators here: {', '.join(engines['mujoco'].methods)}.",
-        *of_schemes(robot, engines["mujoco"]),
+        *of_integrators(robot, engines["mujoco"]),
         *of_left_out(
             [cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], finer, entries
         ),
@@ -42,7 +42,7 @@ def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     """What a run of a held posture says, of what is claimed of it if it is."""
     claims = case.robot.claims.of_scenes if case.robot.claims else {}
     about = f"Claim: {claims[case.name]}. Here" if case.name in claims else capital(case.name)
-    unit = unit_of(case.coordinates)
+    unit = movement_unit(case.coordinates)
     by = " and ".join(f"{LABELS[name]}'s {rad(value, unit)}" for name, value in deviations(case, curve).items())
     return (
         f"{about}, under TMT's torque, in {case.duration:g} s TMT's {case.robot.name} "
@@ -51,7 +51,7 @@ def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     )
 
 
-def of_schemes(robot: Robot, mujoco: Engine) -> list[str]:
+def of_integrators(robot: Robot, mujoco: Engine) -> list[str]:
     """Which integrators are which scheme, of a robot from a file; and which is left out."""
     if not robot.is_read:
         return []
@@ -82,7 +82,7 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
     for name, (ours, theirs) in found.items():
         curve = coarsest_run(runs, cases[name])
         case = cases[name]
-        apart, unit = agreement(curve, case), unit_of(case.coordinates)
+        apart, unit = agreement(curve, case), movement_unit(case.coordinates)
         true = "rest" if cases[name].is_held else "more than 20 digits"
         lines.append(
             f"{name} (true: {true}): TMT {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {apart:.1e} {unit} in the "
@@ -146,10 +146,10 @@ def of_left_out(cases: Sequence[Case], finer: Sequence[int], entries: int = MOST
     left_out, said = {}, []
     for case in cases:
         if len(counts(case, finer, entries)) < len(finer):
-            left_out.setdefault(min(STEPS_AT_MOST, affordable(case, entries)), []).append(case.name)
+            left_out.setdefault(min(STEPS_AT_MOST, steps_afforded(case, entries)), []).append(case.name)
     for most, names in left_out.items():
-        said.append(f"Runs of more than {most} steps, finer than a scene's own, are left out: {', '.join(names)}.")
-    judged = {case.name: affordable(case, entries) for case in cases if case.steps > affordable(case, entries)}
+        said.append(f"Runs of more than {most} steps, finer than a scene's own, are left out: {'; '.join(names)}.")
+    judged = {case.name: steps_afforded(case, entries) for case in cases if case.steps > steps_afforded(case, entries)}
     if judged:
         which = "; ".join(f"{name}: {steps} steps" for name, steps in judged.items())
         said.append(

@@ -8,7 +8,7 @@ from models import chain, random_tree
 
 from compare.engines.mujoco import reading
 from compare.experiments import trajectory
-from compare.experiments.trajectory import derivative, figures_runs, horizon, leaving, runs, sentences
+from compare.experiments.trajectory import derivative, figures_lines, figures_runs, horizon, leaving, runs, sentences
 from compare.judge.check import Result
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
@@ -28,8 +28,8 @@ def test_every_level_of_a_run_is_compared_as_movements():
     other, moved = q.copy(), 1e-3 * rng.normal(size=v.shape)
     for joint in coordinates.places.balls:
         other[:, joint.q] *= -1.0
-    assert np.abs(runs.apart(coordinates, (q, v), (other, v))).max() < 1e-14
-    off = runs.apart(coordinates, (coordinates.move(q, moved), v + moved), (other, v))
+    assert np.abs(runs.off_by(coordinates, (q, v), (other, v))).max() < 1e-14
+    off = runs.off_by(coordinates, (coordinates.move(q, moved), v + moved), (other, v))
     assert off == pytest.approx(np.hstack([moved, moved]), abs=1e-13)
 
 
@@ -53,7 +53,7 @@ def test_the_linear_map_is_that_of_rk4_for_a_robot_of_any_kind():
 def test_what_jacobians_cost_bounds_the_steps_of_a_run():
     """40 hinges: 6400 entries a step."""
     case = LONG.case("c", duration=1.0, dt=1 / 512)
-    assert runs.affordable(case, 6400 * 100) == 100 and runs.affordable(case, 6399) == 0
+    assert runs.steps_afforded(case, 6400 * 100) == 100 and runs.steps_afforded(case, 6399) == 0
     assert runs.counts(case, (1, 2, 16), 6400 * 1023) == [512] and runs.counts(case, (1, 2), 6400 * 1024) == [512, 1024]
     finer, judged = sentences.of_left_out([case], (1, 2), 6400 * 511)
     assert finer == "Runs of more than 511 steps, finer than a scene's own, are left out: c."
@@ -99,7 +99,7 @@ def test_of_many_joints_the_six_that_differ_most_are_drawn():
 def test_a_ball_is_drawn_by_its_turn_from_the_start():
     case = ROBOT.case("c", duration=1.0, dt=1 / 4)
     of_case, count = curve(case, np.zeros(case.coordinates.nv)), case.coordinates.nv
-    values = figures_runs.drawn(case, of_case["tmt"][0])
+    values = figures_lines.drawn(case, of_case["tmt"][0])
     for kind, at, by in case.coordinates.places.joints:
         if kind == "ball":
             assert values[-1, by] == pytest.approx(0.1)
@@ -112,10 +112,10 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
 
 
 def test_a_robot_from_a_file_is_said_which_scheme_each_integrator_is():
-    said = sentences.of_schemes(ROBOT, ENGINES["mujoco"])
+    said = sentences.of_integrators(ROBOT, ENGINES["mujoco"])
     assert said[0].startswith("Their schemes in tmt, for this ") and "RK4: rk4" in said[0]
     methods = {name: method for name, method in ENGINES["mujoco"].methods.items() if name != "implicit"}
-    lacking = sentences.of_schemes(ROBOT, SimpleNamespace(methods=methods))
+    lacking = sentences.of_integrators(ROBOT, SimpleNamespace(methods=methods))
     assert lacking[-1].startswith("No scheme in tmt is that of MuJoCo's implicit for this")
     assert "quaternions are multiplied" in trajectory.tolerance(ROBOT) and "1 rad" not in trajectory.claim(ROBOT)
     assert "quaternions" not in trajectory.tolerance(LONG)

@@ -1,0 +1,58 @@
+"""The lines of a run in a panel: of all joints, or of those in which the engines differ most."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ...case import Case
+from ...judge.run import moved_from
+from ...report.style import LINES, plain
+
+MOST_LINES = len(LINES)  # of joints in a panel
+
+
+def over_time(
+    ax: Axes, t: np.ndarray, ours: np.ndarray, theirs: np.ndarray, case: Case, shown: Sequence[int] | None = None
+) -> None:
+    """Positions or speeds, (times, nv), against time: lines for TMT, up to 65 marks for MuJoCo; shown: which, None: all."""
+    every = slice(None, None, max(1, len(t) // 64))
+    marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
+    names, all_names = case.coordinates.speeds, case.robot.coordinates.speeds
+    few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
+    for k, i in enumerate(range(len(names)) if shown is None else shown):
+        colour, dash = LINES[all_names.index(names[i]) if few else k]
+        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{plain(symbol(case, i))}, TMT")
+        ax.plot(t[every], theirs[every, i], color=colour, clip_on=False, **marks)
+    ax.plot([], [], color="black", label="MuJoCo", **marks)
+
+
+def symbol(case: Case, i: int) -> str:
+    """How the joint of a movement is written."""
+    name = case.coordinates.speeds[i]
+    return case.robot.symbol(name)
+
+
+def drawn(case: Case, q: np.ndarray) -> np.ndarray:
+    """Positions as they are drawn, (times, nv): of a ball the movement from the start."""
+    coordinates = case.coordinates
+    if not coordinates.has_balls:
+        return q
+    values = coordinates.difference(q, q[0])
+    for kind, at, by in coordinates.places.joints:
+        if kind != "ball":
+            values[:, by] = q[:, at]
+    return values
+
+
+def differing_most(case: Case, columns: Sequence[dict]) -> list[int]:
+    """The movements that are drawn, in their order: all, or of many those in which the engines differ most while judged."""
+    count = case.coordinates.nv
+    if count <= MOST_LINES:
+        return list(range(count))
+    largest = np.zeros(count)
+    for c in columns:
+        judged = c["t"] <= c["judged_until_s"]
+        off = moved_from(c["tmt"][0][judged], c["mujoco"][0][judged], case.coordinates)
+        largest = np.fmax(largest, off.max(axis=0))
+    return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())
