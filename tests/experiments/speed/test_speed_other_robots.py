@@ -114,7 +114,7 @@ def test_the_sampled_growth_is_the_growth(gripper):
 
 def test_the_two_bodies_are_the_same(stone):
     case, _ = stone
-    ours, theirs = tmt.mass_matrix(case.q, case.tree), engine(read(tumbling.text())).of(case).mass_matrix(case.q)
+    ours, theirs = tmt.mass_matrix(case.q, case.tree), engine(read(tumbling.mjcf())).of(case).mass_matrix(case.q)
     assert np.abs(ours - theirs).max() < 1e-17
 
 
@@ -123,14 +123,14 @@ def test_the_two_bodies_are_the_same(stone):
 )
 def test_a_method_of_tmt_keeps_its_order_on_a_free_body(gripper, stone, name, least, most):
     _, known, _ = gripper
-    found = tumbling.measured(stone[0], known["tmt"], known["tmt"].methods[name], stone[1])
+    found = tumbling.order_of(stone[0], known["tmt"], known["tmt"].methods[name], stone[1])
     assert least < found[0] < most and found[1] == pytest.approx(2 * found[2])
 
 
 def test_mujoco_has_the_order_that_its_version_says(stone):
-    mujoco = engine(read(tumbling.text()))
+    mujoco = engine(read(tumbling.mjcf()))
     for name in ("RK4", "Euler"):
-        order, *_ = tumbling.measured(stone[0], mujoco, mujoco.methods[name], stone[1])
+        order, *_ = tumbling.order_of(stone[0], mujoco, mujoco.methods[name], stone[1])
         assert abs(order - mujoco.methods[name].order) < 0.05
 
 
@@ -139,14 +139,14 @@ def test_a_body_with_other_moments_shows_no_order(gripper, stone):
     case, _ = stone
     _, known, _ = gripper
     wrong = free_turning(np.linspace(0.0, tumbling.TUMBLED, 9), (0.03, 0.05, 0.0601), case.v, case.q)[1].astype(float)
-    found = tumbling.measured(case, known["tmt"], known["tmt"].methods["rk4"], wrong)
+    found = tumbling.order_of(case, known["tmt"], known["tmt"].methods["rk4"], wrong)
     assert found is None or found[0] < 0.5
 
 
 def test_an_order_that_is_lower_than_with_hinges_is_said():
     row = {"engine": "mujoco", "method": "RK4", "measured_order": 2.0}
-    assert "RK4 has order 2.00 there, where it has 4 with hinges" in tumbling.in_words([row])
-    assert "where it has" not in tumbling.in_words([row | {"measured_order": 4.0}])
+    assert "RK4 has order 2.00 there, where it has 4 with hinges" in tumbling.orders_in_words([row])
+    assert "where it has" not in tumbling.orders_in_words([row | {"measured_order": 4.0}])
 
 
 # what an evaluation costs
@@ -166,7 +166,7 @@ def test_states_of_any_joints_are_evaluated(gripper):
 def test_of_many_joints_fewer_states_and_a_reason():
     humanoid = robot_of(read(PATHS["humanoid29_free"]), "humanoid29_free.xml").tree
     assert evaluations.most_states(humanoid) == 10_000 and evaluations.most_states(ARM.tree) == 1_000_000
-    assert evaluations.operations(humanoid) is None and "35 speeds" in evaluations.left_out_in_words(humanoid)[0]
+    assert evaluations.lengths(humanoid) is None and "35 speeds" in evaluations.left_out_in_words(humanoid)[0]
     assert evaluations.left_out_in_words(ARM.tree) == []
 
 
