@@ -37,7 +37,7 @@ class Reference(NamedTuple):
         said = [f"reference: {self.kind}; {self.file} compared with {REFERENCES[self.kind]}"]
         if self.open_tree:
             said.append(f"open tree: {len(self.open_tree)} equalities off: {', '.join(self.open_tree)}")
-        return (*said, *(f"MuJoCo warns: {line}" for line in self.warnings))
+        return tuple(map(in_one_line, (*said, *(f"MuJoCo warns: {line}" for line in self.warnings))))
 
 
 class Compared(NamedTuple):

@@ -12,7 +12,7 @@ from .robots import Robot
 
 SECONDS_OF_EXACT = 5.0  # of all exact values of a report, about
 SHOWN_NUMBERS = 8  # of a position, in a sentence
-MOST_NUMBERS = 10_000_000  # in T_b of all random states together
+MOST_NUMBERS = 2_000_000  # in T_b of all random states together
 
 
 class Sample:

@@ -4,8 +4,10 @@ import dataclasses
 
 import numpy as np
 
+from compare import states
 from compare.experiment import Setup
 from compare.robots.arm import ARM
+from compare.states import Sample
 
 
 def test_the_states_are_spread_and_the_same_in_every_run(engines):
@@ -30,3 +32,57 @@ def test_a_robot_without_postures_is_looked_at_where_all_its_joints_are_at_zero(
     bare = dataclasses.replace(ARM, postures={}, scenes=())
     named = Setup(bare, engines).named
     assert (named.name, named.states, named.q.tolist()) == ("a posture", ("all joints at zero",), [[0.0, 0.0, 0.0]])
+
+
+def larger(joints):
+    """The arm with so many times its joints and bodies, one chain."""
+    tree, n = ARM.tree, 3 * joints
+    many = {name: getattr(tree, name) * joints for name in ("offset", "axis", "damping", "mass", "com", "inertia")}
+    names = {"hinge_names": [f"h{i}" for i in range(n)], "body_names": [f"b{i}" for i in range(2 * joints)]}
+    hinges = {"parent": range(-1, n - 1), "body_hinge": [3 * k + i for k in range(joints) for i in (1, 2)]}
+    rest = dict.fromkeys(("kind", "armature", "stiffness", "rest", "reference"), ())
+    postures = {f"p{i}": (float(i),) * n for i in range(4)}
+    return dataclasses.replace(
+        ARM,
+        tree=dataclasses.replace(tree, **many, **names, **{k: tuple(v) for k, v in hinges.items()}, **rest),
+        postures=postures,
+    )
+
+
+def test_exact_states_take_five_seconds_at_most():
+    assert states.of_named(ARM) == 5 and states.affordable(ARM) > 205 and states.random(ARM, 10, 7).notes == ()
+    robot = larger(9)  # 27 joints, 18 bodies
+    affordable = states.affordable(robot)
+    assert affordable * states.seconds(robot) <= states.SECONDS_OF_EXACT and 4 < affordable < 20
+    named, some = states.named(robot), states.random(robot, 100, 50)
+    assert named.exact_states + some.exact_states <= affordable and named.exact_states == min(4, affordable // 2)
+    assert some.notes == (
+        f"Exact values are known of {some.exact_states} random states in place of 50: "
+        f"one takes about {states.seconds(robot):.1g} s.",
+    )
+    giant = larger(30)
+    assert states.of_named(giant) == states.random(giant, 5, 5).exact_states == 1
+    assert states.named(giant).notes == (
+        f"Exact values are known of 1 of the 4 named postures: one of them takes about {states.seconds(giant):.1f} s.",
+    )
+
+
+def test_fewer_states_of_a_large_robot_and_its_note():
+    robot = larger(20)
+    some = states.random(robot, 10_000, 1)
+    assert len(some.q) * 3 * 60 * 40 <= states.MOST_NUMBERS < (len(some.q) + 1) * 3 * 60 * 40
+    assert some.notes[0] == f"{len(some.q):,} random states in place of 10,000: so many bodies and joints take long."
+
+
+def test_a_state_of_many_numbers_is_named_by_its_number():
+    assert states.random(ARM, 2, 1).describe(1).startswith("state 1: q = (")
+    assert states.random(larger(3), 2, 1).describe(1) == "state 1"
+
+
+def test_the_first_states_of_a_sample_are_a_sample():
+    sample = Sample(ARM.tree, "some", *np.arange(27.0).reshape(3, 3, 3), 2, ("a", "b", "c"))
+    first = sample.first(2)
+    assert first.q.tolist() == sample.q[:2].tolist() and first.qd.tolist() == sample.qd[:2].tolist()
+    assert first.describe(1) == "b" and sample.first(3) is sample
+    singles = sample.each()
+    assert [single.exact_states for single in singles] == [1, 1, 0] and len(singles[2].truths) == 0

@@ -25,7 +25,7 @@ DIRECTIONS = {
     "judge": {"tmt", "case"},
     "process": set(),
     "report": {"judge", "process"},
-    "setup": {"case", "states", "robots", "engines"},
+    "setup": {"tmt", "case", "states", "robots", "engines"},
     "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots", "setup"},
     "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
     "__main__": {

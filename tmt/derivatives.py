@@ -1,7 +1,7 @@
 """Derivatives of a step for many states of a tree of many joints: of the slope by those of the linear system that gives it.
 
-A slope a solves residual(a, x) = 0, which is linear in a, see `residual` of the methods; so da/dx = -A^-1 dresidual/dx at fixed a,
-A = dresidual/da. Then dual numbers need not go through the solution, nor through derivatives of derivatives.
+A slope a solves residual(a, x) = 0, which is linear in a, see `residual` of the methods; so da/dx = -A^-1 dresidual/dx at fixed
+a, with A = dresidual/da. Then dual numbers need not go through the solution, nor through derivatives of derivatives.
 """
 
 import numpy as np
@@ -14,16 +14,13 @@ PART = 4096  # states times speeds that are taken at once: more do not stay in t
 
 
 def has_residual(stepping) -> bool:
-    """Whether a method says what a slope leaves of its linear system; not if its slope is another than that."""
-    return any("residual" in vars(kind) for kind in up_to_slope(type(stepping)))
-
-
-def up_to_slope(kind):
-    """The classes of an object down to the one that decides its slope."""
-    for base in kind.__mro__:
-        yield base
-        if "slope" in vars(base):
-            return
+    """Whether a method says what a slope leaves of its linear system; not if its slope, or the matrix, is another since."""
+    for kind in type(stepping).__mro__:
+        if "residual" in vars(kind):
+            return True
+        if {"slope", "matrix"} & vars(kind).keys():
+            return False
+    return False
 
 
 def linear_system(

@@ -99,6 +99,8 @@ class ScipyDynamics(TmtDynamics):
                 found, evaluations = solution.y.T, int(solution.nfev)
                 why = why if solution.success else solution.message
             path, ended = as_far_as_it_goes(t, found, start, why)
+            for ball in self.coordinates.places.balls:
+                path[:, ball.q] /= np.linalg.norm(path[:, ball.q], axis=1, keepdims=True)
             return Motion(t, *np.split(path, [self.coordinates.nq], axis=1), evaluations, ended)
 
         return run, read

@@ -48,9 +48,9 @@ def tolerance(robot: Robot) -> str:
         return (
             "64 eps x scale, each entry its own. With F_i the sum of the absolute convective, Euler and gravity terms of a "
             f"joint{damping}{springs} and |tau|, where each is largest, and R = |terms of Mbar| |qdd| + F: bias its own terms; "
-            "accelerations |Mbar^-1| R; entry by entry; inverse dynamics 2 R, whatever the condition of Mbar; power the same times |rates|; "
-            "momenta the same without gravity and torque; energy the sum of m g L, of k (|q| + |rest|)^2 / 2, and of half the "
-            "terms of Mbar times |rates| twice."
+            "accelerations |Mbar^-1| R, entry by entry; inverse dynamics 2 R, whatever the condition of Mbar; power the same "
+            "times |rates|; momenta the same without gravity and torque; energy the sum of m g L, of k (|q| + |rest|)^2 / 2, "
+            "and of half the terms of Mbar times |rates| twice."
         )
     return (
         f"With S the sum of the absolute convective, Euler and gravity terms{damping} and |tau|: bias 64 eps x S; accelerations "

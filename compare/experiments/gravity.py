@@ -56,28 +56,32 @@ def own_tolerance(tree: tmt.Tree) -> str:
     )
 
 
-def gradient(potential_energy: Callable, q: np.ndarray, tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray]:
-    """dV/dq by the rules above, N m or N, (states, nv), and for which of the speeds they are exact, (nv,).
+def has_exact_gradient(tree: tmt.Tree) -> np.ndarray:
+    """For which of the speeds the rules above are exact, (nv,): not for a ball with a spring."""
+    kinds, stiffness = np.array(per_speed(tree, tree.kind)), np.array(per_speed(tree, tree.stiffness))
+    return (kinds != "ball") | (stiffness == 0.0)
+
+
+def gradient(potential_energy: Callable, q: np.ndarray, tree: tmt.Tree) -> np.ndarray:
+    """dV/dq by the rules above, N m or N, (states, nv), right where they are exact.
 
     potential_energy: V, J, of positions (..., nq). q: (states, nq). In an angle V is a + b cos + c sin, and a spring's k x^2 / 2:
-    a turn ahead less a turn back leaves 4 pi k x alone. In a slide's length V is quadratic. That of a ball's spring is neither.
+    a turn ahead less a turn back leaves 4 pi k x alone. In a slide's length V is quadratic.
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     kinds, stiffness = np.array(per_speed(tree, tree.kind)), np.array(per_speed(tree, tree.stiffness))
-    exact = (kinds != "ball") | (stiffness == 0.0)
 
     def difference(steps):
         """V at one step forward less V at one back, along each speed."""
-        moves = np.diag(steps)
-        ahead, behind = (coordinates.move(q[:, None], sign * moves) for sign in (1.0, -1.0))
+        ahead, behind = (coordinates.move(q[:, None], sign * np.diag(steps)) for sign in (1.0, -1.0))
         return potential_energy(ahead) - potential_energy(behind)
 
-    quarter = difference(np.where(kinds == "slide", 1.0, np.pi / 2)) / 2
+    slopes = difference(np.where(kinds == "slide", 1.0, np.pi / 2)) / 2
     sprung = (kinds == "hinge") & (stiffness > 0.0)
     if sprung.any():
         springs = difference(np.where(sprung, 2 * np.pi, 0.0)) / (4 * np.pi)
-        quarter = quarter + (1.0 - np.pi / 2) * springs * sprung
-    return quarter, exact
+        slopes = slopes + (1.0 - np.pi / 2) * springs * sprung
+    return slopes
 
 
 def rows(setup: Setup) -> Result:
@@ -85,25 +89,25 @@ def rows(setup: Setup) -> Result:
     result, tree, is_read = Result("gravity"), setup.robot.tree, setup.robot.is_read
     ours, theirs = setup.compared().values()
     units, rates = unit(tree, "N m", "N"), unit(tree, "rad/s2", "m/s2")
+    few = max(1, MOST_ENERGIES // (2 * tree.coordinates.nv))  # states: each takes two energies for each speed
+    exact = has_exact_gradient(tree)
     for sample in (*setup.named.each(), setup.random):
         q, scale = sample.q, scales(tree, is_read, sample.q)
-        held = ours.gravity_balance(q), theirs.gravity_balance(q)
-        result.agree(sample, "holding torque", units, *held, scale.weight, truth="gravity_balance")
+        held, engine_held = ours.gravity_balance(q), theirs.gravity_balance(q)
+        result.agree(sample, "holding torque", units, held, engine_held, scale.weight, truth="gravity_balance")
         if tree.has_springs:
-            held = held[0] + tmt.spring_torque(q, tree), theirs.inverse(q, 0.0, 0.0)
-            result.agree(sample, "holding torque, springs too", units, *held, scale.holding)
+            held, engine_held = held + tmt.spring_torque(q, tree), theirs.inverse(q, 0.0, 0.0)
+            result.agree(sample, "holding torque, springs too", units, held, engine_held, scale.holding)
         if sample is not setup.random:
-            postures = result.curves.setdefault("postures", {})
-            postures[sample.name] = {"tmt": held[0][0], "mujoco": held[1][0]}
-        few = slice(max(1, MOST_ENERGIES // (2 * tree.coordinates.nv)))  # each takes two energies for each speed
-        part = sample.first(few.stop)
-        size = gradient_scale(tree, part.q) if has_own_scales(tree, is_read) else scale.potential_energy
-        for label, engine, torque in (("TMT", ours, held[0]), ("MuJoCo", theirs, held[1])):
-            found, exact = gradient(engine.potential_energy, part.q, tree)
-            if exact.any():
-                pair = (torque[few][:, exact], found[:, exact])
-                of = size[:, exact] if np.ndim(size) else size
-                result.agree(part, f"{label}: torque - dV/dq", units, *(pair if label == "TMT" else pair[::-1]), of)
+            result.curves.setdefault("postures", {})[sample.name] = {"tmt": held[0], "mujoco": engine_held[0]}
+        if not exact.any():
+            continue
+        part = sample.first(few)
+        slope, engine_slope = (gradient(engine.potential_energy, part.q, tree)[:, exact] for engine in (ours, theirs))
+        size = gradient_scale(tree, part.q)[:, exact] if has_own_scales(tree, is_read) else scale.potential_energy
+        held, engine_held = held[:few, exact], engine_held[:few, exact]
+        result.agree(part, "TMT: torque - dV/dq", units, held, slope, size)
+        result.agree(part, "MuJoCo: torque - dV/dq", units, engine_slope, engine_held, size)
     result.notes += [note for sample in (setup.named, setup.random) for note in sample.notes]
     if not exact.all():
         result.notes.append("The gradient of V is left out for balls with a spring: there is no exact rule for it.")

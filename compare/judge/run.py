@@ -95,9 +95,9 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """The energy that the motion of a case can have exchanged up to each state of a run, J, (times,).
 
     It starts with a kinetic energy and with that of its springs, and can gain the whole potential range of the stated robot,
-    twice the sum of m g reach. No reach bounds what slides and a torque do: where that is more, it is the most work of the torque,
-    and the weight times the way along the slides. `done`: the work of the torque. Any may have 64 eps of 1 J for each inertia
-    and stiffness of 1.
+    twice the sum of m g reach. No reach bounds what slides and a torque do: where that is more, it is the most work of the
+    torque, `done`, and the weight times the way along the slides. Rounding may add 64 eps of 1 J for each inertia and stiffness
+    of 1.
     """
     tree, coordinates = case.tree, case.coordinates
     has = 2.0 * gravity_scale(case.robot.tree) + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)

@@ -14,6 +14,7 @@ from . import Robot
 
 DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
 LEAST_STEPS, MOST_STEPS_OF_A_FILE = 64, 8192  # of a scene, by its coarsest step
+COARSER = 4  # than the file's own step
 STILL = 1e-6  # rad/s2 or m/s2: what accelerates less where it is let go stays
 THROWN_UP, TUMBLING = 2.0, (120.0, 60.0, -90.0)  # m/s, and deg/s about a free body's own axes
 SET_GOING = {"hinge": 60.0, "slide": 0.2, "ball": 60.0}  # deg/s or m/s
@@ -79,8 +80,8 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[S
     rests = np.abs(accelerations).max() < STILL
     going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * (3 if kind == "ball" else 1))}
     how, speed = ("set going", going) if rests else ("let go", {})
-    timing = {"duration": DURATION, "dt": DURATION / coarsest(tree, q, inverse, dt), "judged": 0.0}
-    damped = timing | {"dt": DURATION / coarsest(tree, q, inverse, dt, added)}
+    timing = {"duration": DURATION, "dt": DURATION / coarsest(tree, inverse, dt), "judged": 0.0}
+    damped = timing | {"dt": DURATION / coarsest(tree, inverse, dt, added)}
     made = [] if rests else [Scene(f"{start}, held", start, "hold", tags=("own",), **timing)]
     made += [
         Scene(f"{start}, {how}", start, tags=("own", "speed", "regular"), **speed, **timing),
@@ -101,15 +102,16 @@ def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float
     return tuple(float(rate / ease) for ease in np.diag(inverse))
 
 
-def coarsest(tree: tmt.Tree, q: np.ndarray, inverse: np.ndarray, dt: float, added: tuple = ()) -> int:
-    """Into how many steps a scene is divided: 64, 128 ... 8192; no step is longer than dt, s, or than the fastest decay or swing.
+def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = ()) -> int:
+    """Into how many steps a scene is divided: 64, 128 ... 8192, of four times the file's own dt, s, as finer runs divide them.
 
-    That is 1 over the rate, 1/s, of the joints' own damping, what is added, and the springs at q.
+    No step is longer than 1 over the fastest rate, 1/s, of the joints' own damping, what is added, and the springs.
+    inverse: of Mbar, (nv, nv).
     """
     decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
     of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
     swing = np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max())
-    least = max(DURATION / dt, DURATION * decay, DURATION * swing)
+    least = DURATION * max(1.0 / (COARSER * dt), decay, swing)
     count = LEAST_STEPS
     while count < min(0.999 * least, MOST_STEPS_OF_A_FILE):
         count *= 2

@@ -9,55 +9,23 @@ from scipy.linalg import eig, eigh
 import tmt
 from tmt import METHODS, composite, method
 from tmt.dual import seeded
-from tmt.implicit import ImplicitRungeKutta
-from tmt.methods import RungeKutta, SemiImplicitEuler, amplification, by_speed, square
 
 from ..case import SEED, Case, Coordinates
+from .derivative import holding, moving, slopes, stiffness
+from .steps import growth_of, is_runge_kutta, linear_step
 
-FEW = 6  # speeds, up to which the method is differentiated as it stands, and beyond which regrouped: the same but for rounding
+AS_IT_STANDS = (
+    6  # speeds, up to which the method is differentiated as written, and beyond regrouped: but for rounding the same
+)
 LONGEST_STEP, SHORTEST_STEP = 1e3, 1e-4  # s: steps among which a limit is sought
 SCANNED = 281  # steps between these, 40 for each power of ten
 NEUTRAL = 1e-9  # growth per step that rounding can pretend
 NEGLIGIBLE = 1e-6  # relative to the fastest mode: a rate below is zero
 SLOWEST = 1e-6  # 1/s: and so is a rate below this, where no mode is fast
-PUSHED_ALONG = (
-    3  # directions at random among the movements without stiffness, in which it is seen whether they are flat
-)
-AT_ONE = (
-    1e-7,
-    1e-3,
-)  # how far from 1 rounding and a rate of zero may put the growth of a mode without stiffness, with any step
-
-
-def stiffness(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """d(torque that holds)/dq at q, of gravity and springs, N m/rad, (nv, nv), by movements: exact.
-
-    Of hinges without springs V is a + b cos q_i + c sin q_i in each angle; else by dual numbers.
-    """
-    if set(tree.kind) == {"hinge"} and not tree.has_springs:
-        quarter = np.pi / 2 * np.eye(len(q))
-        return (tmt.gravity_balance(q + quarter, tree) - tmt.gravity_balance(q - quarter, tree)) / 2
-    moved = moving(tree, q, np.eye(tree.coordinates.nv))
-    return np.array(slopes(moved, holding(tree, moved)))
-
-
-def moving(tree: tmt.Tree, q, directions) -> list:
-    """The position q, (nq,) of any scalars, as dual numbers that move along directions, (nv,) of slopes: (nq,)."""
-    start = [float(x) for x in q] if isinstance(q, np.ndarray) else q
-    return seeded(start, tree.coordinates.component_rates(start, list(directions)))
-
-
-def holding(tree: tmt.Tree, q) -> list:
-    """The torque that holds a posture against gravity and springs, N m, (nv,), over any scalar."""
-    torque = method.bias(method.bodies(tree, q), tree.gravity)
-    return [a + b for a, b in zip(torque, method.spring_torque(tree, q))] if tree.has_springs else torque
-
-
-def slopes(seeds, values) -> list:
-    """The derivatives of values by what these seeds move along."""
-    shape = np.shape(seeds[0].slope)
-    found = [seeds[0].parts(value)[1] for value in values]
-    return [np.broadcast_to(slope, shape) if np.ndim(slope) < len(shape) else slope for slope in found]
+# directions at random among the movements without stiffness, in which it is seen whether they are flat
+PUSHED_ALONG = 3
+# how far from 1 rounding and a rate of zero may put the growth of a mode without stiffness, with any step
+AT_ONE = (1e-7, 1e-3)
 
 
 def modes(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -143,7 +111,7 @@ class Held:
         nq, n, unit = len(self.q), self.nv, np.eye(2 * self.nv)
         start = [float(x) for x in self.q]
         state = seeded([*start, *np.zeros(n)], [*self.tree.coordinates.component_rates(start, unit[:n]), *unit[n:]])
-        terms = method.mass_matrix_and_bias if n <= FEW else composite.mass_matrix_and_bias
+        terms = method.mass_matrix_and_bias if n <= AS_IT_STANDS else composite.mass_matrix_and_bias
         qdd = method.acceleration(self.tree, state[:nq], state[nq:], [float(t) for t in self.tau], terms)
         return np.vstack([unit[n:], slopes(state, qdd)])
 
@@ -218,32 +186,11 @@ class Held:
         tmt's own this is computed itself.
         """
         if np.ndim(dt):
-            return self.linear_step(METHODS[name], np.asarray(dt, float))
+            return linear_step(self, METHODS[name], np.asarray(dt, float))
+        dt = float(dt)
         if (METHODS[name], dt) not in self.steps:  # the same step is asked for many perturbations
             self.steps[METHODS[name], dt] = self.step(name, np.array([dt]))[0]
         return self.steps[METHODS[name], dt]
-
-    def linear_step(self, stepping, dt) -> np.ndarray:
-        """The same for dt (k,), computed."""
-        unit, n, each = np.eye(2 * self.nv), self.nv, dt[:, None, None]
-        if type(stepping) is SemiImplicitEuler:
-            # at rest the bias has no derivative by the speeds, so it does not matter whether it is implicit
-            stiff = np.diag(by_speed(self.tree, self.tree.stiffness)) * stepping.implicit_springs
-            matrix = self.mass_matrix + each * np.diag(self.tree.damping) + each**2 * stiff
-            force = self.mass_matrix @ self.matrix[n:] - each * np.hstack([0.0 * stiff, stiff])
-            speeds = unit[n:] + each * np.linalg.solve(matrix, force)
-            return np.concatenate([unit[:n] + each * speeds, speeds], axis=1)
-        if type(stepping) is RungeKutta:
-            stages, Z = [], each * self.matrix
-            for row in stepping.A:
-                stages.append(Z @ (unit + sum(a * stage for a, stage in zip(row, stages))))
-            return unit + sum(b * stage for b, stage in zip(stepping.b, stages))
-        if type(stepping) is ImplicitRungeKutta:
-            s = len(stepping.b)
-            coupled = np.eye(2 * n * s) - each * np.kron(stepping.A, self.matrix)
-            stages = np.linalg.solve(coupled, each * np.tile(self.matrix, (s, 1))).reshape(-1, s, 2 * n, 2 * n)
-            return unit + np.einsum("i,kiab->kab", stepping.b, stages)
-        return amplification(stepping, self.tree, self.q, np.zeros(n), self.tau, dt)
 
     def growth(self, name, dt) -> np.ndarray:
         """Growth of the fastest-growing mode in one step, (...) for dt (...): the spectral radius of `step`.
@@ -253,7 +200,7 @@ class Held:
         stepping, dt = METHODS[name], np.asarray(dt, float)
         idle = self.without_stiffness
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            if type(stepping) in (RungeKutta, ImplicitRungeKutta):
+            if is_runge_kutta(stepping):
                 found = growth_of(stepping, dt[..., None] * np.where(idle, 0.0, self.modes[0]))
                 return np.abs(found).max(axis=-1)
             found = np.linalg.eigvals(self.step(name, dt))
@@ -309,13 +256,6 @@ class Held:
         return float(near.max())
 
 
-def growth_of(stepping, z: np.ndarray) -> np.ndarray:
-    """What a step of a Runge-Kutta method makes of 1 where y' = lambda y, for z = lambda dt of any shape."""
-    A = square(stepping.A) if type(stepping) is RungeKutta else np.array(stepping.A)
-    stages = np.linalg.solve(np.eye(len(A)) - z[..., None, None] * A, np.ones((len(A), 1)))[..., 0]
-    return 1.0 + z * (stages @ np.array(stepping.b))
-
-
 def floats(tree: tmt.Tree) -> bool:
     """Whether a free body carries nothing or the rest: three slides and a ball from the world. Under gravity it has no rest."""
     kinds = tree.kind
@@ -329,53 +269,3 @@ def held(robot, posture: str, damping: float = 0.0) -> Held:
     """A named posture under TMT's own torque, with joint damping added, N m s/rad; without gravity if it floats."""
     gravity = not floats(robot.tree)
     return Held(robot.case(f"{posture}, held", posture=posture, torque="hold", damping=damping, gravity=gravity))
-
-
-def named(robot) -> tuple[str, ...]:
-    """The names of its postures."""
-    return (*robot.postures, *robot.positions)
-
-
-def all_that_stay(robot) -> tuple[str, ...]:
-    """The postures at which a small deviation stays small, the one that stands for a centre first."""
-    stay = [name for name in named(robot) if held(robot, name).stays]
-    return tuple(sorted(stay, key=lambda name: name != robot.kinds.get("centre", stay[0])))
-
-
-def kinds(robot) -> dict[str, str]:
-    """What each named posture is when it is held, see `Held.kind`."""
-    return {name: held(robot, name).kind for name in named(robot)}
-
-
-def of_kind(robot, kind: str) -> str | None:
-    """The posture that stands for a kind: the robot's choice, else the first of that kind; None: there is none."""
-    return robot.kinds.get(kind) or next((name for name, found in kinds(robot).items() if found == kind), None)
-
-
-def all_of_kind(robot, kind: str) -> tuple[str, ...]:
-    """The postures of a kind, the one that stands for it first."""
-    first = of_kind(robot, kind)
-    others = (name for name, found in kinds(robot).items() if found == kind and name != first)
-    return () if first is None else (first, *others)
-
-
-def region(name: str, z: np.ndarray) -> np.ndarray:
-    """Growth in one step of a single hinge whose eigenvalues times dt are z and its conjugate, shape of z.
-
-    The step is taken on qdd = -|z|^2 q + 2 Re(z) qd with dt = 1; so it exists for partitioned methods too, whose growth
-    depends on the pair. At most 1: stable.
-    """
-    stepping = METHODS[name]
-    size, rate = np.abs(z) ** 2, 2.0 * z.real
-    inertia = 1.0 - rate if stepping.damps_implicitly else 1.0
-
-    def slope(q, qd):
-        return [(qd[0] * rate - q[0] * size) / inertia]
-
-    state = seeded([np.zeros_like(size), np.zeros_like(size)], np.eye(2).reshape(2, 2, *(1 for _ in z.shape)))
-    with np.errstate(all="ignore"):
-        q, qd = stepping.step(slope, state[:1], state[1:], 1.0)
-        J = np.array([np.broadcast_to(part[0].slope, (2, *z.shape)) for part in (q, qd)])
-        half, determinant = 0.5 * (J[0, 0] + J[1, 1]), J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
-        root = np.sqrt(half**2 - determinant + 0j)
-        return np.maximum(np.abs(half + root), np.abs(half - root))

@@ -6,11 +6,11 @@ from scipy.linalg import eigh
 import tmt
 
 from ..case import Coordinates
-from .linear import stiffness
+from .derivative import stiffness
 
-AT_REST = 1e-13  # of the largest torque of gravity and springs on the way: less is rounding
+BALANCED = 1e-13  # of the largest torque of gravity and springs on the way: less is rounding
 MOST_TRIED = 100  # postures on the way down
-LONGEST = 0.5  # rad or m of one joint at a time: what is far is not known from here
+FARTHEST = 0.5  # rad or m of one joint at a time: what is far is not known from here
 ASIDE = 0.1  # rad or m, along the mode by which a posture that does not stay is left
 FLAT = 1e-6  # of the largest stiffness over inertia: less is none
 
@@ -28,13 +28,13 @@ def at_rest(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | None:
         squares, shapes = eigh(0.5 * (K + K.T), inertia)
         flat = FLAT * np.abs(squares).max()
         largest = max(largest, np.abs(force).max())
-        if np.abs(force).max() <= AT_REST * largest:
+        if np.abs(force).max() <= BALANCED * largest:
             if squares[0] >= -flat:
                 return q
             down = ASIDE * shapes[:, 0] / np.abs(shapes[:, 0]).max()
         else:
             down = shapes @ (shapes.T @ force / np.maximum(np.abs(squares), max(flat, 1e-300)))
-            down *= min(1.0, LONGEST / np.abs(down).max())
+            down *= min(1.0, FARTHEST / np.abs(down).max())
         for _ in range(40):
             lower = coordinates.move(q, down)
             if potential(tree, lower) < height:
@@ -42,7 +42,7 @@ def at_rest(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | None:
             down = 0.5 * down
         else:
             # no lower posture is told from this one in doubles
-            return q if squares[0] >= -flat and np.abs(force).max() <= 1e6 * AT_REST * largest else None
+            return q if squares[0] >= -flat and np.abs(force).max() <= 1e6 * BALANCED * largest else None
         q, height = lower, potential(tree, lower)
     return None
 

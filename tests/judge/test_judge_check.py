@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from compare.judge.check import Result, largest
+from compare.judge.check import Result, largest, worst_of_each
 from compare.robots.arm import ARM
 from compare.states import Sample
 
@@ -106,3 +106,50 @@ def test_every_component_of_a_state_is_compared(place):
     values = np.zeros((4, 3, 3))
     values[(2, *place)] = -3.0
     assert largest(values).tolist() == [0.0, 0.0, 3.0, 0.0]
+
+
+@pytest.mark.parametrize("eps, passes", [(63, True), (65, False)])
+@pytest.mark.parametrize("entry", [(0, 0, 0), (1, 1, 0), (2, 0, 1)])
+def test_each_entry_has_its_own_tolerance_if_the_scale_has(eps, passes, entry):
+    """A small entry that is off fails beside a large one that is off by more, and passes where it may be."""
+    scale, result, of = np.full((3, 2, 2), 100.0), Result("mass"), sample(3)
+    scale[entry] = 1e-3
+    theirs = np.full((3, 2, 2), 50 * EPS)
+    theirs[entry] = eps * EPS * 1e-3
+    result.agree(of, "Mbar", "kg m2", np.zeros((3, 2, 2)), theirs, scale)
+    (check,), (row,) = result.checks, result.rows
+    assert check.passed is passes and check.value == theirs[entry] and check.tolerance == 64 * EPS * 1e-3
+    assert row["scale"] == 1e-3 and row["difference_eps"] == eps and check.note.startswith(f"state {entry[0]}:")
+
+
+def test_a_scale_of_each_entry_may_be_the_same_for_all_states_or_bodies():
+    differences = np.arange(12.0).reshape(2, 3, 2)
+    for scale in (np.array([[[1.0, 4.0]]]), np.broadcast_to([1.0, 4.0], (5, 3, 2))):
+        found, of = worst_of_each(differences, scale)
+        assert found.tolist() == [4.0, 10.0] and of.tolist() == [1.0, 1.0]
+    assert [a.tolist() for a in worst_of_each(differences, 2.0)] == [[5.0, 11.0], [2.0, 2.0]]
+    assert [a.tolist() for a in worst_of_each(differences, np.array([2.0, 3.0, 9.0]))] == [[5.0, 11.0], [2.0, 3.0]]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_an_entry_that_is_no_number_fails_whatever_the_others_are(bad):
+    result, theirs = Result("mass"), np.ones((2, 2))
+    theirs[1, 0] = bad
+    result.agree(sample(2), "bias", "N m or N", np.zeros((2, 2)), theirs, np.ones((2, 2)))
+    assert result.checks[0].value is None and not result.checks[0].passed
+
+
+def test_nothing_may_differ_where_the_scale_is_zero():
+    for value, passes in ((0.0, True), (1e-300, False)):
+        result = Result("gravity")
+        result.agree(
+            sample(1), "holding torque", "N m", np.zeros((1, 2)), np.array([[value, 0.0]]), np.array([[0.0, 1.0]])
+        )
+        assert result.checks[0].passed is passes
+
+
+def test_without_an_exact_state_nothing_is_compared_with_one():
+    result, of = Result("mass"), sample(2, exact=0)
+    result.agree(of, "Mbar", "kg m2", np.zeros((2, 1)), np.zeros((2, 1)), 1.0, truth="mass_matrix")
+    assert [check.quantity for check in result.checks] == ["Mbar"] and result.rows[0]["tmt_from_exact_eps"] is None
+    assert result.rows[0]["exact_states"] == 0

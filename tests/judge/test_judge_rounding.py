@@ -2,12 +2,14 @@
 
 import dataclasses
 
+import mpmath
 import numpy as np
 import pytest
 
 import tmt
-from compare.judge.rounding import band, growth, slope_rounding, step_rounding
+from compare.judge.rounding import OF_A_BALL, band, growth, slope_rounding, step_rounding
 from compare.robots.arm import ARM
+from tmt.coordinates import coordinates_of
 from tmt.methods import METHODS, amplification
 
 EPS = 2.0**-52
@@ -125,3 +127,41 @@ def test_the_growth_of_a_run_that_diverges_is_no_number_from_there():
     q[5:] = np.nan
     grown = growth(METHODS["rk4"], TURN, q, qd, np.array([3.0]), 0.1, every=2)
     assert np.isfinite(grown[:3]).all() and np.isnan(grown[3:]).all() and len(grown) == 5
+
+
+def test_the_rounding_of_a_turn_is_that_of_a_product_of_quaternions():
+    """Of 300 movements and differences of a ball, beside 50 digits: no more than what the bound counts for them."""
+    ball, rng = coordinates_of(("ball",)), np.random.default_rng(3)
+    turned, measured = [], []
+    for _ in range(300):
+        p, u = rng.normal(size=4), rng.uniform(-2.0, 2.0, 3)
+        p, near = p / np.linalg.norm(p), np.array(ball.move(list(p / np.linalg.norm(p)), list(1e-9 * u)))
+        found = ball.move(list(p), list(u))
+        with mpmath.workdps(50):
+            digits = [[mpmath.mpf(float(x)) for x in values] for values in (p, u, found, near)]
+            off = ball.difference(digits[2], ball.move(*digits[:2]))
+            exact = ball.difference(digits[3], digits[0])
+            turned.append(max(map(abs, off)))
+            measured.append(max(abs(a - b) for a, b in zip(exact, ball.difference(list(near), list(p)))))
+    assert 0.5 * EPS < max(turned) < 12 * EPS and 0.5 * EPS < max(measured) < 8 * EPS
+    assert OF_A_BALL == (2 * 12 + 8) * EPS
+
+
+def test_a_slide_is_rounded_by_its_length_and_a_ball_by_a_whole_turn():
+    tree = dataclasses.replace(
+        TURN, hinge_names=("lift", "head"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "ball"),
+        axis=((0.0, 0.0, 1.0), *np.eye(3)), damping=(0.0,) * 4, body_hinge=(1,), armature=(), stiffness=(), rest=(),
+        reference=(),
+    )  # fmt: skip
+    q, qd = np.array([[2.0, 0.6, 0.0, 0.8, 0.0]]), np.array([[1.0, 0.0, 0.0, 4.0]])
+    (found,) = step_rounding(METHODS["rk4"], tree, q, qd, np.zeros(4), 1e-3)
+    rates = found[4:]
+    expected = 8 * EPS * np.array([2.0 + 1e-3, 4.0, 4.0, 4.0 + 4e-3]) + 1e-3 * rates
+    assert found[:4] == pytest.approx(expected, rel=1e-12) and OF_A_BALL == 8 * EPS * 4.0
+
+
+def test_a_band_that_is_bounded_is_infinite_from_there_on():
+    q, qd, *_ = turning(16, 0.1)
+    tau, stepping = np.array([3.0]), METHODS["rk4"]
+    whole, part = (band(stepping, TURN, q, qd, tau, 0.1, 4, most) for most in (None, 11))
+    assert np.array_equal(part[:3], whole[:3]) and np.isinf(part[3:]).all() and np.isfinite(whole).all()

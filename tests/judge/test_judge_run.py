@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.judge.run import departure, deviation, deviation_alive, diverged_at, number_or_none
+from compare.case import Coordinates
+from compare.judge.run import departure, deviation, deviation_alive, diverged_at, number_or_none, unit_of
+from compare.robots import Robot
 from compare.robots.arm import ARM
 
 CASES = {case.name: case for case in ARM.cases}
@@ -59,3 +61,54 @@ def test_silent_nonsense_is_found_by_its_energy(mujoco):
     assert diverged_at(case, t, q, v) is not None
     t, q, v, *_ = mujoco.of(case).run(*case.start, case.tau, 5 / 64, 64, "RK4")
     assert diverged_at(case, t, q, v) is None
+
+
+def alone(kind, **more) -> tmt.Tree:
+    """A ball of 2 kg with inertia 0.5 kg m2 on a slide along z or on a ball joint, its centre in the origin."""
+    axis = np.eye(3) if kind == "ball" else [(0.0, 0.0, 1.0)]
+    given = {"gravity": (0.0, 0.0, 0.0), "damping": (0.0,) * len(axis)} | more
+    return tmt.Tree(
+        hinge_names=("joint",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=axis, body_names=("ball",), body_hinge=(0,),
+        mass=(2.0,), com=((0.0, 0.0, 0.0),), inertia=(np.eye(3) * 0.5,), kind=(kind,), **given,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "tree, scene",
+    [
+        (alone("ball"), {"torque": (0.0, 0.0, 3.0)}),  # it turns and turns: all of its energy is the work of the torque
+        (alone("slide"), {"torque": (3.0,)}),
+        (alone("slide", gravity=(0.0, 0.0, -9.81)), {}),  # no reach, and the weight goes down with it
+        (alone("slide", stiffness=(8.0,), rest=(0.0,)), {"posture": (0.7,), "duration": np.pi / 4, "dt": np.pi / 256}),
+    ],
+)
+def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_have_exchanged(tree, scene):
+    """Each starts at rest: at the end its kinetic energy is what it has got, and may be twice that, but no more."""
+    case = Robot("ball", None, tree, {}, ()).case("alone", **{"duration": 4.0, "dt": 1 / 16} | scene)
+    t, q, v = tmt.simulate(*case.start, case.tau, case.scene.dt, case.steps, "dopri8", tree)
+    assert diverged_at(case, t, q, v) is None
+    for share, ends in ((0.999, None), (1.001, t[-1])):
+        wrong = v.copy()
+        wrong[-1] *= np.sqrt(1.0 + share)
+        assert diverged_at(case, t, q, wrong) == ends
+
+
+def test_a_robot_at_rest_without_gravity_has_not_diverged_by_rounding():
+    tree = alone("ball", stiffness=(8.0,), rest=unit(1.0, 0.3, -0.2, 0.1))
+    case = Robot("ball", None, tree, {}, ()).case("held", posture=tree.rest, torque="hold")
+    t, q, v = tmt.simulate(*case.start, case.tau, case.scene.dt, case.steps, "rk4", tree)
+    assert diverged_at(case, t, q, v) is None and unit_of(case.coordinates) == "rad"
+    v[3, 0] += 1e-6
+    assert diverged_at(case, t, q, v) == t[3]
+
+
+def unit(*values) -> tuple:
+    return tuple(np.array(values) / np.linalg.norm(values))
+
+
+def test_a_quaternion_and_its_negative_are_the_same_turn():
+    coordinates = Coordinates(("head",), ("ball",))
+    q = np.array([unit(1.0, 0.0, 0.0, 0.0), unit(-1.0, 0.0, 0.0, -0.049), unit(1.0, 0.0, 0.0, 0.051)])
+    assert deviation(q[:2], q[0], coordinates) == pytest.approx(2.0 * np.arctan(0.049))
+    assert departure(np.arange(3.0), q, coordinates) == 2.0
+    assert unit_of(Coordinates(("a", "b"), ("slide", "ball"))) == "rad or m"

@@ -11,7 +11,7 @@ from ...robots import Robot
 from ...truth.linear import held
 from .choice import who
 from .claims import of_claims
-from .departure import own_torque
+from .torques import own_torque
 
 ONE_ULP, FOUR_DECIMALS = "one ulp off", "four decimals"
 NEAR_TORQUES = {ONE_ULP: lambda own: np.nextafter(own, np.inf), FOUR_DECIMALS: lambda own: own.round(4)}

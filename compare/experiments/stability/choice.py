@@ -10,7 +10,8 @@ from ...case import Case
 from ...engines import LABELS, Engine, Method, one_of_each_scheme
 from ...judge.scale import gravity_scale
 from ...robots import Robot
-from ...truth.linear import NEGLIGIBLE, all_that_stay, held
+from ...truth.linear import NEGLIGIBLE, held
+from ...truth.postures import all_that_stay
 
 DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 FEW_SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit_midpoint")  # of a quick run, by tmt's names
@@ -84,6 +85,16 @@ def who(row: dict) -> str:
 def dampings_of(robot: Robot) -> tuple[float, ...]:
     """What damping is added, N m s/rad; a robot that is read from a file has its own alone."""
     return DAMPINGS[:1] if robot.is_read else DAMPINGS
+
+
+def unit_of_movements(robot: Robot) -> str:
+    """The unit of movements."""
+    return " or ".join(dict.fromkeys(robot.coordinates.units))
+
+
+def joint_of(robot: Robot) -> str:
+    """What the joints are called."""
+    return "hinge" if set(robot.tree.kind) == {"hinge"} else "joint"
 
 
 def damped(robot: Robot, damping: float) -> str:

@@ -8,7 +8,8 @@ from ...engines import Engine, Method, same_scheme
 from ...judge.run import departure, deviation, number_or_none
 from ...robots import Claims, Robot
 from ...truth.linear import Held, held
-from .departure import own_torque, predicted, residual, variants
+from .departure import predicted
+from .torques import own_torque, residual, variants
 
 CLEAR_ULPS = 16  # of each component: a push that rounding of the bias on the way cannot turn round
 VARIANT, NEAREST = "variant", "nearest to own bias"  # names of torques

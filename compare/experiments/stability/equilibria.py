@@ -12,9 +12,11 @@ from ...judge.scale import EPS, FACTOR
 from ...judge.words import capital
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.linear import Held, held, named, region
+from ...truth.linear import Held, held
+from ...truth.postures import posture_names
+from ...truth.steps import region
 from .choice import coarsest_case, dampings_of
-from .subjects import Subjects, places
+from .subjects import Subjects, places, subjects_of
 
 FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
     1e-2,
@@ -25,11 +27,11 @@ FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
 MOST_NAMED = 6  # rates of a posture in a sentence
 
 
-def check_equilibria(result: Result, robot: Robot, setup: Setup) -> None:
+def check_equilibria(result: Result, setup: Setup) -> None:
     """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
-    mujoco, table = setup.engines["mujoco"], []
+    robot, mujoco, table = subjects_of(setup.robot).robot, setup.engines["mujoco"], []
     usual = (FINE_AMPLIFICATION, coarsest_case(robot).scene.dt)
-    for name in named(robot):
+    for name in posture_names(robot):
         at = held(robot, name)
         values = at.modes[0]
         table += [
@@ -42,7 +44,7 @@ def check_equilibria(result: Result, robot: Robot, setup: Setup) -> None:
             for method, dt in product(one_of_each_scheme(mujoco), steps):
                 where = f"{name}, {method.name}, dt = {dt:.4g} s, damping {damping:g}"
                 theirs = transition(mujoco.of(at.case), at.q, at.tau, dt, method.name)
-                check_amplification(result, where, at, at.step(method.scheme, dt), theirs)
+                check_amplification(result, where, at.sizes, at.step(method.scheme, dt), theirs)
     result.tables["stability_modes"] = table
 
 
@@ -67,9 +69,9 @@ def few(texts: Sequence[str], between: str) -> str:
     return between.join(texts[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def check_amplification(result: Result, where: str, at: Held, ours: np.ndarray, theirs: np.ndarray) -> None:
+def check_amplification(result: Result, where: str, q: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> None:
     """The check of one amplification: within what rounding does to a difference quotient."""
-    allowed = FACTOR * EPS * (1.0 + np.abs(at.sizes).max()) * np.abs(ours).max() / NUDGE
+    allowed = FACTOR * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max() / NUDGE
     quantity = "amplification of one step, TMT to MuJoCo"
     result.check(where, quantity, np.abs(ours - theirs).max(), allowed, "", rounding=True)
 

@@ -1,6 +1,7 @@
 """Failures that a linear limit does not foresee, or that an engine does not report."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from ...judge.check import Result
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
 from ...robots import Robot
-from ...truth.linear import Held, named
+from ...truth.linear import Held
+from ...truth.postures import posture_names
 from .choice import fraction
-from .limits import GROWTH_ALLOWED, GROWTH_STEPS, LINEAR_DEVIATION, growth_in_run, stiffest
+from .growth import GROWTH_STEPS, LINEAR_DEVIATION, growth_in_run, stiffest
+from .limits import GROWTH_ALLOWED
 
 RESONANCE = np.sqrt(3.0)  # omega dt at which a swing takes three steps
 RESONANT_SWINGS = np.linspace(RESONANCE - 0.02, RESONANCE + 0.02, 41)
@@ -74,9 +77,10 @@ def observed(case: Case, t: np.ndarray, run: dict) -> dict:
     }  # fmt: skip
 
 
+@lru_cache(maxsize=16)
 def potential_range(case: Case) -> float:
     """The highest less the lowest potential, J: what the named postures lead to, joint by joint to where it is extreme."""
-    starts = np.array([case.robot.posture(name) for name in named(case.robot)])
+    starts = np.array([case.robot.posture(name) for name in posture_names(case.robot)])
     return highest_potential(case.tree, starts, 1.0) + highest_potential(case.tree, starts, -1.0)
 
 
@@ -164,6 +168,11 @@ def check_silent(result: Result, reset: dict, gain: dict) -> None:
             result.check(where, quantity, delay, case.scene.dt, "s")
     result.notes += [reset_in_words(reset), gain_in_words(gain)]
     result.curves["silent"] = {"reset": reset, "gain": gain}
+
+
+def is_silent(runs: Mapping[str, dict]) -> bool:
+    """Whether one of the two runs fails."""
+    return any(run["since_s"] is not None for run in runs.values())
 
 
 def reset_in_words(reset: dict) -> str:

@@ -10,7 +10,8 @@ from ...judge.check import Result
 from ...judge.run import LEFT, departure
 from ...judge.words import capital
 from ...truth.linear import Held
-from .departure import own_torque, span
+from .departure import span
+from .torques import own_torque
 
 EXPONENT_TOLERANCE = 0.02  # how near -1/2 the exponent of the time to leave is to be
 FALL_SIZES = tuple(10.0**-k for k in (2, 2.5, 3, 3.5, 4, 4.5, 5))  # rad

@@ -9,10 +9,9 @@ from ...judge.run import LEFT, number_or_nan
 from ...judge.words import capital
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from ...robots import Robot
-from .choice import coarsest_case, step_text
-from .departure import DEPARTURE_TOLERANCE, late, near
+from .choice import coarsest_case, joint_of, step_text, unit_of_movements
+from .departure import DEPARTURE_TOLERANCE, late, near_row, size_of
 from .figures_limits import look
-from .subjects import subjects_of
 
 SCHEME_MARKS = {"rk4": "o", "explicit_euler": "v", "semi_implicit_euler": "s", "implicit": "D", "implicit_midpoint": "^",
                 "gauss_legendre_4": "P"}  # fmt: skip
@@ -22,7 +21,8 @@ ENGINE_LOOKS = {"tmt": (BLUE, "o"), "mujoco": (ORANGE, "s")}
 
 def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Time to leave a saddle against the size of the perturbation, with the predicted slope."""
-    saddle, coarse = subjects_of(robot).saddle.name, coarsest_case(robot)
+    unit = unit_of_movements(robot)
+    saddle, coarse = result.curves["looked at"]["saddle"], coarsest_case(robot)
     rows = [row for row in result.tables["departure"] if row["scene"] in (saddle, f"{saddle}, torque off")]
     steps = sorted({row["dt_s"] for row in rows}, reverse=True)
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
@@ -31,12 +31,9 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         here = [row for row in rows if row["dt_s"] == dt]
         marks = iter(INTEGRATOR_MARKS)
         for engine, method in dict.fromkeys((row["engine"], row["method"]) for row in here):
-            mine = sorted(
-                (r for r in here if (r["engine"], r["method"]) == (engine, method)), key=lambda r: r["perturbation_rad"]
-            )
-            p, predicted, observed = (
-                [number_or_nan(r[key]) for r in mine] for key in ("perturbation_rad", "predicted_s", "observed_s")
-            )
+            mine = sorted((r for r in here if (r["engine"], r["method"]) == (engine, method)), key=size_of)
+            p = [size_of(row) for row in mine]
+            predicted, observed = ([number_or_nan(r[key]) for r in mine] for key in ("predicted_s", "observed_s"))
             if engine == "tmt":
                 colour, dash, name = look(method)
                 ax.plot(p, predicted, linestyle=dash, color=colour, linewidth=1)
@@ -48,14 +45,14 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         ax.axvspan(1e-15, 3e-13, color=(GREY, 0.15))
         ax.set(xscale="log", xlim=(1e-15, 3e-2), ylim=(0, None), title=f"dt = {step_text(coarse, dt)} s")
         ax.set_xticks([1e-14, 1e-11, 1e-8, 1e-5])
-    axes[0].set_ylabel(f"time until a hinge is {LEFT:g} rad away, s")
-    fig.supxlabel("perturbation, rad (grey: as the error of torque that moves the equilibrium so far)", fontsize=9)
+    axes[0].set_ylabel(f"time until a {joint_of(robot)} is {LEFT:g} {unit} away, s")
+    fig.supxlabel(f"perturbation, {unit} (grey: as the error of torque that moves the equilibrium so far)", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=8)
     rate = max(row["real_per_s"] for row in result.tables["stability_modes"] if row["scene"] == saddle)
     both = [row for row in rows if None not in (row["observed_s"], row["predicted_s"])]
-    close = sum(abs(late(row)) <= near(row["dt_s"]) for row in both)
+    close = sum(abs(late(row)) <= near_row(row) for row in both)
     caption = (
-        f"How long the {robot.name} stays at {saddle}. Lines: first crossing of {LEFT:g} rad by each method's own linear map, "
+        f"How long the {robot.name} stays at {saddle}. Lines: first crossing of {LEFT:g} {unit} by each method's own linear map, "
         "its angles rounded to doubles; the fastest mode alone gives a slope of "
         f"ln 10 / {rate:.3f} = {np.log(10) / rate:.3f} s for each power of ten. Marks: {len(rows)} runs. "
         f"{len(both)} leave as the map does, {close} of them within one step or {DEPARTURE_TOLERANCE:g} s"
@@ -66,7 +63,7 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
 
 def draw_falls(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Time to leave a marginal posture against the perturbation: the law of a cubic potential."""
-    posture = subjects_of(robot).marginal.name
+    posture = result.curves["looked at"]["marginal"]
     rows = [row for row in result.tables["departure"] if row["scene"] == posture]
     fig = Figure(figsize=(WIDTH, 3.1), layout="constrained")
     ax = fig.subplots()

@@ -12,8 +12,7 @@ from ...robots import Robot
 from .choice import coarsest_case, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
 from .figures_limits import look
-from .limits import LINEAR_DEVIATION
-from .subjects import subjects_of
+from .growth import LINEAR_DEVIATION
 
 
 def draw_edge(result: Result, robot: Robot) -> tuple[str, Figure, str]:
@@ -59,10 +58,11 @@ def draw_edge(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     worst = "; ".join(
         f"{method.label} {fold(grown[0].max())} and {fold(grown[1].max())}" for method, grown in near.items()
     )
+    centre = result.curves["looked at"]["centre"]
     caption = (
-        f"The nonlinear edge at {subjects_of(robot).centre.name}. Above: growth over ω dt and the size of the perturbation; "
-        f"the linear limit is 2. Below: near √3, where a swing takes three steps. The largest growth there in {close['steps']} "
-        f"steps, from {LINEAR_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {worst}. Divergence is drawn at 1e9."
+        f"The nonlinear edge at {centre}. Above: growth over ω dt and the size of the perturbation; the linear limit is 2. "
+        f"Below: near √3, where a swing takes three steps. The largest growth there in {close['steps']} steps, "
+        f"from {LINEAR_DEVIATION:g} and from {LARGE_DEVIATION:g} rad: {worst}. Divergence is drawn at 1e9."
     )
     return "stability_edge", fig, caption
 

@@ -10,8 +10,8 @@ from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
 from .choice import coarsest_case, damped, fraction
 from .departure import span
-from .limits import LINEAR_DEVIATION, apart
-from .subjects import subjects_of
+from .growth import LINEAR_DEVIATION
+from .limits import apart
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),
@@ -36,7 +36,7 @@ def in_print(method: Method) -> str:
 
 def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Predicted and observed limits as paired bars, scene by scene and damping by damping."""
-    rows = [row for row in result.rows if row["scene"] in subjects_of(robot).centres]
+    rows = [row for row in result.rows if row["scene"] in result.curves["looked at"]["centres"]]
     panels = list(dict.fromkeys((row["scene"], row["damping"]) for row in rows))
     schemes = list(dict.fromkeys(row["method"] for row in rows if row["engine"] == "tmt"))
     columns = min(3, len(panels))
@@ -73,7 +73,7 @@ def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         ax.grid(axis="y", visible=False)
     for ax in axes.flat[len(panels) :]:
         ax.set_visible(False)
-    fig.supxlabel("largest dt, s (damping in N m s/rad)", fontsize=9)
+    fig.supxlabel("largest dt, s" + " (damping in N m s/rad)" * (not robot.is_read), fontsize=9)
     handles = [
         axes[0, 0].barh(-9, 1, color=ORANGE, label="predicted from one step"),
         axes[0, 0].barh(-9, 1, color=BLUE, label="observed, TMT"),
@@ -98,7 +98,7 @@ def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
 def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Eigenvalues times dt inside each method's stability region."""
     drawn, points, case = result.curves["regions"], result.curves["points"], coarsest_case(robot)
-    centre, dt = next(iter(subjects_of(robot).centres), None), case.scene.dt
+    centre, dt = result.curves["looked at"]["centre"], case.scene.dt
     columns = 2 if len(drawn) == 4 else 3
     lines = -(-len(drawn) // columns)
     fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
@@ -112,18 +112,21 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         ax.contour(
             x, y, np.where(np.isfinite(growth), growth, 99.0), levels=[1.0 + 1e-3], colors=[GREY], linewidths=0.8
         )
+        mine = (row for row in result.rows if (row["engine"], row["method"]) == ("tmt", names[0]))
+        limits = (row for row in mine if (row["scene"], row["damping"]) == (centre, 0.0))
+        row = next((row for row in limits if row["predicted_dt_s"] is not None), None)
+        # of a robot that is read from a file, whose own step is small, all modes at the limit; else one, and all at its step
+        spread = row["predicted_dt_s"] if row and robot.is_read else dt
+        titles[names] += f", dt = {spread:.3g} s" if robot.is_read else ""
         for (posture, damping), values in points.items():
             mark, colour, size, fill = at_saddle if posture != centre else with_damping if damping else at_centre
-            z, label = dt * values, f"{posture}, {damped(robot, damping)}"
+            z, label = spread * values, f"{posture}, {damped(robot, damping)}"
             ax.plot(z.real, z.imag, mark, color=colour, markersize=size, fillstyle=fill, label=label)
-        for row in result.rows:
-            if (row["engine"], row["method"], row["scene"], row["damping"]) == ("tmt", names[0], centre, 0.0):
-                at = row["predicted_dt_s"]
-                if at is not None:
-                    values = points[centre, 0.0]
-                    z = at * values[np.argmin(np.abs(np.abs(values) - row["mode_per_s"]))]
-                    ax.plot(z.real, abs(z.imag), "x", color="black", markersize=6, label=f"{centre} at its limit")
-                    outside.append(f"{abs(z):.3f} ({titles[names]})")
+        if row:
+            values = points[centre, 0.0]
+            z = row["predicted_dt_s"] * values[np.argmin(np.abs(np.abs(values) - row["mode_per_s"]))]
+            ax.plot(z.real, abs(z.imag), "x", color="black", markersize=6, label=f"{centre} at its limit")
+            outside.append(f"{abs(z):.3f} ({titles[names]})")
         ax.axhline(0, color="black", linewidth=0.5)
         ax.axvline(0, color="black", linewidth=0.5)
         ax.set(title=titles[names], xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
@@ -142,12 +145,13 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         if not damping
     }
     real = "; ".join(f"{name}: {', '.join(f'{z:.3f}' for z in found)}" for name, found in growing.items() if found)
-    limiting, swing = "the fastest mode", "omega dt"
+    limiting, swing, step = "the fastest mode", "omega dt", f"dt = {fraction(case.duration, dt)} s"
     if robot.is_read:
         limiting, swing = "the mode that a step first lets grow", "|eigenvalue| dt"
+        step = f"the limit of dt at {centre}, where there is one, else {step}"
     caption = (
         "The upper half of the stability regions (grey: one step lets neither of a pair of conjugate eigenvalues "
-        f"grow) with the eigenvalues of the held {robot.name} times dt = {fraction(case.duration, dt)} s. "
+        f"grow) with the eigenvalues of the held {robot.name} times {step}. "
         + (f"Positive real parts, which grow in the exact motion too ({real}). " if real else "")
         + (f"Crosses: {limiting} of {centre} at the limit, {swing} = {', '.join(outside)}. " if outside else "")
         + "Of partitioned methods two different real eigenvalues do not have a region; their marks are a guide."
@@ -157,7 +161,7 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
 
 def draw_growth_map(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """Growth over dt, a row for each engine and method."""
-    drawn, centre = result.curves["map"], subjects_of(robot).centre.name
+    drawn, centre = result.curves["map"], result.curves["looked at"]["centre"]
     by_method, dts, steps, allowed = (drawn[key] for key in ("grown", "x", "steps", "allowed"))
     grown = np.array(list(by_method.values()))
     fig = Figure(figsize=(WIDTH, 0.9 + 0.27 * len(by_method)), layout="constrained")

@@ -6,18 +6,13 @@ import numpy as np
 
 from ...engines import Engine, Method
 from ...judge.check import Result
-from ...judge.run import deviation, number_or_none
 from ...robots import Robot
 from ...truth.linear import Held
 from .choice import damped, who
+from .growth import GROWTH_STEPS, LINEAR_DEVIATION, growth_per_step, growth_per_step_in_words
 
-LINEAR_DEVIATION = 1e-6  # rad, at the start
-GROWTH_STEPS = 2000  # of a run
-MOST_OF_A_QUARTER = {
-    False: 20_000,
-    True: 2500,
-}  # steps of a quarter of a run, however slow a mode swings; of a file's robot
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
+FAR = 1e4  # fold, of what has left the reach of a linear motion
 GROWTH_MARGIN = 1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
 CRITERION = "no mode grows from the second to the last quarter of a run"
@@ -28,8 +23,6 @@ BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 # relative, of the growth in all steps: the deviation reaches 1e-5 rad, and its square is not in a linear map
 GROWTH_TOLERANCE = 1e-3
-# where growth per step is compared: rad, of the deviation; how much it may grow; in at most how many steps
-TINY_DEVIATION, TOTAL_GROWTH, MOST_GROWTH_STEPS = 1e-8, 1e3, 200
 LIMIT_KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
 
 
@@ -62,22 +55,6 @@ def limits_and_growths(
             "seen": seen, "allowed": tolerance,
         })  # fmt: skip
     return {"rows": rows, "growths": growths}
-
-
-def growth_in_run(
-    method: Method,
-    engines: Mapping[str, Engine],
-    at: Held,
-    direction: np.ndarray,
-    dt: float,
-    size: float = LINEAR_DEVIATION,
-    steps: int = GROWTH_STEPS,
-) -> float:
-    """The largest deviation of a run over that at its start, which is size x direction, rad; inf if it diverged."""
-    dynamics, start = engines[method.engine].of(at.case), at.moved(size * direction)
-    with np.errstate(over="ignore", invalid="ignore"):
-        motion = dynamics.run(start, np.zeros(at.nv), at.tau, float(dt), steps, method.name)
-        return deviation(at.away(motion.q), 0.0) / size
 
 
 def observed_limit(
@@ -143,14 +120,14 @@ def shares(
 
 
 def quarter_of(at: Held, dt: float, steps: int) -> int:
-    """A quarter of a run of at least so many steps: it holds a swing of the slowest mode."""
+    """A quarter of a run of at least so many steps: it holds a swing of the slowest mode.
+
+    Of a robot that is read from a file, some mode of which may be very slow, a quarter of so many steps.
+    """
     swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
-    return max(
-        steps // 4,
-        min(MOST_OF_A_QUARTER[at.case.robot.is_read], int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
-        if len(swings)
-        else 0,
-    )
+    if at.case.robot.is_read or not len(swings):
+        return steps // 4
+    return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
 
 
 def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
@@ -167,42 +144,14 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
 
 
 def grows(early: np.ndarray, late: np.ndarray) -> bool:
-    """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run."""
+    """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run.
+
+    What has grown far early may come back: it is out of the reach of a linear motion.
+    """
     if not np.isfinite(late).all():
         return True
-    return bool(((late > GROWTH_ALLOWED) | ((late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED))).any())
-
-
-def growth_per_step(method: Method, engines: Mapping[str, Engine], at: Held, dt: float) -> dict:
-    """How much the fastest-growing mode grows in one step: in a run, by its share in the deviation, and predicted."""
-    predicted, shape, measure = at.fastest_growing(method.scheme, dt)
-    steps = int(np.clip(np.log(TOTAL_GROWTH) / np.log(predicted), 2, MOST_GROWTH_STEPS))
-    n, start, dynamics = at.nv, TINY_DEVIATION * shape.real, engines[method.engine].of(at.case)
-    with np.errstate(over="ignore", invalid="ignore"):
-        motion = dynamics.run(at.moved(start[:n]), start[n:], at.tau, dt, steps, method.name)
-        share = np.abs(np.concatenate([at.away(motion.q), motion.v], axis=1) @ measure)
-        total = share[-1] / share[0]
-    return {
-        "scene": at.name, "engine": method.engine, "method": method.name, "dt_s": dt, "mode_per_s": at.rate(shape),
-        "predicted_growth": predicted, "observed_growth": number_or_none(total ** (1.0 / steps)),
-        "steps": steps, "total_off": float(np.abs(total / predicted**steps - 1.0)),
-    }  # fmt: skip
-
-
-def map_of_growth(
-    method: Method, engines: Mapping[str, Engine], at: Held, dts: Sequence[float], steps: int = GROWTH_STEPS
-) -> np.ndarray:
-    """Growth of the deviation in so many steps along the stiffest mode of a posture, for each dt."""
-    direction = stiffest(at)[1]
-    return np.array([growth_in_run(method, engines, at, direction, dt, steps=steps) for dt in dts])
-
-
-def stiffest(at: Held) -> tuple[float, np.ndarray]:
-    """Rate, rad/s, and angles (largest 1 rad) of the fastest swinging mode; a rate of 0: no mode swings."""
-    values, vectors = at.modes
-    n, k = at.nv, int(np.argmax(values.imag))
-    angles = (vectors[:n, k] / vectors[np.argmax(np.abs(vectors[:n, k])), k]).real
-    return float(values[k].imag), angles / np.abs(angles).max()
+    still = (late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED)
+    return bool(((early > FAR) | (late > GROWTH_ALLOWED) | still).any())
 
 
 def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
@@ -262,17 +211,4 @@ def late_in_words(late: Mapping[str, float]) -> list[str]:
     return [
         f"With little damping a mode hardly grows just above its limit. So far above it a run of this length shows the growth, "
         f"and so far from the prediction an observed limit may be: {places}."
-    ]
-
-
-def growth_per_step_in_words(rows: list[dict]) -> list[str]:
-    """How far the growth of one step is from the predicted one, where a method always fails."""
-    if not rows:
-        return ["No method fails at every step in these scenes."]
-    off = [abs(row["observed_growth"] / row["predicted_growth"] - 1.0) for row in rows if row["observed_growth"]]
-    where = ", ".join(dict.fromkeys(row["scene"] for row in rows))
-    return [
-        f"Where a method fails at every step ({where}), the growth of one step is predicted and measured, {len(rows)} "
-        f"times: {f'largest difference {max(off):.1e}, relative' if off else 'no run gives a number'}"
-        + (f"; runs without a number: {len(rows) - len(off)}." if off and len(off) < len(rows) else ".")
     ]

@@ -12,7 +12,7 @@ from ...judge.check import Result
 from ...judge.run import diverged_at, number_or_none
 from ...truth.linear import Held
 from .choice import who
-from .limits import stiffest
+from .growth import stiffest
 
 FINE_STEP = 1e-3  # s
 MINUTE = 60.0  # s

@@ -11,13 +11,15 @@ import numpy as np
 from ...case import Case
 from ...judge.words import capital
 from ...robots import Robot
-from ...truth.linear import Held, all_of_kind, all_that_stay, floats, held, named, of_kind
+from ...truth.linear import Held, floats, held
+from ...truth.postures import all_of_kind, all_that_stay, of_kind, posture_names
 from ...truth.rest import at_rest
 from .choice import DAMPINGS, free_motion
 from .falling import without_law
-from .limits import stiffest
+from .growth import stiffest
 
 MOST_POSTURES = 6  # named postures that are looked at, the first
+MANY = 7  # speeds, beyond which the runs of a file's robot are at one such posture
 REST = "at rest"  # the name of the posture at which a robot that is read from a file rests without torque
 
 
@@ -34,6 +36,12 @@ class Subjects(NamedTuple):
     free: Case | None  # a free motion from the centre
     left_out: tuple[str, ...]  # what is left out, and why, in sentences
 
+    @property
+    def names(self) -> dict:
+        """The names of the postures, for who draws."""
+        one = {kind: at and at.name for kind, at in (("saddle", self.saddle), ("marginal", self.marginal))}
+        return one | {"centres": self.centres, "centre": self.centre and self.centre.name}
+
 
 @lru_cache(maxsize=64)
 def subjects_of(robot: Robot) -> Subjects:
@@ -42,6 +50,12 @@ def subjects_of(robot: Robot) -> Subjects:
     centres, saddles = (tuple(names) for names in (all_that_stay(robot), all_of_kind(robot, "saddle")))
     still = [name for name in centres if held(robot, name).without_stiffness.all()]
     centres = tuple(name for name in centres if name not in still)
+    if robot.is_read and robot.coordinates.nv > MANY and len(centres) > 1:
+        left_out.append(
+            f"A robot of more than {MANY} speeds is run at the first of the postures at which a small deviation stays small: "
+            f"{centres[0]}, not {', '.join(centres[1:])}."
+        )
+        centres = centres[:1]
     centre, saddle = (held(robot, names[0]) if names else None for names in (centres, saddles))
     swinging = centre if centre and stiffest(centre)[0] > 0.0 else None
     name = of_kind(robot, "marginal")
@@ -95,10 +109,12 @@ def looked_at(robot: Robot) -> tuple[Robot, list[str]]:
 
     Of a file's robot, whose postures are seldom at rest without torque, also the one to which it sinks from the first of them.
     """
-    names, notes = named(robot), []
+    names, notes = posture_names(robot), []
     if len(names) > MOST_POSTURES:
         names = names[:MOST_POSTURES]
-        notes.append(f"Of {len(named(robot))} named postures the first {len(names)} are looked at: {', '.join(names)}.")
+        notes.append(
+            f"Of {len(posture_names(robot))} named postures the first {len(names)} are looked at: {', '.join(names)}."
+        )
         postures, positions = ({n: of[n] for n in names if n in of} for of in (robot.postures, robot.positions))
         robot = replace(robot, postures=postures, positions=positions)
     if not robot.is_read:

@@ -11,7 +11,7 @@ from ...robots import Robot
 from ...setup import Setup
 from . import drift, errors, horizon, sentences
 from .derivative import compare_derivatives
-from .runs import follow
+from .runs import FEW_ENTRIES, MOST_ENTRIES, follow
 
 TITLE = "Trajectories: the same scheme for every integrator of MuJoCo"
 FEW_EXACT_STEPS = 8  # with many digits, in a small run
@@ -22,7 +22,7 @@ def claim(robot: Robot) -> str:
     if robot.is_read:
         return (
             "For every integrator of MuJoCo the same scheme stands on the TMT side, as the notes say; integrators that are one "
-            "scheme here agree with it alike. implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is "
+            "scheme here give the same bits. implicit takes the exact derivative of the bias, which is MuJoCo's qDeriv; RK4 is "
             "the classical one. The two agree in the derivative at recorded states, in one step from each of them, and in the "
             "open-loop run as long as rounding allows."
         )
@@ -58,12 +58,18 @@ def of_file(robot: Robot) -> str:
     return (
         "Derivative and one step: the rounding of a solve with the method's own matrix A, |A^-1| (64 eps |A| |a| + 64 eps S), S "
         f"the sum of the absolute terms of the force, and 8 eps of the sums of the step{ball}. Open loop: a band computed along "
-        "the run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's own "
-        f"steps. Judged while the band of the positions is below {NARROW:g} {unit} and no run has diverged. A run has diverged if "
-        f"it stops, is not finite, or has gained more energy than the {robot.name}'s motion can have exchanged: its whole "
-        "potential range with the energy of speeds and springs at the start, or, where that is more, the work of the torque and "
-        "of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same step."
+        "the run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's "
+        f"own steps. Judged while the band of the positions is below {NARROW:g} {unit} and no run has diverged. A run has "
+        f"diverged if it stops, is not finite, or has gained more energy than the {robot.name}'s motion can have exchanged: "
+        "the whole potential range with the energy of speeds and springs at the start, or, where that is more, the work of the "
+        "torque and of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same "
+        "step."
     )
+
+
+def entries(setup: Setup) -> int:
+    """Of the Jacobians of a run, so many at most."""
+    return setup.of(MOST_ENTRIES, MOST_ENTRIES, FEW_ENTRIES)
 
 
 def begin(setup: Setup) -> None:
@@ -80,7 +86,7 @@ def begin(setup: Setup) -> None:
     duration, steps = horizon.growth_run(setup.robot, grown, setup.size == "small")
     of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
-        "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer), cases),
+        "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer, entries=entries(setup)), cases),
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
         "growth": (
             grown,
@@ -120,7 +126,7 @@ def rows(setup: Setup) -> Result:
     result.curves["errors"] = errors.errors_when_held(result, setup.robot) | errors.errors_when_free(
         result, setup.robot
     )
-    result.notes = sentences.notes(result, setup.robot, setup.engines, setup.finer) + result.notes
+    result.notes = sentences.notes(result, setup.robot, setup.engines, setup.finer, entries(setup)) + result.notes
     return result
 
 

@@ -10,8 +10,8 @@ from tmt.dual import seeded
 from ...engines import Engine
 from ...engines.mujoco.linear import implicit_derivative
 from ...judge.check import Result, closest
-from ...judge.scale import EPS, FACTOR, mass_scale
 from ...judge.run import unit_of
+from ...judge.scale import EPS, FACTOR, mass_scale
 from ...robots import Robot
 
 ADDED_DAMPING = 0.5  # N m s/rad: its derivative is part of it

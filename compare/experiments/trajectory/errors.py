@@ -8,6 +8,8 @@ from ...judge.run import deviation, number_or_none
 from ...robots import Robot
 from ...truth import reference
 
+SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")
+
 
 def errors_when_held(result: Result, robot: Robot) -> dict[str, tuple]:
     """Of each held scene, whose true motion is rest: {scene: (TMT, MuJoCo)}, rad.
@@ -43,5 +45,11 @@ def coarsest_runs(result: Result, robot: Robot) -> Iterator[tuple[Case, dict]]:
     """Each case that was run, with the curve of its coarsest step of RK4."""
     runs = result.curves["runs"]
     for case in robot.cases:
-        if curve := runs.get((case.name, "rk4", case.steps)):
+        if curve := coarsest_run(runs, case):
             yield case, curve
+
+
+def coarsest_run(runs: dict, case: Case) -> dict | None:
+    """The curve of the coarsest step of MuJoCo's RK4, whichever scheme that is here; None: there is none."""
+    found = (runs.get((case.name, scheme, case.steps)) for scheme in SCHEMES_OF_RK4)
+    return next((curve for curve in found if curve), None)

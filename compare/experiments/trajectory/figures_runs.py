@@ -15,7 +15,7 @@ from ...judge.run import moved_from, step_in_words, unit_of
 from ...judge.words import capital
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name, plain
 from .drift import DRIFT_DURATION, found_order
-from .horizon import early, power
+from .horizon import CARRIED, early, power
 from .leaving import left_in_words
 from .sentences import agreement, rad
 
@@ -100,7 +100,12 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     lines_of_legend = -(-(len(shown) + 4) // LEGEND_COLUMNS)
     fig.subplots_adjust(
-        left=0.105, right=0.985, bottom=0.075, top=(93 - 3 * lines_of_legend) / 100, hspace=0.12, wspace=0.08
+        left=0.105,
+        right=0.985,
+        bottom=0.075,
+        top=(93 - 3 * lines_of_legend - 2 * (len(columns) > 3)) / 100,
+        hspace=0.12,
+        wspace=0.08,
     )
     axes = fig.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
     until = []
@@ -125,12 +130,21 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
         if c["judged_until_s"] < case.duration:
             lines.axvspan(c["judged_until_s"], case.duration, color=(GREY, 0.15))
         lines.set(xlabel="time, s", xlim=(0, case.duration))
-        if len(f"{case.duration:g}") > 2:  # the last number of a column would meet the first of the next
+        if (
+            len(f"{case.duration:g}") > 2 or case.duration < 2.0
+        ):  # the last number of a column would meet the first of the next
             lines.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))
         until.append(f"{c['integrator']} to {c['judged_until_s']:.2f} s")
     place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
     per = " or ".join(f"{one}/s" for one in unit.split(" or "))
-    for ax, label in zip(axes[:, 0], (f"{place}, {unit}", f"{speed}, {per}", f"{place}: difference, {unit}")):
+    for ax, label in zip(
+        axes[:, 0],
+        (
+            f"{place}, {unit}",
+            f"{speed}, {per}",
+            f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}",
+        ),
+    ):
         ax.set_ylabel(label)
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
     fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=LEGEND_COLUMNS)
@@ -150,7 +164,8 @@ def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) ->
         f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
-            f"With {case.steps} steps of RK4 TMT is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true motion. "
+            f"With {case.steps} steps of RK4 TMT is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true "
+            "motion. "
             if errors
             else ""
         )
@@ -227,16 +242,19 @@ def draw_growth(result: Result) -> tuple[str, Figure, str]:
     colours = cycle((BLUE, RED, GREEN, ORANGE, PINK, SKY, GREY, "black"))
     last = {name: grown[np.isfinite(grown)][-1] for name, grown in curves.items()}
     ends = sorted(last, key=last.get)
-    places = {}
+    low = -20.0 if min(last.values()) < -5.0 else -5.0
+    high = 65.0 if max(last.values()) > min(CARRIED) else 20.0
+    apart, places = 0.065 * (high - low), {}
     for name in ends:  # labels at the ends of the curves, not over each other
-        places[name] = max(min(last[name], 60.0), max(places.values(), default=-20.0) + 5.5)
+        places[name] = max(min(last[name], high - apart), max(places.values(), default=low) + apart)
     for (name, grown), colour in zip(curves.items(), colours):
         ax.plot(t, grown, color=colour)
         ax.text(t[-1] * 1.01, places[name], name, color=colour, va="center", fontsize=8)
     for digits, text in ((16, "doubles"), (30, "30 digits")):
-        ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")
-        ax.text(0.5, digits + 0.8, text, fontsize=8)
-    ax.set(xlabel="time, s", ylabel="log10 of the growth", xlim=(0, t[-1]), ylim=(-20, 65))
+        if digits < high:
+            ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")
+            ax.text(t[-1] / 120, digits + 0.01 * (high - low), text, fontsize=8)
+    ax.set(xlabel="time, s", ylabel="log10 of the growth", xlim=(0, t[-1]), ylim=(low, high))
     soon = early(t)
     each = "; ".join(
         f"{name}: {power(curves[name][soon], 1)} and {power(curves[name][-1], 0)}" for name in reversed(ends)

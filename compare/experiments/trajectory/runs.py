@@ -16,8 +16,11 @@ from ...truth.smallest import reduced
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
 STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
-MOST_ENTRIES = 2_700_000  # of the Jacobians of all steps of a run: they take the time
-RECORDED = 128  # states of a run that are compared: one for each of the scene's own steps, or fewer
+MOST_ENTRIES, FEW_ENTRIES = (
+    2_700_000,
+    100_000,
+)  # of the Jacobians of all steps of a run: they take the time; in a small run
+RECORDED = 64  # states of a run that are compared: one for each of the scene's own steps, or fewer
 HALF_TURN = (
     np.pi
 )  # rad: the bound of a step's rounding is of first order in dt, and none for a step that turns a joint farther
@@ -39,14 +42,14 @@ class TmtSide(NamedTuple):
     ulp: np.ndarray  # (steps + 1, nq): positions of the run that starts one ulp away
 
 
-def affordable(case: Case) -> int:
-    """The steps of a run up to which its band is computed: a Jacobian has (2 nv)^2 entries."""
-    return MOST_ENTRIES // (2 * case.coordinates.nv) ** 2
+def affordable(case: Case, entries: int = MOST_ENTRIES) -> int:
+    """The steps of a run up to which its band is computed, if all Jacobians have so many entries: each has (2 nv)^2."""
+    return entries // (2 * case.coordinates.nv) ** 2
 
 
-def counts(case: Case, finer: Sequence[int]) -> list[int]:
+def counts(case: Case, finer: Sequence[int], entries: int = MOST_ENTRIES) -> list[int]:
     """The numbers of steps of a case's runs: multiples of its own; at most 8192 and what is affordable, its own excepted."""
-    most = min(STEPS_AT_MOST, affordable(case))
+    most = min(STEPS_AT_MOST, affordable(case, entries))
     return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= most]
 
 
@@ -63,11 +66,17 @@ def apart(coordinates: Coordinates, one: Sequence[np.ndarray], other: Sequence[n
     return np.concatenate([coordinates.difference(one[0], other[0]), one[1] - other[1]], axis=-1)
 
 
-def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], known: dict | None = None) -> Result:
+def follow(
+    case: Case,
+    engines: Mapping[str, Engine],
+    finer: Sequence[int],
+    known: dict | None = None,
+    entries: int = MOST_ENTRIES,
+) -> Result:
     """One case with every scheme and step size, and once by RK4 without the joints that it does not need.
 
     finer: steps as multiples of the scene's own. known: a dict in which TMT's side is kept, for whoever compares it with
-    several engines.
+    several engines. entries: of the Jacobians of a run, see `affordable`.
     """
     result, known = Result("trajectory"), {} if known is None else known
     if case not in known:  # what joints a scene of a robot from a file needs is not asked here
@@ -75,14 +84,14 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
     schemes = {}
     for method in engines["mujoco"].methods.values():
         schemes.setdefault(method.scheme, []).append(method)
-    runs = [(case, steps, *item) for steps in counts(case, finer) for item in schemes.items()]
+    runs = [(case, steps, *item) for steps in counts(case, finer, entries) for item in schemes.items()]
     if smaller := known[case]:
         runs.append((smaller, smaller.steps, "rk4", schemes["rk4"]))
     dynamics = {each: compared(engines, each) for each in {run[0] for run in runs}}
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for each, steps, scheme, methods in runs:
             if (each, steps, scheme) not in known:
-                known[each, steps, scheme] = tmt_side(each, dynamics[each]["tmt"], steps, scheme)
+                known[each, steps, scheme] = tmt_side(each, dynamics[each]["tmt"], steps, scheme, entries)
             compare_runs(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
     if fast := result.notes:
         result.notes = [
@@ -92,7 +101,7 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int], know
     return result
 
 
-def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide:
+def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: int = MOST_ENTRIES) -> TmtSide:
     """TMT's side of a case: the run, its band, and the two other levels at its recorded states."""
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
@@ -103,7 +112,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> TmtSide
     one_ulp_away = (np.nextafter(start, np.inf) for start in case.start)
     return TmtSide(
         t, q, v,
-        band(stepping, tree, q, v, tau, dt, every, affordable(case)),
+        band(stepping, tree, q, v, tau, dt, every, affordable(case, entries)),
         ended,
         states,
         dynamics.acceleration(*states, tau),

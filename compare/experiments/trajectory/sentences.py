@@ -13,24 +13,28 @@ from ...judge.check import Result
 from ...judge.run import moved_from, unit_of
 from ...judge.words import capital
 from ...robots import Robot
-from .errors import deviations
+from .errors import coarsest_run, deviations
 from .leaving import causes_in_words, left_in_words
-from .runs import STEPS_AT_MOST, affordable, counts
+from .runs import MOST_ENTRIES, STEPS_AT_MOST, affordable, counts
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
 
 
-def notes(result: Result, robot: Robot, engines: Mapping[str, Engine], finer: Sequence[int]) -> list[str]:
+def notes(
+    result: Result, robot: Robot, engines: Mapping[str, Engine], finer: Sequence[int], entries: int = MOST_ENTRIES
+) -> list[str]:
     """All of them, of the runs that these engines have given."""
     runs, cases = result.curves["runs"], {case.name: case for case in robot.cases}
-    held = [case for case in robot.cases if case.is_held and (case.name, "rk4", case.steps) in runs]
+    held = [(case, curve) for case in robot.cases if case.is_held and (curve := coarsest_run(runs, case))]
     return [
-        *(of_held(case, engines, runs[case.name, "rk4", case.steps]) for case in held),
+        *(of_held(case, engines, curve) for case, curve in held),
         *of_errors(runs, result.curves["errors"], cases),
         *of_first_order(runs, cases),
         f"MuJoCo's integrators here: {', '.join(engines['mujoco'].methods)}.",
         *of_schemes(robot, engines["mujoco"]),
-        *of_left_out([cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], finer),
+        *of_left_out(
+            [cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], finer, entries
+        ),
     ]
 
 
@@ -76,7 +80,7 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
         return []
     lines, says_nothing = [], []
     for name, (ours, theirs) in found.items():
-        curve = runs[name, "rk4", cases[name].steps]
+        curve = coarsest_run(runs, cases[name])
         case = cases[name]
         apart, unit = agreement(curve, case), unit_of(case.coordinates)
         true = "rest" if cases[name].is_held else "more than 20 digits"
@@ -137,17 +141,17 @@ def ends_in_words(ended: Mapping[str, float | None]) -> str:
     return f"diverges: {', '.join(at)}"
 
 
-def of_left_out(cases: Sequence[Case], finer: Sequence[int]) -> list[str]:
+def of_left_out(cases: Sequence[Case], finer: Sequence[int], entries: int = MOST_ENTRIES) -> list[str]:
     """Which scenes are followed with fewer step sizes than others, and which are judged for fewer steps than they have."""
     left_out, said = {}, []
     for case in cases:
-        if len(counts(case, finer)) < len(finer):
-            left_out.setdefault(min(STEPS_AT_MOST, affordable(case)), []).append(case.name)
+        if len(counts(case, finer, entries)) < len(finer):
+            left_out.setdefault(min(STEPS_AT_MOST, affordable(case, entries)), []).append(case.name)
     for most, names in left_out.items():
         said.append(f"Runs of more than {most} steps, finer than a scene's own, are left out: {', '.join(names)}.")
-    long = {case.name: affordable(case) for case in cases if case.steps > affordable(case)}
-    if long:
-        which = "; ".join(f"{name}: {most} steps" for name, most in long.items())
+    judged = {case.name: affordable(case, entries) for case in cases if case.steps > affordable(case, entries)}
+    if judged:
+        which = "; ".join(f"{name}: {steps} steps" for name, steps in judged.items())
         said.append(
             "The band of rounding asks for a Jacobian of each step, and these scenes are judged for no more steps than can be "
             f"afforded: {which}."

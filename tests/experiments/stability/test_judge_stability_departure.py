@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from judged import BOTH, only
 
-from compare.experiments.stability import departure, falling, figures_departure
+from compare.experiments.stability import departure, falling, figures_departure, torques
+from compare.experiments.stability.subjects import subjects_of
 from compare.judge import run
 from compare.robots.arm import ARM
 from compare.truth.linear import held
@@ -23,6 +24,14 @@ def departure_row(observed, predicted, dt=0.01, size=1e-6, engine="tmt", scene="
 def test_departure_within_one_step_or_three_hundredths(result, share, passes, dt, aim, sign):
     departure.check_departures(result, [departure_row(2.0 + sign * share * aim, 2.0, dt)])
     assert only(result) is passes and f"{int(passes)} of these within" in result.notes[0]
+
+
+@BOTH
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_row_may_say_itself_how_near_a_departure_is_to_be(result, share, passes, sign):
+    row = departure_row(2.0 + sign * share * 0.2, 2.0) | {"allowed_s": 0.2}
+    departure.check_departures(result, [row])
+    assert only(result) is passes
 
 
 @pytest.mark.parametrize("observed, predicted, passes", [(None, None, True), (1.0, None, False), (None, 1.0, False)])
@@ -59,7 +68,7 @@ def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
 @pytest.mark.parametrize("joints, reach, count", [(3, 1, 27), (4, 2, 625), (5, 1, 243), (6, 1, 13), (9, 2, 37)])
 def test_torques_within_some_ulps_are_bounded_in_number(joints, reach, count):
     tau = np.linspace(-3.0, 5.0, joints)
-    found = departure.variants(tau, reach)
+    found = torques.variants(tau, reach)
     assert found.shape == (count, joints) and (found[count // 2] == tau).all()
     away = np.abs(found - tau) / np.spacing(np.abs(tau))
     assert len({tuple(row) for row in found}) == count and (away.max(axis=0) == reach).all()
@@ -99,6 +108,7 @@ def test_departure_figure_marks_each_engine_at_its_times(result):
         departure_row(None, None),
         departure_row(1.0, 1.0, scene="ball catch, printed torque"),
     ]
+    result.curves["looked at"] = subjects_of(ARM).names
     _, fig, caption = figures_departure.draw_departure(result, ARM)
     lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].lines}
     assert lines["MuJoCo RK4"] == 3.0 and lines["RK4"] == 2.0

@@ -10,6 +10,7 @@ import tmt
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import choice, failure, figures_failure, long_runs
+from compare.experiments.stability.subjects import subjects_of
 from compare.judge.scale import gravity_scale
 from compare.robots.arm import ARM
 
@@ -167,6 +168,7 @@ def test_edge_names_each_engine_with_its_growth(result):
     }
     result.curves["edge"] = {"x": np.array([1.0, 2.0]), "y": np.array([1e-3, 1e-2]), "steps": 2000,
                              "grown": {IMPLICIT: np.ones((2, 2))}}  # fmt: skip
+    result.curves["looked at"] = subjects_of(ARM).names
     caption = figures_failure.draw_edge(result, ARM)[2]
     assert "TMT implicit 1.50-fold and 200.00-fold; MuJoCo implicit 2.50-fold and diverges" in caption
 

@@ -102,6 +102,7 @@ def test_limits_figure_marks_mujoco_where_mujoco_is(result):
     )
     names = ("rk4", "implicit_midpoint", "implicit")
     result.curves["schemes"] = {("tmt", name): name for name in names} | {("mujoco", "RK4"): "rk4"}
+    result.curves["looked at"] = {"centres": ("bent",)}
     _, fig, caption = figures_limits.draw_limits(result, ARM)
     marks = [line.get_xdata() for line in fig.axes[0].lines if line.get_marker() == "|" and len(line.get_xdata())]
     assert [float(*x) for x in marks] == [0.0999]

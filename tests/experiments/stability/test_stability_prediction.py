@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from compare.robots.arm import ARM
-from compare.truth.linear import all_of_kind, held, kinds, of_kind, region
+from compare.truth.linear import held
+from compare.truth.postures import all_of_kind, kinds, of_kind
+from compare.truth.steps import region
 
 BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
 

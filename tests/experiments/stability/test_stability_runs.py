@@ -7,7 +7,7 @@ import pytest
 
 import tmt
 from compare.engines.mujoco.linear import left_to_itself, transition
-from compare.experiments.stability import choice, departure, failure, falling, limits
+from compare.experiments.stability import choice, departure, failure, falling, growth, limits, torques
 from compare.judge import run
 from compare.judge.check import Result
 from compare.robots.arm import ARM
@@ -87,9 +87,9 @@ def test_a_marginal_posture_is_left_with_one_over_the_square_root(engines, metho
 def test_a_tiny_step_that_rounding_holds_back_is_in_the_prediction(engines, method):
     """From a torque error of a few ulps at 1 ms the arm leaves later than the linear map without rounding says."""
     at, dt, euler = BALL, 1e-3, method("tmt", "semi_implicit_euler")
-    tau = departure.own_torque(method("mujoco", "Euler"), engines, at)
+    tau = torques.own_torque(method("mujoco", "Euler"), engines, at)
     tau = tau + 3e-15 * tmt.mass_matrix(at.q) @ at.modes[1][:3, 0].real / np.abs(at.modes[1][:3, 0]).max() * 7.513**2
-    off = departure.residual(euler, engines, at, tau[None])
+    off = torques.residual(euler, engines, at, tau[None])
     rounded, exact = (
         departure.predicted(at, euler.scheme, dt, np.zeros((1, 3)), off, rounded=rounded)[0]
         for rounded in (True, False)
@@ -112,17 +112,17 @@ def test_departure_is_predicted_beside_a_mode_without_stiffness(engines, method)
 
 def test_own_bias_holds_for_ever(engines, method):
     theirs, ours = method("mujoco", "RK4"), method("tmt", "rk4")
-    tau = departure.own_torque(theirs, engines, BALL)
+    tau = torques.own_torque(theirs, engines, BALL)
     assert not engines["mujoco"].of(BALL.case).run(BALL.q, np.zeros(3), tau, 5 / 64, 200, "RK4").v.any()
-    own = departure.own_torque(ours, engines, BALL)  # no double need be the bias of compiled code: the nearest is taken
-    left = departure.residual(ours, engines, BALL, np.array([own, BALL.tau]))
+    own = torques.own_torque(ours, engines, BALL)  # no double need be the bias of compiled code: the nearest is taken
+    left = torques.residual(ours, engines, BALL, np.array([own, BALL.tau]))
     assert np.abs(left[0]).max() <= min(np.abs(left[1]).max(), np.spacing(np.abs(BALL.tau).max()))
     motion = engines["tmt"].of(BALL.case).run(BALL.q, np.zeros(3), own + 1e-12, 5 / 64, 100, "rk4")
     assert np.nanmax(np.abs(motion.q - BALL.q)) > 0.1
 
 
 def test_resonance_needs_a_large_perturbation(engines, method):
-    sizes = [limits.LINEAR_DEVIATION, failure.LARGE_DEVIATION]
+    sizes = [growth.LINEAR_DEVIATION, failure.LARGE_DEVIATION]
     near = failure.edge_growth(method("tmt", "implicit"), BENT, engines, sizes, failure.RESONANT_SWINGS)
     assert near[0].max() < 3.0 and near[1].max() > limits.GROWTH_ALLOWED
 

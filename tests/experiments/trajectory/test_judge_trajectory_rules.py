@@ -5,9 +5,12 @@ import pytest
 from judged import verdicts
 from trajectory_curves import FREE, HELD
 
+from compare.case import Coordinates
 from compare.experiments.trajectory import rules
 from compare.judge.check import Result
 from compare.judge.run import check_movement, required_time
+
+TWO_HINGES = Coordinates(("alpha", "beta"))
 
 
 def test_a_run_is_judged_while_its_band_is_below_a_thousandth_of_a_radian_and_nothing_has_diverged():
@@ -25,13 +28,13 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
     for off, passes in ((0.999, True), (1.001, False), (np.nan, False), (np.inf, False)):
         difference, result = np.zeros((3, 4)), Result("trajectory")
         difference[1, 3] = off
-        rules.check_level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, bar, times, {})
+        rules.check_level(result, "x", {"level": "open loop"}, TWO_HINGES, difference, bar, times, {})
         (check,), (row,) = result.checks, result.rows
         assert (check.passed, check.unit, check.note) == (passes, "rad/s", "beta at t = 0.500 s")
         assert row["worst_difference"] == check.value and (row["largest_difference"] is None) == (check.value is None)
     difference = np.array([[0.2, 0.7, 3.0, 0.0], [0.1, 0.4, 0.0, 0.0], [0.0, 0.5, 0.0, 0.9]])
     result = Result("trajectory")
-    rules.check_level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, bar, times, {})
+    rules.check_level(result, "x", {"level": "open loop"}, TWO_HINGES, difference, bar, times, {})
     assert (result.rows[0]["largest_difference"], result.rows[0]["worst_difference"]) == (0.7, 3.0)
     for off, passes in (
         (0.0, True),
@@ -39,8 +42,23 @@ def test_a_row_is_the_component_and_the_time_that_come_closest_to_the_tolerance(
         (np.nan, False),
     ):  # where rounding has nothing to add, nothing may differ
         result, difference = Result("trajectory"), np.array([[0.0, 0.0, off, 0.0]])
-        rules.check_level(result, "x", {"level": "open loop"}, ("alpha", "beta"), difference, 0.0 * bar[:1], times, {})
+        rules.check_level(result, "x", {"level": "open loop"}, TWO_HINGES, difference, 0.0 * bar[:1], times, {})
         assert result.checks[0].passed is passes
+
+
+def test_a_row_names_the_joint_of_any_kind_and_its_own_unit():
+    """A slide, then a ball: four movements, and four speeds."""
+    coordinates, one = Coordinates(("lift", "head"), ("slide", "ball")), np.ones((1, 8))
+    for place, name, unit in ((0, "lift", "m"), (3, "head z", "rad"), (4, "lift", "m/s"), (5, "head x", "rad/s")):
+        result, difference = Result("trajectory"), 0.1 * one
+        difference[0, place] = 0.9
+        rules.check_level(result, "x", {"level": "open loop"}, coordinates, difference, one, np.zeros(1), {})
+        (check,), (row,) = result.checks, result.rows
+        assert (check.unit, check.note, row["worst_unit"]) == (unit, f"{name} at t = 0.000 s", unit)
+        assert row["unit"] == "rad or m" and row["largest_difference"] == (0.9 if place < 4 else 0.1)
+    result = Result("trajectory")
+    rules.check_level(result, "x", {"level": "derivative"}, coordinates, one[:, :4], one[:, :4], np.zeros(1), {})
+    assert result.rows[0]["unit"] == "rad/s2 or m/s2" and result.checks[0].unit == "m/s2"
 
 
 def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():

@@ -3,10 +3,15 @@
 import dataclasses
 
 import pytest
+from models import PATHS
 
+from compare.case import Case, Scene
+from compare.engines.mujoco import reading
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.setup import engines as engines_of
 from tmt import kernels
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler
 
@@ -60,3 +65,20 @@ def test_a_wrong_scheme_leaves_the_band(scheme, wrong, where, engines, monkeypat
         kernels.stepper.cache_clear()
     failed = {check.quantity for check in checks if not check.passed and check.scene.startswith(where)}
     assert {"one step, TMT to MuJoCo", "open loop, TMT to MuJoCo"} <= failed
+
+
+def test_a_body_that_tumbles_tells_how_a_quaternion_is_moved(monkeypatch):
+    """RK4 that turns it by the mean of its speeds, as MuJoCo did up to 3.17, or the other way round."""
+    read = reading.read(PATHS["free_body"])
+    engines, robot = engines_of(reading.engine(read)), robot_of(read, "free_body.xml")
+    scene = Scene("tumbling", speed=(0.0, 0.0, 0.0, 200.0, 300.0, -100.0), duration=0.25, dt=1 / 64, judged=0.0)
+    case, (scheme,) = Case(robot, scene), {engines["mujoco"].methods["RK4"].scheme}
+    assert [str(check) for check in follow(case, engines, (1,)).checks if not check.passed] == []
+    monkeypatch.setitem(METHODS, scheme, METHODS["rk4_mean_speed" if scheme == "rk4" else "rk4"])
+    kernels.stepper.cache_clear()
+    try:
+        checks = follow(case, engines, (1,)).checks
+    finally:
+        kernels.stepper.cache_clear()
+    failed = {(check.scene.split(", ")[1], check.quantity) for check in checks if not check.passed}
+    assert failed == {("RK4", "one step, TMT to MuJoCo"), ("RK4", "open loop, TMT to MuJoCo")}

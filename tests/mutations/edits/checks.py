@@ -57,6 +57,7 @@ CHECKS = (
 AGREEMENTS = (
     ("mass", "rows", '"Mbar"'),
     ("gravity", "rows", '"holding torque"'),
+    ("gravity", "rows", '"holding torque, springs too"'),
     ("gravity", "rows", '"TMT: torque - dV/dq"'),
     ("gravity", "rows", '"MuJoCo: torque - dV/dq"'),
     ("gravity", "rows", '"qdd of MuJoCo under TMT\'s torque"'),

@@ -1,0 +1,70 @@
+"""What one step of a method does to a linear motion: to a deviation from a held posture, to a single mode."""
+
+import numpy as np
+
+from tmt import METHODS
+from tmt.dual import seeded
+from tmt.implicit import ImplicitRungeKutta
+from tmt.methods import RungeKutta, SemiImplicitEuler, amplification, by_speed
+
+
+def is_runge_kutta(stepping) -> bool:
+    """Whether a method is one of tmt's Runge-Kutta methods, explicit or implicit; a subclass may step otherwise."""
+    return type(stepping) in (RungeKutta, ImplicitRungeKutta)
+
+
+def linear_step(at, stepping, dt: np.ndarray) -> np.ndarray:
+    """What a step of a method does to a small deviation from a held posture, see linear.Held: (k, 2nv, 2nv) for dt (k,), s."""
+    unit, n, each = np.eye(2 * at.nv), at.nv, dt[:, None, None]
+    if type(stepping) is SemiImplicitEuler:
+        # at rest the bias has no derivative by the speeds, so it does not matter whether it is implicit
+        stiff = np.diag(by_speed(at.tree, at.tree.stiffness)) * stepping.implicit_springs
+        matrix = at.mass_matrix + each * np.diag(at.tree.damping) + each**2 * stiff
+        force = at.mass_matrix @ at.matrix[n:] - each * np.hstack([0.0 * stiff, stiff])
+        speeds = unit[n:] + each * np.linalg.solve(matrix, force)
+        return np.concatenate([unit[:n] + each * speeds, speeds], axis=1)
+    if type(stepping) is RungeKutta:
+        stages, Z = [], each * at.matrix
+        for row in stepping.A:
+            stages.append(Z @ (unit + sum(a * stage for a, stage in zip(row, stages))))
+        return unit + sum(b * stage for b, stage in zip(stepping.b, stages))
+    if type(stepping) is ImplicitRungeKutta:
+        s = len(stepping.b)
+        coupled = np.eye(2 * n * s) - each * np.kron(stepping.A, at.matrix)
+        stages = np.linalg.solve(coupled, each * np.tile(at.matrix, (s, 1))).reshape(-1, s, 2 * n, 2 * n)
+        return unit + np.einsum("i,kiab->kab", stepping.b, stages)
+    return amplification(stepping, at.tree, at.q, np.zeros(n), at.tau, dt)
+
+
+def growth_of(stepping, z: np.ndarray) -> np.ndarray:
+    """What a step of a Runge-Kutta method makes of 1 where y' = lambda y, for z = lambda dt of any shape."""
+    if type(stepping) is ImplicitRungeKutta:
+        A = np.eye(len(stepping.b)) - z[..., None, None] * np.array(stepping.A)
+        stages = np.linalg.solve(A, np.ones((len(stepping.b), 1)))[..., 0]
+        return 1.0 + z * (stages @ np.array(stepping.b))
+    stages = []
+    for row in stepping.A:
+        stages.append(1.0 + z * sum(a * stage for a, stage in zip(row, stages) if a))
+    return 1.0 + z * sum(b * stage for b, stage in zip(stepping.b, stages) if b)
+
+
+def region(name: str, z: np.ndarray) -> np.ndarray:
+    """Growth in one step of a single hinge whose eigenvalues times dt are z and its conjugate, shape of z.
+
+    The step is taken on qdd = -|z|^2 q + 2 Re(z) qd with dt = 1; so it exists for partitioned methods too, whose growth
+    depends on the pair. At most 1: stable.
+    """
+    stepping = METHODS[name]
+    size, rate = np.abs(z) ** 2, 2.0 * z.real
+    inertia = 1.0 - rate if stepping.damps_implicitly else 1.0
+
+    def slope(q, qd):
+        return [(qd[0] * rate - q[0] * size) / inertia]
+
+    state = seeded([np.zeros_like(size), np.zeros_like(size)], np.eye(2).reshape(2, 2, *(1 for _ in z.shape)))
+    with np.errstate(all="ignore"):
+        q, qd = stepping.step(slope, state[:1], state[1:], 1.0)
+        J = np.array([np.broadcast_to(part[0].slope, (2, *z.shape)) for part in (q, qd)])
+        half, determinant = 0.5 * (J[0, 0] + J[1, 1]), J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+        root = np.sqrt(half**2 - determinant + 0j)
+        return np.maximum(np.abs(half + root), np.abs(half - root))

@@ -1,0 +1,145 @@
+"""Scales of any robot, each entry's own: the sums of absolute terms, written out body by body."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import tmt
+from compare.judge import entries, scale
+
+MOMENTS = ((0.02, 0.03, 0.04), (0.001, 0.002, 0.002), (0.01, 0.01, 0.02))
+TREE = tmt.Tree(  # a slide, on it a hinge, on that a ball; and a hinge of its own beside them
+    hinge_names=("rail", "swing", "wrist", "lid"),
+    parent=(-1, 0, 1, -1),
+    offset=((0.0, 0.0, 0.3), (0.0, 0.2, 0.0), (0.4, 0.0, 0.0), (0.0, -0.6, 0.0)),
+    axis=((1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+    damping=(0.4, 0.0, 0.1, 0.1, 0.1, 0.0),
+    body_names=("cart", "bob", "door"),
+    body_hinge=(0, 2, 3),
+    mass=(2.0, 0.5, 1.5),
+    com=((0.0, 0.0, 0.1), (0.0, 0.0, -0.2), (0.3, 0.0, 0.0)),
+    inertia=tuple(tuple(map(tuple, np.diag(moments))) for moments in MOMENTS),
+    gravity=(0.0, 3.0, -4.0),
+    kind=("slide", "hinge", "ball", "hinge"),
+    armature=(0.3, 0.02, 0.0, 0.0, 0.0, 0.0),
+    stiffness=(20.0, 5.0, 2.0, 0.0),
+    rest=(0.1, -0.3, 1.0, 0.0, 0.0, 0.0, 0.0),
+    reference=(0.05, 0.0, 0.0, 0.0),
+)  # fmt: skip
+SLIDES = np.array([[1, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]])
+TURNS = np.array([[0, 0, 0, 0, 0, 0], [0, 1, 1, 1, 1, 0], [0, 0, 0, 0, 0, 1]])
+COUNT = (1, 2, 1)  # of hinges and balls on the way to each body, at least 1
+LARGEST = (0.04, 0.002, 0.02)  # moments of inertia
+Q = np.array([[-0.7, 0.4, *np.array([1.0, 2.0, 0.0, 2.0]) / 3.0, 1.0], [0.05, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
+QD = np.array([[0.5, -1.0, 2.0, 0.0, 1.0, -3.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+LENGTH = np.array([0.3 + 0.75 + 0.2 + 0.4 + 0.2, 0.3 + 0.2 + 0.4 + 0.2])  # of the bob, the farthest
+OF = entries.Entries(TREE, Q, QD)
+
+
+def summed(of_body) -> np.ndarray:
+    """The sum over states and bodies of what a body's number and L give, each k times."""
+    return np.array([sum(COUNT[b] * of_body(b, s, L) for b in range(3)) for s, L in enumerate(LENGTH)])
+
+
+def test_the_reach_has_what_slides_have_moved():
+    assert np.allclose(scale.reaches(TREE, Q)[0], [0.3 + 0.75 + 0.1, LENGTH[0], 0.6 + 0.3], rtol=1e-14)
+    assert np.allclose(scale.reaches(TREE), [0.4, LENGTH[1], 0.9], rtol=1e-14)
+    assert scale.gravity_scale(TREE, Q)[0] == pytest.approx(5.0 * np.dot(TREE.mass, [1.15, LENGTH[0], 0.9]), rel=1e-14)
+    assert np.allclose(OF.length, LENGTH, rtol=1e-14)
+
+
+def test_a_column_of_a_slide_has_no_length():
+    T = np.broadcast_to(OF.T, (2, 3, 3, 6))
+    for b in range(3):
+        assert np.allclose(T[0, b, 1], COUNT[b] * (SLIDES[b] + LENGTH[0] * TURNS[b]))
+        assert np.allclose(OF.B[0, b], COUNT[b]) and np.allclose(OF.positions[:, b, 0], COUNT[b] * LENGTH)
+
+
+def test_the_mass_matrix_sums_every_term_where_it_is_largest():
+    expected = summed(
+        lambda b, s, L: (
+            TREE.mass[b] * np.outer(SLIDES[b] + L * TURNS[b], SLIDES[b] + L * TURNS[b])
+            + LARGEST[b] * np.outer(TURNS[b], TURNS[b])
+        )
+    ) + np.diag(TREE.armature)
+    assert np.allclose(OF.mass_matrix, expected, rtol=1e-13)
+    assert (OF.mass_matrix >= np.abs(tmt.mass_matrix(Q, TREE))).all()
+    assert OF.mass_matrix[0, 1, 5] == 0.0  # no body is moved by both
+
+
+def test_forces_sum_weight_springs_and_what_moves():
+    weight = summed(lambda b, s, L: 5.0 * TREE.mass[b] * (SLIDES[b] + L * TURNS[b]))
+    assert np.allclose(OF.weight, weight, rtol=1e-14)
+    springs = np.array([[20.0 * 0.8, 5.0 * 0.7, 2 * np.pi, 2 * np.pi, 2 * np.pi, 0.0]])
+    assert np.allclose(OF.holding[0], weight[0] + springs[0], rtol=1e-14)
+
+    def moving(b, s, L):
+        S, V = np.abs(QD[s]) @ TURNS[b], np.abs(QD[s]) @ SLIDES[b]
+        newton = 2 * TREE.mass[b] * S * (L * S + V)
+        return newton * (SLIDES[b] + L * TURNS[b]) + (TREE.mass[b] * V**2 + LARGEST[b] * S**2) * TURNS[b]
+
+    assert np.allclose(OF.bias, summed(moving) + weight, rtol=1e-13)
+    assert np.array_equal(OF.bias[1], OF.weight[1])  # at rest
+    tau, drag = np.full(6, 3.0), np.array(TREE.damping) * np.abs(QD)
+    assert np.allclose(OF.force(tau)[0], OF.bias[0] + 3.0 + drag[0] + springs[0], rtol=1e-14)
+
+
+def test_energies_have_the_springs():
+    g = 5.0 * np.dot(COUNT, TREE.mass) * LENGTH[0]
+    springs = 20.0 * 0.8**2 / 2 + 5.0 * 0.7**2 / 2 + 3 * 2.0 * np.pi**2 / 2
+    assert OF.potential_energy[0] == pytest.approx(g + springs, rel=1e-14)
+    speeds = np.abs(QD[0])
+    assert OF.energy[0] == pytest.approx(g + springs + speeds @ OF.mass_matrix[0] @ speeds / 2, rel=1e-14)
+
+
+def test_errors_go_through_the_inverse_entry_by_entry():
+    M, force, qdd = tmt.mass_matrix(Q, TREE)[0], OF.force(1.0), np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0]] * 2)
+    root = np.sqrt(np.diag(M))
+    residual = (OF.mass_matrix[0] + np.outer(root, root)) @ np.abs(qdd[0]) + force[0]
+    assert np.allclose(OF.acceleration(force, qdd)[0], np.abs(np.linalg.inv(M)) @ residual, rtol=1e-12)
+    assert np.allclose(OF.closing(force, qdd)[0], 2 * residual, rtol=1e-13)
+    assert OF.power(force, qdd)[0] == pytest.approx(2 * residual @ np.abs(QD[0]), rel=1e-13)
+    assert np.allclose(OF.change(qdd)[0], OF.closing(OF.force(), qdd)[0])
+
+
+def test_units_of_joints_change_nothing_but_their_own_entries():
+    """The same robot with its slide measured in mm: what each entry is off by stays the same share of its scale."""
+    M = tmt.mass_matrix(Q, TREE)
+    units = np.array([1e-3, 1.0, 1.0, 1.0, 1.0, 1.0])
+    in_mm = M * np.outer(units, units)
+    assert np.linalg.cond(in_mm[0]) > 10 * np.linalg.cond(M[0])
+    force, qdd = OF.force(1.0), np.ones((2, 6))
+    turned = np.abs(np.linalg.inv(in_mm[0])) @ (units * OF.residual(force, qdd)[0])
+    assert np.allclose(turned * units, OF.acceleration(force, qdd)[0], rtol=1e-9)
+
+
+def test_without_gravity_at_rest_nothing_is_allowed_and_nothing_asked():
+    weightless = dataclasses.replace(TREE, gravity=(0.0, 0.0, 0.0))
+    of = entries.Entries(weightless, Q[1:], QD[1:])
+    assert not of.bias.any() and not of.weight.any()
+    assert not tmt.bias(Q[1], QD[1], weightless).any()
+    assert of.acceleration(of.force(1.0), 0.0).min() > 0.0
+
+
+def test_stated_hinges_keep_one_number_for_each_state():
+    q, qd = np.random.default_rng(3).uniform(-3, 3, (2, 5, 3))
+    of = entries.scales(tmt.ARM, False, q, qd)
+    assert isinstance(of, entries.Numbers)
+    assert np.array_equal(of.bias, scale.bias_scale(tmt.ARM, q, qd))
+    assert np.array_equal(of.mass_matrix, scale.mass_scale(tmt.ARM, q))
+    assert of.weight == scale.gravity_scale(tmt.ARM) and of.positions == scale.reaches(tmt.ARM).max()
+    for changed in (
+        {"kind": ("slide", "hinge", "hinge")},
+        {"armature": (0.0, 0.1, 0.0)},
+        {"stiffness": (0.0, 0.0, 1.0)},
+    ):
+        tree = dataclasses.replace(tmt.ARM, **changed)
+        assert isinstance(entries.scales(tree, False, q, qd), entries.Entries)
+    assert isinstance(entries.scales(tmt.ARM, True, q, qd), entries.Entries)
+
+
+def test_units_are_those_of_the_joints_that_there_are():
+    assert entries.unit(tmt.ARM, "N m", "N") == "N m" and entries.unit(TREE, "N m", "N") == "N m or N"
+    sliding = dataclasses.replace(tmt.ARM, kind=("slide",) * 3)
+    assert entries.unit(sliding, "N m", "N") == "N"

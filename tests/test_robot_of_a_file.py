@@ -1,0 +1,112 @@
+"""A robot that is read from a file: postures, scenes, and the damping and steps that are chosen for it."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from models import PATHS, random_tree
+
+import tmt
+from compare.engines.mujoco import engine, read
+from compare.robots.file import COARSER, DURATION, added_damping, coarsest, robot_of, scenes_from
+
+ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
+
+
+def reading_of(tree, **more):
+    """What a reader gives of a tree, with changes."""
+    known = {"name": "", "source": "text", "tree": tree, "features": ("one",), "keyframes": {}, "dt": 0.002}
+    known |= {"qpos0": np.array(tree.zero), "ranges": (None,) * len(tree.hinge_names)}
+    return SimpleNamespace(**known | more)
+
+
+def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
+    arm, ranges = tmt.ARM, ((-1.0, 2.0), None, (0.0, 1.0))
+    keys = {"home": np.array([0.1, 0.2, 0.3]), "again": np.array([0.1, 0.2, 0.3]), "middle": np.zeros(3)}
+    robot = robot_of(reading_of(arm, keyframes=keys, ranges=ranges), "my.xml")
+    # the key called middle is zero, as qpos0 is; the middle of the ranges keeps its name
+    assert list(robot.poses) == ["home", "key middle", "middle"]
+    np.testing.assert_array_equal(robot.posture("middle"), [0.5, 0.0, 0.5])
+    assert {scene.posture for scene in robot.scenes} == {"home"}
+    assert list(robot_of(reading_of(arm, ranges=ranges), "my.xml").poses) == ["qpos0", "middle"]
+    assert robot_of(reading_of(arm, ranges=ranges), "my.xml").scenes[0].posture == "middle"
+    alone = robot_of(reading_of(arm), "my.xml")
+    assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0"
+    assert alone.ranges == (None,) * 3 and alone.is_read
+
+
+def test_quaternions_of_one_turn_are_one_posture():
+    reading = read(PATHS["pendulum_ball"])
+    keys = {"turned": -np.array(reading.qpos0)}
+    assert list(robot_of(replace(reading, keyframes=keys), "p.xml").poses) == ["turned"]
+    near = reading.qpos0.copy()
+    near[:4] = [np.cos(1e-8), np.sin(1e-8), 0.0, 0.0]
+    assert list(robot_of(replace(reading, keyframes={"near": near}), "p.xml").poses) == ["near", "qpos0"]
+
+
+def test_its_name_is_the_models_or_the_files():
+    assert robot_of(reading_of(tmt.ARM), "folder/my arm.xml").name == "my arm"
+    named = robot_of(reading_of(tmt.ARM, name="lift"), "folder/my arm.xml")
+    assert (named.name, named.described, named.mjcf) == ("lift", "folder/my arm.xml", Path("folder/my arm.xml"))
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_every_scene_is_one_of_the_robot_in_both_engines(name):
+    reading = read(PATHS[name])
+    robot, mujoco = robot_of(reading, f"{name}.xml"), engine(reading)
+    assert all("own" in scene.tags and scene.judged == 0.0 for scene in robot.scenes)
+    for case in robot.cases:
+        ours = tmt.acceleration(case.q, case.v, case.tau, case.tree)
+        theirs = mujoco.of(case).acceleration(case.q, case.v, case.tau)
+        assert np.abs(ours - theirs).max() <= 1e-9 * (1.0 + np.abs(ours).max())
+        assert np.abs(ours).max() < 1e-6 or not case.is_held
+    is_free = any(feature.feature == "free" for feature in robot.features)
+    assert any(scene.name.endswith("thrown") for scene in robot.scenes) == is_free
+
+
+def test_what_rests_where_it_is_let_go_is_set_going():
+    still = replace(tmt.ARM, gravity=(0.0, 0.0, 0.0))
+    names = [scene.name for scene in robot_of(reading_of(still), "my.xml").scenes]
+    assert names == ["qpos0, set going", "qpos0, set going, damped"]
+    # by as little as can be seen, and a little more
+    for size, found in ((1e-7, "set going"), (1e-5, "let go")):
+        tree = replace(still, gravity=(0.0, 0.0, -size))
+        scenes = scenes_from(tree, "qpos0", np.zeros(3), 0.002)
+        accelerations = np.abs(tmt.acceleration(np.zeros(3), np.zeros(3), np.zeros(3), tree)).max()
+        assert (accelerations < 1e-6) == (found == "set going")
+        assert scenes[-1].name == f"qpos0, {found}, damped"
+
+
+def test_added_damping_lets_every_joint_decay_at_one_rate():
+    inverse = np.array([[4.0, 1.0], [1.0, 0.25]])
+    for accelerations, rate in (([0.0, 0.0], 2.0), ([1.0, -1.0], 2.0), ([4.0, -16.0], 8.0)):
+        damping = added_damping(inverse, np.array(accelerations))
+        np.testing.assert_allclose(np.diag(inverse) * damping, rate)
+
+
+def test_steps_are_four_of_the_files_own_and_no_longer_than_the_fastest_rate():
+    inertia = float(tmt.mass_matrix(np.zeros(1), ONE)[0, 0])
+    inverse = np.array([[1.0 / inertia]])
+
+    def count(dt, rate=0.0, swing=0.0, added=()):
+        return coarsest(replace(ONE, damping=(rate * inertia,), stiffness=(swing**2 * inertia,)), inverse, dt, added)
+
+    assert count(1.0) == 64 and count(DURATION / 64 / COARSER) == 64
+    assert count(0.99 * DURATION / 64 / COARSER) == 128 and count(1e-9) == 8192
+    assert count(1.0, rate=63.9) == 64 and count(1.0, rate=64.9) == 128
+    assert count(1.0, swing=63.9) == 64 and count(1.0, swing=64.9) == 128
+    assert count(1.0, rate=40.0, added=(30.0 * inertia,)) == 128
+
+
+def test_random_trees_have_scenes_that_both_engines_start_alike():
+    for seed in range(3):
+        reading = read(random_tree(seed))
+        robot, mujoco = robot_of(reading, "tree.xml"), engine(reading)
+        for case in robot.cases:
+            scale = 1.0 + np.abs(tmt.acceleration(case.q, case.v, case.tau, case.tree)).max()
+            off = mujoco.of(case).acceleration(*case.start, case.tau) - tmt.acceleration(
+                *case.start, case.tau, case.tree
+            )
+            assert np.abs(off).max() < 1e-9 * scale

@@ -1,0 +1,79 @@
+"""Momenta that no inner force changes, against the bodies' own, and against their motion."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from models import PATHS
+
+import tmt
+from compare.engines.mujoco import reading
+from compare.experiments.acceleration import rate
+from compare.truth.conserved import conserved
+from tmt import method
+
+RNG = np.random.default_rng(5)
+
+
+def tree_of(name):
+    return reading.read(PATHS[name]).tree
+
+
+def some_state(tree):
+    """q (1, nq) and qd (1, nv), its quaternions of length 1."""
+    u, qd = RNG.normal(size=(2, tree.coordinates.nv))
+    return np.array([tree.coordinates.move(list(tree.zero), list(u))], dtype=float), qd[None]
+
+
+def bodies_momentum(tree, q, qd):
+    """Linear and angular momentum about the origin of the bodies alone, without rotors, by sums over the bodies."""
+    x = tmt.com_positions(q, tree)[0]
+    T, B = tmt.jacobians(q, tree)
+    linear, angular, frames = np.zeros(3), np.zeros(3), method.joint_frames(tree, q[0].tolist())
+    for b, mass in enumerate(tree.mass):
+        p = mass * T[0, b] @ qd[0]
+        turn = np.array([list(row) for row in frames[tree.body_hinge[b]].turn])
+        linear, angular = linear + p, angular + np.cross(x[b], p) + turn @ np.array(tree.inertia[b]) @ B[0, b] @ qd[0]
+    return linear, angular
+
+
+def test_a_free_robot_has_the_momenta_of_its_bodies():
+    tree = tree_of("quadruped")
+    q, qd = some_state(tree)
+    linear, angular = (np.array(m.momentum(list(q[0]), list(qd[0]))) for m in conserved(tree))
+    assert [m.name for m in conserved(tree)] == ["linear momentum", "angular momentum"]
+    expected = bodies_momentum(tree, q, qd)
+    assert np.allclose(linear, expected[0], atol=1e-12) and np.allclose(angular, expected[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["quadruped", "pendulum_ball", "gripper", "mixed", "arm6"])
+def test_it_changes_by_the_force_at_the_joints_that_carry_all(name):
+    tree = dataclasses.replace(tree_of(name), gravity=(0.0, 0.0, 0.0))
+    q, qd = some_state(tree)
+    tau = RNG.normal(size=qd.shape)
+    qdd = tmt.acceleration(q, qd, tau, tree)
+    force = tau - np.array(tree.damping) * qd - tmt.spring_torque(q, tree)
+    for momentum in conserved(tree):
+        change = np.stack(rate(momentum.momentum, tree, q, qd, qdd), axis=-1)
+        assert np.allclose(change, momentum.effect(q, force), atol=1e-10 * np.abs(force).max() * tree.coordinates.nv)
+        sizes = momentum.size(q, np.abs(force))
+        assert (np.abs(momentum.effect(q, force)) <= sizes * (1 + 1e-12)).all()
+
+
+def test_which_momenta_there_are():
+    names = {name: [m.name for m in conserved(tree_of(name))] for name in ("arm6", "free_body", "pendulum_ball")}
+    arm = tree_of("arm6")
+    assert names["arm6"] == [f"p_{arm.hinge_names[0]}"] and conserved(arm)[0].unit == "N m"
+    assert names["free_body"] == ["linear momentum", "angular momentum"] and names["pendulum_ball"] == [
+        "angular momentum"
+    ]
+    sliding = dataclasses.replace(arm, kind=("slide",) + arm.kind[1:])
+    assert conserved(sliding)[0].unit == "N"
+    ball, free = tree_of("pendulum_ball"), tree_of("free_body")
+    assert conserved(dataclasses.replace(ball, armature=(0.1, 0.1, 0.2, 0, 0, 0))) == ()
+    assert len(conserved(dataclasses.replace(ball, armature=(0.1, 0.1, 0.1, 0, 0.3, 0)))) == 1
+    assert [m.kind for m in conserved(dataclasses.replace(free, armature=(0, 0, 0, 0.1, 0, 0)))] == ["linear"]
+    assert [m.kind for m in conserved(dataclasses.replace(free, armature=(0.2,) * 3 + (0.1,) * 3))] == [
+        "linear",
+        "angular",
+    ]
