@@ -8,6 +8,7 @@ import tmt
 from compare.engines import Method
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import engine, read
+from compare.engines.scipy import Scipy
 from compare.experiments.speed import accuracy, advice, evaluations, floors, settings, tumbling
 from compare.judge.check import Result
 from compare.judge.rounding import growth
@@ -206,3 +207,10 @@ def test_errors_below_what_is_known_have_its_size(gripper):
     row = speed.row_of_run(case, case, known, known["tmt"].methods["dopri8"], setting, truth, 1e-11)
     assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]
     assert Setup.small(robot, known).robot is robot
+
+
+def test_a_coarse_run_of_scipy_has_quaternions_of_length_1(stone):
+    case, exact = stone
+    motion = Scipy().of(case).run(*case.start, case.tau, tumbling.TUMBLED / 8, 8, "RK45", tolerance=1e-2)
+    assert np.abs(np.linalg.norm(motion.q, axis=1) - 1.0).max() < 1e-15
+    assert 1e-6 < np.abs(case.coordinates.difference(motion.q, exact)).max()
