@@ -32,12 +32,12 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     if many:
         large = coordinates.nv > LARGE
         angles, states = 1, setup.of(4 if large else STATES_OF_SUBSET, 2 if large else 4, 2)
-        sets = sets[:: setup.of(1, 6 if large else 3, 6)]
-        chosen = "each joint alone and" if setup.size == "full" else "of each joint alone and"
-        result.notes.append(
-            f"Of the subsets of {len(robot.joints)} joints {len(sets)} are locked, {chosen} {RANDOM_SUBSETS} chosen at random"
-            f"{'' if setup.size == 'full' else ' every so many'}."
-        )
+        stride = setup.of(1, 6 if large else 3, 6)
+        sets = sets[::stride]
+        chosen = f"each joint alone and {RANDOM_SUBSETS} chosen at random"
+        if stride > 1:
+            chosen = f"one in {stride} of {chosen}, all of which are those of a full run"
+        result.notes.append(f"Of the subsets of {len(robot.joints)} joints {len(sets)} are locked: {chosen}.")
     for locked in sets:
         found = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
