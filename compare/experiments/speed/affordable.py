@@ -44,5 +44,8 @@ def left_out_in_words(tree: tmt.Tree) -> list[str]:
             "place, and neither the kernel nor the literal form is timed."
         ]
     if not literal_is_compiled(tree):
-        return [f"The literal form is not compiled: its {lengths(tree)[0]} operations would take too long."]
+        return [
+            f"The literal form, whose {lengths(tree)[0]} operations would take too long to compile, is not, and neither is the "
+            "composite form with the library's sine."
+        ]
     return []

@@ -106,11 +106,11 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
         yield RK4_STEP, LOOP, steps
         return
     forward, terms = kernels.evaluator(tree, FORWARD), kernels.evaluator(tree, TERMS)
-    library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
     if literal_is_compiled(tree):
         literal = kernels.evaluator(tree, FORWARD, method.mass_matrix_and_bias, "library_sincos")
+        library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
         yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
-    yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
+        yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
     yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)
     yield TERMS, WAITING, lambda count: terms.chain(q, qd, tau, count)
     yield RK4_STEP, EACH, steps
