@@ -115,7 +115,9 @@ def estimated(method: Method, tree: Tree) -> float:
     evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
     if method.adaptive:
         return evaluation
-    return evaluation * stepping.stages * (2 * n * ITERATIONS if stepping.solves_stages else 1)
+    if stepping.solves_stages:
+        return evaluation * stepping.stages * 2 * n * ITERATIONS
+    return evaluation * stepping.stages * (n if getattr(stepping, "implicit_bias", False) else 1)
 
 
 def settings_of(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
