@@ -96,7 +96,7 @@ def test_steps_of_a_large_robot_end_sooner(gripper):
     large = settings.regular_of(robot_of(read(PATHS["humanoid29_free"]), "humanoid29_free.xml"))
     method = Method("tmt", "rk4", 4, "rk4")
     finest = [settings.halvings(method, case)[-1].steps for case in (small, large)]
-    assert finest[0] >= 2**15 and finest[1] == large.steps * 4
+    assert finest[0] >= 2**15 and finest[1] <= 1024
     assert settings.halvings(method, settings.regular_of(ARM))[-1].steps == settings.FINEST["tmt"]
 
 
