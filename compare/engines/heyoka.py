@@ -13,7 +13,7 @@ from tmt.space import arctan, cos, sin, sqrt
 
 from ..case import Case
 from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
-from .scipy import as_far_as_it_goes, each
+from .scipy import as_far_as_it_goes, each, of_length_1
 from .tmt import TmtDynamics
 
 FULL = 1e-15  # tolerance: all digits of a double
@@ -88,7 +88,8 @@ class HeyokaDynamics(TmtDynamics):
         def read(outcome):
             why, *_, steps, _, path = outcome
             path, ended = as_far_as_it_goes(t, path, start, f"heyoka stops: {why}")
-            return Motion(t, *np.split(path, [self.coordinates.nq], axis=1), None, ended, int(steps))
+            q, v = np.split(path, [self.coordinates.nq], axis=1)
+            return Motion(t, of_length_1(self.coordinates, q), v, None, ended, int(steps))
 
         return run, read
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from tmt import kernels
 
-from ..case import Case
+from ..case import Case, Coordinates
 from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .tmt import TmtDynamics
 
@@ -101,13 +101,22 @@ class ScipyDynamics(TmtDynamics):
             path, ended = as_far_as_it_goes(t, found, start, why)
             for ball in self.coordinates.places.balls:
                 path[:, ball.q] /= np.linalg.norm(path[:, ball.q], axis=1, keepdims=True)
-            return Motion(t, *np.split(path, [self.coordinates.nq], axis=1), evaluations, ended)
+            q, v = np.split(path, [self.coordinates.nq], axis=1)
+            return Motion(t, of_length_1(self.coordinates, q), v, evaluations, ended)
 
         return run, read
 
 
 class NotFinite(ArithmeticError):
     """A slope at a time, s, that is not finite."""
+
+
+def of_length_1(coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
+    """Positions (times, nq) with each quaternion divided by its length, which a coarse tolerance lets drift."""
+    q = q.copy()
+    for joint in coordinates.places.balls:
+        q[:, joint.q] /= np.linalg.norm(q[:, joint.q], axis=1, keepdims=True)
+    return q
 
 
 def as_far_as_it_goes(t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:

@@ -18,6 +18,7 @@ ALL_SUBSETS, RANDOM_SUBSETS = (
     6,
     20,
 )  # joints up to which all subsets are locked; of more each alone and so many at random
+LARGE = 12  # speeds, of more fewer states are taken, and subsets in a run that is not full
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}  # of a robot that has slides
 
@@ -29,13 +30,14 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     coordinates, many = robot.coordinates, len(robot.joints) > ALL_SUBSETS
     sets, states = subsets(robot.joints), STATES_OF_SUBSET
     if many:
-        angles, states = 1, setup.of(STATES_OF_SUBSET, 4, 2)
-        sets = sets[:: setup.of(1, 3, 6)]
-        chosen = "each joint alone and" if setup.size == "full" else "of each joint alone and"
-        result.notes.append(
-            f"Of the subsets of {len(robot.joints)} joints {len(sets)} are locked, {chosen} {RANDOM_SUBSETS} chosen at random"
-            f"{'' if setup.size == 'full' else ' every so many'}."
-        )
+        large = coordinates.nv > LARGE
+        angles, states = 1, setup.of(4 if large else STATES_OF_SUBSET, 2 if large else 4, 2)
+        stride = setup.of(1, 6 if large else 3, 6)
+        sets = sets[::stride]
+        chosen = f"each joint alone and {RANDOM_SUBSETS} chosen at random"
+        if stride > 1:
+            chosen = f"one in {stride} of {chosen}, all of which are those of a full run"
+        result.notes.append(f"Of the subsets of {len(robot.joints)} joints {len(sets)} are locked: {chosen}.")
     for locked in sets:
         found = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):

@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ...case import Case
-from ...engines import COMPARED, GRID, LABELS, Engine, Method, Setting
+from ...engines import COMPARED, GRID, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.run import diverged_at, unit_of
@@ -21,15 +21,15 @@ from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets, tumbling
 from .floors import floor
 from .settings import (
-    MOST_SECONDS,
+    absent_in_words,
     coarsest_steps,
-    estimated,
     followed,
-    left_out,
     methods,
     regular_of,
     scenes_of,
     settings_of,
+    too_long_next,
+    unavailable,
 )
 
 TITLE = "Speed against accuracy"
@@ -60,10 +60,7 @@ def tolerance(robot: Robot) -> str:
     made = "a table, made again in part by the tests" if ours else "made for what no table has, and kept"
     runs = f"runs with many digits ({made})"
     if robot.is_read:
-        runs = (
-            f"a run in doubles by tmt's {DOUBLES}, whose steps are halved as long as that brings two runs nearer to each other: "
-            "what is left between them, or rounding, is the smallest error that can be seen"
-        )
+        runs = f"a run in doubles by tmt's {DOUBLES}, whose digits are seen by halving its steps: smaller errors are not known"
     what = "angles" if unit_of(robot.coordinates) == "rad" else f"movements ({unit_of(robot.coordinates)})"
     return (
         f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {runs}. Checked: "
@@ -119,7 +116,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     complete = (whole or not timed) and not setup.robot.is_read
     result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete)
     if timed and setup.robot.coordinates.has_balls:
-        result.tables["speed_orders"] += tumbling.orders(result, setup.engines)
+        result.tables["speed_orders"] += tumbling.orders_on_a_body(result, setup.engines)
     schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
     accuracy.check_same_schemes(result, floors, schemes, unit)
     accuracy.check_smallest_errors(result, floors, unit)
@@ -160,25 +157,6 @@ def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Seq
     result.notes += accuracy.smaller_models_in_words(result.rows)
 
 
-def unavailable(setup: Setup, names: Sequence[str]) -> list[dict]:
-    """A row for each scene, each engine that cannot take part and why: with its methods that are left out; no numbers."""
-    groups = {}
-    for (engine, method), reason in left_out(setup.engines, setup.size, setup.robot).items():
-        groups.setdefault((engine, reason), []).append(method)
-    return [
-        {"scene": name, "engine": engine, "method": ", ".join(out), "why_not": reason}
-        for name in names
-        for (engine, reason), out in groups.items()
-    ]
-
-
-def absent_in_words(row: dict, engines: Mapping[str, Engine]) -> str:
-    """Who takes no part and why, in a sentence."""
-    whole = row["method"] == ", ".join(engines[row["engine"]].methods)
-    who = LABELS.get(row["engine"], row["engine"])
-    return f"{who if whole else row['engine'] + ' ' + row['method']} takes no part: {row['why_not']}."
-
-
 def rows_of_scene(
     case: Case, engines: Mapping[str, Engine], known: Mapping[str, Reference], size: str, which: str
 ) -> tuple[list[dict], float]:
@@ -192,18 +170,13 @@ def rows_of_scene(
         for setting in settings_of(method, case, size, which):
             found.append(row_of_run(case, case, engines, method, setting, reference, left))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
-            if accuracy.gained_nothing(now, work, best, last, left) or too_long(method, case, work, size):
+            if accuracy.gained_nothing(now, work, best, last, left) or too_long_next(method, case, work, size):
                 break
             best, last = min(best, now), work
     smaller = None if case.robot.is_read else reduced(case)
     few = [method for method in taking if smaller and (method.engine, method.name) in SMALLER]
     setting = Setting(case.duration, SMALLER_STEPS)
     return found + [row_of_run(smaller, case, engines, method, setting, reference) for method in few], left
-
-
-def too_long(method: Method, case: Case, work: int, size: str) -> bool:
-    """Whether the next tolerance of a method that chooses its own steps would take too long with the robot of a file."""
-    return case.robot.is_read and method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2.0
 
 
 def row_of_run(

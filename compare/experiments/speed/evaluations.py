@@ -9,17 +9,16 @@ import tmt
 from tmt import generic, kernels, method
 from tmt.methods import METHODS
 
-from ...case import SEED, Case, Coordinates
+from ...case import SEED, Case
 from ...judge import timing
 from ...setup import Setup
+from .affordable import MOST_RESULTS, left_out_in_words, lengths, literal_is_compiled, most_states, states_of
 from .settings import coarsest_steps, regular_of
 
 STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
 TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
 MOST_CALLS = 100_000  # of the same in a call that is timed
-MOST_RESULTS = 10_000_000  # of the results of many states, of a robot of many joints
-MOST_LITERAL = 3000  # operations of the literal form, up to which its straight-line code is compiled
 IN_PYTHON = 12  # up to which the literal form is timed in Python
 FORWARD, TERMS, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
@@ -50,45 +49,8 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
         taken = timing.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
     overhead = simulate_overhead(regular_of(setup.robot))
-    words = costs_in_words(nanoseconds, overhead, operations(tree), setup.robot.name, missing)
+    words = costs_in_words(nanoseconds, overhead, lengths(tree), setup.robot.name, missing)
     return evaluation_rows(nanoseconds), words + left_out_in_words(tree)
-
-
-def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) -> list[np.ndarray]:
-    """Random positions (count, nq), speeds and torques (count, nv)."""
-    if set(coordinates.all_kinds) == {"hinge"}:
-        return list(rng.uniform(-3.0, 3.0, (3, count, coordinates.nv)))
-    return [coordinates.random(rng, count), *rng.uniform(-3.0, 3.0, (2, count, coordinates.nv))]
-
-
-def most_states(tree: tmt.Tree) -> int:
-    """How many states are evaluated at once at most, a power of ten."""
-    n = len(tree.axis)
-    return int(10.0 ** np.floor(np.log10(MOST_RESULTS / (n * (n + 3) // 2))))
-
-
-def operations(tree: tmt.Tree) -> list[int] | None:
-    """Of the straight-line code of the literal and of the composite form; None: none is made for so many joints."""
-    if not kernels.is_evaluated_straight(tree):
-        return None
-    return [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
-
-
-def literal_is_compiled(tree: tmt.Tree) -> bool:
-    """Whether the literal form of a tree is short enough for its compilation."""
-    return kernels.is_evaluated_straight(tree) and operations(tree)[0] <= MOST_LITERAL
-
-
-def left_out_in_words(tree: tmt.Tree) -> list[str]:
-    """What is not timed, and why, in sentences."""
-    if not kernels.is_evaluated_straight(tree):
-        return [
-            f"Straight-line code for {len(tree.axis)} speeds would take too long to compile: the loop over any tree takes its "
-            "place, and neither the kernel nor the literal form is timed."
-        ]
-    if not literal_is_compiled(tree):
-        return [f"The literal form is not compiled: its {operations(tree)[0]} operations would take too long."]
-    return []
 
 
 def per_state(counts: dict, times: list[list[float]]) -> dict:
@@ -144,11 +106,11 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
         yield RK4_STEP, LOOP, steps
         return
     forward, terms = kernels.evaluator(tree, FORWARD), kernels.evaluator(tree, TERMS)
-    library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
     if literal_is_compiled(tree):
         literal = kernels.evaluator(tree, FORWARD, method.mass_matrix_and_bias, "library_sincos")
+        library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
         yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
-    yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
+        yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
     yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)
     yield TERMS, WAITING, lambda count: terms.chain(q, qd, tau, count)
     yield RK4_STEP, EACH, steps

@@ -30,12 +30,7 @@ def colour_of(engine: str) -> str:
     return COLOURS.get(engine, GREY)
 
 
-def unit_of(result: Result) -> str:
-    """The unit of the errors."""
-    return result.curves.get("unit", "rad")
-
-
-def floor_in_words(result: Result) -> str:
+def least_in_words(result: Result) -> str:
     """What the least error is, in the legend."""
     return "what is known of the reference" if result.curves.get("doubles") else "rounding: eps × growth"
 
@@ -107,10 +102,10 @@ def draw_times(result: Result, scene: str) -> tuple[str, Figure, str]:
     )  # fmt: skip
     for engine in dict.fromkeys(engine for engine, _ in by_method):
         ax.plot([], [], color=colour_of(engine), linewidth=3, label=written(engine))
-    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=floor_in_words(result))
+    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=least_in_words(result))
     ax.set(xscale="log", yscale="log", xlim=(OF_DIVERGED * 3, FINE_END / 30))
     ax.set(
-        xlabel=f"worst error on the way, {unit_of(result)} (finer to the right)",
+        xlabel=f"worst error on the way, {result.curves.get('unit', 'rad')} (finer to the right)",
         ylabel=f"time for {motion(runs_of(result, scene))} of motion, ms",
     )
     labelled(ax, ends)
@@ -155,21 +150,17 @@ def labelled(ax: Axes, ends: list[list]) -> None:
 
 def spoken(result: Result, scene: str) -> str:
     """The message of a scene: how many times faster at the errors asked for."""
-    unit = unit_of(result)
+    unit = result.curves.get("unit", "rad")
     lines = [line for line in result.tables["what_should_i_use"] if line["scene"] == scene and line["ratio"]]
     ratios = ", ".join(
-        f"{spelled(line['ratio'])} times as long for {value(line, 'target'):.0e} {unit}" for line in lines
+        f"{line['ratio']:.{0 if line['ratio'] >= 3.0 else 1}f} times as long for {value(line, 'target'):.0e} {unit}"
+        for line in lines
     )
     return (
         f"MuJoCo's cheapest setting takes {ratios} as tmt's."
         if ratios
         else "no error asked for is reached by both MuJoCo and tmt."
     )
-
-
-def spelled(ratio: float) -> str:
-    """A ratio in words: of small ones two digits."""
-    return f"{ratio:.0f}" if ratio >= 3.0 else f"{ratio:.2g}"
 
 
 def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
@@ -183,7 +174,7 @@ def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
                 line(ax, engine, method, errors, [r["evaluations"] for r in good])
         ax.set(xlim=(COARSE_END * 2, 2e-16), ylim=(40, 2e6))
     fig.supylabel("evaluations of the right-hand side", fontsize=9)
-    finish(fig, axes, f"worst error on the way, {unit_of(result)}")
+    finish(fig, axes, f"worst error on the way, {result.curves.get('unit', 'rad')}")
     caption = (
         "The same errors against evaluations of the equations of motion, which do not depend on the machine. "
         f"{agreeing(result.checks)}{fewest(result, result.curves.get('regular'), 1e-9)}Of an implicit method an evaluation with "
@@ -212,7 +203,7 @@ def fewest(result: Result, scene: str, target: float) -> str:
         counts[method] = min(good, default=None)
     if None in counts.values():
         return ""
-    return f"For {target:.0e} {unit_of(result)} ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
+    return f"For {target:.0e} {result.curves.get('unit', 'rad')} ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
 
 
 def draw_energy(result: Result) -> tuple[str, Figure, str]:

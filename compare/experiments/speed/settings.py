@@ -1,13 +1,14 @@
 """Who takes part: the scenes that are followed, the methods of the engines that are there, and their steps and tolerances."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from tmt import Tree, kernels
 from tmt.methods import method_named
 
 from ...case import Case
-from ...engines import COMPARED, GRID, Engine, Method, Setting, one_of_each_scheme
+from ...engines import COMPARED, GRID, LABELS, Engine, Method, Setting, one_of_each_scheme
 from ...robots import Robot
+from ...setup import Setup
 
 FINEST = {"mujoco": 2**16, "tmt": 2**18}  # steps beyond which a run would take too long to be timed again and again
 FINEST_RK4, FINEST_IMPLICIT = 2**17, 2**15  # of MuJoCo's RK4; of methods that solve their stages, and of other engines
@@ -114,7 +115,9 @@ def estimated(method: Method, tree: Tree) -> float:
     evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
     if method.adaptive:
         return evaluation
-    return evaluation * stepping.stages * (2 * n * ITERATIONS if stepping.solves_stages else 1)
+    if stepping.solves_stages:
+        return evaluation * stepping.stages * 2 * n * ITERATIONS
+    return evaluation * stepping.stages * (n if getattr(stepping, "implicit_bias", False) else 1)
 
 
 def settings_of(method: Method, case: Case, size: str = "full", which: str = "all") -> tuple[Setting, ...]:
@@ -154,3 +157,27 @@ def tolerances(method: Method, case: Case) -> tuple[Setting, ...]:
     """Tolerances that are divided by ten again and again."""
     first, last = EXPONENTS.get(method.name, OTHER_EXPONENTS)
     return tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
+
+
+def unavailable(setup: Setup, names: Sequence[str]) -> list[dict]:
+    """A row for each scene, each engine that cannot take part and why: with its methods that are left out; no numbers."""
+    groups = {}
+    for (engine, method), reason in left_out(setup.engines, setup.size, setup.robot).items():
+        groups.setdefault((engine, reason), []).append(method)
+    return [
+        {"scene": name, "engine": engine, "method": ", ".join(out), "why_not": reason}
+        for name in names
+        for (engine, reason), out in groups.items()
+    ]
+
+
+def absent_in_words(row: dict, engines: Mapping[str, Engine]) -> str:
+    """Who takes no part and why, in a sentence."""
+    whole = row["method"] == ", ".join(engines[row["engine"]].methods)
+    who = LABELS.get(row["engine"], row["engine"])
+    return f"{who if whole else row['engine'] + ' ' + row['method']} takes no part: {row['why_not']}."
+
+
+def too_long_next(method: Method, case: Case, work: int, size: str) -> bool:
+    """Whether the next tolerance of a method that chooses its own steps would take too long with the robot of a file."""
+    return case.robot.is_read and method.adaptive and work * estimated(method, case.tree) > MOST_SECONDS[size] / 2.0

@@ -45,20 +45,20 @@ def stone() -> Robot:
     return Robot(BODY, Path("stone.xml"), tree, {}, ())
 
 
-def text() -> str:
+def mjcf() -> str:
     """The same body as MJCF."""
     return TEXT.format(mass=repr(MASS), moments=" ".join(map(repr, MOMENTS)))
 
 
-def orders(result: Result, engines: Mapping[str, Engine]) -> list[dict]:
+def orders_on_a_body(result: Result, engines: Mapping[str, Engine]) -> list[dict]:
     """Rows and checks: each method of fixed step of both engines, its order and the one measured; and a sentence in `result`."""
     case = stone().case("tumbling", posture=QUATERNION, speed=SPEEDS)
     times = np.linspace(0.0, TUMBLED, READ + 1)
     _, exact = free_turning(times, MOMENTS, case.v, case.q)
     exact, table = exact.astype(float), []
-    for of_body in (engines["tmt"], engine(read(text()))):
+    for of_body in (engines["tmt"], engine(read(mjcf()))):
         for method in of_body.methods.values():
-            found = None if method.adaptive else measured(case, of_body, method, exact)
+            found = None if method.adaptive else order_of(case, of_body, method, exact)
             if found:
                 order, coarse, fine = found
                 table.append(
@@ -69,11 +69,11 @@ def orders(result: Result, engines: Mapping[str, Engine]) -> list[dict]:
             elif not method.adaptive:
                 where = f"{BODY}, {method.engine} {method.name}"
                 result.check(where, "runs that show its order", 0, 1, "runs", rule="at least")
-    result.notes.append(in_words(table))
+    result.notes.append(orders_in_words(table))
     return table
 
 
-def measured(case: Case, engine: Engine, method: Method, exact: np.ndarray) -> tuple[float, float, float] | None:
+def order_of(case: Case, engine: Engine, method: Method, exact: np.ndarray) -> tuple[float, float, float] | None:
     """The order between the two finest steps whose errors fall regularly, and these steps, s; None: there are no two.
 
     exact: quaternions at the times that are read.
@@ -93,7 +93,7 @@ def measured(case: Case, engine: Engine, method: Method, exact: np.ndarray) -> t
     return float(np.log2(large / small)), coarse, fine
 
 
-def in_words(table: list[dict]) -> str:
+def orders_in_words(table: list[dict]) -> str:
     """The orders in a sentence."""
     parts = []
     for name in dict.fromkeys(row["engine"] for row in table):

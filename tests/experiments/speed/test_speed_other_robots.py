@@ -8,6 +8,7 @@ import tmt
 from compare.engines import Method
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import engine, read
+from compare.engines.scipy import Scipy
 from compare.experiments.speed import accuracy, advice, evaluations, floors, settings, tumbling
 from compare.judge.check import Result
 from compare.judge.rounding import growth
@@ -95,7 +96,7 @@ def test_steps_of_a_large_robot_end_sooner(gripper):
     large = settings.regular_of(robot_of(read(PATHS["humanoid29_free"]), "humanoid29_free.xml"))
     method = Method("tmt", "rk4", 4, "rk4")
     finest = [settings.halvings(method, case)[-1].steps for case in (small, large)]
-    assert finest[0] >= 2**15 and finest[1] == large.steps * 4
+    assert finest[0] >= 2**15 and finest[1] <= 1024
     assert settings.halvings(method, settings.regular_of(ARM))[-1].steps == settings.FINEST["tmt"]
 
 
@@ -114,7 +115,7 @@ def test_the_sampled_growth_is_the_growth(gripper):
 
 def test_the_two_bodies_are_the_same(stone):
     case, _ = stone
-    ours, theirs = tmt.mass_matrix(case.q, case.tree), engine(read(tumbling.text())).of(case).mass_matrix(case.q)
+    ours, theirs = tmt.mass_matrix(case.q, case.tree), engine(read(tumbling.mjcf())).of(case).mass_matrix(case.q)
     assert np.abs(ours - theirs).max() < 1e-17
 
 
@@ -123,14 +124,14 @@ def test_the_two_bodies_are_the_same(stone):
 )
 def test_a_method_of_tmt_keeps_its_order_on_a_free_body(gripper, stone, name, least, most):
     _, known, _ = gripper
-    found = tumbling.measured(stone[0], known["tmt"], known["tmt"].methods[name], stone[1])
+    found = tumbling.order_of(stone[0], known["tmt"], known["tmt"].methods[name], stone[1])
     assert least < found[0] < most and found[1] == pytest.approx(2 * found[2])
 
 
 def test_mujoco_has_the_order_that_its_version_says(stone):
-    mujoco = engine(read(tumbling.text()))
+    mujoco = engine(read(tumbling.mjcf()))
     for name in ("RK4", "Euler"):
-        order, *_ = tumbling.measured(stone[0], mujoco, mujoco.methods[name], stone[1])
+        order, *_ = tumbling.order_of(stone[0], mujoco, mujoco.methods[name], stone[1])
         assert abs(order - mujoco.methods[name].order) < 0.05
 
 
@@ -139,14 +140,14 @@ def test_a_body_with_other_moments_shows_no_order(gripper, stone):
     case, _ = stone
     _, known, _ = gripper
     wrong = free_turning(np.linspace(0.0, tumbling.TUMBLED, 9), (0.03, 0.05, 0.0601), case.v, case.q)[1].astype(float)
-    found = tumbling.measured(case, known["tmt"], known["tmt"].methods["rk4"], wrong)
+    found = tumbling.order_of(case, known["tmt"], known["tmt"].methods["rk4"], wrong)
     assert found is None or found[0] < 0.5
 
 
 def test_an_order_that_is_lower_than_with_hinges_is_said():
     row = {"engine": "mujoco", "method": "RK4", "measured_order": 2.0}
-    assert "RK4 has order 2.00 there, where it has 4 with hinges" in tumbling.in_words([row])
-    assert "where it has" not in tumbling.in_words([row | {"measured_order": 4.0}])
+    assert "RK4 has order 2.00 there, where it has 4 with hinges" in tumbling.orders_in_words([row])
+    assert "where it has" not in tumbling.orders_in_words([row | {"measured_order": 4.0}])
 
 
 # what an evaluation costs
@@ -166,7 +167,7 @@ def test_states_of_any_joints_are_evaluated(gripper):
 def test_of_many_joints_fewer_states_and_a_reason():
     humanoid = robot_of(read(PATHS["humanoid29_free"]), "humanoid29_free.xml").tree
     assert evaluations.most_states(humanoid) == 10_000 and evaluations.most_states(ARM.tree) == 1_000_000
-    assert evaluations.operations(humanoid) is None and "35 speeds" in evaluations.left_out_in_words(humanoid)[0]
+    assert evaluations.lengths(humanoid) is None and "35 speeds" in evaluations.left_out_in_words(humanoid)[0]
     assert evaluations.left_out_in_words(ARM.tree) == []
 
 
@@ -206,3 +207,10 @@ def test_errors_below_what_is_known_have_its_size(gripper):
     row = speed.row_of_run(case, case, known, known["tmt"].methods["dopri8"], setting, truth, 1e-11)
     assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]
     assert Setup.small(robot, known).robot is robot
+
+
+def test_a_coarse_run_of_scipy_has_quaternions_of_length_1(stone):
+    case, exact = stone
+    motion = Scipy().of(case).run(*case.start, case.tau, tumbling.TUMBLED / 8, 8, "RK45", tolerance=1e-2)
+    assert np.abs(np.linalg.norm(motion.q, axis=1) - 1.0).max() < 1e-15
+    assert np.abs(case.coordinates.difference(motion.q, exact)).max() > 1e-6

@@ -1,0 +1,51 @@
+"""What of an evaluation can be compiled and timed in reasonable time, for a robot of any joints."""
+
+import numpy as np
+
+import tmt
+from tmt import kernels, method
+
+from ...case import Coordinates
+
+MOST_RESULTS = 10_000_000  # numbers, the results of many states, of a robot of many joints
+MOST_LITERAL = 3000  # operations of the literal form, up to which its straight-line code is compiled
+
+
+def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) -> list[np.ndarray]:
+    """Random positions (count, nq), speeds and torques (count, nv)."""
+    if set(coordinates.all_kinds) == {"hinge"}:
+        return list(rng.uniform(-3.0, 3.0, (3, count, coordinates.nv)))
+    return [coordinates.random(rng, count), *rng.uniform(-3.0, 3.0, (2, count, coordinates.nv))]
+
+
+def most_states(tree: tmt.Tree) -> int:
+    """How many states are evaluated at once at most, a power of ten."""
+    n = len(tree.axis)
+    return int(10.0 ** np.floor(np.log10(MOST_RESULTS / (n * (n + 3) // 2))))
+
+
+def lengths(tree: tmt.Tree) -> list[int] | None:
+    """Of the straight-line code of the literal and of the composite form; None: none is made for so many joints."""
+    if not kernels.is_evaluated_straight(tree):
+        return None
+    return [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
+
+
+def literal_is_compiled(tree: tmt.Tree) -> bool:
+    """Whether the literal form of a tree is short enough for its compilation."""
+    return kernels.is_evaluated_straight(tree) and lengths(tree)[0] <= MOST_LITERAL
+
+
+def left_out_in_words(tree: tmt.Tree) -> list[str]:
+    """What is not timed, and why, in sentences."""
+    if not kernels.is_evaluated_straight(tree):
+        return [
+            f"Straight-line code for {len(tree.axis)} speeds would take too long to compile: the loop over any tree takes its "
+            "place, and neither the kernel nor the literal form is timed."
+        ]
+    if not literal_is_compiled(tree):
+        return [
+            f"The literal form, whose {lengths(tree)[0]} operations would take too long to compile, is not, and neither is the "
+            "composite form with the library's sine."
+        ]
+    return []
