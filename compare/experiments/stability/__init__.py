@@ -38,10 +38,8 @@ def tolerance(robot: Robot) -> str:
     """How far apart what is compared may be."""
     run, sought = "2000 steps, or more until a quarter holds a swing of the slowest mode", "without the prediction"
     if robot.is_read:
-        run, sought = (
-            f"{limits.GROWTH_STEPS} steps, 1000 of a quick run or with more than {MANY} speeds",
-            "among steps about the predicted one",
-        )
+        run = f"{limits.GROWTH_STEPS} steps, 1000 of a quick run or with more than {MANY} speeds"
+        sought = "among steps about the predicted one"
     return (
         "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
         "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
