@@ -32,6 +32,8 @@ def symbols():
         mass=(one, one),
         inertia=(((one,) * 3,) * 3,) * 2,
         moves=tmt.ARM.moves,
+        coordinates=tmt.ARM.coordinates,
+        reference=(zero,) * 3,
     )
     return SimpleNamespace(
         d=d, e=e, a=a, b=b, g=g, bodies=method.bodies(tree, [a, b, g], [ad, bd, gd]), qd=(ad, bd, gd)

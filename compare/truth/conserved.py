@@ -85,3 +85,11 @@ def conserved(tree: tmt.Tree) -> tuple[Conserved, ...]:
     if len(set(rotors)) > 1 or (free and len(set(tree.armature[:3])) > 1):
         return linear
     return (*linear, Conserved(tree, "angular momentum", "angular", "N m"))
+
+
+def floats(tree: tmt.Tree) -> bool:
+    """Whether a free body carries nothing or the rest: three slides and a ball from the world. Under gravity it has no rest."""
+    kinds = tree.kind
+    return any(
+        tree.parent[i] == -1 and kinds[i : i + 4] == ("slide", "slide", "slide", "ball") for i in range(len(kinds) - 3)
+    )

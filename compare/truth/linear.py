@@ -11,6 +11,7 @@ from tmt import METHODS, composite, method
 from tmt.dual import seeded
 
 from ..case import SEED, Case, Coordinates
+from .conserved import floats
 from .derivative import holding, moving, slopes, stiffness
 from .steps import growth_of, is_runge_kutta, linear_step
 
@@ -254,14 +255,6 @@ class Held:
         overlap = np.abs(angles.conj().T @ shape)
         near = np.abs(values[overlap > overlap.max() - 1e-6])
         return float(near.max())
-
-
-def floats(tree: tmt.Tree) -> bool:
-    """Whether a free body carries nothing or the rest: three slides and a ball from the world. Under gravity it has no rest."""
-    kinds = tree.kind
-    return any(
-        tree.parent[i] == -1 and kinds[i : i + 4] == ("slide", "slide", "slide", "ball") for i in range(len(kinds) - 3)
-    )
 
 
 @lru_cache(maxsize=64)

@@ -15,7 +15,9 @@ def test_it_says_of_which_robots_its_compilation_would_take_minutes():
     assert Heyoka().unavailable() is None
     for tree in (tmt.ARM, read(PATHS["gripper"]).tree, read(PATHS["free_body"]).tree):
         assert Heyoka().too_long(tree) is None
-    assert "7 speeds its compilation would take minutes: its equations have" in Heyoka().too_long(read(PATHS["arm7"]).tree)
+    assert "7 speeds its compilation would take minutes: its equations have" in Heyoka().too_long(
+        read(PATHS["arm7"]).tree
+    )
     assert "30 speeds its compilation would take minutes" in Heyoka().too_long(read(chain(30)).tree)
 
 

@@ -7,8 +7,9 @@ from models import PATHS, random_tree
 import tmt
 from compare.engines.mujoco import reading
 from compare.robots.file import robot_of
+from compare.truth.conserved import floats
 from compare.truth.derivative import stiffness
-from compare.truth.linear import floats, held
+from compare.truth.linear import held
 from compare.truth.postures import posture_names
 from compare.truth.rest import at_rest
 from tmt import METHODS

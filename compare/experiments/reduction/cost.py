@@ -11,7 +11,7 @@ from ...case import Case, Coordinates
 from ...engines import Setting
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR, contacts, with_additions
 from ...judge.check import Result
-from ...judge.run import step_in_words, unit_of
+from ...judge.run import movement_unit, step_in_words
 from ...judge.scale import reaches
 from ...judge.timing import fastest
 from ...judge.units import renamed
@@ -47,7 +47,7 @@ def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
         if name.startswith(CAPSULES) and contacts(models[name], *fallen)[1]:
             pushed.add((name, integrator))
     rows = cost_rows(seconds, paths, touching, case.coordinates)
-    result.tables["cost_in_mujoco"] = renamed(rows, unit_of(case.coordinates))
+    result.tables["cost_in_mujoco"] = renamed(rows, movement_unit(case.coordinates))
     check_bits(result, f"{case.name}, {step_in_words(case, FALL_STEPS)}", result.tables["cost_in_mujoco"], pushed)
     if not pushed:
         result.notes.append(f"{case.name}: the floor that is in reach pushes no joint, nor does anything else.")

@@ -17,7 +17,9 @@ from ...setup import Setup
 from ...truth.smallest import Needed, needed, reduced
 from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
 
-BOTH_INTEGRATORS = 6  # speeds of the robot of a file whose runs by both integrators are compared, of more those by the last
+BOTH_INTEGRATORS = (
+    6  # speeds of the robot of a file whose runs by both integrators are compared, of more those by the last
+)
 MOST_IN_A_BAND = 12  # speeds of the robot of a file whose runs are compared within a band of rounding
 
 

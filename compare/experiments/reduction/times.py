@@ -9,7 +9,7 @@ from tmt.kernels import slope_source
 from ...case import Case
 from ...engines import Engine, Setting, same_scheme
 from ...judge.check import Result
-from ...judge.run import unit_of
+from ...judge.run import movement_unit
 from ...judge.timing import fastest
 from ...judge.units import renamed
 from ...setup import Setup
@@ -47,7 +47,7 @@ def time_models(result: Result, models: Sequence[tuple], setup: Setup, rounds: i
                 call, _ = dynamics.prepare(*case.start, case.tau, setting, method)
                 calls[name, case.joints, engine, integrator] = call
     rows = time_rows(models, setup, fastest(calls, rounds), result.curves["apart"])
-    result.rows += renamed(rows, unit_of(setup.robot.coordinates))
+    result.rows += renamed(rows, movement_unit(setup.robot.coordinates))
 
 
 def time_rows(

@@ -11,7 +11,7 @@ from ...case import Case
 from ...engines import COMPARED, GRID, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
-from ...judge.run import diverged_at, unit_of
+from ...judge.run import diverged_at, movement_unit
 from ...judge.scale import FACTOR
 from ...judge.units import renamed, said
 from ...robots import Robot
@@ -61,7 +61,7 @@ def tolerance(robot: Robot) -> str:
     runs = f"runs with many digits ({made})"
     if robot.is_read:
         runs = f"a run in doubles by tmt's {DOUBLES}, whose digits are seen by halving its steps: smaller errors are not known"
-    what = "angles" if unit_of(robot.coordinates) == "rad" else f"movements ({unit_of(robot.coordinates)})"
+    what = "angles" if movement_unit(robot.coordinates) == "rad" else f"movements ({movement_unit(robot.coordinates)})"
     return (
         f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {runs}. Checked: "
         "that each method of fixed step has its order in the error of the first second, which falls "
@@ -104,7 +104,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.rows += [row for of_scene in of_scenes for row in of_scene]
     names = [case.name for case in cases]
     floors = dict(zip(names, lefts))
-    unit = unit_of(setup.robot.coordinates)
+    unit = movement_unit(setup.robot.coordinates)
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "doubles": setup.robot.is_read}
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"

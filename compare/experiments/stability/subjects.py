@@ -11,7 +11,8 @@ import numpy as np
 from ...case import Case
 from ...judge.words import capital
 from ...robots import Robot
-from ...truth.linear import Held, floats, held
+from ...truth.conserved import floats
+from ...truth.linear import Held, held
 from ...truth.postures import all_of_kind, all_that_stay, of_kind, posture_names
 from ...truth.rest import at_rest
 from .choice import DAMPINGS, free_motion

@@ -44,7 +44,8 @@ EDITS = (
     Edit("states", "random", "robot.coordinates.random(rng, states, robot.ranges)",
          "np.zeros((states, len(robot.joints)))",
          "every random state is zero"),
-    Edit("states", "of_named", "min(len(robot.poses), affordable(robot) // 2)", "1", "of the named postures one is compared with its exact value"),
+    Edit("states", "of_named", "min(len(robot.poses), affordable(robot) // 2)", "1",
+         "of the named postures one is compared with its exact value"),
     # scales
     Edit("judge.scale", "reaches", "to_joint[joint] + np.linalg.norm(com)", "100.0 * (to_joint[joint] + np.linalg.norm(com))",
          "reaches x 100"),
