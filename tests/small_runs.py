@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 from crane import crane
+from model_edits import EDITS, failing
 
 from compare import experiment
 from compare.engines.mujoco import load, parse
@@ -69,6 +70,7 @@ JOBS = (  # in the order in which the tests ask for them
     (on_the_moon, "stability"),
     *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
     (of_crane,),
+    *((failing, old, new) for old, new, _ in EDITS.values()),
 )
 
 
