@@ -15,17 +15,14 @@ from .conserved import floats
 from .derivative import holding, moving, slopes, stiffness
 from .steps import growth_of, is_runge_kutta, linear_step
 
-AS_IT_STANDS = (
-    6  # speeds, up to which the method is differentiated as written, beyond regrouped: but for rounding the same
-)
+AS_IT_STANDS = 6  # speeds, up to which the method is differentiated as written; beyond it is regrouped
 LONGEST_STEP, SHORTEST_STEP = 1e3, 1e-4  # s: steps among which a limit is sought
 SCANNED = 281  # steps between these, 40 for each power of ten
 NEUTRAL = 1e-9  # growth per step that rounding can pretend
 NEGLIGIBLE = 1e-6  # relative to the fastest mode: a rate below is zero
 SLOWEST = 1e-6  # 1/s: and so is a rate below this, where no mode is fast
 PUSHED_ALONG = 3  # random directions among the movements without stiffness, in which it is seen whether they are flat
-# how far from 1 rounding and a rate of zero may put the growth of a mode without stiffness, with any step
-AT_ONE = (1e-7, 1e-3)
+AT_ONE = (1e-7, 1e-3)  # how far from 1 rounding and a rate of zero may put the growth of a mode without stiffness
 
 
 def modes(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
