@@ -40,7 +40,7 @@ def growth_of(stepping, z: np.ndarray) -> np.ndarray:
     """What a step of a Runge-Kutta method makes of 1 where y' = lambda y, for z = lambda dt of any shape."""
     if type(stepping) is ImplicitRungeKutta:
         A = np.eye(len(stepping.b)) - z[..., None, None] * np.array(stepping.A)
-        stages = np.linalg.solve(A, np.ones((len(stepping.b), 1)))[..., 0]
+        stages = np.linalg.solve(A, np.ones((*z.shape, len(stepping.b), 1)))[..., 0]
         return 1.0 + z * (stages @ np.array(stepping.b))
     stages = []
     for row in stepping.A:
