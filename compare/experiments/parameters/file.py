@@ -22,8 +22,8 @@ CLAIM = (
 )
 TOLERANCE = (
     "64 eps x the largest entry of the quantity; of an inertia tensor x the sum of its principal moments, for it is turned to "
-    "its principal axes and back (before MuJoCo 4.0 a fullinertia only to about 5e-7: there 1e-6). Forces of what is switched off: exactly "
-    "0; where springs and damping are taken from a sum, 64 eps x the largest of these."
+    "its principal axes and back (before MuJoCo 4.0 a fullinertia only to about 5e-7: there 1e-6 x that sum). Forces of what is "
+    "switched off: exactly 0; where springs and damping are taken from a sum, 64 eps x the largest of these."
 )
 UNITS_OF_ALL = {"mass": "kg", "pos": "m", "com": "m", "inertia": "kg m2", "anchor": "m", "axis": ""}
 OF_MOVEMENTS = {  # of joints that turn, and of slides
