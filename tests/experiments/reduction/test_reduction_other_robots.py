@@ -151,3 +151,12 @@ def test_a_joint_that_cannot_be_taken_out_is_said_of_a_file():
     result = reduction.rows(setup_of(text), timed=False)
     assert any("Nothing is reduced" in note and "aligned" in note for note in result.notes)
     assert all(check.passed for check in result.checks)
+
+
+@pytest.mark.parametrize("joints, speeds", [((), 0), (("lower",), 3), (("upper", "lower"), 6)])
+def test_a_ball_has_three_speeds_in_the_table_of_times(joints, speeds):
+    setup = setup_of(PATHS["pendulum_ball"])
+    case = next(case for case in setup.robot.cases if not case.is_held)
+    locked = tuple(name for name in setup.robot.joints if name not in joints)
+    rows = times.time_rows([(case.name, case.changed(locked=locked) if joints else None)], setup, {}, {})
+    assert {(row["hinges"], row["nv"]) for row in rows} == {(" ".join(joints) or "none", speeds)}
