@@ -103,7 +103,9 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     ):
         ax.set_ylabel(label)
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
-    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=columns_of_legend)
+    fig.legend(
+        handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=columns_of_legend
+    )
     return file_name("trajectory", case.name), fig, run_caption(result, case, until, len(shown))
 
 
