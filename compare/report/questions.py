@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from ..judge import units
 from ..judge.check import Result
 from .verdict import Section
 
@@ -79,14 +80,16 @@ def far_from_true(results: Mapping[str, Result]) -> str:
 def choice(results: Mapping[str, Result]) -> list[tuple]:
     """What a user of MuJoCo asks: which integrator, which step; one line of the table that answers it."""
     lines = results["speed"].tables.get("what_should_i_use", []) if "speed" in results else []
-    line = next((line for line in lines if line["target_rad"] == 1e-6 and line["mujoco"] and line["tmt"]), None)
+    named = (line for line in lines if units.value(line, "target") == 1e-6 and line["mujoco"] and line["tmt"])
+    line = next(named, None)
     if line is None:
         return []
     of_scene = (
         row["dt_s"] * row["steps"] for row in results["speed"].rows if row["scene"] == line["scene"] and row["dt_s"]
     )
+    error = f"{units.value(line, 'target'):.0e} {line.get('unit', 'rad')}"
     text = (
-        f"What should I use? For {line['target_rad']:.0e} rad over {next(of_scene):.4g} s ({line['scene']}): {line['mujoco']} "
+        f"What should I use? For {error} over {next(of_scene):.4g} s ({line['scene']}): {line['mujoco']} "
         f"({line['mujoco_ms']:.2g} ms), or {line['tmt']} ({line['tmt_ms']:.2g} ms); more in the table of that name."
     )
     return [("", "which integrator and which step", "speed", text)]

@@ -3,6 +3,7 @@
 import pytest
 from sections import section
 
+from compare.judge.units import renamed
 from compare.report.questions import answers
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
@@ -54,7 +55,8 @@ def test_the_answer_on_motion_says_of_how_many_steps_the_errors_are(steps, words
     )
 
 
-def test_what_to_use_gives_each_engine_its_own_time():
+@pytest.mark.parametrize("unit", ["rad", "m", "rad or m"])
+def test_what_to_use_gives_each_engine_its_own_time(unit):
     line = {
         "scene": "bent",
         "target_rad": 1e-6,
@@ -63,7 +65,7 @@ def test_what_to_use_gives_each_engine_its_own_time():
         "tmt": "rk4",
         "tmt_ms": 2.0,
     }
-    lines = [line | {"target_rad": 1e-3, "mujoco_ms": 5.0}, line | {"tmt": None}, line]
+    lines = renamed([line | {"target_rad": 1e-3, "mujoco_ms": 5.0}, line | {"tmt": None}, line], unit)
     found = [
         answer
         for *_, answer in answers(
@@ -71,5 +73,5 @@ def test_what_to_use_gives_each_engine_its_own_time():
         )
     ]
     assert found[-1].startswith(
-        "What should I use? For 1e-06 rad over 4.5 s (bent): RK4, 9 steps (7 ms), or rk4 (2 ms)"
+        f"What should I use? For 1e-06 {unit} over 4.5 s (bent): RK4, 9 steps (7 ms), or rk4 (2 ms)"
     )

@@ -65,7 +65,8 @@ def draw_needs(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     one = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint"
     words += [f"Fewer than all {len(joints)} {one}s, proved, for {'; '.join(fewer)}."] if fewer else []
     start = f"What each scene of the {'' if robot.is_read else 'stated '}{robot.name} needs."
-    return "reduction_needs", fig, " ".join([start, *words, gain(result.rows, len(joints), one)])
+    words.append(gain(result.rows, robot.coordinates.nv, "speed" if robot.coordinates.has_balls else one))
+    return "reduction_needs", fig, " ".join([start, *words])
 
 
 def kind_of_joint(joint: str, found: dict) -> str:
@@ -92,15 +93,15 @@ def mark_times(ax: Axes, result: Result, name: str, y: float) -> None:
             ax.text(smallest / 1.15, y + offset, f"×{whole / smallest:.2f}", ha="right", va="center", fontsize=8)
 
 
-def gain(rows: list[dict], joints: int, one: str = "hinge") -> str:
-    """The largest gain of a model with fewer joints than so many, in words."""
-    smaller = [row for row in rows if row["speedup"] and row["nv"] < joints]
+def gain(rows: list[dict], nv: int, one: str = "hinge") -> str:
+    """The largest gain of a model with fewer speeds than so many, in words; one: what a speed is called."""
+    smaller = [row for row in rows if row["speedup"] and row["nv"] < nv]
     best = max(smaller, key=lambda row: row["speedup"], default=None)
     if best is None:
         return "No smaller model was timed."
     return (
         f"The largest gain is that of {LABELS[best['engine']]} in {best['scene']}, {best['integrator']}: with {best['nv']} of "
-        f"{joints} {one}s a step takes {1 / best['speedup']:.2f} of the time of the whole model's."
+        f"{nv} {one}s a step takes {1 / best['speedup']:.2f} of the time of the whole model's."
     )
 
 

@@ -48,10 +48,10 @@ def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str]
 def need_in_words(case: Case, need: Needed) -> str:
     """What a case needs and why, in a sentence."""
     names, locked = case.joints, case.scene.locked
-    why = "; ".join(need.moves.values())
+    reasons = list(need.moves.values())
     if need.undecided:
-        why += f"; of {', '.join(need.undecided)} it is not decided: the acceleration does not fold to 0"
-    why = capital(why)
+        reasons.append(f"of {', '.join(need.undecided)} it is not decided: the acceleration does not fold to 0")
+    why = capital("; ".join(reasons))
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (

@@ -66,7 +66,7 @@ def time_rows(
                         "scene": name,
                         "hinges": " ".join(joints) or "none",
                         "engine": engine,
-                        "nv": len(joints),
+                        "nv": case.coordinates.nv if case else 0,
                         "operations": count if engine == "tmt" else None,
                         "ns_per_step": 1e9 * taken / steps if taken else None,
                         "speedup": seconds[name, every, engine, integrator] / taken if taken else None,

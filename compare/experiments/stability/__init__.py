@@ -175,7 +175,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     left = any(row["scene"] == looked_at["saddle"] for row in tables.get("departure", ()))
     drawn = {
         figures_limits.draw_limits: bool(looked_at["centres"]),
-        figures_limits.draw_regions: True,
+        figures_limits.draw_regions: bool(curves["points"]),
         figures_departure.draw_departure: left,
         figures_claims.draw_torques: "stability_torques" in tables,
         figures_failure.draw_silent: "silent" in curves and (not robot.is_read or failure.is_silent(curves["silent"])),

@@ -77,8 +77,13 @@ def subjects_of(robot: Robot) -> Subjects:
         left_out.append(f"No mode swings at {centre.name}: the nonlinear edge is left out.")
     if not saddle:
         left_out.append(f"{none} a saddle: departures from one are left out.")
-    if not marginal:
+    if not name:
         left_out.append(f"{none} marginal: the law of leaving one is left out.")
+    elif not marginal:
+        left_out.append(
+            f"{capital(name)}, held, is marginal, but nothing pushes along its movements without stiffness: the law of leaving "
+            "it is left out."
+        )
     elif lawless:
         left_out.append(f"{capital(name)}, held, is marginal, but {lawless}: the law of leaving it is left out.")
     if not robot.claims and not robot.is_read:

@@ -21,7 +21,8 @@ from .sentences import agreement, rad
 
 SCHEME_LINES = dict(zip(("semi_implicit_euler", "implicit", "rk4"), LINES))  # colour and dash
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
-LEGEND_COLUMNS = 4  # of a legend
+LEGEND_COLUMNS = 4  # of a legend; with names longer than LONG three
+LONG = 14  # letters of a joint's name
 
 
 def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str]:
@@ -51,7 +52,9 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     columns = [result.curves["runs"][key] for key in of_case if key[-1] == steps]
     shown, unit = differing_most(case, columns), movement_unit(case.coordinates)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
-    lines_of_legend = -(-(len(shown) + 4) // LEGEND_COLUMNS)
+    long = any(len(case.coordinates.speeds[i]) > LONG for i in shown)
+    columns_of_legend = LEGEND_COLUMNS - long
+    lines_of_legend = -(-(len(shown) + 4) // columns_of_legend)
     fig.subplots_adjust(
         left=0.105,
         right=0.985,
@@ -100,7 +103,9 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     ):
         ax.set_ylabel(label)
     handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
-    fig.legend(handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=LEGEND_COLUMNS)
+    fig.legend(
+        handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=columns_of_legend
+    )
     return file_name("trajectory", case.name), fig, run_caption(result, case, until, len(shown))
 
 

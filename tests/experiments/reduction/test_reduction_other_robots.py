@@ -15,7 +15,7 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import Setup, engines
 from compare.truth.pendulum import pendulum, swing
-from compare.truth.smallest import needed
+from compare.truth.smallest import Needed, needed
 
 
 def setup_of(source, size="small"):
@@ -151,3 +151,18 @@ def test_a_joint_that_cannot_be_taken_out_is_said_of_a_file():
     result = reduction.rows(setup_of(text), timed=False)
     assert any("Nothing is reduced" in note and "aligned" in note for note in result.notes)
     assert all(check.passed for check in result.checks)
+
+
+@pytest.mark.parametrize("joints, speeds", [((), 0), (("lower",), 3), (("upper", "lower"), 6)])
+def test_a_ball_has_three_speeds_in_the_table_of_times(joints, speeds):
+    setup = setup_of(PATHS["pendulum_ball"])
+    case = next(case for case in setup.robot.cases if not case.is_held)
+    locked = tuple(name for name in setup.robot.joints if name not in joints)
+    rows = times.time_rows([(case.name, case.changed(locked=locked) if joints else None)], setup, {}, {})
+    assert {(row["hinges"], row["nv"]) for row in rows} == {(" ".join(joints) or "none", speeds)}
+
+
+def test_joints_of_which_nothing_is_decided_make_a_sentence(gripper):
+    held = next(case for case in gripper.robot.cases if case.is_held)
+    words = needs.need_in_words(held, Needed((), {}, held.joints))
+    assert "all 4 joints. Of shoulder, wrist, left, right it is not decided" in words

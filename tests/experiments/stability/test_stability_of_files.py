@@ -5,11 +5,12 @@ import pytest
 from models import PATHS
 
 from compare.engines.mujoco import reading
+from compare.experiments import stability
 from compare.experiments.stability import choice, departure, limits
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
-from compare.setup import engines
+from compare.setup import Setup, engines
 from compare.truth.linear import held
 from compare.truth.postures import posture_names
 
@@ -44,6 +45,22 @@ def test_of_many_keyframes_the_first_are_looked_at_and_named():
 def test_what_a_file_lacks_is_said(name, words):
     seen = subjects_of(read(PATHS[name])[0])
     assert all(any(word in text for text in seen.left_out) for word in words)
+
+
+@pytest.mark.parametrize("source, marginal", [
+    (PATHS["free_body"], "Qpos0"), (PATHS["gripper"], "Open"), (SWING.format(keys=""), None),
+])  # fmt: skip
+def test_a_marginal_posture_that_nothing_pushes_is_not_denied(source, marginal):
+    left_out = subjects_of(read(source)[0]).left_out
+    none = any("named postures is marginal" in text for text in left_out)
+    assert none == (marginal is None)
+    assert none or any(text.startswith(f"{marginal}, held, is marginal, but nothing pushes") for text in left_out)
+
+
+def test_regions_without_an_eigenvalue_are_not_drawn():
+    robot, mujoco = read(PATHS["free_body"])
+    result = stability.rows(Setup.quick(robot, engines(mujoco)))
+    assert not result.curves["points"] and not list(stability.figures(result, robot))
 
 
 def test_a_limit_is_sought_about_the_predicted_one_and_found_again():
