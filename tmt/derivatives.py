@@ -85,7 +85,8 @@ def of_part(stepping, tree, q, qd, tau, dt):
         A, force = linear_system(stepping, tree, *values, tau, dt)
         a = np.linalg.solve(A, force[..., None])[..., 0].T.copy()
         left = stepping.residual(tree, list(a), q, qd, tau, dt, composite.mass_matrix_and_bias)
-        rows = np.array([np.broadcast_to(x.slope, (2 * nv, a.shape[1])) for x in left])
+        # what no state changes is no dual number: a sphere that floats free
+        rows = np.array([np.broadcast_to(state[0].parts(x)[1], (2 * nv, a.shape[1])) for x in left])
         slopes = -np.linalg.solve(A, rows.transpose(2, 0, 1)).transpose(1, 2, 0)
         return [Dual(value, one, level) for value, one in zip(a, slopes.copy())]
 

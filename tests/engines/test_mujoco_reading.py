@@ -73,6 +73,8 @@ def test_a_flag_of_the_file_counts(rng):
         assert_the_same(engine(reading).of(case_of(damped, damping=0.5)), damped, rng)
 
 
+LEVER = PLAIN.replace('name="j"', 'name="j" axis="0 1 0"')  # which gravity turns
+
 MORE = {  # feature: file, names
     "hinge": (mjcf(), ("j",)),
     "slide": (mjcf(PLAIN.replace("name=\"j\"", "type=\"slide\"")), ("joint 0",)),
@@ -90,7 +92,7 @@ MORE = {  # feature: file, names
         ("b", "j"),
     ),
     "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
-    "gravcomp": (mjcf(PLAIN.replace("name=\"b\"", "name=\"b\" gravcomp=\"1\"")), ("b",)),
+    "gravcomp": (mjcf(LEVER.replace("name=\"b\"", "name=\"b\" gravcomp=\"1\"")), ("b",)),
     "actuator": (mjcf(after='<actuator><position joint="j" kp="100" kv="3"/></actuator>'), ("actuator 0",)),
     "equality": (mjcf(TWO, after='<equality><joint name="mimic" joint1="j" joint2="k"/></equality>'), ("mimic",)),
     "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
@@ -161,7 +163,6 @@ WITHOUT_EFFECT = {
     "limit": mjcf(PLAIN.replace('name="j"', 'name="j" range="-1 1"')),
     "friction": mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')),
     "water": mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'),
-    "no weight": mjcf(PLAIN.replace('name="b"', 'name="b" gravcomp="1"')),
 }
 
 
@@ -169,6 +170,19 @@ WITHOUT_EFFECT = {
 def test_a_run_is_that_of_the_plain_file(name):
     for integrator in ("implicitfast", "RK4"):
         assert np.array_equal(run_of(WITHOUT_EFFECT[name], integrator), run_of(mjcf(), integrator))
+
+
+def test_a_run_has_the_whole_weight():
+    weightless = mjcf(LEVER.replace('name="b"', 'name="b" gravcomp="1"'))
+    for integrator in ("implicitfast", "RK4"):
+        assert np.array_equal(run_of(weightless, integrator), run_of(mjcf(LEVER), integrator))
+        assert not np.allclose(run_of(mjcf(LEVER), integrator), run_of(mjcf(), integrator))
+
+
+def test_keyframes_keep_their_names():
+    keys = '<keyframe><key name="a" qpos="1"/><key qpos="2"/><key name="c" qpos="3"/></keyframe>'
+    found = read(mjcf(after=keys)).keyframes
+    assert {name: q.tolist() for name, q in found.items()} == {"a": [1.0], "key 1": [2.0], "c": [3.0]}
 
 
 REFUSED = {

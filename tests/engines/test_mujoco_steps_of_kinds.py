@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from files import EVERYTHING, assert_the_same, case_of, random_state
+from files import EVERYTHING, PLAIN, assert_the_same, case_of, mjcf, random_state
 
 import tmt
 from compare.engines.mujoco import engine, read
@@ -62,6 +62,19 @@ def test_additions_to_a_bare_model(reading, rng):
         if "capsules" not in name:
             assert np.allclose(dynamics.run(*state, 1e-3, 5, "RK4").states, bare, rtol=1e-12, atol=1e-12)
             assert contacts(dynamics, *state, 1e-3, 5, "RK4") == (0.0, False)
+
+
+@pytest.mark.parametrize("flag", ["gravity", "damper", "spring"])
+def test_default_flags_bring_back_no_force_that_the_file_disables(flag):
+    joint = PLAIN.replace('name="j"', 'name="j" axis="0 1 0" damping="1" stiffness="3" springref="40"')
+    reading = read(mjcf(joint, f'<option><flag {flag}="disable"/></option>'))
+    case = case_of(reading.tree)
+    found = {
+        name: e.of(case).acceleration([0.3], [0.5], [0.0])
+        for name, e in with_additions(engine(reading), 0.02, -5.0, -9.0).items()
+    }
+    for name, acceleration in found.items():
+        assert acceleration == pytest.approx(tmt.acceleration([0.3], [0.5], [0.0], reading.tree), rel=1e-12), name
 
 
 def test_a_reading_and_its_engine_can_go_to_another_process(reading, rng):

@@ -7,12 +7,13 @@ import numpy as np
 
 from .dynamics import MujocoDynamics
 from .engine import Mujoco
-from .flags import FLAGS
+from .flags import FLAGS, bit
 from .inventory import take_away
 from .joints import joint_name, kind_of
 from .lock import clear, editable, with_names
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
+OF_THE_FORCES = bit(("GRAVITY",)) | bit(("DAMPER",)) | bit(("SPRING",))  # of the file, see take_away
 MINIMAL = "nothing (minimal)"
 AGAIN = "nothing, timed again"
 CAPSULES = "default flags + capsules"
@@ -56,7 +57,8 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
         spec.add_actuator(target=last, trntype=mujoco.mjtTrn.mjTRN_JOINT)
 
     def default(spec):
-        spec.option.disableflags = spec.option.enableflags = 0
+        spec.option.disableflags &= OF_THE_FORCES if engine.bare else 0  # which are then taken away, as they were
+        spec.option.enableflags = 0
 
     def default_with(*more):
         return lambda spec: [edit(spec) for edit in (default, *more)]

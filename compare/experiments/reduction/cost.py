@@ -70,11 +70,12 @@ def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
     """Radius of capsules, heights of a floor in reach and of one out of reach of a Tree, m.
 
     By the largest distance of a centre of mass from the base, to six digits, for the robot may reach twice as far; of the arm
-    0.03, -0.4 and -2.
+    0.03, -0.4 and -2. At least by the largest radius of gyration: a centre of mass may be at the base.
     """
     base = [offset for parent, offset in zip(tree.parent, tree.offset) if parent < 0]
     offset = [(0.0, 0.0, 0.0) if parent < 0 else offset for parent, offset in zip(tree.parent, tree.offset)]
-    reach = reaches(dataclasses.replace(tree, offset=offset)).max()
+    gyration = [np.sqrt(np.max(inertia) / mass) for inertia, mass in zip(tree.inertia, tree.mass) if mass > 0.0]
+    reach = max(reaches(dataclasses.replace(tree, offset=offset)).max(), *gyration)
     radius, near, far = (float(f"{part * reach:.6g}") for part in (1 / 15, 8 / 9, 40 / 9))
     lowest = min(height for *_, height in base)
     return radius, lowest - near, lowest - far

@@ -7,7 +7,7 @@ import pytest
 
 import tmt
 from compare.case import Scene
-from compare.engines.mujoco import ModelError, additions
+from compare.engines.mujoco import ModelError, additions, engine, read
 from compare.experiments.reduction import cost
 from compare.robots.arm import ARM
 
@@ -45,6 +45,13 @@ def test_sizes_follow_the_robot_and_its_base():
         com=2.0 * np.array(ARM.tree.com),
     )
     assert cost.sizes(big) == (0.06, 1.5 - 0.8, 1.5 - 4.0)
+
+
+def test_a_body_with_its_centre_of_mass_at_the_base_has_a_size():
+    reading = read('<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>')
+    radius, near, far = cost.sizes(reading.tree)
+    assert radius == pytest.approx(np.sqrt(0.4) * 0.1 / 15, rel=1e-5) and far < near < 0.0
+    assert additions.with_additions(engine(reading), radius, near, far)
 
 
 def test_the_fall_is_the_regular_scene_else_a_free_one_else_a_posture():

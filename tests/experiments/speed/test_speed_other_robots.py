@@ -1,5 +1,7 @@
 """Speed of robots of files: references in doubles, who takes part, orders on a free body, units."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from models import PATHS
@@ -214,3 +216,25 @@ def test_a_coarse_run_of_scipy_has_quaternions_of_length_1(stone):
     motion = Scipy().of(case).run(*case.start, case.tau, tumbling.TUMBLED / 8, 8, "RK45", tolerance=1e-2)
     assert np.abs(np.linalg.norm(motion.q, axis=1) - 1.0).max() < 1e-15
     assert np.abs(case.coordinates.difference(motion.q, exact)).max() > 1e-6
+
+
+def test_an_order_that_a_method_has_not_fails(gripper):
+    ours = gripper[1]["tmt"]
+    claims = {"rk4": ours.methods["rk4"]._replace(order=5)}
+    result = Result("speed")
+    tumbling.orders_on_a_body(result, {"tmt": SimpleNamespace(of=ours.of, methods=claims)})
+    failed = [check.scene for check in result.checks if not check.passed]
+    assert len(failed) == 1 and failed[0].endswith("tmt rk4")
+
+
+def test_an_adaptive_method_sees_the_errors_of_a_ball(stone):
+    case, stepping = stone[0], tmt.METHODS["dopri8_adaptive"]
+
+    def slope(q, qd):
+        return stepping.slope(case.tree, q, qd, case.tau.tolist(), 0.1)
+
+    *_, fifth, fifth_of_speeds, third, third_of_speeds = stepping.attempt(
+        slope, case.q.tolist(), case.v.tolist(), 0.1, case.tree.coordinates
+    )
+    assert min(np.abs([fifth, fifth_of_speeds]).max(axis=1)) > 1e-9
+    assert min(np.abs([third, third_of_speeds]).max(axis=1)) > 1e-7
