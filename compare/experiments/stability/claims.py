@@ -20,7 +20,7 @@ PRINTED_COUNTS = (64, 256, 1024, 4096)
 
 def of_claims(engines: Mapping[str, Engine]) -> tuple[Method, Method]:
     """What the claims are about: RK4 of tmt and of MuJoCo."""
-    rk4 = engines["tmt"].methods["rk4"]
+    rk4 = same_scheme(engines, engines["mujoco"].methods["RK4"], "tmt")
     return rk4, same_scheme(engines, rk4, "mujoco")
 
 
