@@ -1,0 +1,139 @@
+"""Why two sets of equations of motion differ, in the words of the derivation.
+
+The right equations are those of a tree, by the TMT method; the others are known by their values alone, at some states. Causes
+have ranks: 1 an option or a convention of a joint (order, sense, zero, unit); 2 one number, one term or one coefficient; 3 two
+of them. The search ends after the first rank in which something explains the values down to their tolerance, and lists all
+that does: they cannot be told apart.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+import tmt
+
+from .fit import Fitted, Search
+from .model import Equations
+from .places import places
+from .slips import slips
+from .variants import Variant, both, conventions, options, values_of
+from .words import Cause, of_fitted, of_variant
+
+STATES = 24
+FEW = 2  # states at which many conventions are tried first
+NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
+BESIDE = 4  # conventions beside which a number is fitted
+
+
+class Diagnosis(NamedTuple):
+    """What explains a difference."""
+
+    differs: bool
+    causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
+    left: float = 0.0  # of the difference that the nearest single number, term or pair leaves, a share
+    digits: float = np.inf  # to which the values agree
+
+    @property
+    def sentence(self) -> str:
+        """The finding."""
+        if not self.differs:
+            return "There is nothing to explain: the equations agree."
+        if self.causes:
+            ties = "" if len(self.causes) == 1 else f" ({len(self.causes)} explanations that cannot be told apart)"
+            return f"{'; or '.join(cause.text for cause in self.causes[:4])}{ties}."
+        rounded = ""
+        if self.digits >= 2.0:
+            rounded = f" The values agree to {int(self.digits)} digits: rounded constants would look like this."
+        share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
+        return f"No single number or term explains this, nor do two: {share} is left.{rounded}"
+
+
+def packed(mass_matrix: np.ndarray | None, bias: np.ndarray | None, nv: int, states: int) -> np.ndarray:
+    """Values as `Equations` has them, (states, entries); NaN where a quantity is not given."""
+    i, j = np.tril_indices(nv)
+    M = np.full((states, len(i)), np.nan) if mass_matrix is None else np.asarray(mass_matrix)[:, i, j]
+    h = np.full((states, nv), np.nan) if bias is None else np.asarray(bias)
+    return np.concatenate([M, h], axis=1)
+
+
+def diagnose(
+    tree: tmt.Tree, names: Sequence[str], q: np.ndarray, qd: np.ndarray, given: np.ndarray, tolerance: np.ndarray
+) -> Diagnosis:
+    """What explains given values that differ from those of a tree's equations.
+
+    names: of the joints. q: (states, nq), qd: (states, nv). given, tolerance: (states, entries), see `packed`.
+    """
+    equations = Equations(tree, q, qd)
+    search = Search(equations, places(equations), given, tolerance)
+    if not search.differs:
+        return Diagnosis(False)
+    names, singles = tuple(names), search.singles()
+    fitted = [one for one in singles if one.ratio <= 1.0]
+    for rank, found in enumerate(ranks(search, names, fitted), start=1):
+        causes = list(found)
+        if causes:
+            return Diagnosis(True, tuple(cause._replace(tied=len(causes) - 1) for cause in causes))
+    left = min([one.left for one in (*singles, *search.pair_fits)], default=1.0)
+    known = search.known
+    apart = np.abs(search.off[known]).max() * np.finfo(float).eps * 64
+    return Diagnosis(True, (), left, float(-np.log10(apart)))
+
+
+def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted]) -> Iterable[Iterable[Cause]]:
+    """The explanations of each rank, found when they are asked for."""
+    equations = search.equations
+    of_joints = list(conventions(equations, names))
+    explaining = explained(search, options(equations)) + explained_by_joints(search, of_joints)
+    yield [
+        *(of_variant(variant, left) for variant, left in explaining),
+        *(of_fitted(one, 1) for one in singles if one.places[0].rank == 1),
+    ]
+    yield [
+        *(of_fitted(one, 2) for one in singles if one.places[0].rank == 2),
+        *(of_variant(variant, left) for variant, left in explained(search, slips(equations))),
+    ]
+    found = [of_variant(variant, left) for variant, left in explained_by_joints(search, list(both(equations, names)))]
+    found += [of_fitted(one, 3) for one in search.pairs() if one.ratio <= 1.0]
+    simple = [variant for variant in (*options(equations), *of_joints) if variant.is_simple]
+    yield found + beside(search, simple)
+
+
+def explained(search: Search, variants: Iterable[Variant]) -> list[tuple[Variant, float]]:
+    """The variants that leave nothing, and the share that they leave."""
+    found = []
+    for variant in variants:
+        left = search.weighted(variant.equations().values()[0])
+        if np.abs(left).max() <= 1.0:
+            found.append((variant, float(np.linalg.norm(left)) / search.size))
+    return found
+
+
+def explained_by_joints(search: Search, variants: Sequence[Variant]) -> list[tuple[Variant, float]]:
+    """The same of conventions of the joints, which may be many: at a few states first."""
+    few = min(FEW, len(search.given))
+    if not variants:
+        return []
+    known, weight = search.known[:few], search.weight[:few]
+    given = np.where(known, search.given[:few], 0.0)
+    all_values = values_of(search.equations, [variant.joints for variant in variants], few)
+    near = [
+        variant
+        for variant, values in zip(variants, all_values)
+        if np.abs(np.where(known, given - values, 0.0) * weight).max() <= 1.0
+    ]
+    return explained(search, near)
+
+
+def beside(search: Search, variants: Sequence[Variant]) -> list[Cause]:
+    """One option or convention together with one number or term, of the few that promise most."""
+    tried = []
+    here = [place for place in search.places if place.column is None]
+    for variant in variants:
+        other = Search(variant.equations(), here, search.given, search.tolerance)
+        tried.append((other.promise / search.size, len(tried), variant, other))
+    found = []
+    for left, _, variant, other in sorted(tried, key=lambda one: one[:2])[:BESIDE]:
+        if left < NEAR:
+            found += [of_fitted(one, 3, variant) for one in other.singles() if one.ratio <= 1.0]
+    return found

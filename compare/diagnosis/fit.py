@@ -1,0 +1,189 @@
+"""Which change of one place, or of two, explains equations: least squares over the states, many places at once."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from .model import TINY, Equations
+from .places import Place
+
+ROUNDS = 25  # of a search from one start
+SETTLED = 1e-14  # a step of a place, of its size
+POLISHED = 16  # places with a quadratic influence that are fitted
+CANDIDATES = 64  # pairs that are fitted, the most promising of all
+TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # further starts for the zero of a hinge
+
+
+class Fitted(NamedTuple):
+    """A change of places that comes closest to the equations."""
+
+    places: tuple[Place, ...]
+    changes: tuple[float, ...]
+    ratio: float  # of what is left to its tolerance, the largest; explained if at most 1
+    left: float  # of the difference, a share: root of the sum of the squares
+
+
+class Search:
+    """Changes of places of the right equations that come closest to given values.
+
+    given: (states, entries) as `Equations.values`; NaN where nothing is given. tolerance: of each entry, (states, entries).
+    """
+
+    def __init__(self, equations: Equations, places: Sequence[Place], given: np.ndarray, tolerance: np.ndarray):
+        self.equations, self.places = equations, list(places)
+        self.given, self.tolerance = given, tolerance
+        self.known = np.isfinite(given)
+        self.weight = np.where(self.known, 1.0 / tolerance, 0.0)
+        self.right = equations.values()[0]
+        self.off = self.weighted(self.right)
+        self.size = float(np.linalg.norm(self.off))
+        self.pair_fits: list[Fitted] = []  # of `pairs`, once they are sought
+
+    def weighted(self, values: np.ndarray) -> np.ndarray:
+        """What is left of given values, in tolerances, (..., states, entries); 0 where nothing is given."""
+        return np.where(self.known, np.where(self.known, self.given, 0.0) - values, 0.0) * self.weight
+
+    @property
+    def differs(self) -> bool:
+        return bool(np.abs(self.off).max() > 1.0)
+
+    def values(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Of each row of changes, (rows, states, entries): x (rows, k), of the places which (rows, k)."""
+        changes, columns = {}, []
+        for row in range(len(which)):
+            for place, change in zip(which[row], x[row]):
+                for path, coefficient in self.places[place].moves:
+                    changes.setdefault(path, np.zeros(len(which), x.dtype))[row] += coefficient * change
+                if self.places[place].column is not None:
+                    columns.append((row, self.places[place], change))
+        values = self.equations.values(changes)
+        values = np.array(np.broadcast_to(values, (len(which), *values.shape[1:])), dtype=x.dtype)
+        for row, place, change in columns:
+            values[row, :, place.entry] += change * place.column
+        return values
+
+    def derivatives(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """By each of the k changes, in tolerances, (rows, k, states, entries)."""
+        steps = np.eye(x.shape[1]) * (1j * TINY)
+        return np.stack([self.values(which, x + step).imag / TINY for step in steps], axis=1) * self.weight
+
+    def fitted(self, which: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The changes nearest to the starts x (rows, k) that come closest, and what is then left, (rows, states, entries)."""
+        size = np.array([[self.places[place].size for place in row] for row in which])
+        left = self.weighted(self.values(which, x))
+        best, damping, moving = (left**2).sum(axis=(1, 2)), np.full(len(x), 1e-3), np.arange(len(x))
+        for _ in range(ROUNDS):
+            J = self.derivatives(which[moving], x[moving]).reshape(len(moving), x.shape[1], -1)
+            J = J * size[moving][:, :, None]
+            normal = np.einsum("rim,rjm->rij", J, J)
+            diagonal = np.einsum("rii->ri", normal)
+            diagonal = np.where(diagonal > 0.0, diagonal, 1.0)  # a place that nothing is seen of stays
+            scaled = normal / np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
+            scaled += np.eye(x.shape[1]) * damping[moving][:, None, None]
+            down = np.einsum("rim,rm->ri", J, left[moving].reshape(len(moving), -1)) / np.sqrt(diagonal)
+            step = np.linalg.solve(scaled, down[:, :, None])[:, :, 0] / np.sqrt(diagonal)
+            tried = x[moving] + step * size[moving]
+            after = self.weighted(self.values(which[moving], tried))
+            sums = np.nan_to_num((after**2).sum(axis=(1, 2)), nan=np.inf)
+            better = sums < best[moving]
+            now = moving[better]
+            x[now], left[now], best[now] = tried[better], after[better], sums[better]
+            damping[moving] = np.clip(np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), 1e-16, 1e8)
+            going = (np.abs(step).max(axis=1) > SETTLED) & (damping[moving] < 1e6)
+            moving = moving[going]
+            if not len(moving):
+                break
+        return x, left
+
+    def outcome(self, which: np.ndarray, x: np.ndarray, left: np.ndarray) -> list[Fitted]:
+        """Of each set of places the best row, the smallest remainder first."""
+        found = {}
+        for places, changes, rest in zip(which, x, left):
+            ratio = float(np.nan_to_num(np.abs(rest).max(), nan=np.inf))
+            share = float(np.linalg.norm(rest)) / self.size if self.size else 0.0
+            one = Fitted(tuple(self.places[k] for k in places), tuple(map(float, changes)), ratio, share)
+            key = tuple(sorted(places.tolist()))
+            if key not in found or one.ratio < found[key].ratio:
+                found[key] = one
+        return sorted(found.values(), key=lambda one: one.ratio)
+
+    @cached_property
+    def nearest(self) -> list[tuple[float, float]]:
+        """Of each place what the best change leaves, in tolerances, and that change, as far as the values are quadratic in it."""
+        first, second = (part.reshape(len(self.places), -1) for part in self.expansion)
+        r, found = self.off.ravel(), []
+        rr, ra, rb = r @ r, first @ r, second @ r
+        aa, ab, bb = (np.einsum("kn,kn->k", *pair) for pair in ((first, first), (first, second), (second, second)))
+        for k, place in enumerate(self.places):
+            cubic = [2.0 * bb[k], 3.0 * ab[k], aa[k] - 2.0 * rb[k], -ra[k]]
+            roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
+            roots = roots[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))].real
+            left = {
+                x: rr - 2.0 * x * ra[k] - 2.0 * x * x * rb[k] + x * x * aa[k] + 2.0 * x**3 * ab[k] + x**4 * bb[k]
+                for x in roots
+            }
+            best = min(left, key=left.get, default=0.0)
+            found.append((float(np.sqrt(max(0.0, left.get(best, rr)))), float(best) * place.size))
+        return found
+
+    @property
+    def promise(self) -> float:
+        """The least that one place leaves, about, in tolerances: directions and zeros beyond small changes are not seen."""
+        return min([left for left, _ in self.nearest], default=float(np.linalg.norm(self.off)))
+
+    def singles(self) -> list[Fitted]:
+        """Each place alone, the smallest remainder first.
+
+        Where the values are quadratic in its change, the best one is the root of a cubic; of these the few that come closest,
+        and of directions and zeros all, are fitted from several starts.
+        """
+        which, starts, promising = [], [], []
+        for k, (place, (left, best)) in enumerate(zip(self.places, self.nearest)):
+            if place.is_quadratic:
+                promising.append((left, k, best))
+            else:
+                turned = TURNED if place.kind == "zero" else (-1.0, 1.0)
+                near = [0.0, best, *turned]
+                which += [[k]] * len(near)
+                starts += [[x] for x in near]
+        for _, k, x in sorted(promising)[:POLISHED]:
+            which.append([k])
+            starts.append([x])
+        return self.outcome(np.array(which), *self.fitted(np.array(which), np.array(starts)))
+
+    @cached_property
+    def expansion(self) -> tuple[np.ndarray, np.ndarray]:
+        """First and second coefficients of the values in each place's change over its size, in tolerances.
+
+        (places, states, entries) each; exact where the values are quadratic in it, in all but directions and zeros.
+        """
+        which = np.arange(len(self.places))[:, None]
+        size = np.array([[place.size] for place in self.places])
+        up, down = (self.values(which, sign * size) for sign in (1.0, -1.0))
+        return (up - down) / 2.0 * self.weight, ((up + down) / 2.0 - self.right) * self.weight
+
+    def pairs(self) -> list[Fitted]:
+        """Two places together, of all pairs those that come closest where each change acts alone, fitted."""
+        first, second = (part.reshape(len(self.places), -1) for part in self.expansion)
+        columns = np.concatenate([first, second])
+        lengths = np.linalg.norm(columns, axis=1)
+        columns = np.divide(columns, lengths[:, None], out=np.zeros_like(columns), where=lengths[:, None] > 0.0)
+        inner, down, count = columns @ columns.T, columns @ self.off.ravel(), len(self.places)
+        active = [k for k in range(count) if lengths[k] > 0.0]
+        pairs = np.array(list(combinations(active, 2)))
+        if not len(pairs):
+            return []
+        spans = np.concatenate([pairs, pairs + count], axis=1)  # of the first and second coefficients of both
+        matrices = inner[spans[:, :, None], spans[:, None, :]] + 1e-9 * np.eye(4)
+        coefficients = np.linalg.solve(matrices, down[spans][:, :, None])[:, :, 0]
+        gained = np.einsum("pi,pi->p", coefficients, down[spans])
+        best = np.argsort(-gained)[:CANDIDATES]
+        size = np.array([place.size for place in self.places])
+        starts = coefficients[best][:, :2] / lengths[pairs[best]] * size[pairs[best]]
+        which = np.concatenate([pairs[best]] * 2)
+        starts = np.concatenate([starts, np.zeros_like(starts)])
+        self.pair_fits = self.outcome(which, *self.fitted(which, starts))
+        return self.pair_fits

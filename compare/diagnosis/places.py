@@ -1,0 +1,145 @@
+"""The places where equations can be wrong by one number: of the model, of a term, of a coefficient.
+
+A change x of a place adds x times its coefficient to entries of the tree (or to factors of terms), or x times the right
+coefficient to an entry of Mbar or h. A convention of a joint, its zero, is a number too, of rank 1; the others are of rank 2.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .model import TERMS, Equations, Path
+
+XYZ = "xyz"
+INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
+OF_TERM = {
+    "translation": "T' m T of {}", "rotation": "B' I B of {}", "gravity": "gravity term T' m g of {}",
+    "convective": "convective term T' m v_conv of {}", "Euler": "Euler term B' I w_conv of {}",
+    "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
+}  # fmt: skip
+TOGETHER = {  # terms that are often left out together, and what they are called
+    "all moments of {} in the bias": ("Euler", "gyroscopic"),
+    "all rates of {} in the bias": ("convective", "Euler", "gyroscopic"),
+    "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
+}
+EVERY = "every body"
+
+
+class Place(NamedTuple):
+    """One number that can be wrong."""
+
+    rank: int
+    kind: str  # "zero", "number", "term", "coefficient"
+    name: str
+    stated: float
+    unit: str
+    size: float  # of a change that matters, for starts of a search
+    moves: tuple[tuple[Path, float], ...] = ()  # entries of the tree, and how far they go with a change of 1
+    entry: int | None = None  # of the values of a state, with a column of its own instead
+    column: np.ndarray | None = None  # (states,)
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether Mbar and h are a polynomial of second degree in it."""
+        return not any(path.field in ("axis", "reference") for path, _ in self.moves)
+
+
+def places(equations: Equations) -> list[Place]:
+    """All of them."""
+    return [*numbers(equations), *terms(equations), *coefficients(equations)]
+
+
+def numbers(equations: Equations) -> list[Place]:
+    """Every number of the tree; where only the anchor of a joint moves, all that the joint carries stays where it is."""
+    tree, stated = equations.tree, equations.stated
+    length = max(1e-3, float(np.abs(stated["offset"]).max()), float(np.abs(stated["com"]).max()))
+    found = []
+
+    def add(kind, name, field, index, unit, size, *more, rank=2):
+        moves = ((Path(field, index), 1.0), *more)
+        found.append(Place(rank, kind, name, float(stated[field][index]), unit, float(size), moves))
+
+    for b, body in enumerate(tree.body_names):
+        heavy = stated["mass"][b] or stated["mass"].max()
+        add("number", f"mass of {body}", "mass", (b,), "kg", heavy)
+        for k, axis in enumerate(XYZ):
+            add("number", f"CoM {axis} of {body}", "com", (b, k), "m", length)
+        size = np.abs(stated["inertia"][b]).max() or heavy * length**2
+        for name, i, j in INERTIA:
+            mirrored = () if i == j else ((Path("inertia", (b, j, i)), 1.0),)
+            add("number", f"inertia {name} of {body}", "inertia", (b, i, j), "kg m2", size, *mirrored)
+    carried = [[b for b, joint in enumerate(tree.body_hinge) if joint == i] for i in range(len(tree.parent))]
+    following = [[j for j, parent in enumerate(tree.parent) if parent == i] for i in range(len(tree.parent))]
+    for i, (joint, (kind, at, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
+        for k, axis in enumerate(XYZ):
+            add("number", f"offset {axis} of {joint}", "offset", (i, k), "m", length)
+            if kind != "slide":
+                stays = [(Path("com", (b, k)), -1.0) for b in carried[i]]
+                stays += [(Path("offset", (j, k)), -1.0) for j in following[i]]
+                add("number", f"anchor {axis} of {joint}", "offset", (i, k), "m", length, *stays)
+        if kind != "ball":
+            unit = "m" if kind == "slide" else "rad"
+            add("zero", f"zero of {joint}", "reference", (i,), unit, length if kind == "slide" else 1.0, rank=1)
+            for k, axis in enumerate(XYZ):
+                add("number", f"axis {axis} of {joint}", "axis", (by.start, k), "", 0.5)
+        for speed in range(by.start, by.stop):
+            rotor = "kg" if kind == "slide" else "kg m2"
+            size = stated["mass"].max() * (1.0 if kind == "slide" else length**2)
+            name = joint if kind != "ball" else f"{joint} {XYZ[speed - by.start]}"
+            add("number", f"armature of {name}", "armature", (speed,), rotor, size)
+    for k, axis in enumerate(XYZ):
+        add("number", f"gravity {axis}", "gravity", (k,), "m/s2", 9.81)
+    return found
+
+
+def terms(equations: Equations) -> list[Place]:
+    """The factor of every term of each body, and of all bodies together where there are several; 1 is right."""
+    bodies = equations.tree.body_names
+    groups = {body: [b] for b, body in enumerate(bodies)}
+    if len(bodies) > 1:
+        groups[EVERY] = list(range(len(bodies)))
+    called = {name: (term,) for term, name in OF_TERM.items()} | TOGETHER
+    found = []
+    for name, together in called.items():
+        for body, which in groups.items():
+            moves = tuple((Path("factor", (b, TERMS.index(term))), 1.0) for b in which for term in together)
+            found.append(Place(2, "term", name.format(body), 1.0, "times", 1.0, moves))
+    return found
+
+
+def coefficients(equations: Equations) -> list[Place]:
+    """Entries of Mbar, entries of gravity, and the coefficients of products of rates in h; 1 is right."""
+    nv, states = equations.nv, len(equations.q)
+    values = {entry: equations.values()[0][:, k] for k, entry in enumerate(equations.entries)}
+    at = {entry: k for k, entry in enumerate(equations.entries)}
+    found = [
+        Place(2, "coefficient", f"M[{i}][{j}]", 1.0, "times", 1.0, entry=at["M", i, j], column=values["M", i, j])
+        for i, j in zip(*map(np.ndarray.tolist, equations.triangle))
+    ]
+    of_rates, weight = products_of_rates(equations)
+    for i in range(nv):
+        found.append(Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i]))
+        for (j, k), column in of_rates.items():
+            rates = f"qd{j}^2" if j == k else f"qd{j} qd{k}"
+            name = f"h[{i}], coefficient of {rates}"
+            column = column[:, i] * equations.qd[:, j] * equations.qd[:, k]
+            found.append(Place(2, "coefficient", name, 1.0, "times", 1.0, entry=at["h", i], column=column))
+    return [place for place in found if np.abs(place.column).max() > 0.0 and len(place.column) == states]
+
+
+def products_of_rates(equations: Equations) -> tuple[dict, np.ndarray]:
+    """The coefficient of qd_j qd_k in h, {(j, k): (states, nv)} with j at most k, and h at rest, (states, nv).
+
+    h is quadratic in the rates: c_jj = (h(e_j) + h(-e_j) - 2 h(0)) / 2, c_jk = h(e_j + e_k) - h(e_j) - h(e_k) + h(0).
+    """
+    nv, states = equations.nv, len(equations.q)
+    pairs = [(j, k) for j in range(nv) for k in range(j, nv)]
+    rates = [np.zeros(nv)] + [np.eye(nv)[j] + (np.eye(nv)[k] if k != j else 0.0) for j, k in pairs]
+    q, qd = np.tile(equations.q, (len(rates), 1)), np.repeat(rates, states, axis=0)
+    h = Equations(equations.tree, q, qd).values()[0, :, -nv:].reshape(len(rates), states, nv)
+    weight, single = h[0], {j: h[1 + pairs.index((j, j))] for j in range(nv)}
+    of = {
+        (j, k): single[j] - weight if j == k else h[1 + pairs.index((j, k))] - single[j] - single[k] + weight
+        for j, k in pairs
+    }
+    return of, weight

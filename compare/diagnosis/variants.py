@@ -1,0 +1,155 @@
+"""Explanations without a number to be found: an option, a convention of a joint, a slip in the derivation.
+
+Each gives what Mbar and h would be: values as those of `Equations`. Options and conventions are of rank 1, and equations
+themselves, so that a number can be sought beside them; slips are of rank 2.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations, permutations
+from typing import NamedTuple
+
+import numpy as np
+
+import tmt
+
+from ..coordinates import Coordinates
+from ..joint_map import PER_UNIT, Joint, JointMap
+from ..judge.words import listed
+from .model import TERMS, Equations
+
+TOGETHER = 2000  # maps of the joints in one evaluation
+MOST_JOINTS = 6  # of which every order and every set of senses is tried; of more two exchanged, and one turned
+
+
+class Variant(NamedTuple):
+    """An explanation that is so or not."""
+
+    rank: int
+    kind: str  # "option", "order", "sign", "unit" or "slip"
+    name: str
+    stated: str
+    explains: str
+    equations: Callable[[], Equations]
+    joints: JointMap | None = None  # of a convention of the joints
+    is_simple: bool = True  # it is tried together with one number too
+
+
+class Recast:
+    """Equations whose values are handed on changed: values -> values."""
+
+    def __init__(self, equations: Equations, change: Callable[[np.ndarray], np.ndarray]):
+        self.equations, self.change = equations, change
+
+    def values(self, changes: dict | None = None) -> np.ndarray:
+        return self.change(self.equations.values(changes))
+
+
+def options(equations: Equations) -> Iterator[Variant]:
+    """What an option or a convention of the whole file or program changes."""
+    tree, nv = equations.tree, equations.nv
+    terms = {"gravity": (TERMS.index("gravity"),), "rates": tuple(map(TERMS.index, ("convective", "Euler", "gyroscopic")))}
+
+    def with_factor(of: str, factor: float) -> Callable:
+        def made() -> Equations:
+            changed = Equations(tree, equations.q, equations.qd)
+            changed.stated["factor"][:, terms[of]] = factor
+            return changed
+
+        return made
+
+    def with_bias(change: Callable) -> Callable:
+        return lambda: Recast(equations, lambda values: np.concatenate([values[..., :-nv], change(values[..., -nv:])], -1))
+
+    def without_rotors() -> Equations:
+        changed = Equations(tree, equations.q, equations.qd)
+        changed.stated["armature"][:] = 0.0
+        return changed
+
+    yield Variant(1, "option", "gravity", "on", "off", with_factor("gravity", 0.0))
+    yield Variant(1, "option", "sign of gravity", "+", "-", with_factor("gravity", -1.0))
+    yield Variant(1, "option", "terms of the rates in the bias", "there", "left out", with_factor("rates", 0.0))
+    negative = with_bias(lambda h: -h)
+    yield Variant(1, "option", "sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", negative)
+    if any(tree.damping):
+        drag = np.array(tree.damping) * equations.qd
+        yield Variant(1, "option", "damping D qd", "not in h", "in h", with_bias(lambda h: h + drag))
+        opposite = with_bias(lambda h: h - drag)
+        yield Variant(1, "option", "damping D qd", "not in h", "in h, of the other sign", opposite)
+    if tree.has_springs:
+        pull = tmt.spring_torque(equations.q, tree)
+        yield Variant(1, "option", "springs k (q - rest)", "not in h", "in h", with_bias(lambda h: h + pull))
+    if any(tree.armature):
+        yield Variant(1, "option", "armature", "on the diagonal of Mbar", "left out", without_rotors)
+
+
+def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Variant]:
+    """Order, senses and units of the joints. names: of the joints, as the given equations take them in this order."""
+    tree, q, qd = equations.tree, equations.q, equations.qd
+    coordinates = Coordinates(names, tree.kind)
+    kinds, straight = dict(zip(names, tree.kind)), [name for name, kind in zip(names, tree.kind) if kind != "ball"]
+
+    def variant(kind, name, stated, explains, joints, is_simple=True) -> Variant:
+        joints = tuple(joint._replace(slides=kinds[joint.name] == "slide") for joint in joints)
+        made = JointMap(coordinates, joints)
+        return Variant(1, kind, name, stated, explains, lambda: Equations(tree, q, qd, made), made, is_simple)
+
+    for order in orders(names, tree.kind):
+        exchanged = [name for name, other in zip(names, order) if name != other]
+        simple = len(exchanged) == 2
+        yield variant("order", "order of the joints", ", ".join(names), ", ".join(order), map(Joint, order), simple)
+    most = len(straight) if len(straight) <= MOST_JOINTS else 1
+    for count in range(1, most + 1):
+        for turned in combinations(straight, count):
+            joints = [Joint(name, -1.0 if name in turned else 1.0) for name in names]
+            yield variant("sign", f"sense of {listed(turned)}", "+", "-", joints, count == 1)
+    hinges = [name for name in straight if kinds[name] == "hinge"]
+    for which in dict.fromkeys((*((name,) for name in hinges), tuple(hinges))):
+        for unit in PER_UNIT:
+            if unit and which:
+                joints = [Joint(name, unit=unit if name in which else "") for name in names]
+                name = f"unit of {which[0] if len(which) == 1 else 'all hinges'}"
+                yield variant("unit", name, "rad", unit, joints)
+
+
+def orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """Other orders of joints in which each stands where one of its kind stood."""
+    if len(names) <= MOST_JOINTS:
+        tried = permutations(range(len(names)))
+    else:
+        tried = [list(range(len(names)))[::-1]]
+        for i, j in combinations(range(len(names)), 2):
+            order = list(range(len(names)))
+            order[i], order[j] = j, i
+            tried.append(order)
+    for order in tried:
+        if all(kinds[i] == kind for i, kind in zip(order, kinds)) and list(order) != sorted(order):
+            yield tuple(names[i] for i in order)
+
+
+def both(equations: Equations, names: tuple[str, ...]) -> Iterator[Variant]:
+    """An order and senses together, of up to six joints."""
+    tree = equations.tree
+    straight = [name for name, kind in zip(names, tree.kind) if kind != "ball"]
+    if len(names) > MOST_JOINTS:
+        return
+    for order in orders(names, tree.kind):
+        for count in range(1, len(straight) + 1):
+            for turned in combinations(straight, count):
+                joints = [Joint(name, -1.0 if name in turned else 1.0) for name in order]
+                made = JointMap(Coordinates(names, tree.kind), joints)
+                yield Variant(3, "order and sign", "order and senses of the joints", ", ".join(names),
+                              ", ".join(map(str, joints)), lambda m=made: Equations(tree, equations.q, equations.qd, m), made, False)  # fmt: skip
+
+
+def values_of(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:
+    """What the first states give with each map of the joints, (states, entries): evaluated together."""
+    q, qd = equations.q[:states], equations.qd[:states]
+    for first in range(0, len(maps), TOGETHER):
+        some = maps[first : first + TOGETHER]
+        inner = Equations(equations.tree, *(np.concatenate([move(m) for m in some]) for move in (lambda m: m.positions(q), lambda m: m.speeds(qd))))
+        values = inner.values()[0].reshape(len(some), states, -1)
+        i, j = inner.triangle
+        M = np.zeros((len(some), states, inner.nv, inner.nv))
+        M[..., i, j] = M[..., j, i] = values[..., : len(i)]
+        for one, mass, h in zip(some, M, values[..., len(i) :]):
+            yield np.concatenate([one.own_mass_matrix(mass)[:, i, j], one.own_forces(h)], axis=-1)

@@ -1,0 +1,85 @@
+"""Causes in words."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..joint_map import Joint
+from .fit import Fitted
+from .places import Place
+from .variants import Variant
+
+FACTORS = {0.0: "missing", 0.5: "halved", 2.0: "doubled", -1.0: "of the other sign"}
+CLOSE = 1e-9  # a fitted factor, to one of these
+
+
+class Cause(NamedTuple):
+    """One explanation of everything."""
+
+    rank: int
+    kind: str
+    place: str
+    stated: float | str
+    explains: float | str  # the value that would explain the difference
+    unit: str
+    left_over: float  # of the difference, a share
+    tied: int  # other explanations that cannot be told from it
+    text: str
+
+
+def of_variant(variant: Variant, left: float) -> Cause:
+    """An option, a convention or a slip."""
+    text = f"{variant.name}: {variant.explains}" if variant.kind != "slip" or variant.explains != "so" else variant.name
+    if variant.joints is not None:
+        text += f" (state it as joints={[str(joint) for joint in variant.joints.joints]})"
+    return Cause(variant.rank, variant.kind, variant.name, variant.stated, variant.explains, "", left, 0, text)
+
+
+def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause:
+    """A number, a term or a coefficient, or two of them."""
+    places, found = fitted.places, [place.stated + change for place, change in zip(fitted.places, fitted.changes)]
+    kinds, names = [place.kind for place in places], [place.name for place in places]
+    stated, explains, units = [f"{place.stated:.12g}" for place in places], [f"{x:.12g}" for x in found], [p.unit for p in places]
+    texts = [said(place, value) for place, value in zip(places, found)]
+    if beside:
+        kinds, names = [beside.kind, *kinds], [beside.name, *names]
+        stated, explains, units = [beside.stated, *stated], [beside.explains, *explains], ["", *units]
+        texts = [of_variant(beside, 0.0).text, *texts]
+    text = " and ".join(texts)
+    if len(texts) == 1:
+        place = places[0]
+        return Cause(rank, place.kind, place.name, place.stated, found[0], place.unit, fitted.left, 0, text)
+    joined = [" and ".join(dict.fromkeys(parts)) if parts is units else " and ".join(parts) for parts in (kinds, names, stated, explains, units)]
+    return Cause(rank, *joined, fitted.left, 0, text)
+
+
+def said(place: Place, value: float) -> str:
+    """One place with the value that would explain the difference."""
+    if place.unit == "times":
+        near = [word for factor, word in FACTORS.items() if abs(value - factor) <= CLOSE]
+        if place.kind == "coefficient":
+            return f"{place.name}: yours is {nice(value)} times the right one"
+        return f"{place.name}: {near[0] if near else f'{nice(value)} times'}"
+    unit = f" {place.unit}" if place.unit else ""
+    if place.kind == "zero":
+        joint = place.name.removeprefix("zero of ")
+        how = Joint(joint, zero=zeroed(place, value), slides=place.unit == "m")
+        return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)} (state it as {str(how)!r})"
+    return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)} would explain it"
+
+
+def zeroed(place: Place, value: float) -> float:
+    """What is added to the model's position of a joint, within a turn and of the fewest digits that say the same."""
+    off = value - place.stated
+    if place.unit == "m":
+        return float(f"{off:.9g}")
+    off = (off + np.pi) % (2.0 * np.pi) - np.pi
+    degrees = round(np.degrees(off), 6)
+    return float(np.radians(degrees)) if abs(np.radians(degrees) - off) <= CLOSE else float(off)
+
+
+def nice(value: float) -> str:
+    """A number without the digits that a fit leaves behind."""
+    short = float(f"{value:.9g}")
+    close = abs(value - short) <= CLOSE * max(abs(value), 1e-6)
+    return f"{short:g}" if close and f"{short:g}" == f"{short:.9g}" else f"{short if close else value:.9g}"
