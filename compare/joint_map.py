@@ -113,7 +113,9 @@ def joint_map(coordinates: Coordinates, stated: Sequence[str] | None) -> JointMa
     if twice:
         raise JointsError(f"joints name {twice[0]!r} twice")
     if missing:
-        raise JointsError(f"joints do not name {listed(missing)}; all {len(coordinates.names)} of the model are expected")
+        raise JointsError(
+            f"joints do not name {listed(missing)}; all {len(coordinates.names)} of the model are expected"
+        )
     return JointMap(coordinates, joints)
 
 

@@ -17,7 +17,14 @@ from tmt.space import Vector
 from ..joint_map import JointMap
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
-TERMS = ("translation", "rotation", "gravity", "convective", "Euler", "gyroscopic")  # of each body; the first two of Mbar
+TERMS = (
+    "translation",
+    "rotation",
+    "gravity",
+    "convective",
+    "Euler",
+    "gyroscopic",
+)  # of each body; the first two of Mbar
 TINY = 1e-100  # an imaginary change, whose square vanishes
 
 

@@ -118,7 +118,9 @@ def coefficients(equations: Equations) -> list[Place]:
     ]
     of_rates, weight = products_of_rates(equations)
     for i in range(nv):
-        found.append(Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i]))
+        found.append(
+            Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i])
+        )
         for (j, k), column in of_rates.items():
             rates = f"qd{j}^2" if j == k else f"qd{j} qd{k}"
             name = f"h[{i}], coefficient of {rates}"

@@ -29,7 +29,9 @@ class Parts:
         self.tree, self.equations = tree, equations
         self.T = np.stack([stacked(body.T) for body in bodies], 1).swapaxes(2, 3)  # (states, bodies, 3, nv)
         self.B = np.stack([stacked(body.B) for body in bodies], 1).swapaxes(2, 3)  # body axes
-        self.v_conv, self.w_conv, self.omega = (stacked(getattr(b, name) for b in bodies) for name in ("v_conv", "w_conv", "omega"))
+        self.v_conv, self.w_conv, self.omega = (
+            stacked(getattr(b, name) for b in bodies) for name in ("v_conv", "w_conv", "omega")
+        )
         turns = [frames[joint].turn if joint >= 0 else method.IDENTITY for joint in tree.body_hinge]
         self.R = np.stack([stacked(turn.rows) for turn in turns], 1)  # body axes -> inertial axes
         self.mass, self.inertia = np.array(tree.mass), np.broadcast_to(tree.inertia, (states, len(bodies), 3, 3))
@@ -39,7 +41,11 @@ class Parts:
         """Mbar and h with some of the arrays in place of these, (1, states, entries)."""
         of = vars(self) | changed
         T, B, m, I, w = of["T"], of["B"], of["mass"], of["inertia"], of["omega"]
-        M = np.einsum("sbci,b,sbcj->sij", T, m, T) + np.einsum("sbci,sbcd,sbdj->sij", B, I, B) + np.diag(self.tree.armature)
+        M = (
+            np.einsum("sbci,b,sbcj->sij", T, m, T)
+            + np.einsum("sbci,sbcd,sbdj->sij", B, I, B)
+            + np.diag(self.tree.armature)
+        )
         force = m[:, None] * (of["v_conv"] - self.gravity)
         spin = np.einsum("sbcd,sbd->sbc", I, w)
         moment = np.einsum("sbcd,sbd->sbc", I, of["w_conv"]) + np.cross(w, spin)
@@ -92,7 +98,12 @@ def slips(equations: Equations) -> Iterator[Variant]:
             swapped = parts.inertia.copy()
             swapped[:, b] = swapped[:, b][:, order][:, :, order]
             axes = "xyz"[x] + " and " + "xyz"[y]
-            yield slip(f"axes {axes} of the inertia of {body} exchanged", "right", "so", lambda i=swapped: parts.values(inertia=i))
+            yield slip(
+                f"axes {axes} of the inertia of {body} exchanged",
+                "right",
+                "so",
+                lambda i=swapped: parts.values(inertia=i),
+            )
         yield slip(f"CoM of {body}", "where it is", "at the joint", lambda b=b: com_at_joint(equations, b))
     for i, (joint, (kind, _, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
         if kind != "ball":
@@ -101,7 +112,9 @@ def slips(equations: Equations) -> Iterator[Variant]:
                 if abs(abs(stated[k]) - 1.0) > 1e-9:
                     axis = "-" * (sign < 0.0) + "xyz"[k]
                     shown = "(" + ", ".join(f"{a:.4g}" for a in stated) + ")"
-                    yield slip(f"axis of {joint}", shown, axis, lambda s=by.start, k=k, a=sign: with_axis(equations, s, k, a))
+                    yield slip(
+                        f"axis of {joint}", shown, axis, lambda s=by.start, k=k, a=sign: with_axis(equations, s, k, a)
+                    )
     yield from lagrange(equations)
 
 
@@ -114,7 +127,8 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
 
     def parts() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         slopes = -np.stack(
-            [equations.values({Path("reference", (k,)): np.array([1e-100j])})[0].imag / 1e-100 for k in range(nv)], axis=1
+            [equations.values({Path("reference", (k,)): np.array([1e-100j])})[0].imag / 1e-100 for k in range(nv)],
+            axis=1,
         )
         M = np.zeros((len(equations.q), nv, nv, nv))
         M[:, :, i, j] = M[:, :, j, i] = slopes[:, :, : len(i)]
@@ -127,8 +141,16 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
         return np.concatenate([right[:, : len(i)], of_Mdot * Mdot_qd - of_gradient * gradient + weight], axis=1)[None]
 
     named = {
-        "gradient of the kinetic energy in h": (("left out", 1.0, 0.0), ("of the other sign", 1.0, -1.0), ("twice", 1.0, 2.0)),
-        "Mdot qd in h": (("left out", 0.0, 1.0), ("halved", 0.5, 1.0), ("halved, and no gradient of the kinetic energy", 0.5, 0.0)),
+        "gradient of the kinetic energy in h": (
+            ("left out", 1.0, 0.0),
+            ("of the other sign", 1.0, -1.0),
+            ("twice", 1.0, 2.0),
+        ),
+        "Mdot qd in h": (
+            ("left out", 0.0, 1.0),
+            ("halved", 0.5, 1.0),
+            ("halved, and no gradient of the kinetic energy", 0.5, 0.0),
+        ),
     }
     for name, forms in named.items():
         for explains, *factors in forms:

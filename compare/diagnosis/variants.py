@@ -47,7 +47,10 @@ class Recast:
 def options(equations: Equations) -> Iterator[Variant]:
     """What an option or a convention of the whole file or program changes."""
     tree, nv = equations.tree, equations.nv
-    terms = {"gravity": (TERMS.index("gravity"),), "rates": tuple(map(TERMS.index, ("convective", "Euler", "gyroscopic")))}
+    terms = {
+        "gravity": (TERMS.index("gravity"),),
+        "rates": tuple(map(TERMS.index, ("convective", "Euler", "gyroscopic"))),
+    }
 
     def with_factor(of: str, factor: float) -> Callable:
         def made() -> Equations:
@@ -58,7 +61,9 @@ def options(equations: Equations) -> Iterator[Variant]:
         return made
 
     def with_bias(change: Callable) -> Callable:
-        return lambda: Recast(equations, lambda values: np.concatenate([values[..., :-nv], change(values[..., -nv:])], -1))
+        return lambda: Recast(
+            equations, lambda values: np.concatenate([values[..., :-nv], change(values[..., -nv:])], -1)
+        )
 
     def without_rotors() -> Equations:
         changed = Equations(tree, equations.q, equations.qd)
@@ -146,7 +151,10 @@ def values_of(equations: Equations, maps: Sequence[JointMap], states: int) -> It
     q, qd = equations.q[:states], equations.qd[:states]
     for first in range(0, len(maps), TOGETHER):
         some = maps[first : first + TOGETHER]
-        inner = Equations(equations.tree, *(np.concatenate([move(m) for m in some]) for move in (lambda m: m.positions(q), lambda m: m.speeds(qd))))
+        inner = Equations(
+            equations.tree,
+            *(np.concatenate([move(m) for m in some]) for move in (lambda m: m.positions(q), lambda m: m.speeds(qd))),
+        )
         values = inner.values()[0].reshape(len(some), states, -1)
         i, j = inner.triangle
         M = np.zeros((len(some), states, inner.nv, inner.nv))

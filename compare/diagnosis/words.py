@@ -39,7 +39,11 @@ def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause
     """A number, a term or a coefficient, or two of them."""
     places, found = fitted.places, [place.stated + change for place, change in zip(fitted.places, fitted.changes)]
     kinds, names = [place.kind for place in places], [place.name for place in places]
-    stated, explains, units = [f"{place.stated:.12g}" for place in places], [f"{x:.12g}" for x in found], [p.unit for p in places]
+    stated, explains, units = (
+        [f"{place.stated:.12g}" for place in places],
+        [f"{x:.12g}" for x in found],
+        [p.unit for p in places],
+    )
     texts = [said(place, value) for place, value in zip(places, found)]
     if beside:
         kinds, names = [beside.kind, *kinds], [beside.name, *names]
@@ -49,7 +53,10 @@ def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause
     if len(texts) == 1:
         place = places[0]
         return Cause(rank, place.kind, place.name, place.stated, found[0], place.unit, fitted.left, 0, text)
-    joined = [" and ".join(dict.fromkeys(parts)) if parts is units else " and ".join(parts) for parts in (kinds, names, stated, explains, units)]
+    joined = [
+        " and ".join(dict.fromkeys(parts)) if parts is units else " and ".join(parts)
+        for parts in (kinds, names, stated, explains, units)
+    ]
     return Cause(rank, *joined, fitted.left, 0, text)
 
 
