@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..case import Case, Coordinates
 
-LABELS = {"tmt": "TMT", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
+LABELS = {"tmt": "TMT", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka", "own": "yours"}  # in text
 COMPARED = ("tmt", "mujoco")  # the two engines that every experiment compares
 GRID = 64  # equal times, and the start, at which a prepared run is read
 
