@@ -49,11 +49,13 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
     worst, of_worst = max((largest_of(curves[q][f"{label} to MuJoCo"]), q) for q in quantities)
     against = ""
     if exact:
-        ours, theirs = (max(largest_of(curves[q][f"{engine} to exact"]) for q in quantities) for engine in (label, "MuJoCo"))
+        ours, theirs = (
+            max(largest_of(curves[q][f"{engine} to exact"]) for q in quantities) for engine in (label, "MuJoCo")
+        )
         known = len(curves[quantities[0]][f"{label} to exact"])
         against = (
             f" Against the exact value, at the first {known} of the states, {label} is {eps_in_words(ours)} off and "
-            f"MuJoCo {eps_in_words(theirs)}."
+            f"MuJoCo at most {theirs:.3g}."
         )
     caption = (
         f"Share of the {sample} whose difference is at most so many eps. The engines are {eps_in_words(worst)} apart "
