@@ -45,7 +45,7 @@ def not_empty(text: str) -> str:
     return text
 
 
-def reference(text: str) -> str:
+def stated_reference(text: str) -> str:
     """What a model is compared with: what has a colon is read later."""
     if text in ("arm", "model") or ":" in text:
         return text
@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--reference",
-        type=reference,
+        type=stated_reference,
         metavar="WHAT",
         help="what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); model, "
         "tmt's equations for the model as MuJoCo compiled it (default for any other); or your own equations, FILE.py:OBJECT "
@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--joints",
         type=not_empty,
         metavar="LIST",
-        help="the joints as your own equations take them, in their order: elbow,-shoulder,wrist+90deg",
+        help="the joints as your own equations take them, in their order: first,-second,third+90deg",
     )
     parser.add_argument(
         "--scenes",

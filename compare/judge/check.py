@@ -136,10 +136,8 @@ class Result:
                 "difference_over_bar": check.over_tolerance,
                 "scale": scale[worst],
                 "difference_eps": in_eps[between].max(),
-                **{
-                    f"{engine.lower()}_from_exact_eps": in_eps[f"{engine} to exact"].max() if len(known) else None
-                    for engine in (self.label, "MuJoCo")
-                },
+                f"{self.label.lower()}_from_exact_eps": in_eps[f"{self.label} to exact"].max() if len(known) else None,
+                "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if len(known) else None,
                 "exact_states": len(known) if truth else None,
                 "worst_state": check.note,
                 "worst_q": all_digits(sample.q[worst]),
