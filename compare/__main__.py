@@ -45,6 +45,15 @@ def not_empty(text: str) -> str:
     return text
 
 
+def with_minus(arguments: Sequence[str]) -> list[str]:
+    """The arguments, a list of joints that begins with a minus as part of its option: it is none itself."""
+    given = list(arguments)
+    for k in range(len(given) - 1, 0, -1):
+        if given[k - 1] == "--joints" and given[k].startswith("-") and not given[k].startswith("--"):
+            given[k - 1 : k + 1] = [f"--joints={given[k]}"]
+    return given
+
+
 def stated_reference(text: str) -> str:
     """What a model is compared with: what has a colon is read later."""
     if text in ("arm", "model") or ":" in text:
@@ -99,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="FILE",
         help="scenes of your own (TOML), beside those of the robot in trajectory, speed and reduction",
     )
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(with_minus(sys.argv[1:] if arguments is None else arguments))
     if options.scenes and options.experiment not in (*FOLLOWING_SCENES, "all"):
         parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
     if options.joints and ":" not in (options.reference or ""):
