@@ -17,6 +17,12 @@ from .robots import Robot
 from .setup import Setup as Setup
 from .setup import engines as engines
 
+# which of a user's own equations an experiment asks; others ask all
+ASKED_BY = {
+    "kinematics": ("com_positions", "jacobians"),
+    "mass": ("mass_matrix",),
+    "gravity": ("gravity", "bias", "energy"),
+}
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
 
@@ -29,6 +35,7 @@ def examine(
     """
     (folder / "figures").mkdir()
     sections, drawings, causes = [], [], []
+    own, said = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
     crashed = {
         name: attempt(name, experiment.begin, setup)[1]
@@ -39,7 +46,10 @@ def examine(
         setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        asked = experiment.TITLE, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
+        title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if setup.robot.own else experiment.TITLE
+        asked = title, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
+        if own:
+            add_problems(crash or result, own.equations.problems, said)
         sections.append(Section(name, *asked, crash or result))
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
         new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
@@ -50,6 +60,19 @@ def examine(
         if drawing is not None:
             take_figures(terminal, section, drawing)
     return sections, causes
+
+
+def add_problems(result: Result, problems: Sequence, said: set) -> None:
+    """What is wrong with those of a user's own equations that an experiment asks, each a failed check before all others.
+
+    problems: with quantity and text, see engines.own; said: those that need not be said again, to which these are added.
+    """
+    others, result.checks = result.checks, []
+    for k, problem in enumerate(problems):
+        if k not in said and problem.quantity in ASKED_BY.get(result.experiment, (problem.quantity,)):
+            said.add(k)
+            result.check("", f"{problem.quantity} gives what it should", None, 0.0, "", problem.text, rule="equal")
+    result.checks += others
 
 
 def find_causes(setup: Setup) -> list[dict]:
@@ -89,7 +112,7 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
     most = f"uses {max(used):.2g} of a tolerance" if any(used) and not failed else ""
-    word = f"{len(failed)} FAILED" if failed else "ok"
+    word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
     lines = [f"  CAUSE {cause['text']}" for cause in causes]

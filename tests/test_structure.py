@@ -21,7 +21,8 @@ DIRECTIONS = {
     "states": {"tmt", "robots", "case"},
     "robots": {"tmt", "case"},
     "scene_file": {"case", "robots"},
-    "reference": {"robots", "engines", "process"},
+    "own_file": {"process"},
+    "reference": {"robots", "engines", "process", "case", "joint_map", "own_file"},
     "engines": {"tmt", "case", "coordinates", "joint_map"},
     "truth": {"tmt", "case"},
     "judge": {"tmt", "case"},
@@ -33,6 +34,7 @@ DIRECTIONS = {
     "__main__": {
         "case",
         "engines",
+        "own_file",
         "reference",
         "scene_file",
         "process",

@@ -98,4 +98,4 @@ def outcome(section: Section) -> str:
         return f"It does not hold: {len(differing)} of {len(checks)} checks fail."
     if broke:
         return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
-    return f"It holds: all {len(checks)} checks pass."
+    return f"It holds: all {len(checks)} checks pass." if checks else "It is not decided: nothing was compared."

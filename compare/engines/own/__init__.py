@@ -99,6 +99,10 @@ class OwnDynamics:
     def energy(self, q, v) -> np.ndarray:
         return self.equations.energy(*self.whole(q, v))
 
+    def potential_energy(self, q) -> np.ndarray:
+        """The energy at rest, J, (...); its zero is its own."""
+        return self.energy(q, np.zeros(self.coordinates.nv))
+
     def com_positions(self, q) -> np.ndarray:
         return self.equations.com_positions(*self.whole(q))
 

@@ -109,7 +109,7 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
 
     try:
         symbols = list(sympy.flatten(symbols))
-        entries = [sympy.sympify(entry) for entry in sympy.flatten(matrix)]
+        entries = [sympy.sympify(entry) for entry in sympy.flatten([matrix])]
     except Exception as error:  # whatever SymPy makes of what is given
         raise OwnError(f"{name} is {shown(matrix)}; a SymPy matrix is expected ({shown(str(error))})") from None
     nq, nv = coordinates.nq, coordinates.nv
@@ -139,7 +139,7 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
         columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]
         columns += [np.zeros_like(columns[0])] * (len(plain) - len(columns))  # nothing depends on these
         values = np.broadcast_arrays(*evaluated(*columns), columns[0])[:-1]
-        return np.stack(values, axis=-1).reshape(*states[0].shape[:-1], *shape)
+        return np.stack(values, axis=-1).reshape((*states[0].shape[:-1], *shape))
 
     function.__name__ = name
     return function

@@ -37,9 +37,9 @@ EDITS = (
     Edit("folder", "clear_away", "number is not None", "True", "the folder of a run that is alive is cleared"),
     Edit("folder", "is_of_a_run", "not _1 or _2 or _3", "False", "a folder that no run has made is cleared"),
     # what is drawn, and said of it
-    Edit("experiments.figures", "draw_distances", "max((curves[q]['TMT to MuJoCo'][-1], q) for q in quantities)",
-         "min((curves[q]['TMT to MuJoCo'][-1], q) for q in quantities)", "the least distance is told as the largest"),
-    Edit("experiments.figures", "draw_distances", "('TMT', 'MuJoCo')", "('MuJoCo', 'TMT')", "the caption exchanges the engines"),
+    Edit("experiments.figures", "draw_distances", "max((largest_of(curves[q][f'{label} to MuJoCo']), q) for q in quantities)",
+         "min((largest_of(curves[q][f'{label} to MuJoCo']), q) for q in quantities)", "the least distance is told as the largest"),
+    Edit("experiments.figures", "draw_distances", "(label, 'MuJoCo')", "('MuJoCo', label)", "the caption exchanges the engines"),
     Edit("figures_runs", "draw_held", "curve['left']['tmt']", "curve['left']['mujoco']", "MuJoCo's departure is told of TMT"),
     Edit("figures_runs", "draw_held", "(ours, theirs)", "(theirs, ours)", "the caption exchanges the engines"),
     Edit("figures_runs", "run_caption", "max(used)", "min(used)", "the least use of the band is told as the most"),
