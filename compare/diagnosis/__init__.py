@@ -13,6 +13,8 @@ import numpy as np
 
 import tmt
 
+from ..judge.scale import EPS, FACTOR
+from ..judge.words import listed
 from .fit import Fitted, Search
 from .model import Equations
 from .places import places
@@ -23,6 +25,8 @@ from .words import Cause, of_fitted, of_variant
 STATES = 24
 FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
+SHOWN = 6  # entries in a sentence
+NEAREST = 12  # explanations that are kept though they do not explain
 BESIDE = 4  # conventions beside which a number is fitted
 
 
@@ -33,6 +37,9 @@ class Diagnosis(NamedTuple):
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
     left: float = 0.0  # of the difference that the nearest single number, term or pair leaves, a share
     digits: float = np.inf  # to which the values agree
+    entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[0][1]"
+    compared: int = 0  # entries in all
+    nearest: tuple[tuple[str, float], ...] = ()  # single explanations that leave least, and what they leave, a share
 
     @property
     def sentence(self) -> str:
@@ -44,9 +51,17 @@ class Diagnosis(NamedTuple):
             return f"{'; or '.join(cause.text for cause in self.causes[:4])}{ties}."
         rounded = ""
         if self.digits >= 2.0:
-            rounded = f" The values agree to {int(self.digits)} digits: rounded constants would look like this."
+            rounded = f" The values agree to {int(self.digits)} digits: constants that are rounded, or noise, would look like this."
         share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
-        return f"No single number or term explains this, nor do two: {share} is left.{rounded}"
+        return f"No single number or term explains this, nor do two: {share} is left. {self.where}{rounded}"
+
+    @property
+    def where(self) -> str:
+        """Which entries differ."""
+        if len(self.entries) == self.compared:
+            return "Every entry differs."
+        shown = listed(self.entries if len(self.entries) <= SHOWN else (*self.entries[:SHOWN], "others"))
+        return f"{shown} {'differs' if len(self.entries) == 1 else 'differ'}, the others agree."
 
 
 def packed(mass_matrix: np.ndarray | None, bias: np.ndarray | None, nv: int, states: int) -> np.ndarray:
@@ -70,14 +85,26 @@ def diagnose(
         return Diagnosis(False)
     names, singles = tuple(names), search.singles()
     fitted = [one for one in singles if one.ratio <= 1.0]
-    for rank, found in enumerate(ranks(search, names, fitted), start=1):
+    known = search.known.any(axis=0)
+    differing = np.abs(search.off).max(axis=0) > 1.0
+    about = {
+        "entries": tuple(named(entry) for entry, off in zip(equations.entries, differing) if off),
+        "compared": int(known.sum()),
+        "nearest": tuple((one.places[0].name, one.left) for one in sorted(singles, key=lambda one: one.left)[:NEAREST]),
+    }
+    for found in ranks(search, names, fitted):
         causes = list(found)
         if causes:
-            return Diagnosis(True, tuple(cause._replace(tied=len(causes) - 1) for cause in causes))
+            return Diagnosis(True, tuple(cause._replace(tied=len(causes) - 1) for cause in causes), **about)
     left = min([one.left for one in (*singles, *search.pair_fits)], default=1.0)
-    known = search.known
-    apart = np.abs(search.off[known]).max() * np.finfo(float).eps * 64
-    return Diagnosis(True, (), left, float(-np.log10(apart)))
+    apart = np.abs(search.off[search.known]).max() * EPS * FACTOR
+    return Diagnosis(True, (), left, float(-np.log10(apart)), **about)
+
+
+def named(entry: tuple) -> str:
+    """An entry of Mbar or h, "M[0][1]": of Mbar the one above the diagonal stands for both."""
+    kind, *indices = entry
+    return kind + "".join(f"[{i}]" for i in sorted(indices))
 
 
 def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted]) -> Iterable[Iterable[Cause]]:

@@ -12,6 +12,7 @@ from .places import Place
 
 ROUNDS = 25  # of a search from one start
 SETTLED = 1e-14  # a step of a place, of its size
+LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
 POLISHED = 16  # places with a quadratic influence that are fitted
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # further starts for the zero of a hinge
@@ -91,7 +92,7 @@ class Search:
             better = sums < best[moving]
             now = moving[better]
             x[now], left[now], best[now] = tried[better], after[better], sums[better]
-            damping[moving] = np.clip(np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), 1e-16, 1e8)
+            damping[moving] = np.clip(np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), LEAST, 1e8)
             going = (np.abs(step).max(axis=1) > SETTLED) & (damping[moving] < 1e6)
             moving = moving[going]
             if not len(moving):

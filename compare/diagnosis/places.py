@@ -70,7 +70,7 @@ def numbers(equations: Equations) -> list[Place]:
             add("number", f"inertia {name} of {body}", "inertia", (b, i, j), "kg m2", size, *mirrored)
     carried = [[b for b, joint in enumerate(tree.body_hinge) if joint == i] for i in range(len(tree.parent))]
     following = [[j for j, parent in enumerate(tree.parent) if parent == i] for i in range(len(tree.parent))]
-    for i, (joint, (kind, at, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
+    for i, (joint, (kind, _, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
         for k, axis in enumerate(XYZ):
             add("number", f"offset {axis} of {joint}", "offset", (i, k), "m", length)
             if kind != "slide":

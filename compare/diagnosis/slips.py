@@ -105,7 +105,7 @@ def slips(equations: Equations) -> Iterator[Variant]:
                 lambda i=swapped: parts.values(inertia=i),
             )
         yield slip(f"CoM of {body}", "where it is", "at the joint", lambda b=b: com_at_joint(equations, b))
-    for i, (joint, (kind, _, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
+    for joint, (kind, _, by) in zip(tree.hinge_names, tree.coordinates.joints):
         if kind != "ball":
             stated = np.array(tree.axis[by.start])
             for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0)):
