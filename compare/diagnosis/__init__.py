@@ -60,8 +60,10 @@ class Diagnosis(NamedTuple):
         """Which entries differ."""
         if len(self.entries) == self.compared:
             return "Every entry differs."
-        shown = listed(self.entries if len(self.entries) <= SHOWN else (*self.entries[:SHOWN], "others"))
-        return f"{shown} {'differs' if len(self.entries) == 1 else 'differ'}, the others agree."
+        if len(self.entries) > SHOWN:
+            shown = ", ".join(self.entries[:SHOWN])
+            return f"{len(self.entries)} of {self.compared} entries differ, the others agree: {shown}, ..."
+        return f"{listed(self.entries)} {'differs' if len(self.entries) == 1 else 'differ'}, the others agree."
 
 
 def packed(mass_matrix: np.ndarray | None, bias: np.ndarray | None, nv: int, states: int) -> np.ndarray:

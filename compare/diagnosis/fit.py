@@ -12,6 +12,7 @@ from .places import Place
 
 ROUNDS = 25  # of a search from one start
 SETTLED = 1e-14  # a step of a place, of its size
+SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
 POLISHED = 16  # places with a quadratic influence that are fitted
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
@@ -81,7 +82,7 @@ class Search:
             J = J * size[moving][:, :, None]
             normal = np.einsum("rim,rjm->rij", J, J)
             diagonal = np.einsum("rii->ri", normal)
-            diagonal = np.where(diagonal > 0.0, diagonal, 1.0)  # a place that nothing is seen of stays
+            diagonal = np.where(diagonal > SEEN, diagonal, 1.0)  # a place that nothing is seen of stays
             scaled = normal / np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
             scaled += np.eye(x.shape[1]) * damping[moving][:, None, None]
             down = np.einsum("rim,rm->ri", J, left[moving].reshape(len(moving), -1)) / np.sqrt(diagonal)
