@@ -27,6 +27,7 @@ EXAMPLES = """examples:
   python -m compare mass --out /tmp/mass         one experiment, report elsewhere
   python -m compare all --mjcf my_arm.xml        your MJCF of the arm compared with the stated numbers
   python -m compare all --mjcf robot.xml         any robot compared with tmt's equations for its compiled model
+  python -m compare all --reference my.py:arm    your equations compared with MuJoCo, which runs the arm
   python -m compare speed --scenes my.toml       your own scenes beside those of the arm
 
 exit status: 0 all checks pass; 1 a check failed; 2 the request could not be carried out
@@ -42,6 +43,15 @@ def not_empty(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("it is empty; a name is expected")
     return text
+
+
+def reference(text: str) -> str:
+    """What a model is compared with: what has a colon is read later."""
+    if text in ("arm", "model") or ":" in text:
+        return text
+    forms = "arm, model, FILE.py:OBJECT, MODULE:OBJECT"
+    hint = f"; a colon is missing: {text}:OBJECT, or {text}: for the file itself" if text.endswith(".py") else ""
+    raise argparse.ArgumentTypeError(f"invalid choice: {text!r} (choose from {forms}){hint}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,10 +81,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--reference",
-        choices=["arm", "model"],
+        type=reference,
         metavar="WHAT",
-        help="what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges), or model, "
-        "tmt's equations for the model as MuJoCo compiled it (default for any other)",
+        help="what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); model, "
+        "tmt's equations for the model as MuJoCo compiled it (default for any other); or your own equations, FILE.py:OBJECT "
+        "or MODULE:OBJECT, with mass_matrix(q) and bias(q, qd) (nothing after the colon: the module itself)",
+    )
+    parser.add_argument(
+        "--joints",
+        type=not_empty,
+        metavar="LIST",
+        help="the joints as your own equations take them, in their order: elbow,-shoulder,wrist+90deg",
     )
     parser.add_argument(
         "--scenes",
@@ -85,6 +102,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.scenes and options.experiment not in (*FOLLOWING_SCENES, "all"):
         parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
+    if options.joints and ":" not in (options.reference or ""):
+        parser.error("--joints is for equations of your own (--reference FILE.py:OBJECT or MODULE:OBJECT)")
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
     try:
         return carry_out(options, command)
@@ -111,6 +130,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
     from .engines.mujoco import ModelError
+    from .own_file import OwnFileError
     from .process.workers import WorkerEnded, start_workers
     from .reference import compared_with  # imports are here, so that --help and a wrong word answer at once
     from .report.folder import FolderError, made_by, new_report
@@ -120,14 +140,14 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     terminal = Terminal()
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        reference, robot, mujoco, reading = compared_with(options.reference, options.mjcf)
+        compared, robot, mujoco, reading = compared_with(options.reference, options.mjcf, options.joints)
         if options.scenes:
             robot = robot.with_scenes(read_scenes(options.scenes, robot))
         if options.experiment != "all" and (reason := skipped(options.experiment, robot)):
             raise Refused(f"{options.experiment} cannot serve {robot.name}: {reason}")
         before = made_by(options.out)
         with new_report(options.out) as folder:
-            for line in reference.lines:
+            for line in compared.lines:
                 terminal.say(line)
             with start_workers() as workers, terminal.progress("imports"):
                 from . import experiment
@@ -137,19 +157,19 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
 
                 workers.submit(experiment.warm_up)
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
-                origin = provenance.provenance(command, robot.mjcf, reference.file, SEED)  # of the model as it was read
+                origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 make = Setup.quick if options.quick else Setup
-                setup = make(robot, engines(mujoco), **of_run)
+                setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
                 sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
-            words = verdict.verdict(sections, len(EXPERIMENTS), causes, reference.compared)
+            words = verdict.verdict(sections, len(EXPERIMENTS), causes, compared.compared)
             origin["seconds"] = round(time.perf_counter() - started, 1)
-            report = verdict.Report(sections, robot, origin, words, causes, list(reasons.items()), reference)
+            report = verdict.Report(sections, robot, origin, words, causes, list(reasons.items()), compared)
             files.write(folder, report)
-    except (ModelError, SceneError, FolderError, WorkerEnded) as error:
+    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()
     terminal.say(words, "bold green" if verdict.passed(sections) else "bold red")

@@ -29,6 +29,7 @@ def examine(
     """
     (folder / "figures").mkdir()
     sections, drawings, causes = [], [], []
+    own, said = setup.engines.get("own"), 0
     modules = {name: module(name) for name in names}
     crashed = {
         name: attempt(name, experiment.begin, setup)[1]
@@ -39,7 +40,10 @@ def examine(
         setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        asked = experiment.TITLE, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
+        title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if setup.robot.own else experiment.TITLE
+        asked = title, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
+        if own:
+            said += add_problems(crash or result, own.equations.problems[said:])
         sections.append(Section(name, *asked, crash or result))
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
         new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
@@ -50,6 +54,18 @@ def examine(
         if drawing is not None:
             take_figures(terminal, section, drawing)
     return sections, causes
+
+
+def add_problems(result: Result, problems: Sequence) -> int:
+    """What is wrong with a user's own equations, each a failed check before all others; how many there are.
+
+    problems: with quantity, state and text, see engines.own.
+    """
+    others, result.checks = result.checks, []
+    for problem in problems:
+        result.check("", f"{problem.quantity} gives what it should", None, 0.0, "", problem.text, rule="equal")
+    result.checks += others
+    return len(problems)
 
 
 def find_causes(setup: Setup) -> list[dict]:

@@ -14,12 +14,13 @@ from .engines.tmt import Tmt
 from .robots import Robot
 
 T = TypeVar("T")
+SECONDS_OF_OWN = 5.0  # of a user's own equations, called once at each random state
 
 
-def engines(mujoco: Engine) -> dict[str, Engine]:
-    """All engines by their names; some may be unavailable."""
+def engines(mujoco: Engine, own: Engine | None = None) -> dict[str, Engine]:
+    """All engines by their names; some may be unavailable. own: the engine of a user's own equations, if there are any."""
     schemes = [method.scheme for method in mujoco.methods.values()]
-    return {engine.name: engine for engine in (mujoco, Tmt(schemes), Scipy(), Heyoka())}
+    return {engine.name: engine for engine in (mujoco, Tmt(schemes), Scipy(), Heyoka(), *([own] if own else []))}
 
 
 def nothing(*_: object) -> None:
@@ -62,7 +63,7 @@ class Setup:
         return cls(robot, engines, states=50, exact_states=2, finer=(1, 2), size="small", **more)
 
     def compared(self, case: Case | None = None) -> dict[str, Dynamics]:
-        """The dynamics of a case (of the robot as it is) in the two engines that are compared, tmt and mujoco."""
+        """The dynamics of a case (of the robot as it is) in the two engines that are compared, mujoco last."""
         return compared(self.engines, case or self.robot.case())
 
     @cached_property
@@ -73,4 +74,10 @@ class Setup:
     @cached_property
     def random(self) -> samples.Sample:
         """Random states."""
-        return samples.random(self.robot, self.states, self.exact_states)
+        own = self.engines.get("own")
+        count = own.equations.affordable(self.states, SECONDS_OF_OWN) if own else self.states
+        sample = samples.random(self.robot, count, self.exact_states)
+        if count < self.states:
+            slow = f"{count:,} random states in place of {self.states:,}: your equations take {own.equations.seconds:.2g} s a state."
+            sample.notes = (slow, *sample.notes)
+        return sample

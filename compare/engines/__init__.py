@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..case import Case, Coordinates
 
-LABELS = {"tmt": "TMT", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
-COMPARED = ("tmt", "mujoco")  # the two engines that every experiment compares
+LABELS = {"tmt": "TMT", "own": "yours", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
+WHOSE = {"tmt": "TMT's", "own": "your", "mujoco": "MuJoCo's"}  # before what they have
+COMPARED = ("tmt", "mujoco")  # the two engines that every experiment compares, but for equations of a user's own
 GRID = 64  # equal times, and the start, at which a prepared run is read
 
 
@@ -108,8 +109,8 @@ class Engine(Protocol):
 
 
 def compared(engines: Mapping[str, Engine], case: Case) -> dict[str, Dynamics]:
-    """The dynamics of a case in the two engines that are compared, by their names, tmt first."""
-    return {name: engines[name].of(case) for name in COMPARED}
+    """The dynamics of a case in the two engines that are compared, by their names, mujoco last."""
+    return {name: engines[name].of(case) for name in case.robot.compared}
 
 
 def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray]]:

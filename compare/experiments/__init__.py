@@ -29,7 +29,18 @@ def module(name: str) -> ModuleType:
     return importlib.import_module(f".{name}", __package__)
 
 
+NOT_OF_OWN = {  # why an experiment has nothing to do with equations of a user's own
+    "parameters": "your equations are functions, and have no numbers to read back beside MuJoCo's",
+    "published": "it compares tmt's numbers with printed ones, not yours",
+    "speed": "its methods integrate tmt's equations, not yours",
+    "stability": "its limits are predicted from exact derivatives of the equations, which yours do not give",
+    "reduction": "it takes joints out of the equations, which cannot be done with yours",
+}
+
+
 def skipped(name: str, robot: Robot) -> str | None:
     """Why an experiment cannot serve a robot, or None."""
+    if robot.own and name in NOT_OF_OWN:
+        return NOT_OF_OWN[name]
     why = getattr(module(name), "skipped", None)
     return why(robot) if why else None

@@ -9,7 +9,7 @@ import tmt
 from tmt import method
 from tmt.dual import seeded
 
-from ..engines import LABELS
+from ..engines import LABELS, WHOSE
 from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import gravity_scale
@@ -32,11 +32,11 @@ def claim(robot: Robot) -> str:
         kept = listed([words[momentum.kind] for momentum in conserved(robot.tree)])
     else:
         kept = "the angular momentum about the first hinge"
-    kept = f"; and without gravity and torque {kept} {constant}" if kept else ""
+    kept = f"; and without gravity and torque {kept} {constant}" if kept and not robot.own else ""
+    energy = " energy agrees with MuJoCo's;" if not robot.own or "energy" in robot.own else ""
     return (
         "Bias and accelerations agree at random states under random torque; the acceleration of one engine put into the "
-        f"inverse dynamics of the other gives the torque back; energy agrees with MuJoCo's; the power of the {of} is the "
-        f"rate of the energy{kept}."
+        f"inverse dynamics of the other gives the torque back;{energy} the power of the {of} is the rate of the energy{kept}."
     )
 
 
@@ -62,10 +62,11 @@ def tolerance(robot: Robot) -> str:
 
 def rows(setup: Setup) -> Result:
     """Each quantity at the named postures and at random states."""
-    result, tree, is_read = Result("acceleration"), setup.robot.tree, setup.robot.is_read
-    dynamics = ours, theirs = tuple(setup.compared().values())
-    still = setup.robot.case("no gravity", gravity=False)
-    weightless, momenta = setup.compared(still), conserved(tree)
+    robot, tree, is_read = setup.robot, setup.robot.tree, setup.robot.is_read
+    (name, _), dynamics = robot.compared, tuple(setup.compared().values())
+    result, whose, (ours, theirs) = Result("acceleration", label=LABELS[name]), WHOSE[name], dynamics
+    still = robot.case("no gravity", gravity=False)
+    weightless, momenta = ({}, ()) if robot.own else (setup.compared(still), conserved(tree))
     damping = np.array(tree.damping)
     work, lost = ("tau.qd", "") if not damping.any() else ("(tau - D qd).qd", " + D qd")
     torques, rates = unit(tree, "N m", "N"), unit(tree, "rad/s2", "m/s2")
@@ -75,25 +76,31 @@ def rows(setup: Setup) -> Result:
         scale = scales(tree, is_read, q, qd)
         force = scale.force(tau)
         qdd, engine_qdd = (d.acceleration(q, qd, tau) for d in dynamics)
+        of_scale = engine_qdd if robot.own else qdd  # of one's own nothing need be a number
         M, springs = ours.mass_matrix(q), tmt.spring_torque(q, tree) if tree.has_springs else 0.0
 
         result.agree(sample, "bias", torques, ours.bias(q, qd), theirs.bias(q, qd), scale.bias, truth="bias")
-        result.agree(sample, "qdd", rates, qdd, engine_qdd, scale.acceleration(force, qdd), truth="acceleration")
+        result.agree(sample, "qdd", rates, qdd, engine_qdd, scale.acceleration(force, of_scale), truth="acceleration")
         back, closing = (
             np.einsum("sij,sj->si", M, engine_qdd) + ours.bias(q, qd) + drag + springs,
-            scale.closing(force, qdd),
+            scale.closing(force, of_scale),
         )
-        result.agree(sample, "tau from MuJoCo's qdd by TMT", torques, back, tau, closing)
-        result.agree(sample, "tau from TMT's qdd by mj_inverse", torques, tau, theirs.inverse(q, qd, qdd), closing)
+        result.agree(sample, f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
+        result.agree(sample, f"tau from {whose} qdd by mj_inverse", torques, tau, theirs.inverse(q, qd, qdd), closing)
 
-        result.agree(sample, "energy", "J", ours.energy(q, qd), theirs.energy(q, qd), scale.energy, truth="energy")
-        potential = ours.potential_energy(q), theirs.potential_energy(q)
-        result.agree(sample, "potential energy", "J", *potential, scale.potential_energy, truth="potential_energy")
+        if not robot.own:
+            result.agree(sample, "energy", "J", ours.energy(q, qd), theirs.energy(q, qd), scale.energy, truth="energy")
+            potential = ours.potential_energy(q), theirs.potential_energy(q)
+            result.agree(sample, "potential energy", "J", *potential, scale.potential_energy, truth="potential_energy")
+        elif "energy" in robot.own:  # which may be zero where one likes
+            zero, rest = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
+            above = (engine.energy(q, qd) - engine.energy(zero, rest) for engine in dynamics)
+            result.agree(sample, "energy above the zero position's", "J", *above, scale.energy)
 
         power = np.einsum("si,si->s", tau - drag, qd)
-        for label, accelerations in (("TMT", qdd), ("MuJoCo", engine_qdd)):
+        for engine, accelerations in ((whose, qdd), (WHOSE["mujoco"], engine_qdd)):
             gained = rate(partial(total_energy, tree), tree, q, qd, accelerations)
-            result.agree(sample, f"dE/dt - {work} at {label}'s qdd", "W", gained, power, scale.power(force, qdd))
+            result.agree(sample, f"dE/dt - {work} at {engine} qdd", "W", gained, power, scale.power(force, of_scale))
 
         scale = scales(still.tree, is_read, q, qd)
         for name, engine in weightless.items():
@@ -105,7 +112,13 @@ def rows(setup: Setup) -> Result:
                 loss = momentum.effect(q, -drag - springs)
                 result.agree(sample, quantity, momentum.unit, change, loss, momentum.size(q, size))
         result.notes += sample.notes
-    if len(momenta) == 0 or momenta[-1].kind == "linear":
+    if robot.own:
+        energy = "" if "energy" in robot.own else "they have no energy, and "
+        result.notes.append(
+            f"Of your equations bias, accelerations and torques are compared; {energy}what stays constant without gravity is "
+            "left out, for gravity is in them."
+        )
+    elif len(momenta) == 0 or momenta[-1].kind == "linear":
         result.notes.append(
             f"The rotors of {setup.robot.joints[0]} differ between its axes: the angular momentum is left out."
         )
@@ -130,4 +143,6 @@ def total_energy(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     from .figures import draw_distances  # matplotlib is for the process that draws
 
-    yield partial(draw_distances, result, "random states", ["bias", "qdd", "energy", "potential energy"])
+    quantities = ["bias", "qdd", "energy", "potential energy", "energy above the zero position's"]
+    known = [quantity for quantity in quantities if quantity in result.curves["random states"]]
+    yield partial(draw_distances, result, "random states", known)

@@ -10,6 +10,7 @@ from ..engines import LABELS
 from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR, gravity_scale
+from ..judge.words import capital
 from ..report.style import BLUE, LINES, ORANGE, RED, WIDTH, plain
 from ..robots import Robot
 
@@ -20,13 +21,18 @@ SHOWN_POSTURES = 8  # in one figure
 def draw_distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
     """How far apart the engines are over all states, and how far each is from the exact value."""
     curves = result.curves[sample]
-    exact = [name for name, c in curves.items() if "TMT to exact" in c]  # none where an exact state takes too long
+    label = result.label
+    exact = [name for name, c in curves.items() if f"{label} to exact" in c]  # none where an exact state takes too long
     quantities = quantities or exact or list(curves)[:6]
     columns = 2 if len(quantities) == 4 else min(3, len(quantities))
     lines = -(-len(quantities) // columns)
     fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
     axes = fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-    styles = (("TMT to MuJoCo", "black", "-"), ("TMT to exact", BLUE, "--"), ("MuJoCo to exact", ORANGE, "-."))
+    styles = (
+        (f"{label} to MuJoCo", "black", "-"),
+        (f"{label} to exact", BLUE, "--"),
+        ("MuJoCo to exact", ORANGE, "-."),
+    )
     for ax, quantity in zip(axes.flat, quantities):
         for name, colour, dash in styles if exact else styles[:1]:
             values = np.maximum(curves[quantity][name], ZERO_AT)
@@ -40,13 +46,13 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
         ax.set_ylabel("share of states")
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    worst = max((curves[q]["TMT to MuJoCo"][-1], q) for q in quantities)
+    worst = max((curves[q][f"{label} to MuJoCo"][-1], q) for q in quantities)
     against = ""
     if exact:
-        ours, theirs = (max(curves[q][f"{label} to exact"][-1] for q in quantities) for label in ("TMT", "MuJoCo"))
-        known = len(curves[quantities[0]]["TMT to exact"])
+        ours, theirs = (max(curves[q][f"{engine} to exact"][-1] for q in quantities) for engine in (label, "MuJoCo"))
+        known = len(curves[quantities[0]][f"{label} to exact"])
         against = (
-            f" Against the exact value, at the first {known} of the states, TMT is at most {ours:.3g} eps off and MuJoCo at "
+            f" Against the exact value, at the first {known} of the states, {label} is at most {ours:.3g} eps off and MuJoCo at "
             f"most {theirs:.3g}."
         )
     caption = (
@@ -86,15 +92,16 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
     """Holding torques at the named postures: of more than six joints the six that need most, of the first eight postures."""
     kept, speeds = result.curves["postures"], robot.coordinates.speeds
     postures = dict(list(kept.items())[:SHOWN_POSTURES])
-    most = np.max([np.abs(of["tmt"]) for of in postures.values()], axis=0)
+    first, second = robot.compared
+    most = np.max([np.abs(of[first]) for of in postures.values()], axis=0)
     shown = sorted(np.argsort(-most, kind="stable")[: len(LINES)])
     fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
     ax = fig.subplots()
     places, width, labels = np.arange(len(postures)), 0.78 / len(shown), []
     for i, k in enumerate(shown):
-        ours, theirs = (np.array([of[name][k] for of in postures.values()]) for name in ("tmt", "mujoco"))
+        ours, theirs = (np.array([of[name][k] for of in postures.values()]) for name in (first, second))
         x = places + width * (i - (len(shown) - 1) / 2)
-        labels.append(f"{plain(robot.symbol(speeds[k]))}, TMT")
+        labels.append(f"{plain(robot.symbol(speeds[k]))}, {LABELS[first]}")
         ax.bar(x, ours, width=0.92 * width, color=(LINES[i % len(LINES)][0], 0.75), label=labels[-1])
         mark = {"markersize": min(50 * width, 20), "markeredgewidth": 2, "label": "MuJoCo" if i == 0 else None}
         ax.plot(x, theirs, "_", color="black", **mark)
@@ -103,12 +110,12 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
     ax.set(ylabel=f"holding torque, {unit(robot.tree, 'N m', 'N')}")
     columns = 100 // (8 + max(map(len, labels)))  # that a page has room for
     fig.legend(loc="outside upper center", ncols=max(1, min(len(shown) + 1, 6, columns)))
-    apart = max(np.abs(of["tmt"] - of["mujoco"]).max() for of in kept.values())
+    apart = max(np.abs(of[first] - of[second]).max() for of in kept.values())
     which = "each named posture" if len(postures) == len(kept) else f"the first {len(postures)} of {len(kept)} postures"
     of = "" if len(shown) == len(speeds) else f", at the {len(shown)} of {len(speeds)} joints that need most"
     springs = " with its springs" if robot.tree.has_springs else ""
     caption = (
-        f"Torque that holds {which}{springs}{of}: TMT (bars) and MuJoCo (black marks), at most {apart:.1e} "
+        f"Torque that holds {which}{springs}{of}: {LABELS[first]} (bars) and MuJoCo (black marks), at most {apart:.1e} "
         f"{unit(robot.tree, 'N m', 'N')} apart. " + needless(kept, robot)
     )
     return "gravity_postures", fig, caption
@@ -124,10 +131,11 @@ def needless(postures: dict, robot: Robot) -> str:
     }
     rest = {
         name: [posture for posture, of in postures.items() if (np.abs(of[name]) <= zero[posture]).all()]
-        for name in ("tmt", "mujoco")
+        for name in robot.compared
     }
     words = [
-        f"{LABELS[name]} needs none, but for rounding, at: {', '.join(at) or 'no posture'}."
+        f"{capital(LABELS[name])} needs none, but for rounding, at: {', '.join(at) or 'no posture'}."
         for name, at in rest.items()
     ]
-    return " ".join(words) if rest["tmt"] != rest["mujoco"] else words[0].replace("TMT needs", "Both need")
+    first, second = rest
+    return " ".join(words) if rest[first] != rest[second] else "Both need" + words[0].partition(" needs")[2]

@@ -8,9 +8,11 @@ import numpy as np
 import tmt
 
 from ..case import Coordinates
+from ..engines import LABELS, WHOSE
 from ..judge.check import Result
 from ..judge.entries import Entries, has_own_scales, per_speed, scales, unit
 from ..judge.scale import gravity_scale, spring_scale
+from ..judge.words import capital
 from ..robots import Robot
 from ..setup import Setup
 
@@ -21,10 +23,17 @@ MOST_ENERGIES = 150_000  # of one engine, at random states
 def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
     springs = "; with the springs mj_inverse's at rest" if robot.tree.has_springs else ""
+    whose = WHOSE[robot.compared[0]]
+    of = "in both" if has_potential(robot) else "in MuJoCo"
     return (
-        f"TMT's holding torque is MuJoCo's qfrc_bias at rest{springs}; in both it is the gradient of the engine's own potential "
-        f"energy; and TMT's torque, given to MuJoCo, leaves the {robot.name} at rest."
+        f"{capital(whose)} holding torque is MuJoCo's qfrc_bias at rest{springs}; {of} it is the gradient of the engine's own "
+        f"potential energy; and {whose} torque, given to MuJoCo, leaves the {robot.name} at rest."
     )
+
+
+def has_potential(robot: Robot) -> bool:
+    """Whether the equations that MuJoCo is compared with have an energy: a user's own need not."""
+    return not robot.own or "energy" in robot.own
 
 
 def tolerance(robot: Robot) -> str:
@@ -85,9 +94,9 @@ def gradient(potential_energy: Callable, q: np.ndarray, tree: tmt.Tree) -> np.nd
 
 
 def rows(setup: Setup) -> Result:
-    """Torques at each named posture and at random ones, their gradients, and TMT's torque given to MuJoCo."""
-    result, tree, is_read = Result("gravity"), setup.robot.tree, setup.robot.is_read
-    ours, theirs = setup.compared().values()
+    """Torques at each named posture and at random ones, their gradients, and the one engine's torque given to MuJoCo."""
+    tree, is_read, (name, _) = setup.robot.tree, setup.robot.is_read, setup.robot.compared
+    result, (ours, theirs) = Result("gravity", label=LABELS[name]), setup.compared().values()
     units, rates = unit(tree, "N m", "N"), unit(tree, "rad/s2", "m/s2")
     few = max(1, MOST_ENERGIES // (2 * tree.coordinates.nv))  # states: each takes two energies for each speed
     exact = has_exact_gradient(tree)
@@ -99,27 +108,31 @@ def rows(setup: Setup) -> Result:
             held, engine_held = held + tmt.spring_torque(q, tree), theirs.inverse(q, 0.0, 0.0)
             result.agree(sample, "holding torque, springs too", units, held, engine_held, scale.holding)
         if sample is not setup.random:
-            result.curves.setdefault("postures", {})[sample.name] = {"tmt": held[0], "mujoco": engine_held[0]}
+            result.curves.setdefault("postures", {})[sample.name] = {name: held[0], "mujoco": engine_held[0]}
         if not exact.any():
             continue
         part = sample.first(few)
-        slope, engine_slope = (gradient(engine.potential_energy, part.q, tree)[:, exact] for engine in (ours, theirs))
         size = gradient_scale(tree, part.q)[:, exact] if has_own_scales(tree, is_read) else scale.potential_energy
         held, engine_held = held[:few, exact], engine_held[:few, exact]
-        result.agree(part, "TMT: torque - dV/dq", units, held, slope, size)
+        if has_potential(setup.robot):
+            slope = gradient(ours.potential_energy, part.q, tree)[:, exact]
+            result.agree(part, f"{result.label}: torque - dV/dq", units, held, slope, size)
+        engine_slope = gradient(theirs.potential_energy, part.q, tree)[:, exact]
         result.agree(part, "MuJoCo: torque - dV/dq", units, engine_slope, engine_held, size)
     result.notes += [note for sample in (setup.named, setup.random) for note in sample.notes]
+    if not has_potential(setup.robot):
+        result.notes.append("The gradient of your potential energy is left out: your equations have no energy.")
     if not exact.all():
         result.notes.append("The gradient of V is left out for balls with a spring: there is no exact rule for it.")
 
     for sample in (setup.named, setup.random):
         q, scale = sample.q, scales(tree, is_read, sample.q)
-        # given to TMT, MuJoCo's torque would leave the same number with the other sign
+        # the other way round, MuJoCo's torque would leave the same number with the other sign
         at_rest = np.zeros((len(q), tree.coordinates.nv))
         torque = ours.gravity_balance(q) + (tmt.spring_torque(q, tree) if tree.has_springs else 0.0)
         left = theirs.acceleration(q, at_rest, torque)
         allowed = scale.acceleration(scale.holding, 0.0)
-        result.agree(sample, "qdd of MuJoCo under TMT's torque", rates, at_rest, left, allowed)
+        result.agree(sample, f"qdd of MuJoCo under {WHOSE[name]} torque", rates, at_rest, left, allowed)
     return result
 
 

@@ -21,7 +21,8 @@ SAME_PLACE = np.radians(0.01)  # what a search finds of the place of a flat maxi
 
 def claim(robot: Robot) -> str:
     """What is claimed of any robot, and of where its condition number is largest if that is known."""
-    text = "Mbar = sum T' m T + B' I B equals mj_fullM at every posture; it is symmetric and positive definite"
+    which = "Your Mbar" if robot.own else "Mbar = sum T' m T + B' I B"
+    text = f"{which} equals mj_fullM at every posture; it is symmetric and positive definite"
     if robot.conditioning is None:
         return f"{text}."
     (first, second), (x, y) = robot.conditioning
@@ -83,15 +84,16 @@ def worst_condition(robot: Robot, mass_matrix: Callable) -> tuple:
 
 def rows(setup: Setup) -> Result:
     """Agreement at each named posture and at random states; symmetry, definiteness, conditioning."""
-    result, robot, compared = Result("mass"), setup.robot, setup.compared()
+    robot, compared, (ours, theirs) = setup.robot, setup.compared(), setup.robot.compared
+    result = Result("mass", label=LABELS[ours])
     own = has_own_scales(robot.tree, robot.is_read)
     turns, slides = set(robot.tree.kind) != {"slide"}, "slide" in robot.tree.kind
     units = " or ".join(["kg m2"] * turns + ["kg m"] * (turns and slides) + ["kg"] * slides)
     for sample in (*setup.named.each(), setup.random):
         M = {name: dynamics.mass_matrix(sample.q) for name, dynamics in compared.items()}
         scale = scales(robot.tree, robot.is_read, sample.q)
-        result.agree(sample, "Mbar", units, M["tmt"], M["mujoco"], scale.mass_matrix, truth="mass_matrix")
-    check_symmetry(result, M["tmt"], scale.mass_matrix if own else None)  # MuJoCo's is one triangle written twice
+        result.agree(sample, "Mbar", units, M[ours], M[theirs], scale.mass_matrix, truth="mass_matrix")
+    check_symmetry(result, M[ours], scale.mass_matrix if own else None)  # MuJoCo's is one triangle written twice
     for name, dynamics in compared.items():
         check_definiteness(result, LABELS[name], M[name], in_units=own)
         if robot.conditioning:
@@ -102,7 +104,7 @@ def rows(setup: Setup) -> Result:
     result.notes += [note for sample in (setup.named, setup.random) for note in sample.notes]
     if robot.conditioning:
         degrees = setup.of(3.0, 3.0, 15.0)
-        result.curves["condition"] = condition_grid(robot, compared["tmt"].mass_matrix, degrees)
+        result.curves["condition"] = condition_grid(robot, compared[ours].mass_matrix, degrees)
     elif not robot.is_read:
         result.notes.append(
             f"Nothing is stated of where the condition number of Mbar of the {robot.name} is largest: that is neither checked "
@@ -112,10 +114,10 @@ def rows(setup: Setup) -> Result:
 
 
 def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray | None = None) -> None:
-    """TMT computes both triangles: they must be the same but for rounding. scale: of each entry; None: the largest entry."""
+    """What MuJoCo is compared with has both triangles, the same but for rounding. scale: of each entry; None: the largest."""
     of = "its largest entry" if scale is None else "the scale of the entry"
     skew = over(np.abs(M - M.transpose(0, 2, 1)), np.abs(M).max(axis=(1, 2), keepdims=True) if scale is None else scale)
-    what = f"TMT: Mbar - Mbar' over {of}"
+    what = f"{result.label}: Mbar - Mbar' over {of}"
     result.check("random states", what, skew.max(), FACTOR * EPS, "", rounding=True)
 
 
@@ -125,7 +127,8 @@ def check_definiteness(result: Result, label: str, M: np.ndarray, in_units: bool
     in_units: of Mbar in units of its diagonal, where its entries are kg and kg m2.
     """
     named = "Mbar in units of its diagonal" if in_units else "Mbar"
-    values = np.linalg.eigvalsh(scaled_by_diagonal(M) if in_units else M)
+    finite = np.isfinite(M).all(axis=(1, 2))
+    values = np.linalg.eigvalsh(scaled_by_diagonal(M) if in_units else M) if finite.all() else np.full((1, 2), np.nan)
     what = f"{label}: least eigenvalue of {named} over the largest"
     result.check("random states", what, (values[:, 0] / values[:, -1]).min(), FACTOR * EPS, "", rule="at least")
 

@@ -10,8 +10,16 @@ from tmt.reference import distance
 
 from .scale import EPS, FACTOR
 
-AGREEMENT = ["scene", "quantity", "unit", "states", "largest_difference", "worst_difference", "bar", "difference_over_bar",
-             "tmt_from_exact_eps", "mujoco_from_exact_eps"]  # fmt: skip
+AGREEMENT = [
+    "scene",
+    "quantity",
+    "unit",
+    "states",
+    "largest_difference",
+    "worst_difference",
+    "bar",
+    "difference_over_bar",
+]
 
 RULES = {  # of a verdict: the words between a value and its tolerance, and what passes
     "at most": lambda value, tolerance: value <= tolerance,
@@ -80,6 +88,7 @@ class Result:
     notes: list = field(default_factory=list)  # sentences for the report
     shown: list | None = None  # columns of the table in the report, if not all; none: only in its file
     tables: dict = field(default_factory=dict)  # further tables by name: lists of rows
+    label: str = "TMT"  # of the engine that MuJoCo is compared with
 
     def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most") -> Check:
         """Add a check; a value that is None or not finite stands for a run that gave no number, and fails."""
@@ -87,22 +96,23 @@ class Result:
         self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule))
         return self.checks[-1]
 
-    def agree(self, sample, quantity, unit, tmt_values, mujoco_values, scale, truth=None) -> None:
+    def agree(self, sample, quantity, unit, values, mujoco_values, scale, truth=None) -> None:
         """A row and a check: the worst difference of the two engines over the states, the closest to its tolerance.
 
-        tmt_values, mujoco_values: (states, ...); scale: a number or (states,), or of as many dimensions as the values, a
+        values, mujoco_values: (states, ...); scale: a number or (states,), or of as many dimensions as the values, a
         scale for each entry; truth: the name of a field of tmt.reference.Truth, for one more check of each engine that has an
         exact state: its distance from the exact value, 64 eps x scale too.
         """
         states = len(sample.q)
-        pairs = {"TMT to MuJoCo": np.abs(np.subtract(tmt_values, mujoco_values))}
+        between = f"{self.label} to MuJoCo"
+        pairs = {between: np.abs(np.subtract(values, mujoco_values))}
         known = sample.truth(truth) if truth else ()
         if len(known):
-            for engine, values in (("TMT", tmt_values), ("MuJoCo", mujoco_values)):
-                pairs[f"{engine} to exact"] = distance(values[: len(known)], known)
+            for engine, found in ((self.label, values), ("MuJoCo", mujoco_values)):
+                pairs[f"{engine} to exact"] = distance(found[: len(known)], known)
         apart = {name: worst_of_each(differences, scale) for name, differences in pairs.items()}
         in_eps = {name: over(d, EPS * s) for name, (d, s) in apart.items()}
-        difference, scale = apart["TMT to MuJoCo"]
+        difference, scale = apart[between]
 
         def check_closest(quantity, difference, scale):
             """A check of the state that comes closest to its tolerance, and which one that is."""
@@ -124,9 +134,11 @@ class Result:
                 "bar": check.tolerance,
                 "difference_over_bar": check.over_tolerance,
                 "scale": scale[worst],
-                "difference_eps": in_eps["TMT to MuJoCo"].max(),
-                "tmt_from_exact_eps": in_eps["TMT to exact"].max() if len(known) else None,
-                "mujoco_from_exact_eps": in_eps["MuJoCo to exact"].max() if len(known) else None,
+                "difference_eps": in_eps[between].max(),
+                **{
+                    f"{engine.lower()}_from_exact_eps": in_eps[f"{engine} to exact"].max() if len(known) else None
+                    for engine in (self.label, "MuJoCo")
+                },
                 "exact_states": len(known) if truth else None,
                 "worst_state": check.note,
                 "worst_q": all_digits(sample.q[worst]),
@@ -137,7 +149,7 @@ class Result:
         )
         curves = {name: np.sort(values) for name, values in in_eps.items()}
         self.curves.setdefault(sample.name, {})[quantity] = curves
-        self.shown = AGREEMENT
+        self.shown = [*AGREEMENT, *(f"{engine.lower()}_from_exact_eps" for engine in (self.label, "MuJoCo"))]
 
 
 def closest(difference: np.ndarray, tolerance: np.ndarray) -> tuple[int, ...]:

@@ -93,10 +93,18 @@ class Robot:
     remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
     # what a file has and how it is treated, see engines.mujoco.inventory; then the numbers are those that MuJoCo compiled
     features: tuple = ()
+    own: tuple[
+        str, ...
+    ] = ()  # what a user's own equations give, "mass_matrix" ..., where they are compared; (): tmt's are
 
     @property
     def joints(self) -> tuple[str, ...]:
         return self.tree.hinge_names
+
+    @property
+    def compared(self) -> tuple[str, str]:
+        """The names of the two engines that are compared."""
+        return ("own" if self.own else "tmt"), "mujoco"
 
     @property
     def is_read(self) -> bool:

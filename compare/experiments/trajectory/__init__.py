@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from ...engines import one_of_each_scheme
+from ...engines import LABELS, one_of_each_scheme
 from ...judge.check import Result
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, movement_unit
@@ -11,14 +11,21 @@ from ...robots import Robot
 from ...setup import Setup
 from . import drift, errors, horizon, sentences
 from .derivative import compare_derivatives
+from .own_runs import within_time
 from .runs import FEW_ENTRIES, MOST_ENTRIES, follow
 
 TITLE = "Trajectories: the same scheme for every integrator of MuJoCo"
+TITLE_OF_OWN = "Trajectories: your equations and MuJoCo, both by RK4"
 FEW_EXACT_STEPS = 8  # with many digits, in a small run
 
 
 def claim(robot: Robot) -> str:
     """What is claimed."""
+    if robot.own:
+        return (
+            "Your equations, integrated by this project's RK4, agree with MuJoCo by its RK4: in the accelerations at recorded "
+            "states, in one step from each of them, and in the open-loop run as long as rounding allows."
+        )
     if robot.is_read:
         return (
             "For every integrator of MuJoCo the same scheme stands on the TMT side, as the notes say; integrators that are one "
@@ -80,13 +87,19 @@ def begin(setup: Setup) -> None:
     cases = [case for case in setup.robot.cases if not (setup.is_quick and "full only" in case.scene.tags)]
     exact = [case for case in cases if "digits" in case.scene.tags]
     exact = setup.of(exact, [], exact[-1:])
+    spread, finer, left_out = setup.map, setup.finer, []
+    if setup.robot.own:  # which stay in this process
+        spread, exact = map, []
+        cases, finer, left_out = within_time(setup, cases)
     schemes = [method.scheme for method in one_of_each_scheme(setup.engines["mujoco"])]
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
-    grown = setup.of(cases, [], cases)
+    grown = [] if setup.robot.own else setup.of(cases, [], cases)
     duration, steps = horizon.growth_run(setup.robot, grown, setup.size == "small")
     of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
-        "runs": setup.map(partial(follow, engines=setup.engines, finer=setup.finer, entries=entries(setup)), cases),
+        "runs": spread(partial(follow, engines=setup.engines, finer=finer, entries=entries(setup)), cases),
+        "finer": finer,
+        "left_out": left_out,
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
         "growth": (
             grown,
@@ -99,14 +112,15 @@ def begin(setup: Setup) -> None:
 
 def rows(setup: Setup) -> Result:
     """Each scene, integrator and step: three levels of agreement; then drift, growth of errors, many digits."""
-    result = Result("trajectory", shown=[
+    result = Result("trajectory", label=LABELS[setup.robot.compared[0]], shown=[
         "scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
         "judged_until_s", "required_s", "diverged_at_s", "twin_diverged_at_s",
     ])  # fmt: skip
     if "trajectory" not in setup.background:
         begin(setup)
     work = setup.background.pop("trajectory")
-    compare_derivatives(result, setup.robot, setup.engines)
+    if not setup.robot.own:
+        compare_derivatives(result, setup.robot, setup.engines)
     drift.measure_drift(
         result, setup.robot, setup.engines, setup.of(drift.DRIFT_STEPS, drift.DRIFT_STEPS, drift.FEW_DRIFT_STEPS)
     )
@@ -117,7 +131,7 @@ def rows(setup: Setup) -> Result:
         result.notes += part.notes
         result.curves["runs"] |= part.curves
     horizon.many_digits(result, *work["exact"])
-    if not work["exact"][0] and not setup.is_quick:
+    if not (work["exact"][0] or setup.is_quick or setup.robot.own):
         result.notes.append(
             f"No scene of this {setup.robot.name} is marked to be compared with many digits of its own scheme."
         )
@@ -126,7 +140,8 @@ def rows(setup: Setup) -> Result:
     result.curves["errors"] = errors.errors_when_held(result, setup.robot) | errors.errors_when_free(
         result, setup.robot
     )
-    result.notes = sentences.notes(result, setup.robot, setup.engines, setup.finer, entries(setup)) + result.notes
+    said = sentences.notes(result, setup.robot, setup.engines, work["finer"], entries(setup))
+    result.notes = said + work["left_out"] + result.notes
     return result
 
 

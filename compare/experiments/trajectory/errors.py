@@ -30,14 +30,14 @@ def errors_when_free(result: Result, robot: Robot) -> dict[str, tuple]:
         true = reference.committed(case) if case.steps == reference.RECORDS and not case.is_held else None
         if true:
             joints = range(len(case.joints))
-            of_run = (true.error(curve[name][0], joints).max() for name in ("tmt", "mujoco"))
+            of_run = (true.error(curve[name][0], joints).max() for name in robot.compared)
             errors[case.name] = tuple(map(number_or_none, of_run))
     return errors
 
 
 def deviations(case: Case, curve: dict) -> dict[str, float | None]:
     """How far the runs of both engines go from where they start, rad or m; None of a run that has diverged."""
-    paths = {name: curve[name][0] for name in ("tmt", "mujoco")}
+    paths = {name: curve[name][0] for name in case.robot.compared}
     return {name: number_or_none(deviation(q, q[0], case.coordinates)) for name, q in paths.items()}
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ...case import Case
+from ...engines import LABELS
 from ...judge.run import moved_from
 from ...report.style import LINES, plain
 
@@ -15,14 +16,15 @@ MOST_LINES = len(LINES)  # of joints in a panel
 def over_time(
     ax: Axes, t: np.ndarray, ours: np.ndarray, theirs: np.ndarray, case: Case, shown: Sequence[int] | None = None
 ) -> None:
-    """Positions or speeds, (times, nv), against time: lines for TMT, up to 65 marks for MuJoCo; shown: which, None: all."""
+    """Positions or speeds, (times, nv), against time: lines, and up to 65 marks for MuJoCo; shown: which, None: all."""
     every = slice(None, None, max(1, len(t) // 64))
     marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 2.5}
     names, all_names = case.coordinates.speeds, case.robot.coordinates.speeds
+    ours_called = LABELS[case.robot.compared[0]]
     few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
     for k, i in enumerate(range(len(names)) if shown is None else shown):
         colour, dash = LINES[all_names.index(names[i]) if few else k]
-        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{plain(symbol(case, i))}, TMT")
+        ax.plot(t, ours[:, i], linestyle=dash, color=colour, label=f"{plain(symbol(case, i))}, {ours_called}")
         ax.plot(t[every], theirs[every, i], color=colour, clip_on=False, **marks)
     ax.plot([], [], color="black", label="MuJoCo", **marks)
 
@@ -53,6 +55,6 @@ def differing_most(case: Case, columns: Sequence[dict]) -> list[int]:
     largest = np.zeros(count)
     for c in columns:
         judged = c["t"] <= c["judged_until_s"]
-        off = moved_from(c["tmt"][0][judged], c["mujoco"][0][judged], case.coordinates)
+        off = moved_from(*(c[name][0][judged] for name in case.robot.compared), case.coordinates)
         largest = np.fmax(largest, off.max(axis=0))
     return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())

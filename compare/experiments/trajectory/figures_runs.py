@@ -50,7 +50,7 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     of_case = [key for key in result.curves["runs"] if key[0] == case.name]
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
     columns = [result.curves["runs"][key] for key in of_case if key[-1] == steps]
-    shown, unit = differing_most(case, columns), movement_unit(case.coordinates)
+    shown, unit, label = differing_most(case, columns), movement_unit(case.coordinates), result.label
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     long = any(len(case.coordinates.speeds[i]) > LONG for i in shown)
     columns_of_legend = LEGEND_COLUMNS - long
@@ -67,20 +67,21 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     until = []
     for column, c in zip(axes.T, columns):
         for row, ax in enumerate(column[:2]):
-            paths = [c[name][row] for name in ("tmt", "mujoco")]
+            paths = [c[name][row] for name in case.robot.compared]
             over_time(ax, c["t"], *(paths if row else (drawn(case, q) for q in paths)), case, shown)
             ax.ticklabel_format(axis="y", scilimits=(-2, 3))
         step = step_in_words(case, steps)
         column[0].set_title(f"{c['integrator']}, {step}" if len(columns) < 4 else f"{c['integrator']}\n{step}")
-        difference = moved_from(c["tmt"][0], c["mujoco"][0], case.coordinates).max(axis=1)
-        ulp = moved_from(c["tmt"][0], c["ulp"], case.coordinates).max(axis=1)
+        ours, theirs = (c[name][0] for name in case.robot.compared)
+        difference = moved_from(ours, theirs, case.coordinates).max(axis=1)
+        ulp = moved_from(ours, c["ulp"], case.coordinates).max(axis=1)
         band = np.where(c["band"] < 1e3, c["band"], np.nan)
         lines = column[2]
         lines.semilogy(
-            c["t"][1:], np.maximum(ulp[1:], DRAWN_ZERO), color=BLUE, linewidth=0.8, label="TMT, start 1 ulp away"
+            c["t"][1:], np.maximum(ulp[1:], DRAWN_ZERO), color=BLUE, linewidth=0.8, label=f"{label}, start 1 ulp away"
         )
         lines.semilogy(
-            c["t"][1:], np.maximum(difference[1:], DRAWN_ZERO), color="black", linewidth=1, label="TMT to MuJoCo"
+            c["t"][1:], np.maximum(difference[1:], DRAWN_ZERO), color="black", linewidth=1, label=f"{label} to MuJoCo"
         )
         lines.semilogy(c["t"][:: c["every"]][1:], band[1:], "--", color=ORANGE, label="band of rounding")
         if c["judged_until_s"] < case.duration:
@@ -117,12 +118,12 @@ def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) ->
     used = [row["difference_over_band"] for row in rows if row["difference_over_band"] is not None]
     most = f"at most {max(used):.1e}" if used else "no measured part"
     errors, unit = result.curves["errors"].get(case.name), movement_unit(case.coordinates)
-    count = case.coordinates.nv
+    count, label = case.coordinates.nv, result.label
     return (
         f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
-            f"With {case.steps} steps of RK4 TMT is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true "
+            f"With {case.steps} steps of RK4 {label} is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true "
             "motion. "
             if errors
             else ""

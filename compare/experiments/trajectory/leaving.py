@@ -10,6 +10,7 @@ from ...case import Case
 from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT, movement_unit
+from ...judge.words import capital
 
 NO_TIME = 1e-6  # s: a step in which nothing moves
 STEADY = 1e-3  # per second: a slower growth is none in these runs
@@ -18,10 +19,10 @@ NEAR_PREDICTION = 2  # steps: so near the time that is predicted from rounding, 
 
 def accelerations_left(case: Case, engines: Mapping[str, Engine]) -> dict[str, np.ndarray]:
     """The acceleration that each engine finds at the start under the torque that is to hold, rad/s2, (nv,)."""
-    ours, theirs = compared(engines, case).values()
+    (name, ours), (other, theirs) = compared(engines, case).items()
     return {
-        "tmt": ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
-        "mujoco": theirs.acceleration(*case.start, case.tau),
+        name: ours.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME,
+        other: theirs.acceleration(*case.start, case.tau),
     }
 
 
@@ -65,7 +66,7 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
     sentences = [f"The linear map of RK4 lets {grows}."]
     for name, push in accelerations_left(case, engines).items():
         if not np.isfinite(push).all():
-            sentences.append(f"{LABELS[name]} gives no acceleration there.")
+            sentences.append(f"{capital(LABELS[name])} gives no acceleration there.")
             continue
         size, at = float(np.abs(push).max()), predicted_leaving(case, push)
         away = (
@@ -75,8 +76,8 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
         )
         why = cause_in_words(case, size, may, at, left[name])
         sentences.append(
-            f"{LABELS[name]}: the torque leaves an acceleration of {size:.1e} {per} (rounding allows {may:.1e}); by that map "
-            f"alone the {case.robot.name} would {away}; it {left_in_words(left[name], unit)}{why}."
+            f"{capital(LABELS[name])}: the torque leaves an acceleration of {size:.1e} {per} (rounding allows {may:.1e}); by "
+            f"that map alone the {case.robot.name} would {away}; it {left_in_words(left[name], unit)}{why}."
         )
     return sentences
 

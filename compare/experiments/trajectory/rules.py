@@ -25,15 +25,19 @@ def judged(times: np.ndarray, width: np.ndarray, ends: Mapping[str, float | None
 def check_divergence(
     result: Result, where: str, ends: Mapping[str, float | None], dt: float, steps: int, width: np.ndarray
 ) -> None:
-    """Both diverge at the same step, if one does while the band (recorded,) is narrow: then rounding decides nothing."""
+    """Both diverge at the same step, if one does while the band (recorded,) is narrow: then rounding decides nothing.
+
+    ends: of the engine that MuJoCo is compared with, and of MuJoCo, s.
+    """
     end = ends_first(ends)
     if end == np.inf:
         return
     every = steps // (len(width) - 1)
     if width[int(round(end / dt) / every)] < NARROW:
-        ours, theirs = (steps + 1 if ends[name] is None else round(ends[name] / dt) for name in ("tmt", "mujoco"))
+        ours, theirs = (steps + 1 if at is None else round(at / dt) for at in ends.values())
+        whose = "TMT's" if result.label == "TMT" else result.label
         note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""
-        result.check(where, "step of divergence, MuJoCo's, is TMT's", theirs, ours, "", note, rule="equal")
+        result.check(where, f"step of divergence, MuJoCo's, is {whose}", theirs, ours, "", note, rule="equal")
 
 
 def check_same_bits(result: Result, where: str, integrator: str, first: list, other: list) -> None:
@@ -67,7 +71,9 @@ def check_level(
         one + (per if level == "derivative" else "") for one in movement_unit(coordinates).split(" or ")
     )
     place = f"{coordinates.speeds[i % n]} at t = {times[k]:.3f} s"
-    check = result.check(where, f"{level}, TMT to MuJoCo", difference[k, i], tolerance[k, i], unit, place, True)
+    check = result.check(
+        where, f"{level}, {result.label} to MuJoCo", difference[k, i], tolerance[k, i], unit, place, True
+    )
     result.rows.append(
         about
         | {

@@ -8,7 +8,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...case import Case, Coordinates
-from ...engines import Dynamics, Engine, Method, compared
+from ...engines import LABELS, Dynamics, Engine, Method, compared
 from ...judge.check import Result
 from ...judge.rounding import band, slope_rounding, step_rounding
 from ...judge.run import (
@@ -35,7 +35,7 @@ HALF_TURN = (
 
 
 class TmtSide(NamedTuple):
-    """What TMT gives of one case with one scheme and step; states are recorded at the scene's own steps."""
+    """What TMT, or a user's own equations, give of one case with one scheme and step, recorded at the scene's own steps."""
 
     t: np.ndarray  # (steps + 1,) s
     q: np.ndarray  # (steps + 1, nq) rad
@@ -86,12 +86,14 @@ def follow(
     finer: steps as multiples of the scene's own. known: a dict in which TMT's side is kept, for whoever compares it with
     several engines. entries: of the Jacobians of a run, see `steps_afforded`.
     """
-    result, known = Result("trajectory"), {} if known is None else known
+    ours, theirs = case.robot.compared
+    result, known = Result("trajectory", label=LABELS[ours]), {} if known is None else known
     if case not in known:  # what joints a scene of a robot from a file needs is not asked here
         known[case] = None if case.robot.is_read else reduced(case)
-    schemes = {}
-    for method in engines["mujoco"].methods.values():
-        schemes.setdefault(method.scheme, []).append(method)
+    schemes, here = {}, {method.scheme for method in engines[ours].methods.values()}
+    for method in engines[theirs].methods.values():
+        if method.scheme in here:
+            schemes.setdefault(method.scheme, []).append(method)
     runs = [(case, steps, *item) for steps in counts(case, finer, entries) for item in schemes.items()]
     if smaller := known[case]:
         runs.append((smaller, smaller.steps, "rk4", schemes["rk4"]))
@@ -99,8 +101,8 @@ def follow(
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for each, steps, scheme, methods in runs:
             if (each, steps, scheme) not in known:
-                known[each, steps, scheme] = tmt_side(each, dynamics[each]["tmt"], steps, scheme, entries)
-            compare_runs(result, each, dynamics[each]["mujoco"], steps, methods, known[each, steps, scheme])
+                known[each, steps, scheme] = tmt_side(each, dynamics[each][ours], steps, scheme, entries)
+            compare_runs(result, each, dynamics[each][theirs], steps, methods, known[each, steps, scheme])
     if fast := result.notes:
         result.notes = [
             "Recorded states from which a step turns a hinge by more than half a turn are not compared in one step: "
@@ -110,7 +112,7 @@ def follow(
 
 
 def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: int = MOST_ENTRIES) -> TmtSide:
-    """TMT's side of a case: the run, its band, and the two other levels at its recorded states."""
+    """TMT's side of a case, or a user's: the run, its band, and the two other levels at its recorded states."""
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
     t, q, v, *_ = dynamics.run(*case.start, tau, dt, steps, scheme)
@@ -134,25 +136,25 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
 def compare_runs(
     result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
 ) -> None:
-    """TMT's side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step.
+    """One side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step.
 
     Noted is from how many of the recorded states a step is too long to be compared alone.
     """
     tau, dt, every, coordinates = case.tau, case.duration / steps, steps // recorded(case), case.coordinates
-    t, times, first = mine.t, mine.t[::every], None
+    t, times, first, name = mine.t, mine.t[::every], None, case.robot.compared[0]
     angle_band = mine.width[:, : coordinates.nv].max(axis=1)
     turning = [i for i, unit in enumerate(coordinates.units) if unit == "rad"]
     accelerations = dynamics.acceleration(*mine.states, tau)
     for method in methods:
         _, *theirs = dynamics.run(*case.start, tau, dt, steps, method.name)[:3]
-        ends = {"tmt": mine.ended, "mujoco": diverged_at(case, t, *theirs)}
+        ends = {name: mine.ended, "mujoco": diverged_at(case, t, *theirs)}
         count = judged(times, angle_band, ends)
         where = f"{case.name}, {method.name}, {step_in_words(case, steps)}"
         until, required = float(times[count - 1]), required_time(case, method.scheme, dt)
         about = {"scene": case.name, "engine_integrator": method.name, "twin": method.scheme, "dt_s": dt}
         ending = {
             "judged_until_s": until, "required_s": required, "diverged_at_s": ends["mujoco"],
-            "twin_diverged_at_s": ends["tmt"],
+            "twin_diverged_at_s": ends[name],
         }  # fmt: skip
         slow = dt * np.abs(mine.states[1][:, turning]).max(axis=1, initial=0.0) <= HALF_TURN
         one = one_step(dynamics, mine.states, tau, dt, method.name)
@@ -178,9 +180,9 @@ def compare_runs(
         if first is None:
             first = method, theirs
             result.curves[(case.name, method.scheme, steps)] = {
-                "integrator": method.name, "t": t, "every": every, "tmt": [mine.q, mine.v], "mujoco": theirs,
+                "integrator": method.name, "t": t, "every": every, name: [mine.q, mine.v], "mujoco": theirs,
                 "band": angle_band, "ulp": mine.ulp, "judged_until_s": until, "ended": ends,
-                "left": {"tmt": departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
+                "left": {name: departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
             }  # fmt: skip
         else:
             check_same_bits(result, where, first[0].name, first[1], theirs)

@@ -7,7 +7,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import LABELS, Engine
+from ...engines import LABELS, WHOSE, Engine
 from ...engines.mujoco.flags import INTEGRATORS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit
@@ -42,11 +42,13 @@ def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     """What a run of a held posture says, of what is claimed of it if it is."""
     claims = case.robot.claims.of_scenes if case.robot.claims else {}
     about = f"Claim: {claims[case.name]}. Here" if case.name in claims else capital(case.name)
-    unit = movement_unit(case.coordinates)
-    by = " and ".join(f"{LABELS[name]}'s {rad(value, unit)}" for name, value in deviations(case, curve).items())
+    unit, named = movement_unit(case.coordinates), WHOSE | {"own": "yours"}
+    ours, left = case.robot.compared[0], curve["left"]
+    torque = "TMT's torque" if ours == "tmt" else "the torque that holds the compiled model"
+    by = " and ".join(f"{named[name]} {rad(value, unit)}" for name, value in deviations(case, curve).items())
     return (
-        f"{about}, under TMT's torque, in {case.duration:g} s TMT's {case.robot.name} "
-        f"{left_in_words(curve['left']['tmt'], unit)}, MuJoCo's {left_in_words(curve['left']['mujoco'], unit)}; the farthest is "
+        f"{about}, under {torque}, in {case.duration:g} s {WHOSE[ours]} {case.robot.name} {left_in_words(left[ours], unit)}, "
+        f"MuJoCo's {left_in_words(left['mujoco'], unit)}; the farthest is "
         f"{by}. " + " ".join(causes_in_words(case, engines, curve["left"]))
     )
 
@@ -55,6 +57,10 @@ def of_integrators(robot: Robot, mujoco: Engine) -> list[str]:
     """Which integrators are which scheme, of a robot from a file; and which is left out."""
     if not robot.is_read:
         return []
+    if robot.own:
+        return [
+            "Your equations are integrated by this project's RK4: of MuJoCo's integrators RK4 alone is compared with it."
+        ]
     schemes, methods = {}, mujoco.methods
     for method in methods.values():
         schemes.setdefault(method.scheme, []).append(method.name)
@@ -82,10 +88,11 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
     for name, (ours, theirs) in found.items():
         curve = coarsest_run(runs, cases[name])
         case = cases[name]
+        label = LABELS[case.robot.compared[0]]
         apart, unit = agreement(curve, case), movement_unit(case.coordinates)
         true = "rest" if cases[name].is_held else "more than 20 digits"
         lines.append(
-            f"{name} (true: {true}): TMT {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {apart:.1e} {unit} in the "
+            f"{name} (true: {true}): {label} {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {apart:.1e} {unit} in the "
             f"{curve['judged_until_s']:.2f} s that are judged"
         )
         if None not in (ours, theirs) and max(ours, theirs) > SAYS_NOTHING * apart:
@@ -105,7 +112,7 @@ def agreement(curve: dict, case: Case) -> float:
     """How far the engines are apart while they are judged, rad or m."""
     last = int(np.searchsorted(curve["t"], curve["judged_until_s"] * (1 + 1e-9), side="right"))
     states = slice(0, last, curve["every"])
-    return float(moved_from(curve["tmt"][0][states], curve["mujoco"][0][states], case.coordinates).max())
+    return float(moved_from(*(curve[name][0][states] for name in case.robot.compared), case.coordinates).max())
 
 
 def of_first_order(runs: dict, cases: Mapping[str, Case]) -> list[str]:

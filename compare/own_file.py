@@ -1,0 +1,169 @@
+"""Equations of one's own, from a Python file or a module: FILE.py:OBJECT or MODULE:OBJECT.
+
+FILE and MODULE are what stands before the last colon, so that a Windows drive may come first; OBJECT may be dotted, and nothing
+after the colon is the module itself. What is imported prints to stderr, and leaves no compiled files behind.
+"""
+
+import difflib
+import importlib
+import importlib.machinery
+import importlib.util
+import inspect
+import os
+import sys
+import traceback
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from types import ModuleType
+
+from .process.crash import described
+
+FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
+SHOWN_LINE = 60  # letters of a line that is no Python
+
+
+class OwnFileError(ValueError):
+    """Equations that cannot be loaded; the message is one line."""
+
+
+def own_object(stated: str) -> object:
+    """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnFileError, in one line."""
+    place, _, name = stated.rpartition(":")
+    if not place:
+        raise OwnFileError(f"{stated!r} names no file and no module; {FORMS_OF_REFERENCE} is expected")
+    with aside():
+        module, folder = module_of(place, stated)
+        with on_path(folder):
+            return instance(part_of(module, place, name), stated, file_of(module, place))
+
+
+def is_file(place: str) -> bool:
+    """Whether it is a file that is named, and not a module."""
+    return place.endswith(".py") or any(sign in place for sign in {os.sep, "/"}) or Path(place).is_file()
+
+
+def module_of(place: str, stated: str) -> tuple[ModuleType, str]:
+    """The module of a file or of that name, and the folder in which it finds others."""
+    if not is_file(place):
+        with on_path(os.getcwd()):
+            return module_named(place), os.getcwd()
+    path = Path(place)
+    if path.is_dir():
+        raise OwnFileError(f"{place}: it is a folder; a Python file is expected")
+    if not path.is_file():
+        beside = path.parent.glob("*.py") if path.parent.is_dir() else ()
+        raise OwnFileError(f"{place}: no such file{near(path.name, (other.name for other in beside))}")
+    path = path.resolve()
+    # a name that nothing else has: a file numpy.py shadows no package
+    name = f"compare_own_{path.stem}"
+    loader = importlib.machinery.SourceFileLoader(name, str(path))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_file_location(name, path, loader=loader))
+    sys.modules[name] = module  # dataclasses look for it there
+    with on_path(str(path.parent)), raised_in(str(path), place):
+        loader.exec_module(module)
+    return module, str(path.parent)
+
+
+def module_named(name: str) -> ModuleType:
+    """A module by import."""
+    if not all(part.isidentifier() for part in name.split(".")):
+        raise OwnFileError(f"{name!r} is no name of a module; {FORMS_OF_REFERENCE} is expected")
+    try:
+        found = importlib.util.find_spec(name)
+    except ModuleNotFoundError:
+        found = None
+    except Exception as error:  # of a package that it is in
+        raise OwnFileError(f"{name}: {described(error, with_place=False)}") from None
+    if found is None:
+        known = (path.stem for path in Path().glob("*.py"))
+        raise OwnFileError(f"{name}: no such module{near(name, known)}")
+    with raised_in(found.origin or name, name):
+        return importlib.import_module(name)
+
+
+def part_of(module: ModuleType, place: str, name: str) -> object:
+    """What a dotted name is in a module; the module itself without one."""
+    found, known = module, ""
+    for part in filter(None, name.split(".")) if name else ():
+        try:
+            found = getattr(found, part)
+        except AttributeError:
+            names = [other for other in dir(found) if not other.startswith("_")]
+            inside = f" in {known}" if known else ""
+            raise OwnFileError(f"{place}: there is no {part!r}{inside}{near(part, names)}") from None
+        known = f"{known}.{part}" if known else part
+    return found
+
+
+def instance(found: object, stated: str, file: str) -> object:
+    """An object as it is, a class without arguments instantiated."""
+    if not inspect.isclass(found):
+        return found
+    try:
+        needed = [
+            name
+            for name, parameter in inspect.signature(found).parameters.items()
+            if parameter.default is parameter.empty
+            and parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        ]
+    except (TypeError, ValueError):  # of a class that tells nothing
+        needed = []
+    if needed:
+        raise OwnFileError(
+            f"{stated}: the class {found.__name__} takes {', '.join(needed)}; an object of it is expected, or a class that "
+            "takes nothing"
+        )
+    with raised_in(file, stated):
+        return found()
+
+
+def file_of(module: ModuleType, place: str) -> str:
+    return getattr(module, "__file__", None) or place
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """Names that are close to one, in words."""
+    close = difflib.get_close_matches(name, list(known), 3, 0.6)
+    return f"; there is {' and '.join(close)}" if close else ""
+
+
+@contextmanager
+def raised_in(file: str, place: str) -> Iterator[None]:
+    """What is raised in this block becomes one line: the error, and the line of the file in which it came up."""
+    try:
+        yield
+    except SyntaxError as error:
+        where = place if error.filename == file else error.filename or place
+        text = " ".join((error.text or "").split())[:SHOWN_LINE]
+        line, text = f", line {error.lineno}" if error.lineno else "", f": {text}" if text else ""
+        raise OwnFileError(f"{where}{line}: {type(error).__name__}, {error.msg}{text}") from None
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # also SystemExit: the file may be a script
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+        at = f", line {lines[-1]}" if lines else ""
+        raise OwnFileError(f"{place}{at}: {described(error, with_place=False)}") from None
+
+
+@contextmanager
+def on_path(folder: str) -> Iterator[None]:
+    """A folder is looked through last for what is imported, so that no file in it shadows a package."""
+    sys.path.append(folder)
+    try:
+        yield
+    finally:
+        sys.path.reverse()
+        sys.path.remove(folder)
+        sys.path.reverse()
+
+
+@contextmanager
+def aside() -> Iterator[None]:
+    """What a user's code does in this block writes no compiled files, and prints to stderr."""
+    before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        sys.dont_write_bytecode = before
