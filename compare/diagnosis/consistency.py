@@ -30,10 +30,11 @@ class Condition(NamedTuple):
     unit: str
     state: int
     text: str  # what is wrong where it is not met
+    rule: str = "at most"  # or "at least"
 
     @property
     def is_met(self) -> bool:
-        return bool(self.value <= self.tolerance)
+        return bool(self.value <= self.tolerance if self.rule == "at most" else self.value >= self.tolerance)
 
 
 def conditions(
@@ -81,15 +82,15 @@ def symmetric(M: np.ndarray, allowed: np.ndarray) -> Condition:
 
 
 def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
-    """In units of its diagonal, where entries may be kg and kg m2; the value is the least eigenvalue with the other sign."""
+    """In units of its diagonal, where entries may be kg and kg m2."""
     M = (M + np.swapaxes(M, 1, 2)) / 2.0
     diagonal = np.einsum("sii->si", M)
     root = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     least = np.linalg.eigvalsh(M / (root[:, :, None] * root[:, None, :]))[:, 0]
     s = int(np.argmin(least))
-    floor = -allowed[s] / diagonal[s].max() if diagonal[s].max() > 0.0 else 0.0
+    floor = allowed[s] / diagonal[s].max() if diagonal[s].max() > 0.0 else 0.0
     text = f"Your M is not positive definite: its least eigenvalue, in units of its diagonal, is {least[s]:.3g}."
-    return Condition("M is positive definite", -float(least[s]), float(floor), "", s, text)
+    return Condition("M is positive definite", float(least[s]), float(floor), "", s, text, "at least")
 
 
 def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, floor: float) -> Condition | None:

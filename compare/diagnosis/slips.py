@@ -10,7 +10,7 @@ import numpy as np
 from tmt import method
 
 from .model import Equations, Path
-from .places import EVERY
+from .places import EVERY, at_rest
 from .variants import Variant
 
 
@@ -155,12 +155,6 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
     for name, forms in named.items():
         for explains, *factors in forms:
             yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, lambda f=factors: values(*f))
-
-
-def at_rest(equations: Equations) -> np.ndarray:
-    """h without rates, (states, nv)."""
-    still = Equations(equations.tree, equations.q, np.zeros_like(equations.qd))
-    return still.values()[0][:, -equations.nv :]
 
 
 def slip(name: str, stated: str, explains: str, values: Callable[[], np.ndarray]) -> Variant:
