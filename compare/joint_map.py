@@ -1,8 +1,8 @@
 """How equations of one's own name, order, turn, zero and measure the joints of a model.
 
-A joint of one's own is stated as "elbow", "-elbow" (the other sense), "elbow+90deg", "elbow-0.1rad", "slider+0.2m" (its own zero:
-own position = position of the model + 90 deg), "elbow in deg" (positions in deg and speeds in deg/s), "elbow in deg, rad/s"
-(positions alone), or several of these: "-elbow+90deg in deg". They stand in the order in which one's own equations take them.
+A joint of one's own is stated as "knee", "-knee" (the other sense), "knee+90deg", "knee-0.1rad", "slider+0.2m" (its own zero:
+own position = position of the model + 90 deg), "knee in deg" (positions in deg and speeds in deg/s), "knee in deg, rad/s"
+(positions alone), or several of these: "-knee+90deg in deg". They stand in the order in which one's own equations take them.
 Mbar and h of one's own are per rad and in N m in each of them, whatever the unit of the arguments.
 """
 
@@ -17,7 +17,7 @@ from .judge.words import listed
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 STATED = re.compile(r"(?P<name>.+?)(?P<zero>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
-FORMS = '"elbow", "-elbow", "elbow+90deg" or "elbow in deg"'
+FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
 class JointsError(ValueError):

@@ -1,0 +1,152 @@
+"""Equations of one's own as an engine: what a user brings, integrated by the same RK4 as tmt's."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+import tmt
+from tmt.stepping import stepped
+
+from ...case import Case
+from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states
+from .equations import OwnEquations, Problem
+from .functions import ARGUMENTS, OwnError
+
+__all__ = ["ARGUMENTS", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem"]
+
+RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme
+
+
+class Own:
+    """The engine of equations of one's own. schemes: of RK4_SCHEMES those that this robot needs beside RK4."""
+
+    name = "own"
+
+    def __init__(self, equations: OwnEquations, schemes: Iterable[str] = ()):
+        self.equations, self.schemes = equations, set(schemes) | {"rk4"}
+
+    @property
+    def methods(self) -> Mapping[str, Method]:
+        return {
+            name: Method(self.name, name, tmt.METHODS[name].order, name) for name in RK4_SCHEMES if name in self.schemes
+        }
+
+    def unavailable(self) -> str | None:
+        return None
+
+    def of(self, case: Case) -> "OwnDynamics":
+        return OwnDynamics(self.equations, case)
+
+
+class OwnDynamics:
+    """A case in equations of one's own.
+
+    Without gravity: less its gravity, or its bias at rest. Damping that is added and gravity that is off act as torques do;
+    locked joints have their rows and columns left out.
+    """
+
+    def __init__(self, equations: OwnEquations, case: Case):
+        self.equations, self.case, self.coordinates = equations, case, case.coordinates
+        self.tree = case.tree  # of what it has, damping and springs alone
+        whole = case.robot.coordinates
+        free = [place for name, place in zip(whole.names, whole.places.joints) if name in case.joints]
+        self.free_q = [i for place in free for i in range(place.q.start, place.q.stop)]
+        self.free_v = [i for place in free for i in range(place.qd.start, place.qd.stop)]
+        self.still = np.array(case.posture if case.locked else np.zeros(whole.nq), float)
+        self.nv = whole.nv
+
+    def has(self, name: str) -> bool:
+        """Whether the equations have a function of this name of their own."""
+        return self.equations.has(name)
+
+    def whole(self, q, *others) -> list[np.ndarray]:
+        """States of all joints, locked ones at their place and at rest: q (..., nq), and values of the speeds (..., nv)."""
+        q = np.asarray(q, float)
+        every = np.broadcast_to(self.still, (*q.shape[:-1], len(self.still))).copy()
+        every[..., self.free_q] = q
+        found = [every]
+        for values in others:
+            values = np.asarray(values, float)
+            full = np.zeros((*values.shape[:-1], self.nv))
+            full[..., self.free_v] = values
+            found.append(full)
+        return found
+
+    def mass_matrix(self, q) -> np.ndarray:
+        M = self.equations.mass_matrix(*self.whole(q))
+        return M[..., self.free_v, :][..., self.free_v]
+
+    def bias(self, q, v) -> np.ndarray:
+        q, v = self.whole(q, v)
+        h = self.equations.bias(q, v)
+        return (h if self.case.scene.gravity else h - self.equations.gravity_balance(q))[..., self.free_v]
+
+    def gravity_balance(self, q) -> np.ndarray:
+        weight = self.equations.gravity_balance(*self.whole(q))
+        return weight[..., self.free_v] * self.case.scene.gravity
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        case, own = self.case, self.equations
+        if not case.locked:
+            lifted = 0.0 if case.scene.gravity else own.gravity_balance(q)
+            return own.acceleration(q, v, np.asarray(tau) - case.added_damping * v + lifted)
+        forces = tau - np.array(self.tree.damping) * v - self.bias(q, v)
+        if self.tree.has_springs:
+            forces = forces - tmt.spring_torque(q, self.tree)
+        return np.linalg.solve(self.mass_matrix(q), forces[..., None])[..., 0]
+
+    def energy(self, q, v) -> np.ndarray:
+        return self.equations.energy(*self.whole(q, v))
+
+    def com_positions(self, q) -> np.ndarray:
+        return self.equations.com_positions(*self.whole(q))
+
+    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
+        T, B = self.equations.jacobians(*self.whole(q))
+        return T[..., self.free_v], B[..., self.free_v]
+
+    def run(self, q, v, tau, dt, steps, method="rk4", tolerance=None) -> Motion:
+        """Motion under constant torque; NaN from the moment in which a run has diverged."""
+        if tolerance is not None:
+            raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
+        batch, (q, v, tau) = rows_of_states(q, v, tau)
+        scheme, joints = tmt.METHODS[method], self.tree
+        path_q, path_v = (np.full((len(part), steps + 1, part.shape[1]), np.nan) for part in (q, v))
+        path_q[:, 0], path_v[:, 0] = q, v
+
+        def slope(q: list, v: list) -> list:
+            state = (np.stack([np.broadcast_to(a, len(tau)) for a in part], axis=-1) for part in (q, v))
+            return list(np.moveaxis(self.acceleration(*state, tau), -1, 0))
+
+        with np.errstate(all="ignore"):  # of a run that diverges
+            for k in range(steps):
+                parts = ([path[:, k, i] for i in range(path.shape[2])] for path in (path_q, path_v))
+                for path, after in zip((path_q, path_v), stepped(scheme, joints, slope, *parts, dt)):
+                    path[:, k + 1] = np.stack(after, axis=-1)
+                if not np.isfinite(path_v[:, k + 1]).any():
+                    break
+        return self.motion(batch, path_q, path_v, dt, 4 * steps * len(q))
+
+    def motion(self, batch, path_q, path_v, dt, evaluations) -> Motion:
+        """The paths of runs, (runs, steps + 1, ...), as a Motion."""
+        steps = path_q.shape[1] - 1
+        finite = np.isfinite(path_q).all(axis=2) & np.isfinite(path_v).all(axis=2)
+        ended = np.full(len(path_q), None, dtype=object)
+        for run in np.flatnonzero(~finite.all(axis=1)):
+            first = int(np.argmin(finite[run]))
+            path_q[run, first:] = path_v[run, first:] = np.nan
+            ended[run] = f"at t = {dt * max(0, first - 1):g} s: a number is not finite"
+        q, v = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_v))
+        return Motion(dt * np.arange(steps + 1), q, v, evaluations, ended.reshape(batch)[()], steps)
+
+    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
+        every = setting.every
+
+        def run() -> Motion:
+            return self.run(q, v, tau, setting.duration / setting.steps, setting.steps, method, setting.tolerance)
+
+        def read(motion: Motion) -> Motion:
+            t = np.linspace(0.0, setting.duration, GRID + 1)
+            return motion._replace(t=t, q=motion.q[::every].copy(), v=motion.v[::every].copy())
+
+        return run, read

@@ -1,0 +1,257 @@
+"""Equations of one's own, asked at states of the model's joints; what is wrong with them is collected."""
+
+import time
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+import tmt
+from tmt.values import shown
+
+from ...case import Coordinates
+from ...joint_map import JointMap, JointsError, joint_map
+from .. import rows_of_states
+from .functions import ARGUMENTS, STATE, OwnError, call, functions_of, names_of
+from .returned import SHAPES, converted, as_raised, same, state_in_words
+
+SKEW = 1e-9  # of the largest entry: from here on a mass matrix is not symmetric; less is a difference of entries
+AT_ONCE = 1.5  # times what one state takes: two or three at once take no more, and so do many
+TIMED, SLOW = 64, 0.01  # states that are tried together to see what one takes; unless so few take as long as this, s
+
+
+class Problem(NamedTuple):
+    """Something wrong with equations that can be used all the same."""
+
+    quantity: str
+    state: str  # the first at which it was found, as the function was given it
+    text: str  # one line
+
+
+class OwnEquations:
+    """Equations of one's own; quantities at any states of the model's joints, q (..., nq), v and tau (..., nv).
+
+    source: an object or module with mass_matrix(q) and bias(q, qd), or a mapping of such names to functions; further functions
+    see ARGUMENTS; `joint_names` if it has them. Or a tmt.Tree. Or the same names with SymPy matrices, and `symbols`.
+    joints: how its joints are those of the model; None: by its own names where it has them, else the model's.
+    tree: the model's equations, of which damping and springs are taken where there is no acceleration. required: functions
+    without which OwnError is raised, as for whatever else cannot be used.
+    """
+
+    def __init__(
+        self,
+        source: object,
+        coordinates: Coordinates,
+        joints: JointMap | None = None,
+        tree: tmt.Tree | None = None,
+        required: tuple[str, ...] = ("mass_matrix", "bias"),
+    ):
+        self.source, self.coordinates, self.tree = source, coordinates, tree
+        self.functions = functions_of(source, coordinates, required)
+        try:
+            self.joints = joints or joint_map(coordinates, names_of(source))
+        except JointsError as error:
+            raise OwnError(f"joint_names: {error}") from None
+        self.takes_batches: dict[str, bool] = {}  # of each function that was called
+        self.times: dict[str, tuple[float, float]] = {}  # s of one state, and of one more in a batch
+        self.shapes: dict[str, tuple] = {}  # of what each gives at one state
+        self.found: dict[tuple[str, str], list] = {}  # (quantity, what): [state, text, at how many]
+
+    def has(self, name: str) -> bool:
+        """Whether it has a function of its own of this name."""
+        return name in self.functions
+
+    @property
+    def problems(self) -> list[Problem]:
+        """What was found wrong so far, each once."""
+        return [
+            Problem(quantity, state, f"{text} at {state}" + (f", and at {count - 1} more states" if count > 1 else ""))
+            for (quantity, _), (state, text, count) in self.found.items()
+        ]
+
+    @property
+    def seconds(self) -> float:
+        """What one call of each function that was called takes at one state, s."""
+        return sum(single for single, _ in self.times.values())
+
+    def affordable(self, states: int, seconds: float) -> int:
+        """How many of so many states there is time for, at least 1, with each function called once at each."""
+        each = sum(more for _, more in self.times.values())
+        return states if each == 0.0 else int(np.clip(seconds / each, 1, states))
+
+    # quantities at states
+
+    def mass_matrix(self, q) -> np.ndarray:
+        """Mbar, kg m2, (..., nv, nv)."""
+        M = self.asked("mass_matrix", q)
+        self.check_symmetry(M.reshape(-1, *M.shape[-2:]), *self.own_states(rows_of_states(q)[1]))
+        return self.joints.mass_matrix(M)
+
+    def bias(self, q, v) -> np.ndarray:
+        """h, N m, (..., nv)."""
+        return self.joints.forces(self.asked("bias", q, v))
+
+    def gravity_balance(self, q) -> np.ndarray:
+        """Its gravity, or its bias at rest, N m, (..., nv)."""
+        if self.has("gravity"):
+            return self.joints.forces(self.asked("gravity", q))
+        return self.bias(q, np.zeros(self.coordinates.nv))
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        """rad/s2, (..., nv): its own, or from Mbar a = tau - D v - k (q - rest) - h with the model's damping and springs."""
+        if self.has("acceleration"):
+            return self.joints.forces(self.asked("acceleration", q, v, tau))
+        batch, (q, v, tau) = rows_of_states(q, v, tau)
+        M, forces = self.mass_matrix(q), tau - self.bias(q, v) - self.passive(q, v)
+        solved = np.full(forces.shape, np.nan)
+        for i in np.flatnonzero(np.isfinite(M).all(axis=(1, 2))):
+            try:
+                solved[i] = np.linalg.solve(M[i], forces[i])
+            except np.linalg.LinAlgError:
+                self.note("mass_matrix", "is singular", self.own_states([q]), np.arange(len(q)) == i)
+        return solved.reshape(*batch, -1)
+
+    def passive(self, q, v) -> np.ndarray:
+        """What damping and springs of the model take, N m, (states, nv)."""
+        if self.tree is None:
+            return np.zeros(np.shape(v))
+        drag = np.array(self.tree.damping) * v
+        return drag + tmt.spring_torque(q, self.tree) if self.tree.has_springs else drag
+
+    def energy(self, q, v) -> np.ndarray:
+        """J, (...); its zero is its own."""
+        return self.asked("energy", q, v)
+
+    def com_positions(self, q) -> np.ndarray:
+        """m, (..., m, 3)."""
+        return self.asked("com_positions", q)
+
+    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
+        """T_b and B_b, (..., m, 3, nv)."""
+        both = np.moveaxis(self.asked("jacobians", q), -4, 0)
+        return tuple(self.joints.forces(part) for part in both)
+
+    def try_at(self, q, v, tau) -> None:
+        """Call every function at the first of some states; OwnError if one cannot be used."""
+        for name in self.functions:
+            self.asked(name, *(q, v, tau)[: ARGUMENTS[name]])
+
+    # how functions are called
+
+    def asked(self, name: str, *states) -> np.ndarray:
+        """What a function returns at states of the model's joints, as it returns it; NaN where it raised."""
+        if not self.has(name):
+            raise OwnError(f"the equations have no {call(name)}; it is expected")
+        batch, rows = rows_of_states(*states)
+        finite = np.isfinite(np.concatenate(rows, axis=1)).all(axis=1)  # what has diverged is not asked
+        given = self.own_states([part[finite] for part in rows])
+        if not finite.any():
+            return np.full((*batch, *self.shapes.get(name, SHAPES[name](self.coordinates.nv))), np.nan)
+        if name not in self.takes_batches:
+            self.first(name, given)
+        found, raised = self.each(name, given)
+        bad = ~np.isfinite(found).reshape(len(found), -1).all(axis=1) & ~raised
+        self.note(name, "is not finite", given, bad)
+        values = np.full((len(rows[0]), *found.shape[1:]), np.nan)
+        values[finite] = found
+        return values.reshape(*batch, *values.shape[1:])
+
+    def own_states(self, rows: list[np.ndarray]) -> list[np.ndarray]:
+        """q, qd and tau, as many as there are, in one's own joints."""
+        ways = (self.joints.own_positions, self.joints.own_speeds, self.joints.own_forces)
+        return [way(part) for way, part in zip(ways, rows)]
+
+    def each(self, name: str, given: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Values (states, ...) at states in one's own joints, NaN where it raised; and where that is."""
+        raised = np.zeros(len(given[0]), bool)
+        if self.takes_batches.get(name):
+            try:
+                return self.called(name, given, len(raised)), raised
+            except OwnError:  # found where it is, state by state
+                pass
+        values = np.full((len(raised), *self.shapes[name]), np.nan)
+        for i in range(len(raised)):
+            try:
+                values[i] = self.called(name, [part[i] for part in given])
+            except OwnError as error:
+                raised[i] = True
+                self.note(name, str(error), given, np.arange(len(raised)) == i)
+        return values, raised
+
+    def first(self, name: str, given: list[np.ndarray]) -> None:
+        """Call a function at one state, whatever is wrong is an OwnError; then find out whether it takes several at once."""
+        count = 3 if self.coordinates.nv == 2 else 2  # not as many as there are joints
+        singles, took = [], []
+        for i in range(min(count, len(given[0]))):
+            state = [part[i] for part in given]
+            started = time.perf_counter()
+            try:
+                singles.append(self.called(name, state))
+            except OwnError as error:
+                if i:  # it is met again, and noted
+                    break
+                raise OwnError(f"{error}, at {state_in_words(state)}") from error
+            took.append(time.perf_counter() - started)
+            self.shapes[name] = singles[0].shape
+        single = more = min(took)
+        if len(singles) == count:
+            together, seconds = self.tried_together(name, [part[:count] for part in given])
+            if together is not None and same(together, np.array(singles)):
+                self.takes_batches[name] = True
+                more = 0.0 if seconds <= AT_ONCE * single else seconds / count
+                if seconds < SLOW:
+                    many = [part[:TIMED] for part in given]
+                    more = self.tried_together(name, many)[1] / len(many[0])
+        if len(given[0]) > 1:  # else another time
+            self.takes_batches.setdefault(name, False)
+        self.times[name] = single, more
+
+    def tried_together(self, name: str, given: list[np.ndarray]) -> tuple[np.ndarray | None, float]:
+        """Values of several states at once, None if it does not take them; and how long that takes, s."""
+        known = {key: list(value) for key, value in self.found.items()}
+        try:
+            with warnings.catch_warnings(), np.errstate(all="ignore"):
+                warnings.simplefilter("ignore")
+                started = time.perf_counter()
+                values = self.called(name, given, len(given[0]))
+                return values, time.perf_counter() - started
+        except OwnError:
+            return None, 0.0
+        finally:
+            self.found = known  # it may not be written for that
+
+    def called(self, name: str, given: list[np.ndarray], count: int | None = None) -> np.ndarray:
+        """What a function returns at one state, or at count of them; OwnError says what it did instead."""
+        handed = [np.array(part) for part in given]
+        try:
+            value = self.functions[name](*handed)
+        except (Exception, SystemExit) as error:  # whatever a user's own function does
+            hint = ""
+            if isinstance(self.source, type) and isinstance(error, TypeError) and "missing" in str(error):
+                hint = f"; of the class {self.source.__name__} an object such as {self.source.__name__}() is expected"
+            raise OwnError(f"{name} raised {as_raised(error)}{hint}") from error
+        for symbol, before, after in zip(STATE, given, handed):
+            if not np.array_equal(before, after):
+                self.note(name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], [True])
+        expected = self.shapes.get(name, SHAPES[name](self.coordinates.nv))
+        if name != "jacobians":
+            return converted(name, value, expected, count)
+        if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
+            raise OwnError(
+                f"jacobians is {shown(value)}; two arrays, T and B, of shape (bodies, 3, {expected[-1]}) are expected"
+            )
+        return np.stack([converted(name, part, expected[1:], count) for part in value], axis=-4)
+
+    def check_symmetry(self, M: np.ndarray, q: np.ndarray) -> None:
+        """Note where a mass matrix, (states, nv, nv) at q (states, nq) in one's own joints, is not symmetric."""
+        skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2))
+        self.note("mass_matrix", "is not symmetric", [q], skew > SKEW * np.abs(M).max(axis=(1, 2)))
+
+    def note(self, name: str, what: str, given: list[np.ndarray], where) -> None:
+        """Add a problem at those of the states (states, n), in one's own joints, at which it was found."""
+        if not np.any(where):
+            return
+        first = int(np.argmax(where))
+        text = what if what.startswith(name) else f"{name} {what}"
+        state = state_in_words([part[first] for part in given])
+        self.found.setdefault((name, what), [state, text, 0])[2] += int(np.sum(where))
