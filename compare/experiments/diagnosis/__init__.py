@@ -167,9 +167,9 @@ def record(cause: Cause) -> dict:
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
-    from . import figures  # matplotlib is for the process that draws
+    from . import figures_found  # matplotlib is for the process that draws
 
     if result.curves.get("nearest"):
-        yield partial(figures.draw_nearest, result)
+        yield partial(figures_found.draw_nearest, result)
     if result.curves.get("outcomes"):
-        yield partial(figures.draw_outcomes, result)
+        yield partial(figures_found.draw_outcomes, result)
