@@ -55,7 +55,9 @@ class Diagnosis(NamedTuple):
             return f"Nothing of what there was time for explains this ({self.searched}). {self.where}"
         rounded = ""
         if self.digits >= 2.0:
-            rounded = f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
+            rounded = (
+                f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
+            )
         share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
         return f"No single number or term explains this, nor do two: {share} is left. {self.where}{rounded}"
 
