@@ -61,6 +61,7 @@ def assert_agrees(
     rtol: of each entry's scale, beside the tolerance of rounding: for equations whose constants are rounded.
     ValueError, in one line, for what cannot be compared: a model, a shape, a function that raises at the first state.
     """
+    __tracebackhide__ = True  # pytest shows the line of the test
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
     if given.fails or given.problems:
         raise AssertionError(message(given, cause_of(given) if given.fails else ""))
@@ -95,7 +96,5 @@ def differences(
         for (at, *entry), (own, right, tolerance, ratio) in zip(places, values):
             why = cause if ratio > 1.0 else ""
             state = given.states[at]
-            found.append(
-                Difference(name, entries[tuple(entry)], state, own, right, own - right, tolerance, ratio, why)
-            )
+            found.append(Difference(name, entries[tuple(entry)], state, own, right, own - right, tolerance, ratio, why))
     return sorted(found, key=lambda one: -one.ratio)

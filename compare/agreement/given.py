@@ -16,13 +16,19 @@ from ..case import is_number
 from ..coordinates import Coordinates
 from ..engines.own import ARGUMENTS, OwnEquations, is_function
 from ..joint_map import JointMap, joint_map
+from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.file import robot_of
 from ..states import random
 
-QUANTITIES = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # and what their entries are called
-LONGEST = 20.0  # s of one's own functions at random states
+SYMBOLS_OF = {
+    "mass_matrix": "M",
+    "bias": "h",
+    "gravity": "g",
+    "acceleration": "qdd",
+}  # and what their entries are called
+OWN_SECONDS = 20.0  # s of one's own functions at random states
 
 
 class State(NamedTuple):
@@ -45,23 +51,18 @@ class Compared(NamedTuple):
     @property
     def ratio(self) -> np.ndarray:
         """Of the difference to the tolerance; 0 where both are 0, inf where one's own is no finite number."""
-        return over(np.abs(self.own - self.right), self.tolerance)
-
-
-def over(off: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """A difference in units of what is allowed: 0 where it is 0, inf where it is no finite number."""
-    off = np.where(np.isfinite(off), off, np.inf)
-    return np.divide(off, allowed, out=np.where(off > 0.0, np.inf, 0.0), where=allowed > 0.0)
+        off = np.abs(self.own - self.right)
+        return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
 
 
 class Given:
     """What `assert_agrees` and `differences` are given, with what it is compared with."""
 
     def __init__(self, mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed):
-        brought = dict(zip(QUANTITIES, (mass_matrix, bias, gravity, acceleration)))
+        brought = dict(zip(SYMBOLS_OF, (mass_matrix, bias, gravity, acceleration)))
         brought = {name: value for name, value in brought.items() if value is not None}
         if not brought:
-            raise ValueError(f"there is nothing to compare; {', '.join(QUANTITIES)} or some of them are expected")
+            raise ValueError(f"there is nothing to compare; {', '.join(SYMBOLS_OF)} or some of them are expected")
         if not is_number(rtol) or rtol < 0.0:
             raise ValueError(f"rtol is {shown(rtol)}; a number of at least 0 is expected")
         self.rtol, self.brought = float(rtol), brought
@@ -71,12 +72,10 @@ class Given:
         functions = {name: value for name, value in brought.items() if is_function(value)}
         self.own = OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
         if q is None:
-            for name, value in brought.items():
-                if name not in functions:
-                    raise ValueError(f"{name} is an array of values; q of shape (states, {self.coordinates.nq}), at which they are, is expected")
-            for name, value in {"qd": qd, "tau": tau}.items():
-                if value is not None:
-                    raise ValueError(f"{name} is given without q; q of shape (states, {self.coordinates.nq}) is expected")
+            alone = [f"{name} is an array of values" for name in brought if name not in functions]
+            alone += [f"{name} is given" for name, value in {"qd": qd, "tau": tau}.items() if value is not None]
+            if alone:
+                raise ValueError(f"{alone[0]}, but not q; q of shape (states, {self.coordinates.nq}) is expected")
             self.take_random(states, seed)
         else:
             self.take_states(q, qd, tau)
@@ -104,7 +103,7 @@ class Given:
         sample = random(self.robot, states, 0, seed)
         self.q, self.qd, self.tau = sample.q, sample.qd, sample.tau
         self.own.try_at(self.q, self.qd, self.tau)
-        count = self.own.affordable(len(self.q), LONGEST)
+        count = self.own.affordable(len(self.q), OWN_SECONDS)
         if count < len(self.q):
             said = f"{count} states in place of {states}: your functions take {self.own.seconds:.2g} s a state"
             warnings.warn(said, stacklevel=5)
@@ -113,13 +112,13 @@ class Given:
     def take_states(self, q, qd, tau) -> None:
         """The states that are given, in joints of one's own."""
         nq, nv = self.coordinates.nq, self.coordinates.nv
-        own = {"q": rows("q", q, nq, None)}
+        own = {"q": rows_given("q", q, nq, None)}
         count = len(own["q"])
         for name, value in {"qd": qd, "tau": tau}.items():
             needed = [of for of in self.brought if name in ("q", "qd", "tau")[: ARGUMENTS[of]]]
             if value is None and needed:
                 raise ValueError(f"{needed[0]} depends on {name}; {name} of shape ({count}, {nv}) is expected, or 0.0")
-            own[name] = np.zeros((count, nv)) if value is None else rows(name, value, nv, count)
+            own[name] = np.zeros((count, nv)) if value is None else rows_given(name, value, nv, count)
         self.q = self.joints.positions(own["q"])
         self.qd, self.tau = self.joints.speeds(own["qd"]), self.joints.forces(own["tau"])
         for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
@@ -178,7 +177,9 @@ class Given:
                     "acceleration": lambda right=right: scale.acceleration(scale.force(self.tau), right),
                 }[name]()
             except np.linalg.LinAlgError:
-                raise ValueError("Mbar of the model is singular at a state: there is no acceleration to compare") from None
+                raise ValueError(
+                    "Mbar of the model is singular at a state: there is no acceleration to compare"
+                ) from None
             turned = self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
             size = np.abs(turned(np.broadcast_to(size, right.shape)))
             found[name] = Compared(turned(own), turned(right), size, (FACTOR * EPS + self.rtol) * size)
@@ -187,7 +188,7 @@ class Given:
     def entries(self, name: str) -> dict[tuple, str]:
         """What the entries of a quantity are called, by their place."""
         names = [self.coordinates.speeds[i] for i in self.joints.v]
-        symbol = QUANTITIES[name]
+        symbol = SYMBOLS_OF[name]
         if name == "mass_matrix":
             return {(i, j): f"{symbol}[{a}][{b}]" for i, a in enumerate(names) for j, b in enumerate(names)}
         return {(i,): f"{symbol}[{a}]" for i, a in enumerate(names)}
@@ -203,7 +204,7 @@ class Given:
         return [problem.text for problem in self.own.problems] if self.own is not None else []
 
 
-def rows(name: str, values: object, size: int, count: int | None) -> np.ndarray:
+def rows_given(name: str, values: object, size: int, count: int | None) -> np.ndarray:
     """States as rows, (states, size); a number stands for all. ValueError for anything else. count: of states, None: any."""
     array = real_numbers(values)
     expected = f"({'states' if count is None else count}, {size})"

@@ -3,9 +3,11 @@
 import numpy as np
 
 from ..engines.own import ARGUMENTS, state_in_words
+from ..judge.check import over
+from ..judge.words import listed
 from .given import Compared, Given
 
-LEAST_DIGITS = 2  # in common: then the constants may be rounded
+LEAST_DIGITS = 3  # in common: then the constants may be rounded
 
 
 def message(given: Given, cause: str) -> str:
@@ -33,36 +35,36 @@ def of_quantity(given: Given, name: str, one: Compared) -> list[str]:
     own, right, off = one.own[worst], one.right[worst], abs(one.own[worst] - one.right[worst])
     entry, state = given.entries(name)[tuple(map(int, worst[1:]))], given.states[worst[0]]
     taken = ARGUMENTS[name]
-    found = f"{ratio[worst]:.3g} times its tolerance of {one.tolerance[worst]:.2g}" if np.isfinite(off) else "no number"
+    allowed = f"{ratio[worst]:.3g} times its tolerance of {one.tolerance[worst]:.2g}"
     return [
         f"{name}: mismatched entries {count} / {ratio.size} ({100.0 * count / ratio.size:.3g} %), at "
         f"{int((ratio > 1.0).reshape(len(ratio), -1).any(axis=1).sum())} / {len(ratio)} states",
         f"  worst: {entry} at state {state.number}, {state_in_words(list(map(np.array, state[1 : 1 + taken])))}",
         f"    yours:  {float(own)!r}",
         f"    MuJoCo: {float(right)!r}",
-        f"    difference: {off:.3g}, {found}",
+        f"    difference: {off:.3g}, {allowed}" if np.isfinite(off) else "    yours is not a finite number",
     ]
 
 
 def of_digits(given: Given) -> list[str]:
     """To how many digits all agree, and what to state if the constants are rounded."""
-    worst = 0.0
-    for one in given.compared.values():
-        off = np.abs(one.own - one.right)
-        worst = max(worst, float(np.divide(off, one.scale, out=np.where(off > 0, np.inf, 0.0), where=one.scale > 0).max()))
-    digits = -np.log10(worst) if 0.0 < worst < np.inf else 0.0
-    if digits < LEAST_DIGITS:
+    worst = max(float(over(np.abs(one.own - one.right), one.scale).max()) for one in given.compared.values())
+    if not 0.0 < worst <= 10.0**-LEAST_DIGITS:
         return []
-    exponent = int(np.floor(digits))
-    first = np.ceil(worst * 10.0 ** (exponent + 1)) 
-    rtol = float(f"{first:.0f}e-{exponent + 1}")
-    return [f"Yours agree to {exponent} digits: if their constants are rounded so, state rtol={rtol:g}."]
+    exponent = int(np.floor(np.log10(worst)))
+    rtol = float(f"{np.ceil(worst / 10.0**exponent):.0f}e{exponent}")
+    digits = int(-np.log10(worst))
+    return [f"Yours agree to {digits} digits of their terms: if your constants are rounded, state rtol={rtol:g}."]
 
 
 def of_joints(given: Given) -> str:
     """In which joints it was compared, and how others are stated."""
-    joints = [str(joint) for joint in given.joints.joints]
-    if given.are_stated:
-        return f"Compared with joints={joints}."
-    first = given.joints.joints[0].name
-    return f"Compared with joints={joints}; another order, sense, zero or unit is stated so: {'-' + first!r}, {first + '+90deg'!r}, {first + ' in deg'!r}."
+    joints = given.joints.joints
+    text = f"Compared with joints={[str(joint) for joint in joints]}"
+    kinds = dict(zip(given.coordinates.names, given.coordinates.all_kinds))
+    straight = [joint for joint in joints if kinds[joint.name] != "ball"]
+    if given.are_stated or not straight:
+        return f"{text}."
+    name, kind = straight[0].name, kinds[straight[0].name]
+    forms = [f"-{name}", f"{name}+90deg", f"{name} in deg"] if kind == "hinge" else [f"-{name}", f"{name}+0.1m"]
+    return f"{text}; another order, or {listed(list(map(repr, forms)))}, can be stated."

@@ -1,6 +1,5 @@
 """The probable cause of a difference, in a sentence: what the diagnosis finds in Mbar and h, and what can only be in qdd."""
 
-import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -8,15 +7,22 @@ import numpy as np
 import tmt
 
 from ..diagnosis import STATES, Diagnosis, diagnose, packed
+from ..diagnosis.consistency import conditions
+from ..diagnosis.forces import causes_of_forces
+from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
-from .given import Given, over
+from .given import Given
 
-SHARPER = 4.0  # times: Mbar and h that are found from accelerations are off by so much more
+SECONDS_OF_CAUSE = 10.0  # of a search
+QUICK = 1e-3  # s a state: functions that take no longer are asked some hundred times more
+STATED_SO = "state it as"  # in the text of a cause that `joints` can state
+SHARPER = 4.0  # times the tolerance: of Mbar and h that are found from accelerations
+SHOWN_CAUSES = 4
 
 
 class Values(NamedTuple):
-    """Mbar and h of one's own with their tolerances, in the model's joints, at states: what a diagnosis is given."""
+    """Mbar and h of one's own with their tolerances, at states in the model's joints: what a diagnosis is given."""
 
     q: np.ndarray
     qd: np.ndarray
@@ -28,115 +34,116 @@ class Values(NamedTuple):
 def cause_of(given: Given) -> str:
     """The sentence."""
     failing = [name for name, one in given.compared.items() if (one.ratio > 1.0).any()]
-    of_equations = [name for name in failing if name != "acceleration"]
-    if not of_equations and (simple := of_acceleration(given)):
-        return simple
-    if not of_equations and {"mass_matrix", "bias"} <= given.compared.keys():
-        return "mass_matrix and bias agree: the difference comes from how they are solved, or from damping or springs."
-    values = known_values(given, of_equations)
+    if failing == ["acceleration"]:
+        which = some_states(given)
+        if acting := of_forces(given, which):
+            return acting
+        if {"mass_matrix", "bias"} <= given.compared.keys():
+            return "mass_matrix and bias agree: it is in how they are solved, or in damping, springs or friction."
+        values = of_accelerations(given, which)
+    else:
+        values = of_equations(given, [name for name in failing if name != "acceleration"])
     if values is None:
-        return "It is not sought from accelerations that are numbers: give mass_matrix and bias too."
-    return diagnosed(given, values)
+        return "It cannot be found in values of accelerations alone: give mass_matrix and bias too."
+    return diagnosed_sentence(given, values)
 
 
-def diagnosed(given: Given, values: Values) -> str:
-    """What a diagnosis says of values; joints that it finds to be otherwise are stated anew, and not beside what was stated."""
-    M, h = values.mass_matrix, values.bias
-    names = given.coordinates.names
+def diagnosed_sentence(given: Given, values: Values) -> str:
+    """What a diagnosis says of values. Joints that it finds to be otherwise are stated in place of what was stated."""
+    joints, (of_M, of_h), nv = given.joints, values.tolerances, given.coordinates.nv
 
-    def found(q, qd, M, h, *tolerances) -> Diagnosis:
-        states = len(q)
-        tolerance = packed(*tolerances, given.coordinates.nv, states)
-        return diagnose(given.tree, names, q, qd, packed(M, h, given.coordinates.nv, states), tolerance)
+    def found(q, qd, M, h, of_M, of_h) -> Diagnosis:
+        given_values, tolerance = (packed(*both, nv, len(q)) for both in ((M, h), (of_M, of_h)))
+        return diagnose(given.tree, given.coordinates.names, q, qd, given_values, tolerance, SECONDS_OF_CAUSE)
 
-    first = found(values.q, values.qd, M, h, *values.tolerances)
-    of_joints = any(cause.kind in ("order", "sign", "unit", "zero", "order and sign") for cause in first.causes)
-    joints = given.joints
-    if of_joints and not joints.is_same:
-        turned = [None if M is None else joints.own_mass_matrix(M), None if h is None else joints.own_forces(h)]
-        sizes = [np.abs(joints.own_mass_matrix(values.tolerances[0])), np.abs(joints.own_forces(values.tolerances[1]))]
-        anew = found(joints.own_positions(values.q), joints.own_speeds(values.qd), *turned, *sizes)
+    first = found(values.q, values.qd, values.mass_matrix, values.bias, of_M, of_h)
+    if any(STATED_SO in cause.text for cause in first.causes) and not joints.is_same:
+        M, h = values.mass_matrix, values.bias
+        anew = found(
+            joints.own_positions(values.q),
+            joints.own_speeds(values.qd),
+            None if M is None else joints.own_mass_matrix(M),
+            None if h is None else joints.own_forces(h),
+            np.abs(joints.own_mass_matrix(of_M)),
+            np.abs(joints.own_forces(of_h)),
+        )
         if anew.causes:
-            return f"{anew.sentence} That takes the place of joints={[str(joint) for joint in joints.joints]}."
+            return f"{anew.sentence} That is to take the place of joints={[str(joint) for joint in joints.joints]}."
+    if not first.causes and (broken := first_broken(given, values)):
+        return f"{broken} {first.sentence}"
     return first.sentence
 
 
-def known_values(given: Given, failing: list[str]) -> Values | None:
-    """Mbar and h at some of the states, the worst one among them; None if nothing is known of them."""
+def first_broken(given: Given, values: Values) -> str:
+    """What is wrong with Mbar and h of one's own whatever the model is; "" if that is nothing, or takes long to find out."""
+    own = given.own
+    if own is None or not (own.has("mass_matrix") and own.has("bias")) or own.seconds > QUICK:
+        return ""
+    if not all(np.isfinite(part).all() for part in (values.mass_matrix, values.bias) if part is not None):
+        return ""
+    known = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, given.qd[: len(values.q)])
+    return next((condition.text for condition in known if not condition.is_met), "")
+
+
+def some_states(given: Given) -> np.ndarray:
+    """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
+    worst = np.max([one.ratio.reshape(len(given.q), -1).max(axis=1) for one in given.compared.values()], axis=0)
+    order = np.argsort(~np.isfinite(worst), kind="stable")[: STATES - 1]
+    return np.unique([int(np.argmax(np.where(np.isfinite(worst), worst, -1.0))), *order])
+
+
+def of_equations(given: Given, failing: list[str]) -> Values:
+    """Mbar and h at some of the states, gravity in the place of h where that alone is given or off."""
     which = some_states(given)
     q, qd = given.q[which], given.qd[which]
     own = {name: values[which] for name, values in given.values.items()}
     M, h = own.get("mass_matrix"), own.get("bias")
-    if failing == ["gravity"] or (h is None and "gravity" in own):
+    if "gravity" in own and (h is None or failing == ["gravity"]):
         h, qd = own["gravity"], np.zeros_like(qd)
-        M = None if failing == ["gravity"] else M
-    if M is None and h is None:
-        return of_accelerations(given, which)
-    scale = Entries(given.tree, q, qd)
-    rounding = FACTOR * EPS + given.rtol
-    sizes = (np.broadcast_to(size, (len(q), *size.shape[1:])) for size in (scale.mass_matrix, scale.bias))
-    return Values(q, qd, M, h, tuple(positive(rounding * size) for size in sizes))
+    scale, rounding = Entries(given.tree, q, qd), FACTOR * EPS + given.rtol
+    sizes = np.broadcast_to(scale.mass_matrix, (len(q), *np.shape(scale.mass_matrix)[-2:])), scale.bias
+    return Values(q, qd, M, h, tuple(above_zero(rounding * size) for size in sizes))
 
 
-def positive(tolerance: np.ndarray) -> np.ndarray:
+def above_zero(allowed: np.ndarray) -> np.ndarray:
     """A tolerance that can be divided by."""
-    return np.maximum(tolerance, np.finfo(float).tiny / EPS)
+    return np.maximum(allowed, np.finfo(float).tiny / EPS)
 
 
-def some_states(given: Given) -> np.ndarray:
-    """The numbers of so many states as a diagnosis takes: of those with finite values the first, and the worst."""
-    worst = np.max([one.ratio.reshape(len(given.q), -1).max(axis=1) for one in given.compared.values()], axis=0)
-    order = np.argsort(~np.isfinite(worst), kind="stable")[:STATES]
-    finite = np.where(np.isfinite(worst), worst, -1.0)
-    return np.unique([int(np.argmax(finite)), *order[: STATES - 1]])
+def of_forces(given: Given, which: np.ndarray) -> str:
+    """What explains accelerations that do not follow from the right Mbar and h: damping, springs and the like; "": nothing."""
+    tree, q, qd, tau = given.tree, given.q[which], given.qd[which], given.tau[which]
+    qdd = given.values["acceleration"][which]
+    M, h = tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree)
+    pull = tmt.spring_torque(q, tree) if tree.has_springs else 0.0
+    acting = tau - np.array(tree.damping) * qd - pull - h - np.einsum("sij,sj->si", M, qdd)
+    scale = Entries(tree, q, qd)
+    allowed = SHARPER * (FACTOR * EPS + given.rtol) * scale.residual(scale.force(tau), qdd)
+    if not np.isfinite(acting).all() or not (over(np.abs(acting), allowed) > 1.0).any():
+        return ""
+    causes = causes_of_forces(tree, q, qd, tau, h, acting, above_zero(allowed))
+    return "; or ".join(cause.text for cause in causes[:SHOWN_CAUSES]) + "." * bool(causes)
 
 
 def of_accelerations(given: Given, which: np.ndarray) -> Values | None:
-    """Mbar and h from a function of accelerations: these are linear in the torque, and Mbar^-1 is their slope."""
-    own, tree = given.own, given.tree
+    """Mbar and h from a function of accelerations: these are linear in the torque, and Mbar^-1 is their slope. None: neither."""
+    own = given.own
     if own is None or not own.has("acceleration"):
         return None
     q, qd, tau = given.q[which], given.qd[which], given.tau[which]
-    base = own.acceleration(q, qd, tau)
-    size = np.abs(tau).max() + 1.0
+    base, size = own.acceleration(q, qd, tau), np.abs(tau).max() + 1.0
     slopes = [(own.acceleration(q, qd, tau + size * e) - base) / size for e in np.eye(given.coordinates.nv)]
     inverse = np.stack(slopes, axis=-1)
     if not np.isfinite(inverse).all() or np.linalg.cond(inverse).max() > 1.0 / np.sqrt(EPS):
         return None
     M = np.linalg.inv(inverse)
     h = tau - own.passive(q, qd) - np.einsum("sij,sj->si", M, base)
-    scale = Entries(tree, q, qd)
-    force = scale.force(np.abs(tau) + size)
+    # each acceleration is off by eps of all of its terms, and so is what they are solved for
+    scale = Entries(given.tree, q, qd)
     spread = np.abs(scale.M) @ scale.inverse
-    root = np.sqrt(np.einsum("sii->si", scale.M))
-    of_M = spread @ (scale.mass_matrix + root[:, :, None] * root[:, None, :]) @ spread.transpose(0, 2, 1)
-    off = np.einsum("sij,sj->si", spread, scale.residual(force, base))
-    # an acceleration is off by eps of all of its terms: those of one more torque are as large as they
-    of_M = of_M + off[:, :, None] * np.abs(M).max() / size
+    off = np.einsum("sij,sj->si", spread, scale.residual(scale.force(np.abs(tau) + size), base))
+    of_M = off[:, :, None] * np.abs(M).max() / size
+    of_M = of_M + spread @ scale.mass_matrix @ spread.transpose(0, 2, 1)
     of_h = off + np.einsum("sij,sj->si", of_M, np.abs(base))
     rounding = SHARPER * (FACTOR * EPS + given.rtol)
-    return Values(q, qd, M, h, (positive(rounding * of_M), positive(rounding * of_h)))
-
-
-def of_acceleration(given: Given) -> str:
-    """What explains accelerations alone: torque, damping and springs, which are not in Mbar and h; "" if they do not."""
-    own, compared, tree = given.values["acceleration"], given.compared["acceleration"], given.tree
-    tolerance = given.joints.forces(compared.tolerance)
-    undamped = dataclasses.replace(tree, damping=np.zeros_like(tree.damping))
-    loose = dataclasses.replace(tree, stiffness=np.zeros_like(tree.stiffness))
-    tried = {
-        "the sign of tau: qdd is that of -tau": (tree, -given.tau),
-        "tau is left out": (tree, np.zeros_like(given.tau)),
-        "damping D qd is left out": (undamped, given.tau),
-        "damping D qd has the other sign": (undamped, given.tau + np.array(tree.damping) * given.qd),
-        "springs k (q - rest) are left out": (loose, given.tau),
-        "damping D qd and springs k (q - rest) are left out": (
-            dataclasses.replace(loose, damping=undamped.damping),
-            given.tau,
-        ),
-    }
-    for text, (changed, tau) in tried.items():
-        right = tmt.acceleration(given.q, given.qd, tau, changed)
-        if (over(np.abs(own - right), np.abs(tolerance)) <= 1.0).all():
-            return f"In qdd {text}; mass_matrix and bias are right."
-    return ""
+    return Values(q, qd, M, h, (above_zero(rounding * of_M), above_zero(rounding * of_h)))
