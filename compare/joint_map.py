@@ -34,11 +34,12 @@ class Joint(NamedTuple):
     slides: bool = False
 
     def __str__(self):
-        zero = f"{self.zero:+.17g}m" if self.zero else ""
+        exact = f"{'+' * (self.zero > 0.0)}{float(self.zero)!r}"
+        zero = f"{exact}m" if self.zero else ""
         if self.zero and not self.slides:
             degrees = np.degrees(self.zero)
             whole = abs(degrees - round(degrees, 6)) <= 1e-9
-            zero = f"{round(degrees, 6):+g}deg" if whole else f"{self.zero:+.17g}rad"
+            zero = f"{round(degrees, 6):+.10g}deg" if whole else f"{exact}rad"
         return f"{'-' * (self.sign < 0.0)}{self.name}{zero}{' in ' * bool(self.unit)}{self.unit}"
 
 

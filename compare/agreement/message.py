@@ -8,6 +8,7 @@ from ..judge.words import listed
 from .given import Compared, Given
 
 LEAST_DIGITS = 3  # in common: then the constants may be rounded
+MOST_LISTED = 8  # joints
 
 
 def message(given: Given, cause: str) -> str:
@@ -61,6 +62,8 @@ def of_joints(given: Given) -> str:
     """In which joints it was compared, and how others are stated."""
     joints = given.joints.joints
     text = f"Compared with joints={[str(joint) for joint in joints]}"
+    if len(joints) > MOST_LISTED and not given.are_stated:
+        text = f"Compared with the {len(joints)} joints in the order of the model"
     kinds = dict(zip(given.coordinates.names, given.coordinates.all_kinds))
     straight = [joint for joint in joints if kinds[joint.name] != "ball"]
     if given.are_stated or not straight:

@@ -57,6 +57,11 @@ def state_in_words(state: list[np.ndarray]) -> str:
     return ", ".join(f"{symbol} = {typed(part)}" for symbol, part in zip(STATE, state))
 
 
+def and_more(count: int) -> str:
+    """So many states beside the one that is named."""
+    return f", and at {count} more state{'s' * (count > 1)}" if count else ""
+
+
 def typed(values: np.ndarray) -> str:
     """Numbers as they can be typed."""
     more = ", ..." if len(values) > MOST_SHOWN else ""
