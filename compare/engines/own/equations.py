@@ -2,7 +2,6 @@
 
 import time
 import warnings
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,20 +12,12 @@ from ...case import Coordinates
 from ...joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
 from .functions import ARGUMENTS, STATE, OwnError, call, functions_of, names_of
-from .returned import SHAPES, and_more, as_raised, converted, same, state_in_words
+from .returned import SHAPES, Problem, and_more, as_raised, converted, same, state_in_words
 
 SKEW = 1e-9  # of the largest entry: from here on a mass matrix is not symmetric; less is a difference of entries
 FAR = 2.0**49  # rad and so on: beyond it a run has diverged, and what is found there is no fault of its equations
 AT_ONCE = 1.5  # times what one state takes: two or three at once take no more, and so do many
 TIMED, SLOW = 64, 0.01  # states that are tried together to see what one takes; unless so few take as long as this, s
-
-
-class Problem(NamedTuple):
-    """Something wrong with equations that can be used all the same."""
-
-    quantity: str
-    state: str  # the first at which it was found, as the function was given it
-    text: str  # one line
 
 
 class OwnEquations:
@@ -78,7 +69,7 @@ class OwnEquations:
     def affordable(self, states: int, seconds: float) -> int:
         """How many of so many states there is time for, at least 1, with each function called once at each."""
         each = sum(more for _, more in self.times.values())
-        return states if each == 0.0 else int(np.clip(seconds / each, 1, states))
+        return int(np.clip(seconds / each, 1, states)) if each else states
 
     # quantities at states
 
@@ -256,6 +247,8 @@ class OwnEquations:
         if not where.any():
             return
         first = int(np.argmax(where))
-        text = what if what.startswith(name) else f"{name} {what}"
-        state = state_in_words([part[first] for part in given])
+        text, state = (
+            what if what.startswith(name) else f"{name} {what}",
+            state_in_words([part[first] for part in given]),
+        )
         self.found.setdefault((name, what), [state, text, 0])[2] += int(np.sum(where))
