@@ -4,7 +4,9 @@ import importlib
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
+from types import ModuleType
 
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
@@ -39,8 +41,9 @@ def examine(
         setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        asked = experiment.TITLE, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
-        sections.append(Section(name, *asked, crash or result))
+        asked, unsaid = attempt(name, partial(asked_by, experiment), setup)
+        sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
+        sections[-1].result.checks += unsaid.checks if unsaid else []
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
         new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
         causes += new
@@ -50,6 +53,11 @@ def examine(
         if drawing is not None:
             take_figures(terminal, section, drawing)
     return sections, causes
+
+
+def asked_by(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
+    """What an experiment says of itself: its title, its claim, its tolerance."""
+    return experiment.TITLE, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
 
 
 def find_causes(setup: Setup) -> list[dict]:

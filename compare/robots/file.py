@@ -45,7 +45,7 @@ def robot_of(reading: Reading, shown: str) -> Robot:
         positions=found,
         ranges=tuple(reading.ranges),
         scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt),
-        described=shown,
+        described=Path(shown).name or shown,
         features=tuple(reading.features),
     )
 
