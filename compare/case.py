@@ -5,7 +5,7 @@ hide what a file says: "no gravity", "so much damping more", "these joints locke
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +19,15 @@ from .coordinates import Coordinates
 SEED = 10  # of every random number in a report
 MOST_STEPS = 10_000_000  # of a run
 TORQUES = ("free", "hold")
+
+
+class WrongField(ValueError):
+    """A field that cannot be one of a scene: which, and what is accepted."""
+
+    def __init__(self, scene: object, field: str, value: object, accepted: str):
+        named, found = (shorten(" ".join(repr(part).split())) for part in (scene, value))
+        super().__init__(f"scene {named}: {field} is {found}; {accepted} is expected")
+        self.field, self.accepted = field, accepted
 
 
 @dataclass(frozen=True)
@@ -79,8 +88,7 @@ class Scene:
     def refuse(self, name, wrong, accepted) -> None:
         """Raise ValueError if a field is wrong: what it is, and what is expected."""
         if wrong:
-            named, found = (shorten(" ".join(repr(getattr(self, field)).split())) for field in ("name", name))
-            raise ValueError(f"scene {named}: {name} is {found}; {accepted} is expected")
+            raise WrongField(self.name, name, getattr(self, name), accepted)
 
     @property
     def steps(self) -> int:
@@ -101,7 +109,7 @@ class Case:
         of_kinds = {"hinge": "deg", "slide": "m", "ball": "a quaternion"}
         units = ", ".join(of_kinds[kind] for kind in dict.fromkeys(whole.all_kinds))
         if isinstance(scene.posture, str):
-            count = f"{whole.nq} numbers, one per joint ({', '.join(whole.positions)})"
+            count = f"{whole.nq} numbers, one per joint ({some(whole.positions)})"
             named = self.robot.postures or self.robot.positions
             postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and named]
             accepted = f"{', '.join(postures)} or {count}, in {units}" if postures else f"{count}, in {units}"
@@ -111,15 +119,15 @@ class Case:
             left_out = name != "torque" and value == ()
             known = isinstance(value, str) or len(value) == sizes[name] or left_out
             each = whole.positions if name == "posture" else whole.speeds
-            scene.refuse(name, not known, f"{sizes[name]} numbers, one per joint ({', '.join(each)}), in {unit}")
+            scene.refuse(name, not known, f"{sizes[name]} numbers, one per joint ({some(each)}), in {unit}")
         if not isinstance(scene.posture, str) and scene.posture:
             for joint in whole.places.balls:
                 wrong = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) > CLOSE_TO_ONE
                 scene.refuse("posture", wrong, "a quaternion w, x, y, z of length 1 for each ball")
         known = not isinstance(scene.damping, tuple) or len(scene.damping) == whole.nv
-        scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({', '.join(whole.speeds)}),")
+        scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
         unknown = [name for name in scene.locked if name not in names]
-        most = f"a tuple of at most {len(names) - 1} of {', '.join(names)}"
+        most = f"a tuple of at most {len(names) - 1} of {some(names)}"
         scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)
         moving = [
             name
@@ -251,6 +259,12 @@ def are_numbers(values: object) -> bool:
     """Whether the values are such numbers in a row."""
     row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
     return row and all(is_number(value) for value in values)
+
+
+def some(names: Sequence[str], most: int = 6) -> str:
+    """Names in a sentence: the first ones, and how many more there are."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def shorten(text: str, length: int = 60) -> str:

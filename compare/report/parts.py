@@ -6,7 +6,7 @@ from typing import TypeVar
 from ..judge.check import Check
 from ..process.crash import described
 
-T = TypeVar("T")
+Made = TypeVar("Made")
 
 
 class Parts:
@@ -15,7 +15,7 @@ class Parts:
     def __init__(self) -> None:
         self.broken: dict[str, str] = {}
 
-    def made(self, name: str, otherwise: T, make: Callable[..., T], *arguments: object) -> T:
+    def made(self, name: str, otherwise: Made, make: Callable[..., Made], *arguments: object) -> Made:
         """What `make` returns of these arguments; if it raises, `otherwise`, and the part is named as broken."""
         try:
             return make(*arguments)
