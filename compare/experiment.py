@@ -41,7 +41,7 @@ def examine(
         setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        asked, unsaid = attempt(name, partial(asked_by, experiment), setup)
+        asked, unsaid = attempt(name, partial(own_words, experiment), setup)
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
@@ -55,7 +55,7 @@ def examine(
     return sections, causes
 
 
-def asked_by(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
+def own_words(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
     """What an experiment says of itself: its title, its claim, its tolerance."""
     return experiment.TITLE, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
 

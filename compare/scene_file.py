@@ -86,7 +86,7 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
             accepted = f"free, hold, or {count}" if key == "torque" else count
             raise SceneError(f"{where}: {key} is {in_toml(entry[key])}; {accepted} is expected")
     if "q" in values:
-        values["posture"] = of_length_1(where, entry["q"], values.pop("q"), robot)
+        values["posture"] = with_unit_quaternions(where, entry["q"], values.pop("q"), robot)
     try:
         if "duration" in values and "dt" not in values:
             values["dt"] = values["duration"] / STEPS
@@ -107,7 +107,7 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
         raise SceneError(f"{where}: {' '.join(str(error).split())}") from None
 
 
-def of_length_1(where: str, given: list, q: tuple, robot: Robot) -> tuple:
+def with_unit_quaternions(where: str, given: list, q: tuple, robot: Robot) -> tuple:
     """A position with every quaternion at length 1; SceneError if one is further from it than what few digits leave."""
     q = np.array(q, dtype=float)
     for name, (kind, at, _) in zip(robot.joints, robot.coordinates.places.joints):

@@ -29,7 +29,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     checks = records(parts, "check", [check.record() for check in made])
     fields = ("rank", "place", "stated", "found", "text")
     causes = records(parts, "cause", [{name: cause[name] for name in fields} for cause in report.causes])
-    paragraphs, texts = markdown.body(report, parts), page.body(folder, report, parts)
+    paragraphs, texts = markdown.markdown_body(report, parts), page.page_body(folder, report, parts)
     html = parts.made("index.html", None, page.page, report, texts, parts)
     text = parts.made("the head of report.md", None, markdown.markdown, report, paragraphs, parts)
     save(folder / "report.md", markdown.joined([*parts.lines, *paragraphs]) if text is None else text)

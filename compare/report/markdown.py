@@ -24,26 +24,26 @@ def joined(paragraphs: Sequence[str]) -> str:
     return "\n\n".join(paragraphs).replace("\n\n- ", "\n- ") + "\n"
 
 
-def body(report: Report, parts: Parts) -> list[str]:
+def markdown_body(report: Report, parts: Parts) -> list[str]:
     """The paragraphs below the verdict; a part that breaks is left out."""
     sections, robot, origin, _, causes, skipped, _ = report
     lines = ["**Causes** (1: an option or a convention, 2: a number):", md_table(of_causes(causes))] if causes else []
     lines += [plain_markdown(parts.made("the introduction", "", introduction, robot))]
-    lines += parts.made("the questions", [], of_questions, sections, robot)
+    lines += parts.made("the questions", [], answers_in_markdown, sections, robot)
     for section in sections:
         missing = [f"## {section.title}", "This section could not be made."]
-        lines += parts.made(f"{section.name} in report.md", missing, of_section, section)
+        lines += parts.made(f"{section.name} in report.md", missing, section_in_markdown, section)
     lines += ["## Skipped", *(f"- {name}: {reason}." for name, reason in skipped)] if skipped else []
     return [*lines, "## Where this comes from", md_table(origins(origin))]
 
 
-def of_questions(sections: Sequence[Section], robot) -> list[str]:
+def answers_in_markdown(sections: Sequence[Section], robot) -> list[str]:
     """What was asked, and the answers; nothing if there is no question."""
     asked = questions(sections, robot)
     return [f"## {asked_by(robot)}", md_table(asked)] if len(asked) else []
 
 
-def of_section(section: Section) -> list[str]:
+def section_in_markdown(section: Section) -> list[str]:
     """The paragraphs of one experiment."""
     failed = failing(section)
     lines = [

@@ -32,7 +32,7 @@ def page(report: Report, body: Sequence[str], parts: Parts) -> str:
     )
 
 
-def body(folder: Path, report: Report, parts: Parts) -> list[str]:
+def page_body(folder: Path, report: Report, parts: Parts) -> list[str]:
     """What stands below the links, with its figures inside; folder: where these are. A part that breaks is left out."""
     sections, robot, origin, _, causes, skipped, _ = report
     texts = []
@@ -42,17 +42,17 @@ def body(folder: Path, report: Report, parts: Parts) -> list[str]:
             html_table(of_causes(causes), "text"),
         ]
     texts.append(f"<p>{html.escape(parts.made('the introduction', '', introduction, robot))}</p>")
-    texts += parts.made("the questions", [], of_questions, sections, robot)
+    texts += parts.made("the questions", [], answers_in_html, sections, robot)
     for section in sections:
         missing = [top(section), "<p>This section could not be made.</p>"]
-        texts += parts.made(f"{section.name} in index.html", missing, of_section, folder, section)
+        texts += parts.made(f"{section.name} in index.html", missing, section_in_html, folder, section)
     if skipped:
         reasons = "".join(f"<li>{name}: {words(reason)}.</li>" for name, reason in skipped)
         texts.append(f'<h2 id="skipped">Skipped</h2><ul>{reasons}</ul>')
     return [*texts, '<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
 
 
-def of_questions(sections: Sequence[Section], robot) -> list[str]:
+def answers_in_html(sections: Sequence[Section], robot) -> list[str]:
     """What was asked, and the answers; nothing if there is no question."""
     asked = questions(sections, robot)
     top = f'<h2 id="questions">{html.escape(asked_by(robot))}</h2>'
@@ -64,7 +64,7 @@ def top(section: Section) -> str:
     return f'<h2 id="{section.name}">{html.escape(section.title)}</h2>'
 
 
-def of_section(folder: Path, section: Section) -> list[str]:
+def section_in_html(folder: Path, section: Section) -> list[str]:
     """What stands in the page of one experiment."""
     failed = failing(section)
     texts = [

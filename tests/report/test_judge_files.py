@@ -69,7 +69,7 @@ def test_the_page_is_red_if_a_check_fails_and_tables_are_whole(tmp_path):
     rows = [{"a": 0.123456789012345678, "b": k} for k in range(3)]
     for checks, colour in (((GOOD,), "#009E73"), ((GOOD, BAD), "#D55E00")):
         report, parts = verdict.Report([section("mass", *checks, rows=rows)], ARM, {"command": "c"}, "words"), Parts()
-        html = page.page(report, page.body(tmp_path, report, parts), parts)
+        html = page.page(report, page.page_body(tmp_path, report, parts), parts)
         assert colour in html and html.count("<td>0.123</td>") == 3
         assert ("Checks that fail" in html) == (len(checks) == 2)
     write(tmp_path, verdict.Report([section("mass", GOOD, rows=rows)], ARM, {"command": "c"}, "words"))
