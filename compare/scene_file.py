@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .case import TORQUES, Case, Scene, WrongField, are_numbers, shorten, some
+from .case import TORQUES, Case, Scene
+from .given import WrongField, are_numbers, shorten, some
 from .robots import Robot
 
 KEYS = ("name", "posture", "q", "speed", "torque", "gravity", "damping", "locked", "duration", "dt")
