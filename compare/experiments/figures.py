@@ -126,8 +126,13 @@ def needless(postures: dict, robot: Robot) -> str:
         name: [posture for posture, of in postures.items() if (np.abs(of[name]) <= zero[posture]).all()]
         for name in ("tmt", "mujoco")
     }
-    words = [
-        f"{LABELS[name]} needs none, but for rounding, at: {', '.join(at) or 'no posture'}."
-        for name, at in rest.items()
-    ]
-    return " ".join(words) if rest["tmt"] != rest["mujoco"] else words[0].replace("TMT needs", "Both need")
+    if rest["tmt"] == rest["mujoco"]:
+        return needless_in_words("Both need", rest["tmt"])
+    return " ".join(needless_in_words(f"{LABELS[name]} needs", at) for name, at in rest.items())
+
+
+def needless_in_words(needs: str, postures: list) -> str:
+    """Where no torque is needed, in a sentence that begins with who needs."""
+    return (
+        f"{needs} none, but for rounding, at: {', '.join(postures)}." if postures else f"{needs} some at every posture."
+    )

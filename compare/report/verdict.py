@@ -65,8 +65,8 @@ def verdict(
     differing, broke = failures(sections)
     failing = {check.experiment for check in differing}
     names = ", ".join(section.name for section in sections if not differing or section.name in failing)
-    some = f"({len(sections)} of {experiments} experiments ran)"
-    ran = "" if len(sections) == experiments else f" in {names} {some}"
+    is_whole, some = len(sections) == experiments, f"{len(sections)} of {experiments} experiments"
+    ran = "" if is_whole else f" in {names} ({some}{' ran' if differing else ''})"
     stopped = f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."
     if differing:
         text = f"{compared} do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
@@ -80,7 +80,7 @@ def verdict(
             text += f"First: {differing[0]}."
         return f"{text} {stopped}" if broke else text
     if broke:
-        left = "" if len(sections) == experiments else f" {some}"
+        left = "" if is_whole else f" ({some})"
         return f"Not everything could be compared{left}; the other {len(checks) - len(broke)} checks pass. {stopped}"
     text = f"{compared} agree{ran}: all {len(checks)} checks pass."
     top = worst(sections)

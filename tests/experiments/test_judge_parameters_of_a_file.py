@@ -98,7 +98,7 @@ def test_what_is_switched_off_is_said_with_its_reason():
     ]
     assert treatments_in_words(features) == [
         "Modelled: hinge (2).", "Switched off in MuJoCo for the comparison: limit (2), there are none.",
-        "The open tree is compared: off are the equalities a and b.",
+        "The open tree is compared: the equalities a and b are off.",
     ]  # fmt: skip
     assert treatments_in_words(features[:1]) == ["Modelled: hinge (2)."]
     assert changes_in_words([]) == []

@@ -24,7 +24,7 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
         section("gravity", ("torque", 0.5, 1.0, "at most", True)),
     ]
     text = verdict.verdict(sections, 10)
-    assert text.startswith("The two models agree in mass, gravity (2 of 10 experiments ran): all 3 checks pass.")
+    assert text.startswith("The two models agree in mass, gravity (2 of 10 experiments): all 3 checks pass.")
     assert "is 0.5 kg m2, 50 % of it (gravity: torque, zero)" in text
 
 
@@ -36,7 +36,7 @@ def test_what_does_not_agree_is_named_and_nothing_else():
     broken = section("speed")
     broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no", rule="equal")
     assert verdict.verdict([section("mass", GOOD), broken], 10) == (
-        "Not everything could be compared (2 of 10 experiments ran); the other 1 checks pass. "
+        "Not everything could be compared (2 of 10 experiments); the other 1 checks pass. "
         "Broken off: speed, ValueError: no."
     )
 

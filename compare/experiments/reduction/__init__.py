@@ -10,6 +10,7 @@ from ...engines.mujoco import ModelError
 from ...judge.check import LOCKABLE, Result
 from ...judge.rounding import NARROW
 from ...judge.scale import FACTOR
+from ...judge.words import scene_begins
 from ...robots import Robot
 from ...setup import Setup
 from . import exact_motion, sub_blocks
@@ -83,7 +84,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     if result.rows:  # none of a model that cannot be locked
         yield partial(figures_needs.draw_needs, result, robot)
     for scene in result.curves["swings"]:
-        yield partial(figures_motion.draw_swing, result, scene)
+        yield partial(figures_motion.draw_swing, result, scene, beginning=scene_begins(scene, robot))
     if "small" in result.curves:
         yield partial(figures_motion.draw_small_oscillations, result, robot)
     if "cost_in_mujoco" in result.tables:

@@ -50,7 +50,9 @@ def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
     result.tables["cost_in_mujoco"] = renamed(rows, movement_unit(case.coordinates))
     check_bits(result, f"{case.name}, {step_in_words(case, FALL_STEPS)}", result.tables["cost_in_mujoco"], pushed)
     if not pushed:
-        result.notes.append(f"{case.name}: the floor that is in reach pushes no joint, nor does anything else.")
+        result.notes.append(
+            f"{case.name}: no contact pushes on a joint in this run, neither with the floor that is in reach nor between bodies."
+        )
 
 
 def fall_case(robot: Robot) -> Case:

@@ -176,7 +176,7 @@ def equilibrium(robot: Robot) -> str | None:
 def not_linear(tree: tmt.Tree) -> str | None:
     """Why small oscillations of a Tree are not compared with its linear modes, or None."""
     if any(tree.damping):
-        return "its damping"
+        return "it has damping"
     if set(tree.kind) != {"hinge"} or tree.has_springs:
         return "it has other joints than hinges, or springs"
     return f"it has {len(tree.axis)} joints" if len(tree.axis) > MOST_MODES else None

@@ -146,7 +146,11 @@ def draw_costs(result: Result) -> tuple[str, Figure, str]:
     same = len({row["added"] for row in table} - changing - {MINIMAL, AGAIN})
     caption = (
         "What each addition costs in MuJoCo, a step of Euler and of RK4 as ratios to the minimal model: "
-        f"{'; '.join(words)}. The minimal model timed again differs by {100 * max(again, default=np.nan):.1f} %. The motion is "
-        f"changed by: {'; '.join(sorted(changing)) or 'none'}; {same} additions leave the same bits."
+        f"{'; '.join(words)}. The minimal model timed again differs by {100 * max(again, default=np.nan):.1f} %. "
+        + (
+            f"The motion is changed by: {'; '.join(sorted(changing))}; {same} additions leave the same bits."
+            if changing
+            else f"No addition changes the motion: all {same} leave the same bits."
+        )
     )
     return "reduction_cost_in_mujoco", fig, caption

@@ -9,6 +9,7 @@ from tmt.reference import DIGITS
 
 from ...case import Case, Coordinates
 from ...engines import LABELS
+from ...given import some
 from ...judge.check import Result, closest
 from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, movement_unit, required_time, step_in_words
@@ -50,8 +51,11 @@ def need_in_words(case: Case, need: Needed) -> str:
     names, locked = case.joints, case.scene.locked
     reasons = list(need.moves.values())
     if need.undecided:
-        reasons.append(f"of {', '.join(need.undecided)} it is not decided: the acceleration does not fold to 0")
-    why = capital("; ".join(reasons))
+        reasons.append(
+            f"of {some(need.undecided)} it is not known: at no state tried do they accelerate, but the expression of that does "
+            "not fold to 0"
+        )
+    why = reasons_in_words(reasons, case.robot.is_read)
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (
@@ -62,15 +66,25 @@ def need_in_words(case: Case, need: Needed) -> str:
     if not need.stays:
         one = joint_word(case)
         count = f"the one {one} that is free" if len(names) == 1 else f"all {len(names)} {one}s"
-        return f"{case.name}: {count}{declared}. {why}."
-    left, stays = (" and ".join(some) for some in ([name for name in names if name not in need.stays], need.stays))
+        return f"{case.name}: {count}{declared}{why}."
+    moving = [name for name in names if name not in need.stays]
+    left, stays = (" and ".join(few) if len(few) <= 6 else some(few) for few in (moving, need.stays))
     never, vanish = "never moves: at its start and at rest its acceleration folds", "and is"
     if len(need.stays) > 1:
         never, vanish = "never move: at their start and at rest their accelerations fold", "and are"
+    begins = f"There {stays}" if case.robot.is_read else capital(stays)
     return (
-        f"{case.name}: {left}{declared}. {capital(stays)} {never} to 0 for all values of the others, {vanish} 0 "
-        f"with {DIGITS} digits at random ones. {why}."
+        f"{case.name}: {left}{declared}. {begins} {never} to 0 for all values of the others, {vanish} 0 "
+        f"with {DIGITS} digits at random ones{why}."
     )
+
+
+def reasons_in_words(reasons: Sequence[str], is_read: bool) -> str:
+    """Why joints are needed, as the end of a sentence; with names of a user, which no sentence begins with: the first six."""
+    if not is_read:
+        return f". {capital('; '.join(reasons))}"
+    more = len(reasons) - 6
+    return f": {'; '.join(reasons[:6])}" + (f"; and so for {more} more joints" if more > 0 else "")
 
 
 def joint_word(case: Case) -> str:
@@ -104,13 +118,21 @@ def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Set
         result.curves["apart"][case.name, engine, integrator] = float(apart[t <= until, :nv].max())
     if not smaller:
         moved = {LABELS[engine]: result.curves["apart"][case.name, engine, integrator] for engine in paths}
-        words = " and ".join(f"that of {engine} by {m:.1e} {unit}" if np.isfinite(m) else f"{engine} diverges"
-                             for engine, m in moved.items())  # fmt: skip
-        largest = "angle" if unit == "rad" else "movement"
         result.notes.append(
-            f"{case.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the largest {largest} "
-            f"{'moves' if unit == 'rad' else 'is'}: {words}."
+            f"{case.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged "
+            f"{moved_in_words(moved, unit)}."
         )
+
+
+def moved_in_words(moved: dict[str, float], unit: str) -> str:
+    """How far a joint moves at most in the run of each engine that should stay."""
+    if not any(moved.values()):
+        return f"no joint moves, by {' or '.join(moved)}"
+    words = (
+        f"{m:.1e} {unit} by {name}" if np.isfinite(m) else f"unknown by {name}, which diverges"
+        for name, m in moved.items()
+    )
+    return f"the largest movement of a joint is {' and '.join(words)}"
 
 
 def free_places(case: Case, smaller: Case) -> list[int]:

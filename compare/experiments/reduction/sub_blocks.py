@@ -34,10 +34,12 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
         angles, states = 1, setup.of(4 if large else STATES_OF_SUBSET, 2 if large else 4, 2)
         stride = setup.of(1, 6 if large else 3, 6)
         sets = sets[::stride]
-        chosen = f"each joint alone and {RANDOM_SUBSETS} chosen at random"
-        if stride > 1:
-            chosen = f"one in {stride} of {chosen}, all of which are those of a full run"
-        result.notes.append(f"Of the subsets of {len(robot.joints)} joints {len(sets)} are locked: {chosen}.")
+        listed = f"each of the {len(robot.joints)} joints alone, and {RANDOM_SUBSETS} sets of them chosen at random"
+        result.notes.append(
+            f"Not all sets of joints are locked in turn, but {listed}."
+            if stride == 1
+            else f"Not all sets of joints are locked in turn, but {len(sets)}, 1 in {stride} of those of a full run: {listed}."
+        )
     for locked in sets:
         found = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):

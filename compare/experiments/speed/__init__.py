@@ -14,6 +14,7 @@ from ...judge.check import Result
 from ...judge.run import diverged_at, movement_unit
 from ...judge.scale import FACTOR
 from ...judge.units import renamed, said
+from ...judge.words import scene_begins
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import DOUBLES, Reference, committed, references
@@ -253,7 +254,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
     for scene in figures_times.scenes(result):
-        yield partial(figures_times.draw_times, result, scene)
+        yield partial(figures_times.draw_times, result, scene, beginning=scene_begins(scene, robot))
     yield partial(figures_times.draw_evaluations, result)
     yield partial(figures_times.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)

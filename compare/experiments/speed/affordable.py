@@ -45,7 +45,7 @@ def left_out_in_words(tree: tmt.Tree) -> list[str]:
         ]
     if not literal_is_compiled(tree):
         return [
-            f"The literal form, whose {lengths(tree)[0]} operations would take too long to compile, is not, and neither is the "
+            f"The literal form is not timed: its {lengths(tree)[0]} operations would take too long to compile. Neither is the "
             "composite form with the library's sine."
         ]
     return []

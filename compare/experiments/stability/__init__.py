@@ -42,9 +42,10 @@ def tolerance(robot: Robot) -> str:
         sought = "among steps about the predicted one"
     return (
         "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
-        "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
+        "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 + |q|) "
         "max|J| / 1e-6. Limits: the largest dt at which no mode of the equations of motion grows by more than 0.1 % from the "
-        f"second to the last quarter of a run from 1e-6 rad ({run}), found by bisection {sought}, within 0.1 % of the predicted "
+        f"second to the last quarter of a run from 1e-6 {choice.unit_of_movements(robot)} ({run}), found by bisection {sought}, "
+        "within 0.1 % of the predicted "
         f"dt. Growth: 0.1 % over all steps. Departure (a {choice.joint_of(robot)} 0.1 {choice.unit_of_movements(robot)} away): "
         "within one step or 0.03 s"
         + (", and what forces that are not linear may add," if robot.is_read else "")

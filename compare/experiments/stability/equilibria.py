@@ -9,7 +9,7 @@ from ...engines import one_of_each_scheme
 from ...engines.mujoco.linear import NUDGE, transition
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
-from ...judge.words import capital
+from ...judge.words import posture_begins
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import Held, held
@@ -58,9 +58,10 @@ def kind_in_words(at: Held) -> str:
     if decays and any(at.tree.damping):
         texts.append(f"decays by {min(decays):.3g} to {max(decays):.4g} per second")
     if at.case.robot.is_read and at.without_stiffness.any():
-        texts.append(f"{at.without_stiffness.sum()} of {len(values)} rates are zero")
+        zero = at.without_stiffness.sum()
+        texts.append(f"{zero} of {len(values)} rates {'is' if zero == 1 else 'are'} zero")
     kind = at.kind if at.kind == "marginal" else f"a {at.kind}"
-    return f"{capital(at.name)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
+    return f"{posture_begins(at.name, at.case.robot)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
 
 
 def few(texts: Sequence[str], between: str) -> str:

@@ -11,7 +11,7 @@ from ...case import Case
 from ...engines import LABELS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit, step_in_words
-from ...judge.words import capital
+from ...judge.words import scene_begins
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name
 from .drift import DRIFT_DURATION, found_order
 from .figures_lines import differing_most, drawn, over_time
@@ -119,7 +119,7 @@ def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) ->
     errors, unit = result.curves["errors"].get(case.name), movement_unit(case.coordinates)
     count = case.coordinates.nv
     return (
-        f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
+        f"{scene_begins(case.name, case.robot)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
             f"With {case.steps} steps of RK4 TMT is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true "

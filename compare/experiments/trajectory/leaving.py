@@ -74,8 +74,9 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
             else f"stay within {LEFT} {unit} for {case.duration:g} s"
         )
         why = cause_in_words(case, size, may, at, left[name])
+        left_over = f"{size:.1e}" if size else "0"
         sentences.append(
-            f"{LABELS[name]}: the torque leaves an acceleration of {size:.1e} {per} (rounding allows {may:.1e}); by that map "
+            f"{LABELS[name]}: the torque leaves an acceleration of {left_over} {per} (rounding allows {may:.1e}); by that map "
             f"alone the {case.robot.name} would {away}; it {left_in_words(left[name], unit)}{why}."
         )
     return sentences

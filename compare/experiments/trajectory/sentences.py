@@ -11,7 +11,7 @@ from ...engines import LABELS, Engine
 from ...engines.mujoco.flags import INTEGRATORS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit
-from ...judge.words import capital
+from ...judge.words import scene_begins
 from ...robots import Robot
 from .errors import coarsest_run, deviations
 from .leaving import causes_in_words, left_in_words
@@ -41,7 +41,7 @@ def notes(
 def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     """What a run of a held posture says, of what is claimed of it if it is."""
     claims = case.robot.claims.of_scenes if case.robot.claims else {}
-    about = f"Claim: {claims[case.name]}. Here" if case.name in claims else capital(case.name)
+    about = f"Claim: {claims[case.name]}. Here" if case.name in claims else scene_begins(case.name, case.robot)
     unit = movement_unit(case.coordinates)
     by = " and ".join(f"{LABELS[name]}'s {rad(value, unit)}" for name, value in deviations(case, curve).items())
     return (
@@ -68,7 +68,12 @@ def of_integrators(robot: Robot, mujoco: Engine) -> list[str]:
 
 def rad(value: float | None, unit: str = "rad") -> str:
     """A movement in words; None: the run has diverged."""
-    return "no number (it diverged)" if value is None else f"{value:.1e} {unit}"
+    return "no number (it diverged)" if value is None else f"{short(value)} {unit}"
+
+
+def short(value: float) -> str:
+    """A size in words: 0 where it is exactly that."""
+    return f"{value:.1e}" if value else "0"
 
 
 def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
@@ -85,7 +90,7 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
         apart, unit = agreement(curve, case), movement_unit(case.coordinates)
         true = "rest" if cases[name].is_held else "more than 20 digits"
         lines.append(
-            f"{name} (true: {true}): TMT {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {apart:.1e} {unit} in the "
+            f"{name} (true: {true}): TMT {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {short(apart)} {unit} in the "
             f"{curve['judged_until_s']:.2f} s that are judged"
         )
         if None not in (ours, theirs) and max(ours, theirs) > SAYS_NOTHING * apart:

@@ -56,7 +56,7 @@ def test_of_many_joints_some_subsets_are_locked_and_that_is_said():
     setup = setup_of(random_tree(3))
     result = blocks(setup)
     assert 6 <= len({check.scene for check in result.checks}) <= 8 and all(check.passed for check in result.checks)
-    assert "Of the subsets of" in result.notes[0]
+    assert "Not all sets of joints are locked in turn, but 6, 1 in 6 of" in result.notes[0]
     assert all(row["operations_whole"] is None for row in result.tables["reduction_subsets"])
 
 
@@ -128,7 +128,7 @@ def test_costs_of_a_file_are_measured_with_its_own_step(free_body):
 
 
 def test_what_the_linear_modes_do_not_have_is_not_compared(gripper):
-    assert exact_motion.not_linear(gripper.robot.tree) == "its damping"
+    assert exact_motion.not_linear(gripper.robot.tree) == "it has damping"
     springs = dataclasses.replace(tmt.ARM, stiffness=(1.0, 0.0, 0.0))
     assert "springs" in exact_motion.not_linear(springs) and exact_motion.not_linear(tmt.ARM) is None
 
@@ -165,4 +165,4 @@ def test_a_ball_has_three_speeds_in_the_table_of_times(joints, speeds):
 def test_joints_of_which_nothing_is_decided_make_a_sentence(gripper):
     held = next(case for case in gripper.robot.cases if case.is_held)
     words = needs.need_in_words(held, Needed((), {}, held.joints))
-    assert "all 4 joints. Of shoulder, wrist, left, right it is not decided" in words
+    assert "all 4 joints: of shoulder, wrist, left, right it is not known" in words
