@@ -13,19 +13,23 @@ DIGITS |= dict.fromkeys(
     ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
 )
 
+LISTS = ("names", "hinges", "locked")  # columns with names of joints, which may be many
+LONGEST_LIST = 80  # characters of a list in a report; its file has all
+
 
 def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """A table as text, with the digits that a reader needs."""
     table = table if columns is None else table[columns]
 
-    def text(value, digits):
+    def text(value, digits, is_list):
         if isinstance(value, float):
             if not math.isfinite(value):
                 return ""
             return f"{value:.0f}" if value.is_integer() and 1.0 <= abs(value) < 1e7 else f"{value:.{digits}g}"
-        return "" if value is None else str(value)
+        whole = "" if value is None else str(value)
+        return f"{whole[: LONGEST_LIST - 4]} ..." if is_list and len(whole) > LONGEST_LIST else whole
 
-    columns = {c: [text(v, DIGITS.get(c, 3)) for v in table[c].astype(object)] for c in table.columns}
+    columns = {c: [text(v, DIGITS.get(c, 3), c in LISTS) for v in table[c].astype(object)] for c in table.columns}
     return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
 
 

@@ -119,6 +119,17 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(tmp_path):
     ]
 
 
+@pytest.mark.parametrize("length, cut", [(80, False), (81, True)])
+def test_a_long_list_of_names_is_cut_in_the_report_and_whole_in_its_file(tmp_path, length, cut):
+    (tmp_path / "figures").mkdir()
+    names = "joint;" * 20
+    rows = [{"names": names[:length], "reason": names}]
+    write(tmp_path, verdict.Report([section("mass", GOOD, rows=rows)], ARM, {"command": "c"}, "words"))
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert (f"| {names[:76]} ... |" in text) == cut and (f"| {names[:length]} |" in text) == (not cut)
+    assert names in text and pd.read_csv(tmp_path / "tables" / "mass.csv")["names"].tolist() == [names[:length]]
+
+
 def test_a_number_that_json_does_not_know_costs_its_check_alone(tmp_path):
     (tmp_path / "figures").mkdir()
     wrong = CAUSE | {"found": float("nan")}

@@ -9,6 +9,7 @@ from ...case import Case
 from ...engines.mujoco import ModelError
 from ...judge.check import LOCKABLE, Result
 from ...judge.rounding import NARROW
+from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...judge.words import scene_begins
 from ...robots import Robot
@@ -38,7 +39,8 @@ def tolerance(robot: Robot) -> str:
     return (
         f"Sub-blocks of Mbar and bias: {FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute "
         "terms of the bias, of the whole model. Runs of the smaller and the whole model, by the same method: the band of "
-        f"rounding of the whole one (see trajectory), judged while it is below {NARROW:g} rad, for as long as the scene states. "
+        f"rounding of the whole one (see trajectory), judged while it is below {NARROW:g} {movement_unit(robot.coordinates)}, "
+        "for as long as the scene states. "
         "Errors against an exact solution fall with the step at the method's order, and with the square of the amplitude where "
         "the solution is linear. Additions that exert no force leave the same bits. Timings are no checks."
     )

@@ -129,7 +129,7 @@ def moved_in_words(moved: dict[str, float], unit: str) -> str:
     if not any(moved.values()):
         return f"no joint moves, by {' or '.join(moved)}"
     words = (
-        f"{m:.1e} {unit} by {name}" if np.isfinite(m) else f"unknown by {name}, which diverges"
+        f"{f'{m:.1e}' if m else '0'} {unit} by {name}" if np.isfinite(m) else f"unknown by {name}, which diverges"
         for name, m in moved.items()
     )
     return f"the largest movement of a joint is {' and '.join(words)}"

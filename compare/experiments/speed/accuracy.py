@@ -121,8 +121,8 @@ def floors_in_words(rows: list[dict], floors: Floors) -> list[str]:
                 came, stay, below = came + 1, stay + stopped(errors), below + (min(errors) < left)
     return [
         f"The size of what rounding leaves, eps times the growth of a small difference on the way: {sizes}. Of the curves of "
-        f"all methods {came} come to within {NEAR_ROUNDING} times of it; in {stay} of these the last setting is not the most "
-        f"exact, and {below} get below it."
+        f"all methods {came} {'comes' if came == 1 else 'come'} to within {NEAR_ROUNDING} times of it; in {stay} of these the "
+        f"last setting is not the most exact, and {below} {'gets' if below == 1 else 'get'} below it."
     ]
 
 

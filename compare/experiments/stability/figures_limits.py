@@ -149,7 +149,7 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     limiting, swing, step = "the fastest mode", "omega dt", f"dt = {fraction(case.duration, dt)} s"
     if robot.is_read:
         limiting, swing = "the mode that a step first lets grow", "|eigenvalue| dt"
-        step = f"the limit of dt at {centre}, where there is one, else {step}" if centre else step
+        step = f"the limit of dt at the posture {centre}, where there is one, else {step}" if centre else step
     caption = (
         "The upper half of the stability regions (grey: one step lets neither of a pair of conjugate eigenvalues "
         f"grow) with the eigenvalues of the held {robot.name} times {step}. "

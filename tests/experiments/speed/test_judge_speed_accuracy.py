@@ -138,7 +138,7 @@ def test_sentences_of_first_order_and_smaller_models():
     another = row("tmt", "rk4", 1e-3, 64, 0.5e-3, scene="bent, free, my own")  # a scene that is only called so
     assert accuracy.smaller_models_in_words([*rows, another]) == []
     floors = {"bent, free": 1e-14}
-    assert "Of the curves of all methods 1 come to within 30 times of it; in 0 of these" in accuracy.floors_in_words(
+    assert "Of the curves of all methods 1 comes to within 30 times of it; in 0 of these" in accuracy.floors_in_words(
         rows, floors)[0]  # fmt: skip
 
 
