@@ -82,8 +82,10 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
     try:
         section.figures, failed = drawing.result()
-    except (WorkerEnded, OSError):
+    except OSError:
         raise
+    except WorkerEnded:  # what was computed is kept
+        failed = [("number 1", "the process that draws was ended from outside")]
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import sys
+from concurrent.futures import Future
 from functools import partial
 from types import SimpleNamespace
 
@@ -11,12 +12,15 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from runs import ROOT, on_terminal, readable_lines, words
+from sections import GOOD, section
 
 from compare import __main__ as command_line
 from compare import experiment
 from compare.__main__ import main
 from compare.experiments import EXPERIMENTS
 from compare.judge.check import Result
+from compare.process.workers import WorkerEnded
+from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 
 
@@ -307,6 +311,16 @@ def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsy
     assert main(["broken", "--quick", "--out", str(tmp_path / "out")]) == 2
     assert "a process that computes beside was ended from outside" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_computed_is_kept_though_the_process_that_draws_is_ended(capsys):
+    drawn = section("mass", GOOD)
+    drawing = Future()
+    drawing.set_exception(WorkerEnded("no longer there"))
+    experiment.take_figures(Terminal(), drawn, drawing)
+    assert [check.passed for check in drawn.result.checks] == [True, False]
+    said = "FAIL mass: figure number 1 is drawn: no, the process that draws was ended from outside"
+    assert said in " ".join(capsys.readouterr().out.split())
 
 
 def test_an_experiment_that_cannot_serve_a_robot_is_skipped_or_refused(tmp_path, capsys, monkeypatch):
