@@ -22,6 +22,7 @@ from ..case import SEED, Case
 
 TRIALS = 3  # random states of the other joints, with 50 digits
 EVERY_TRIAL = 6  # up to which every trial is made
+OF_ROUNDED_NUMBERS = 1e-9  # rad/s2 or m/s2: an acceleration below it is that of a model whose numbers are rounded
 ZERO = mpmath.mpf(10) ** (10 - DIGITS)  # rad/s2: what 50 digits leave of an acceleration that vanishes
 
 
@@ -31,6 +32,7 @@ class Needed(NamedTuple):
     stays: tuple
     moves: dict  # name: why
     undecided: tuple  # no state was found at which they move, but their acceleration does not fold to 0
+    hardly: tuple = ()  # of those that move: they accelerate by less than OF_ROUNDED_NUMBERS at all states tried
 
 
 def needed(case: Case) -> Needed:
@@ -40,7 +42,7 @@ def needed(case: Case) -> Needed:
     joints = dict(zip(names, coordinates.places.joints))
     units = {name: coordinates.units[joint.qd.start] for name, joint in joints.items()}
     moves = {name: f"{name} has a speed at the start" for name, joint in joints.items() if any(case.v[joint.qd])}
-    undecided = ()
+    undecided, hardly = (), ()
     while still := tuple(name for name in names if name not in moves and name not in undecided):
         when = "at the start" if len(still) == len(names) else "when the others move"
         largest = dict.fromkeys(still, 0.0)
@@ -57,12 +59,13 @@ def needed(case: Case) -> Needed:
             if a > ZERO
         }
         moves |= found
+        hardly += tuple(name for name in found if largest[name] < OF_ROUNDED_NUMBERS)
         if not found:
             unfolded = tuple(name for name, parts in folded(case, tree, still).items() if any(n != 0.0 for n in parts))
             if not unfolded:
                 break
             undecided += unfolded
-    return Needed(still, moves, undecided)
+    return Needed(still, moves, undecided, hardly)
 
 
 def accelerations(case: Case, tree: Tree, still: Sequence[str], scalar: Callable, q: Sequence, qd: Sequence) -> dict:

@@ -15,12 +15,13 @@ from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, movement_unit, required_time, step_in_words
 from ...judge.words import capital
 from ...setup import Setup
-from ...truth.smallest import Needed, needed, reduced
+from ...truth.smallest import OF_ROUNDED_NUMBERS, Needed, needed, reduced
 from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
 
 BOTH_INTEGRATORS = (
     6  # speeds of the robot of a file whose runs by both integrators are compared, of more those by the last
 )
+MOST_REASONS = 6  # in a sentence
 MOST_IN_A_BAND = 12  # speeds of the robot of a file whose runs are compared within a band of rounding
 
 
@@ -49,13 +50,18 @@ def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str]
 def need_in_words(case: Case, need: Needed) -> str:
     """What a case needs and why, in a sentence."""
     names, locked = case.joints, case.scene.locked
-    reasons = list(need.moves.values())
+    hardly = need.hardly if case.robot.is_read else ()
+    reasons, further = [why for name, why in need.moves.items() if name not in hardly], []
+    if hardly:
+        further.append(
+            f"by less than {OF_ROUNDED_NUMBERS:g} rad/s2 or m/s2, for the numbers of the model are rounded: {some(hardly)}"
+        )
     if need.undecided:
-        reasons.append(
+        further.append(
             f"of {some(need.undecided)} it is not known: at no state tried do they accelerate, but the expression of that does "
             "not fold to 0"
         )
-    why = reasons_in_words(reasons, case.robot.is_read)
+    why = reasons_in_words(reasons, further, case.robot.is_read)
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (
@@ -79,12 +85,13 @@ def need_in_words(case: Case, need: Needed) -> str:
     )
 
 
-def reasons_in_words(reasons: Sequence[str], is_read: bool) -> str:
+def reasons_in_words(reasons: Sequence[str], further: Sequence[str], is_read: bool) -> str:
     """Why joints are needed, as the end of a sentence; with names of a user, which no sentence begins with: the first six."""
     if not is_read:
-        return f". {capital('; '.join(reasons))}"
-    more = len(reasons) - 6
-    return f": {'; '.join(reasons[:6])}" + (f"; and so for {more} more joints" if more > 0 else "")
+        return f". {capital('; '.join([*reasons, *further]))}"
+    more = len(reasons) - MOST_REASONS
+    rest = [f"and so for {more} more joints"] if more > 0 else []
+    return f": {'; '.join([*reasons[:MOST_REASONS], *rest, *further])}"
 
 
 def joint_word(case: Case) -> str:

@@ -166,3 +166,28 @@ def test_joints_of_which_nothing_is_decided_make_a_sentence(gripper):
     held = next(case for case in gripper.robot.cases if case.is_held)
     words = needs.need_in_words(held, Needed((), {}, held.joints))
     assert "all 4 joints: of shoulder, wrist, left, right it is not known" in words
+
+
+def test_of_many_joints_six_reasons_are_given_and_what_only_rounding_moves_is_said_apart():
+    case = setup_of(PATHS["quadruped"]).robot.cases[1]
+    moves = {name: f"{name} accelerates" for name in case.joints}
+    words = needs.need_in_words(case, Needed((), moves, (), case.joints[8:]))
+    assert (
+        f": all 16 joints: {'; '.join(list(moves.values())[:6])}; and so for 2 more joints; by less than 1e-09 "
+        in words
+    )
+    assert words.endswith(f"rounded: {', '.join(case.joints[8:14])} and 2 more.")
+    few = needs.need_in_words(case, Needed((), moves, (), case.joints[6:]))
+    assert "more joints" not in few and few.count("accelerates") == 6
+
+
+@pytest.mark.parametrize("size, hardly", [(1.1e-9, False), (0.9e-9, True)])
+def test_a_joint_that_only_rounding_accelerates_is_told_from_others(tmp_path, size, hardly):
+    sliding = "".join(
+        f'<body><joint name="{name}" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+        for name in ("first", "second")
+    )
+    (tmp_path / "sliding.xml").write_text(f"<mujoco><worldbody>{sliding}</worldbody></mujoco>")
+    robot = setup_of(tmp_path / "sliding.xml").robot
+    need = needed(robot.case("pushed", torque=(size, 1.0), gravity=False))
+    assert need.hardly == (("first",) if hardly else ()) and set(need.moves) == {"first", "second"}
