@@ -160,9 +160,9 @@ def spoken(result: Result, scene: str) -> str:
         )
         for longer in (True, False)
     )
-    said = [f"MuJoCo's cheapest setting takes {slower} as tmt's."] if slower else []
-    said += [f"{'T' if slower else 't'}mt's cheapest setting takes {faster} as MuJoCo's."] if faster else []
-    return " ".join(said) or "no error asked for is reached by both MuJoCo and tmt."
+    said = [f"MuJoCo's cheapest setting takes {slower} as tmt's"] if slower else []
+    said += [f"tmt's cheapest setting takes {faster} as MuJoCo's"] if faster else []
+    return f"{'; '.join(said) or 'no error asked for is reached by both MuJoCo and tmt'}."
 
 
 def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
