@@ -1,8 +1,11 @@
 """What can be said of one run: how far it went, when it left its start, when it diverged."""
 
+from functools import lru_cache
+
 import numpy as np
 
 import tmt
+from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 
 from ..case import Case, Coordinates
 from .check import Result
@@ -106,8 +109,15 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     gone = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
-    nothing = FACTOR * EPS * (np.trace(tmt.mass_matrix(q[0], tree)) + np.sum(tree.stiffness))
+    nothing = FACTOR * EPS * (sum_of_inertias(tree, tuple(q[0].tolist())) + np.sum(tree.stiffness))
     return np.maximum(has, np.maximum.accumulate(np.abs(done) + gone)) + nothing
+
+
+@lru_cache(maxsize=64)
+def sum_of_inertias(tree: tmt.Tree, q: tuple[float, ...]) -> float:
+    """The trace of Mbar at positions (nq,), kg m2 and kg: kept, for many runs start from the same ones."""
+    inertia, _ = mass_matrix_and_bias(tree, list(q), [0.0] * tree.coordinates.nv)
+    return float(np.trace(np.array(inertia, dtype=float)))
 
 
 def number_or_none(number: float | None) -> float | None:

@@ -164,11 +164,11 @@ def rows_of_scene(
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
     found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
-    taking = methods(engines, size, which, case.robot)
+    taking, energy = methods(engines, size, which, case.robot), true_energy(case, reference)
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
-            found.append(row_of_run(case, case, engines, method, setting, reference, left))
+            found.append(row_of_run(case, case, engines, method, setting, reference, left, energy))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
             if accuracy.gained_nothing(now, work, best, last, left) or too_long_next(method, case, work, size):
                 break
@@ -176,7 +176,14 @@ def rows_of_scene(
     smaller = None if case.robot.is_read else reduced(case)
     few = [method for method in taking if smaller and (method.engine, method.name) in SMALLER]
     setting = Setting(case.duration, SMALLER_STEPS)
-    return found + [row_of_run(smaller, case, engines, method, setting, reference) for method in few], left
+    runs = [row_of_run(smaller, case, engines, method, setting, reference, energy=energy) for method in few]
+    return found + runs, left
+
+
+def true_energy(case: Case, reference: Reference) -> np.ndarray:
+    """The energy of the reference of a scene at its times, J, (times,)."""
+    nq = case.coordinates.nq
+    return tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
 
 
 def row_of_run(
@@ -187,17 +194,19 @@ def row_of_run(
     setting: Setting,
     reference: Reference,
     left: float = 0.0,
+    energy: np.ndarray | None = None,
 ) -> dict:
     """A row: one run of a scene, or of the smaller model that has the motion of the whole one.
 
-    left: the least error that a reference in doubles shows; a smaller one is not known, and has this value.
+    left: the least error that a reference in doubles shows; a smaller one is not known, and has this value. energy: that of the
+    reference, J, (times,), where it is known.
     """
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
     places, nq = whole.coordinates.places, whole.coordinates.nq
     free = [[k for i in joints for k in range(*getattr(places.joints[i], part).indices(size))]
             for part, size in (("q", nq), ("qd", places.nv))]  # fmt: skip
     true = reference.high[:, :nq], reference.high[:, nq:]
-    energy = tmt.energy(*true, tree)
+    energy = true_energy(whole, reference) if energy is None else energy
     run, read = engines[method.engine].of(case).prepare(*case.start, case.tau, setting, method.name)
     with np.errstate(all="ignore"):
         motion = read(run())
