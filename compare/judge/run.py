@@ -103,7 +103,12 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     of 1.
     """
     tree, coordinates = case.tree, case.coordinates
-    has = 2.0 * gravity_scale(case.robot.tree) + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
+    # what slides have moved at the start belongs to the reach; what they move from there is the way that they have gone
+    has = (
+        2.0 * gravity_scale(case.robot.tree, case.posture)
+        + tmt.energy(q[0], case.v, tree)
+        - tmt.potential_energy(q[0], tree)
+    )
     if tree.has_springs:
         has = has + tmt.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]

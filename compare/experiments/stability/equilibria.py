@@ -59,8 +59,16 @@ def kind_in_words(at: Held) -> str:
         texts.append(f"decays by {min(decays):.3g} to {max(decays):.4g} per second")
     if at.case.robot.is_read and at.without_stiffness.any():
         texts.append(f"{at.without_stiffness.sum()} of {len(values)} rates are zero")
-    kind = at.kind if at.kind == "marginal" else f"a {at.kind}"
+    kind = at.kind if at.kind == "marginal" else f"a {decaying(at) or at.kind}"
     return f"{capital(at.name)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
+
+
+def decaying(at: Held) -> str | None:
+    """What a centre is called of which every mode decays: a stable focus if one swings, else a stable node; None: it is not."""
+    values, small = at.modes[0], at.small
+    if at.kind != "centre" or not (values.real < -small).all():
+        return None
+    return "stable focus" if (np.abs(values.imag) > small).any() else "stable node"
 
 
 def few(texts: Sequence[str], between: str) -> str:
