@@ -112,14 +112,21 @@ def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = ()) 
     No step is longer than 1 over the fastest rate, 1/s, of the joints' own damping, what is added, and the springs.
     inverse: of Mbar, (nv, nv).
     """
-    decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
-    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
-    swing = np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max())
-    least = DURATION * max(1.0 / (COARSER * dt), decay, swing)
+    least = DURATION * max(1.0 / (COARSER * dt), *fastest_rates(tree, inverse, added))
     count = LEAST_STEPS
     while count < min(0.999 * least, MOST_STEPS_OF_A_FILE):
         count *= 2
     return count
+
+
+def fastest_rates(tree: tmt.Tree, inverse: np.ndarray, added: tuple = ()) -> tuple[float, float]:
+    """The fastest rate of decay by the joints' own damping and what is added, and that of a swing by the springs, 1/s.
+
+    inverse: of Mbar, (nv, nv).
+    """
+    decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
+    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
+    return float(decay), float(np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max()))
 
 
 def thrown(coordinates: Coordinates) -> tuple[float, ...]:

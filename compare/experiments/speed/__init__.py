@@ -18,6 +18,7 @@ from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import DOUBLES, Reference, committed, references
 from ...truth.smallest import reduced
+from ..stiff import has_no_reference, leaves_no_digits
 from . import accuracy, advice, evaluations, targets, tumbling
 from .floors import floor
 from .settings import (
@@ -74,7 +75,9 @@ def tolerance(robot: Robot) -> str:
 
 def skipped(robot: Robot) -> str | None:
     """Why it cannot serve a robot, or None."""
-    return None if scenes_of(robot) else f"the {robot.name} has no scene that every method follows"
+    if not scenes_of(robot):
+        return f"the {robot.name} has no scene that every method follows"
+    return leaves_no_digits(robot) or has_no_reference(robot)
 
 
 def begin(setup: Setup) -> None:

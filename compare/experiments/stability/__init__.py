@@ -11,6 +11,7 @@ from ...judge.check import Result
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import held
+from ..stiff import leaves_no_digits
 from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs
 from .choice import dampings_of
 from .claims_judged import check_claims
@@ -56,6 +57,11 @@ def tolerance(robot: Robot) -> str:
         + " of the first crossing of the method's linear map, whose angles are rounded to doubles at each step; where the map "
         "stays, the run stays."
     )
+
+
+def skipped(robot: Robot) -> str | None:
+    """Why it cannot serve a robot, or None."""
+    return leaves_no_digits(robot)
 
 
 def methods_of(setup: Setup) -> tuple:

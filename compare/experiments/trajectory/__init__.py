@@ -9,6 +9,7 @@ from ...judge.rounding import NARROW
 from ...judge.run import MOVES, movement_unit
 from ...robots import Robot
 from ...setup import Setup
+from ..stiff import leaves_no_digits
 from . import drift, errors, horizon, sentences
 from .derivative import compare_derivatives
 from .runs import FEW_ENTRIES, MOST_ENTRIES, follow
@@ -65,6 +66,11 @@ def tolerance_of_file(robot: Robot) -> str:
         "torque and of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same "
         "step."
     )
+
+
+def skipped(robot: Robot) -> str | None:
+    """Why it cannot serve a robot, or None."""
+    return leaves_no_digits(robot)
 
 
 def entries(setup: Setup) -> int:
