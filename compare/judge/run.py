@@ -7,8 +7,9 @@ import numpy as np
 import tmt
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 
-from ..case import Case, Coordinates
+from ..case import Case, Coordinates, rates_at
 from .check import Result
+from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale
 
 LEFT = 0.1  # rad or m: a held model that is so far from its posture has left it
@@ -133,3 +134,21 @@ def number_or_none(number: float | None) -> float | None:
 def number_or_nan(number: float | None) -> float:
     """A number from a table: NaN, which leaves a gap in a figure and fails a check, where there is none."""
     return np.nan if number is None else number
+
+
+def leaves_no_digits(robot: object) -> str | None:
+    """Why no run of a file's robot can be compared: rounding grows beyond what is judged in two steps; or None.
+
+    A force that moves a joint at the rate r is rounded by 64 eps of itself, and a step multiplies what is off by (r dt)^2, where
+    that is far more than 1: after two of them it is 64 eps (r dt)^4 of 1 rad or 1 m.
+    """
+    if not robot.is_read or not robot.scenes:
+        return None
+    case = min(robot.cases, key=lambda case: case.scene.dt)
+    rate, dt = max(rates_at(case.tree, case.q)), case.scene.dt
+    if not FACTOR * EPS * (rate * dt) ** 4 > NARROW:
+        return None
+    return (
+        f"the {robot.name}'s fastest rate, {rate:.1e} per second, is {rate * dt:.1e} over a step of {dt:.1e} s, the finest of "
+        "its scenes: rounding alone leaves no digits after two steps"
+    )

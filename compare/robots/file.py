@@ -9,7 +9,7 @@ import numpy as np
 import tmt
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
 
-from ..case import Coordinates, Scene
+from ..case import Coordinates, Scene, fastest_rates
 from . import Robot
 
 DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
@@ -117,16 +117,6 @@ def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = ()) 
     while count < min(0.999 * least, MOST_STEPS_OF_A_FILE):
         count *= 2
     return count
-
-
-def fastest_rates(tree: tmt.Tree, inverse: np.ndarray, added: tuple = ()) -> tuple[float, float]:
-    """The fastest rate of decay by the joints' own damping and what is added, and that of a swing by the springs, 1/s.
-
-    inverse: of Mbar, (nv, nv).
-    """
-    decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
-    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
-    return float(decay), float(np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max()))
 
 
 def thrown(coordinates: Coordinates) -> tuple[float, ...]:

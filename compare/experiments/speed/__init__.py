@@ -11,15 +11,15 @@ from ...case import Case
 from ...engines import COMPARED, GRID, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
-from ...judge.run import diverged_at, movement_unit
+from ...judge.run import diverged_at, leaves_no_digits, movement_unit
 from ...judge.scale import FACTOR
 from ...judge.units import renamed, said
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.reference import DOUBLES, Reference, committed, references
+from ...truth.reference import DOUBLES, Reference, committed, has_no_reference, references
 from ...truth.smallest import reduced
-from ..stiff import has_no_reference, leaves_no_digits
 from . import accuracy, advice, evaluations, targets, tumbling
+from .accuracy import fill_in, spread_in_words
 from .floors import floor
 from .settings import (
     absent_in_words,
@@ -238,24 +238,6 @@ def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
         dynamics = setup.engines[method.engine].of(case)
         runs.append(dynamics.prepare(*case.start, case.tau, setting, method.name)[0])
     return timing.in_turns(runs, rounds=setup.of(5, 2, 2))
-
-
-def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
-    """Give each row the least of its times; of those that have more than one, the median over the least."""
-    for row, of_row in zip(rows, times):
-        row["seconds"] = min(of_row)
-    return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]
-
-
-def spread_in_words(spread: Sequence[float]) -> list[str]:
-    """How the times of one setting differ, in words."""
-    if not spread:
-        return ["Each time is that of one run."]
-    return [
-        f"Each time is the least of several runs (one, if it takes longer than {timing.ONCE:g} s), in turns with all of its "
-        f"scene; where there are more than one, their median is {np.median(spread) - 1:.1%} above the least, for one setting "
-        f"in ten more than {np.quantile(spread, 0.9) - 1:.0%}. Errors come from runs of their own."
-    ]
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

@@ -8,10 +8,10 @@ import numpy as np
 
 from ...engines import same_scheme
 from ...judge.check import Result
+from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import held
-from ..stiff import leaves_no_digits
 from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs
 from .choice import dampings_of
 from .claims_judged import check_claims

@@ -4,8 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tmt.methods import METHODS
+
 from ...engines import Engine, Method
 from ...judge.check import Result
+from ...judge.rounding import slope_rounding
+from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...truth.linear import Held
 from .choice import damped, who
@@ -44,7 +48,7 @@ def limits_and_growths(
         tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
         dt = 1e-2 if predicted is None else 1.001 * predicted  # just above the limit its mode grows fastest
         _, shape, _ = at.fastest_growing(method.scheme, dt)
-        open_end = at.case.robot.is_read and tolerance > MOST_TOLERANCE
+        open_end = why_undecided(at, tolerance if predicted else 0.0)
         seen, observed = (
             (None, None) if open_end else observed_limit(method, engines, at, steps, tried_at(at, predicted))
         )
@@ -56,7 +60,7 @@ def limits_and_growths(
             "scene": at.name, "engine": method.engine, "method": method.name, "damping": at.case.scene.damping,
             "mode_per_s": np.abs(at.modes[0]).max() if kind == "never_fails" else at.rate(shape),
             "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION,
-            "seen": seen, "allowed": tolerance,
+            "seen": seen, "allowed": tolerance, "undecided": open_end,
         })  # fmt: skip
     return {"rows": rows, "growths": growths}
 
@@ -147,6 +151,24 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
     return float(excess)
 
 
+def why_undecided(at: Held, tolerance: float) -> str | None:
+    """Why runs of a file's robot cannot show a limit, or None. tolerance: how far above it they show the growth, relative.
+
+    One eps of the forces pushes a mode of the rate r by an acceleration, and its equilibrium by that over r^2.
+    """
+    if not at.case.robot.is_read:
+        return None
+    if tolerance > MOST_TOLERANCE:
+        return f"a run of this length shows growth only more than {100 * MOST_TOLERANCE:g} % above them"
+    rates = np.abs(at.modes[0])[~at.without_stiffness]
+    pushed = slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2][0] / FACTOR
+    if len(rates) and pushed > GROWTH_MARGIN * LINEAR_DEVIATION * rates.min() ** 2:
+        return (
+            f"a rate of {rates.min():.1e} per second is so slow that rounding of the forces moves what it swings about"
+        )
+    return None
+
+
 def grows(early: np.ndarray, late: np.ndarray) -> bool:
     """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run.
 
@@ -160,13 +182,14 @@ def grows(early: np.ndarray, late: np.ndarray) -> bool:
 
 def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
     """The table of limits and that of growth per step, and a check for each row."""
-    late, undecided = {}, {}
+    late, undecided, predicted_only = {}, {}, 0
     for row in (row for part in parts for row in part["rows"]):
-        seen, tolerance = row.pop("seen"), row.pop("allowed")
+        seen, tolerance, reason = row.pop("seen"), row.pop("allowed"), row.pop("undecided", None)
         result.rows.append(row)
         where = f"{row['scene']}, {who(row)}, damping {row['damping']:g}"
         if seen is None:
-            undecided[where] = tolerance
+            undecided.setdefault(reason, []).append(where)
+            predicted_only += row["limit"] == "finite"
             continue
         if row["limit"] == "finite":
             note = "" if seen == "finite" else f"it {LIMIT_KINDS[seen]}"
@@ -181,7 +204,7 @@ def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
         where, off = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s", row.pop("total_off")
         result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
     result.tables["stability_growth"] = growths
-    words = limits_in_words(robot, result.rows, len(undecided)) + late_in_words(late) + undecided_in_words(undecided)
+    words = limits_in_words(robot, result.rows, predicted_only) + late_in_words(late) + undecided_in_words(undecided)
     result.notes[:0] = words
     result.notes += growth_per_step_in_words(growths)
 
@@ -226,14 +249,9 @@ def late_in_words(late: Mapping[str, float]) -> list[str]:
     ]
 
 
-def undecided_in_words(undecided: Mapping[str, float]) -> list[str]:
-    """Which limits no run decides, {where: from how far above the growth would be seen, relative}."""
-    if not undecided:
-        return []
-    places = "; ".join(
-        f"{where}: {'more than ' if excess >= 1e3 else ''}{100 * excess:.2g} %" for where, excess in undecided.items()
-    )
+def undecided_in_words(undecided: Mapping[str, Sequence[str]]) -> list[str]:
+    """Which limits no run decides, {why: where}."""
     return [
-        f"Not decided by runs, and not checked, are limits so weak that a run of this length shows the growth only more than "
-        f"{100 * MOST_TOLERANCE:g} % above: {places}."
+        f"Limits that no run decides, and that are not checked, for {why}: {'; '.join(of)}."
+        for why, of in undecided.items()
     ]

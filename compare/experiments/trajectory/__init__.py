@@ -6,10 +6,9 @@ from functools import partial
 from ...engines import one_of_each_scheme
 from ...judge.check import Result
 from ...judge.rounding import NARROW
-from ...judge.run import MOVES, movement_unit
+from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
 from ...setup import Setup
-from ..stiff import leaves_no_digits
 from . import drift, errors, horizon, sentences
 from .derivative import compare_derivatives
 from .runs import FEW_ENTRIES, MOST_ENTRIES, follow
