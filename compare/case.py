@@ -15,6 +15,8 @@ import tmt
 from tmt.lock import CLOSE_TO_ONE
 
 from .coordinates import Coordinates
+from .coordinates import fastest_rates as fastest_rates
+from .coordinates import rates_at as rates_at
 from .given import WrongField, are_numbers, is_number, some
 
 SEED = 10  # of every random number in a report

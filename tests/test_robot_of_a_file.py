@@ -10,6 +10,7 @@ from models import PATHS, random_tree
 
 import tmt
 from compare.engines.mujoco import engine, read
+from compare.experiments.speed.settings import scenes_of as scenes_of_speed
 from compare.robots.file import COARSER, DURATION, added_damping, coarsest, robot_of, scenes_from
 
 ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
@@ -65,6 +66,13 @@ def test_every_scene_is_one_of_the_robot_in_both_engines(name):
     is_free = any(feature.feature == "free" for feature in robot.features)
     thrown = [scene for scene in robot.scenes if scene.name.endswith("thrown")]
     assert bool(thrown) == is_free and not any("full only" in scene.tags for scene in thrown)
+    regular = [scene.name for scene in robot.scenes if "regular" in scene.tags]
+    assert regular == [scene.name for scene in (thrown or robot.scenes) if "speed" in scene.tags][:1]
+    # a fall in which nothing else moves shows no error of a method
+    moving = [scene.name for scene in scenes_of_speed(robot)]
+    assert (f"{robot.scenes[0].posture}, let go" in moving) == (
+        name not in ("free_body", "quadruped", "humanoid29_free")
+    )
 
 
 def test_what_rests_where_it_is_let_go_is_set_going():

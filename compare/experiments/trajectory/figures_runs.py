@@ -77,7 +77,11 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
         band = np.where(c["band"] < 1e3, c["band"], np.nan)
         lines = column[2]
         lines.semilogy(
-            c["t"][1:], np.maximum(ulp[1:], DRAWN_ZERO), color=BLUE, linewidth=0.8, label="TMT, start 1 ulp away"
+            c["t"][1:],
+            np.maximum(ulp[1:], DRAWN_ZERO),
+            color=BLUE,
+            linewidth=0.8,
+            label=f"TMT, start 1 ulp away{' (0: of 1)' if case.robot.is_read else ''}",
         )
         lines.semilogy(
             c["t"][1:], np.maximum(difference[1:], DRAWN_ZERO), color="black", linewidth=1, label="TMT to MuJoCo"

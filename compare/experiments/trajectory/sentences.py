@@ -14,7 +14,7 @@ from ...judge.run import moved_from, movement_unit
 from ...judge.words import scene_begins
 from ...robots import Robot
 from .errors import coarsest_run, deviations
-from .leaving import causes_in_words, left_in_words
+from .leaving import causes_in_words, left_in_words, stays_in_words
 from .runs import MOST_ENTRIES, STEPS_AT_MOST, counts, steps_afforded
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
@@ -44,6 +44,8 @@ def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     about = f"Claim: {claims[case.name]}. Here" if case.name in claims else scene_begins(case.name, case.robot)
     unit = movement_unit(case.coordinates)
     by = " and ".join(f"{LABELS[name]}'s {rad(value, unit)}" for name, value in deviations(case, curve).items())
+    if case.robot.is_read and (stays := stays_in_words(case, engines, curve["left"])):
+        return f"{about}, under TMT's torque: {stays}; the farthest is {by}."
     return (
         f"{about}, under TMT's torque, in {case.duration:g} s TMT's {case.robot.name} "
         f"{left_in_words(curve['left']['tmt'], unit)}, MuJoCo's {left_in_words(curve['left']['mujoco'], unit)}; the farthest is "

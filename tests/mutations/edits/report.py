@@ -31,7 +31,7 @@ EDITS = (
          "every recorded check has passed"),
     Edit("report.tables", "failing", "not check.passed", "False", "the table of checks that fail is empty"),
     Edit("page", "page", "passed(sections)", "True", "the page is green whatever fails"),
-    Edit("report.parts", "Parts.made", "self.broken.setdefault(*_1)", "None", "a part of the report that breaks is missed by nobody"),
+    Edit("report.parts", "Parts.made", "self.broken.setdefault(*_1)", "None", "a part that breaks is missed by nobody"),
     Edit("verdict", "verdict", "not differing or section.name in failing", "True", "what agrees is said not to"),
     Edit("folder", "put_back", "move(work / 'old', out)", "None", "the old report is not put back"),
     Edit("folder", "refuse_foreign", "name not in own", "False", "files of somebody else's are not seen"),
