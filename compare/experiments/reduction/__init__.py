@@ -8,6 +8,7 @@ from tmt.reference import DIGITS
 from ...case import Case
 from ...engines.mujoco import ModelError
 from ...judge.check import LOCKABLE, Result
+from ...judge.entries import has_own_scales
 from ...judge.rounding import NARROW
 from ...judge.scale import FACTOR
 from ...robots import Robot
@@ -34,10 +35,13 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """What the differences are compared with."""
+    scales = f"{FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute terms of the bias,"
+    if has_own_scales(robot.tree, robot.is_read):
+        scales = "as in mass and acceleration, each entry its own,"
     return (
-        f"Sub-blocks of Mbar and bias: {FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute "
-        "terms of the bias, of the whole model. Runs of the smaller and the whole model, by the same method: the band of "
-        f"rounding of the whole one (see trajectory), judged while it is below {NARROW:g} rad, for as long as the scene states. "
+        f"Sub-blocks of Mbar and bias: {scales} of the whole model. Runs of the smaller and the whole model, by the same "
+        f"method: the band of rounding of the whole one (see trajectory), judged while it is below {NARROW:g} rad, for as long as "
+        "the scene states. "
         "Errors against an exact solution fall with the step at the method's order, and with the square of the amplitude where "
         "the solution is linear. Additions that exert no force leave the same bits. Timings are no checks."
     )

@@ -8,8 +8,9 @@ import numpy as np
 import tmt
 
 from ...case import SEED, Case, Coordinates
-from ...judge.check import Result, closest, largest
-from ...judge.scale import EPS, FACTOR, bias_scale, mass_scale
+from ...judge.check import Result, closest, worst_of_each
+from ...judge.entries import scales
+from ...judge.scale import EPS, FACTOR
 from ...setup import Setup
 from .times import operations
 
@@ -117,7 +118,10 @@ def check_blocks(
 
 
 def differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Iterator[tuple]:
-    """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it."""
+    """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it.
+
+    Of each state the difference that is closest to its tolerance, and its scale, as `mass` and `acceleration` have it.
+    """
     joints, tree = setup.robot.joints, setup.robot.tree
     places = dict(zip(joints, setup.robot.coordinates.places.joints))
     q, v = q.copy(), v.copy()
@@ -135,11 +139,14 @@ def differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Itera
         "Mbar": [left[name].mass_matrix(state[0]) for name in ("tmt", "mujoco")],
         "bias": [left[name].bias(*state) for name in ("tmt", "mujoco")],
     }
-    for quantity, scale in (("Mbar", mass_scale(tree, q)), ("bias", bias_scale(tree, q, v))):
+    of_states = scales(tree, setup.robot.is_read, q, v)
+    of_quantities = ("Mbar", of_states.mass_matrix, block), ("bias", of_states.bias, np.ix_(range(len(q)), free))
+    for quantity, scale, left_of in of_quantities:
+        scale = scale[left_of] if np.ndim(scale) > 1 else scale
         pairs = {
             "TMT, reduced to whole": (of_left[quantity][0], of_whole[quantity][0]),
             "MuJoCo, reduced to whole": (of_left[quantity][1], of_whole[quantity][1]),
             "reduced, TMT to MuJoCo": of_left[quantity],
         }
         for pair, (one, other) in pairs.items():
-            yield quantity, pair, largest(one - other), scale
+            yield quantity, pair, *worst_of_each(one - other, scale)

@@ -75,6 +75,16 @@ def test_a_wrong_lock_of_a_ball_is_seen():
     assert {check.scene for check in checks if not check.passed} == {"upper locked", "lower locked"}
 
 
+def test_a_far_anchor_is_in_the_scale():
+    """Terms that cancel are as large as the distance to the anchor, whatever the bias is."""
+    body = '<inertial pos="0.1 0.02 0.03" mass="1" diaginertia="0.01 0.02 0.025"/>'
+    setup = setup_of(
+        f'<mujoco><worldbody><body pos="0 0 0.1"><joint axis="0 1 0" pos="1e4 0 0"/>{body}<body pos="0 0 0.1">'
+        f'<joint axis="0 1 0"/>{body}</body></body></worldbody></mujoco>'
+    )
+    assert all(check.passed and check.over_tolerance < 0.1 for check in blocks(setup).checks)
+
+
 def test_a_joint_at_its_reference_is_locked_there():
     tree = read(PATHS["mixed"]).tree
     held = sub_blocks.at_zero(tree, tree.hinge_names[:-1])
