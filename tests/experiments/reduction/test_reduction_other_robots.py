@@ -172,6 +172,38 @@ def test_a_ball_has_three_speeds_in_the_table_of_times(joints, speeds):
     assert {(row["hinges"], row["nv"]) for row in rows} == {(" ".join(joints) or "none", speeds)}
 
 
+def test_a_robot_that_falls_does_not_bend():
+    """Its accelerations are 0 with 50 digits of the very numbers of the file: a sum of masses in doubles would bend it."""
+    setup = setup_of(PATHS["quadruped"])
+    case = next(case for case in setup.robot.cases if case.name == "stand, let go")
+    need = needed(case)
+    assert set(need.moves) == {"root z"} and len(need.undecided) == 15
+    words = needs.need_in_words(case, need)
+    assert "and 9 more (tables/reduction_joints.csv) it is not decided" in words and "rear" not in words
+    rows = needs.joint_rows(case, need)
+    assert [row["found"] for row in rows].count("not decided") == 15 and len(rows) == 16
+
+
+def test_what_takes_too_long_with_50_digits_is_not_decided():
+    robot = setup_of(random_tree(3)).robot
+    free = next(case for case in robot.cases if not case.is_held and not case.v.any())
+    need = needs.not_decided(free)
+    assert need == Needed((), {}, robot.joints)
+    assert needs.not_decided(free.changed(speed=(1.0,) * robot.coordinates.nv)).undecided == ()
+
+
+def test_the_claim_has_what_the_scenes_have(gripper):
+    """No pendulum, where there is none; movements in their units; and of many joints no runs of a smaller model."""
+    assert "physical pendulum" in reduction.claim(ARM) and "same motion" in reduction.claim(ARM)
+    assert "physical pendulum" not in reduction.claim(gripper.robot) and "stays" in reduction.claim(gripper.robot)
+    assert "rad or m," in reduction.tolerance(gripper.robot) and "0.001 rad," in reduction.tolerance(ARM)
+    assert "same motion" not in reduction.claim(setup_of(PATHS["humanoid29"]).robot)
+    swing = ARM.case("swing", locked=("alpha", "beta"), posture="zero").scene
+    assert "physical pendulum" in reduction.claim(dataclasses.replace(ARM, scenes=(swing,)))
+    hangs = dataclasses.replace(swing, posture="hanging")
+    assert "physical pendulum" not in reduction.claim(dataclasses.replace(ARM, scenes=(hangs,)))
+
+
 def test_joints_of_which_nothing_is_decided_make_a_sentence(gripper):
     held = next(case for case in gripper.robot.cases if case.is_held)
     words = needs.need_in_words(held, Needed((), {}, held.joints))
