@@ -74,7 +74,8 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
 
 def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> None:
     """All parts of `rows`, one after the other."""
-    sub_blocks.compare_blocks(result, setup, angles=setup.of(10, 3, 1) if timed else 1)
+    angles = setup.of(10, 1 if setup.robot.is_read else 3, 1) if timed else 1
+    sub_blocks.compare_blocks(result, setup, angles)
     integrators = TWO_INTEGRATORS if timed else TWO_INTEGRATORS[-1:]
     models = [model for case in cases for model in of_case(result, case, setup, integrators)]
     exact_motion.swings(result, setup, cases)

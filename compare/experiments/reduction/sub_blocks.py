@@ -12,13 +12,13 @@ from ...judge.check import Result, closest, worst_of_each
 from ...judge.entries import scales
 from ...judge.scale import EPS, FACTOR
 from ...setup import Setup
+from ...states import seconds
 from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
-ALL_SUBSETS, RANDOM_SUBSETS = (
-    6,
-    20,
-)  # joints up to which all subsets are locked; of more each alone and so many at random
+# joints up to which all subsets are locked; of more each alone and so many at random
+ALL_SUBSETS, RANDOM_SUBSETS = 6, 20
+MOST_TO_LOCK = 2.0  # s that an exact state takes, up to which subsets are locked
 LARGE = 12  # speeds, of more fewer states are taken, and subsets in a run that is not full
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}  # of a robot that has slides
@@ -29,6 +29,12 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)
     coordinates, many = robot.coordinates, len(robot.joints) > ALL_SUBSETS
+    if robot.is_read and seconds(robot) > MOST_TO_LOCK:
+        result.notes.append(
+            f"No joints are locked: with the literal sum over {len(robot.tree.mass)} bodies each of so many subsets takes long."
+        )
+        return
+    counted = setup.of(True, not robot.is_read, True) and not many  # tracing takes half of the time
     sets, states = subsets(robot.joints), STATES_OF_SUBSET
     if many:
         large = coordinates.nv > LARGE
@@ -49,7 +55,7 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
                 found.setdefault((quantity, pair), []).append((apart, scale))
         trees = robot.tree, robot.tree.lock(at_zero(robot.tree, locked)), case.tree
         names = "operations_whole", "operations_locked_at_zero", "operations_locked_at_angles"
-        counts = {name: None if many else operations(tree) for name, tree in zip(names, trees)}
+        counts = {name: operations(tree) if counted else None for name, tree in zip(names, trees)}
         units = WITH_SLIDES if "slide" in coordinates.all_kinds else BLOCK_UNITS
         for (quantity, pair), arrays in found.items():
             check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts, units[quantity])

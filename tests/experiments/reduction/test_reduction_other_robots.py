@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from models import PATHS, random_tree
+from models import PATHS, chain, random_tree
 
 import tmt
 from compare.engines.mujoco import engine, read
@@ -58,6 +58,11 @@ def test_of_many_joints_some_subsets_are_locked_and_that_is_said():
     assert 6 <= len({check.scene for check in result.checks}) <= 8 and all(check.passed for check in result.checks)
     assert "Of the subsets of" in result.notes[0]
     assert all(row["operations_whole"] is None for row in result.tables["reduction_subsets"])
+
+
+def test_of_hundreds_of_joints_none_is_locked_and_that_is_said():
+    result = blocks(setup_of(chain(60)))
+    assert not result.checks and "No joints are locked" in result.notes[0]
 
 
 def test_a_wrong_lock_of_a_ball_is_seen():
