@@ -38,6 +38,16 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     assert alone.ranges == (None,) * 3 and alone.is_read
 
 
+def test_no_keyframe_takes_the_place_of_another_posture():
+    names = ["qpos0", "key qpos0", "key key qpos0", "key middle", "middle"]
+    keys = {name: np.full(3, 0.1 * (i + 1)) for i, name in enumerate(names)}
+    poses = robot_of(reading_of(tmt.ARM, keyframes=keys), "my.xml").poses
+    assert len(poses) == 6 and not poses["qpos0"].any()
+    assert poses["key qpos0"].tolist() == keys["key qpos0"].tolist()
+    assert poses["key key key qpos0"].tolist() == keys["qpos0"].tolist()
+    assert poses["key key middle"].tolist() == keys["middle"].tolist()
+
+
 def test_quaternions_of_one_turn_are_one_posture():
     reading = read(PATHS["pendulum_ball"])
     keys = {"turned": -np.array(reading.qpos0)}

@@ -58,7 +58,12 @@ def named_positions(reading: Reading) -> dict[str, tuple]:
         if known and kind != "ball":
             middle[at] = np.mean(known)
     own = {"qpos0": reading.qpos0, "middle": middle}
-    keys = {f"key {name}" if name in own else name: q for name, q in reading.keyframes.items()}
+    keys = {}
+    for name, q in reading.keyframes.items():
+        apart = name
+        while apart in own or (apart != name and apart in reading.keyframes):  # no key may take another's place
+            apart = f"key {apart}"
+        keys[apart] = q
     found = {}
     for name, q in (keys | own).items():
         if not any(np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in found.values()):

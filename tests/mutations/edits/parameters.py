@@ -18,7 +18,7 @@ EDITS = (
     Edit("parameters", "causes_in", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
     Edit("parameters", "cause", "[f'{number:.7g} {unit}'.rstrip() for number in (stated, found)]",
          "[f'{number:.7g} {unit}'.rstrip() for number in (found, stated)]", "stated and compiled are exchanged"),
-    Edit("parameters.file", "tolerance_of", "max(FACTOR * EPS, number.precision)", "1e-3", "a number of a file may be off by a thousandth"),
+    Edit("parameters.file", "tolerance_of", "max(FACTOR * EPS, number.precision)", "1e-3", "a number may be off by a thousandth"),
     Edit("parameters.file", "tolerance_of", "np.trace(number.stated)", "100 * np.trace(number.stated)", "a tensor by more"),
     Edit("parameters.file", "rows_of_file", "known and not number.why", "known and number.why",
          "what an option asks for is compared, and nothing else"),
