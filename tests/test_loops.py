@@ -19,7 +19,7 @@ SEEDS = 1, 2, 3
 
 
 def branched(seed, bodies=4):
-    """A tree with every kind of joint, a free body that stands alone, springs and (of four bodies) a branch inside; its random numbers."""
+    """A tree with every kind of joint, a lone free body, springs and, of four bodies, a branch inside; its random numbers."""
     for number in range(100 * seed, 100 * seed + 100):
         rng = np.random.default_rng(number)
         tree = tree_of_kinds(rng, bodies)
@@ -120,7 +120,7 @@ def test_the_error_of_a_step_is_estimated_as_stated():
     rates, changes = stepping.stage_slopes(slope, q.tolist(), qd.tolist(), dt, tree.coordinates)
     new_q, new_qd, *estimates = stepping.attempt(slope, q.tolist(), qd.tolist(), dt, tree.coordinates)
     sizes = []
-    for kind, at, by in tree.coordinates.joints:
+    for kind, at, _ in tree.coordinates.joints:
         sizes += [1.0] * 3 if kind == "ball" else [max(abs(q[at.start]), abs(new_q[at.start]))]
     sizes += np.maximum(np.abs(qd), np.abs(new_qd)).tolist()
     squares = [
