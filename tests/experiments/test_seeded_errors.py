@@ -107,8 +107,12 @@ def failing(setup, experiment) -> list[str]:
 
 
 def assert_named(setup, expected):
+    found = [
+        name
+        for experiment in dict.fromkeys(named.split()[0] for named in expected)
+        for name in failing(setup, experiment)
+    ]
     for named in expected:
-        found = failing(setup, named.split()[0])
         assert any(name.startswith(named) for name in found), f"{named!r} did not fail; these did: {found}"
 
 
