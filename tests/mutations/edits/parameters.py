@@ -20,7 +20,7 @@ EDITS = (
          "[f'{number:.7g} {unit}'.rstrip() for number in (found, stated)]", "stated and compiled are exchanged"),
     Edit("parameters.file", "tolerance_of", "max(FACTOR * EPS, number.precision)", "1e-3",
          "a number of a file may be off by a thousandth"),
-    Edit("parameters.file", "rows_of_file", "'asked_by': number.why", "'asked_by': ''", "nothing asks for a change"),
+    Edit("parameters.file", "rows_of_file", "number.why", "''", "nothing asks for a change", nth=1),
     Edit("parameters.file", "tolerance_of", "np.trace(number.stated)", "100 * np.trace(number.stated)", "a tensor by more"),
     Edit("parameters.file", "rows_of_file", "known and not number.why", "known and number.why",
          "what an option asks for is compared, and nothing else"),
