@@ -121,10 +121,20 @@ def runs_on_terminals(plain, umlauts):
 
 
 def jobs(folder) -> list[tuple]:
-    """All of these, in the order in which the tests ask for them."""
+    """All of these and some of test modules, which are collected by now, in the order in which the tests ask for them."""
+    from test_reduction import leg
+    from test_seeded_errors import IN_THE_MJCF, failing_in
+    from test_speed_run import with_and_without
+    from test_stability_small import SPARE, lacking
+
     return [
-        *((of_arm, name) for name in ("reduction", "stability")),
+        (of_arm, "reduction"),
+        (leg,),
+        (with_and_without,),
+        (of_arm, "stability"),
         (on_the_moon, "stability"),
+        *((lacking, name) for name in SPARE),
+        *((failing_in, name) for name in IN_THE_MJCF),
         *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
         (runs_on_terminals, *terminal_folders(folder)),
         (report_of_arm,),
