@@ -11,8 +11,9 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
-from runs import ROOT, on_terminal, readable_lines, words
+from runs import ROOT, readable_lines, words
 from sections import GOOD, section
+from small_runs import quick_run
 
 from compare import __main__ as command_line
 from compare import experiment
@@ -25,10 +26,10 @@ from compare.robots.arm import ARM
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory):
-    """One quick run of everything, on a terminal, from a folder that is not the project's."""
-    folder = tmp_path_factory.mktemp("anywhere")
-    return on_terminal(["all", "--quick"], 80, "xterm", folder), folder
+def ran(beside):
+    """One quick run of everything, and its folder."""
+    folder = beside.folder / "anywhere"
+    return beside.result(quick_run, folder), folder
 
 
 def test_all_passes_and_says_so_at_a_glance(ran):

@@ -56,6 +56,16 @@ def test_numbers_that_an_option_changes_are_no_checks_and_are_said():
     assert units["lift", "damping"] == "N s/m" and units["turn", "damping"] == "N m s/rad"
 
 
+@pytest.mark.parametrize("source", [TOTAL, *PATHS.values()], ids=["total", *PATHS])
+def test_a_number_that_is_not_the_stated_one_has_what_asked_for_it(source):
+    rows = [row for row in result_of(source).rows if row["of"] != "file"]
+    assert rows and all(isinstance(row["asked_by"], str) for row in rows)
+    changed = [
+        row for row in rows if row["stated"] is None or abs(row["difference"]) > 1e-5 * max(1, abs(row["stated"]))
+    ]
+    assert all(row["asked_by"] for row in changed) and (source is not TOTAL or changed)
+
+
 def test_a_number_that_differs_for_no_reason_is_a_failed_check_and_a_cause():
     result = Result("parameters")
     number = Stated("arm", "mass", 2.0, 2.5, "")

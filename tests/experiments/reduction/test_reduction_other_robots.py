@@ -212,4 +212,4 @@ def test_the_claim_has_what_the_scenes_have(gripper):
 def test_joints_of_which_nothing_is_decided_make_a_sentence(gripper):
     held = next(case for case in gripper.robot.cases if case.is_held)
     words = needs.need_in_words(held, Needed((), {}, held.joints))
-    assert "all 4 joints: of shoulder, wrist, left, right it is not known" in words
+    assert "all 4 joints: of shoulder, wrist, left, right it is not decided" in words
