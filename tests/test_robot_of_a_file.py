@@ -60,7 +60,7 @@ def test_quaternions_of_one_turn_are_one_posture():
 def test_its_name_is_the_models_or_the_files():
     assert robot_of(reading_of(tmt.ARM), "folder/my arm.xml").name == "my arm"
     named = robot_of(reading_of(tmt.ARM, name="lift"), "folder/my arm.xml")
-    assert (named.name, named.described, named.mjcf) == ("lift", "folder/my arm.xml", Path("folder/my arm.xml"))
+    assert (named.name, named.described, named.mjcf) == ("lift", "my arm.xml", Path("folder/my arm.xml"))
 
 
 @pytest.mark.parametrize("name", PATHS)

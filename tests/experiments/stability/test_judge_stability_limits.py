@@ -111,7 +111,7 @@ def test_what_decays_is_a_node_or_a_focus(rates, swings, name):
     values = np.array([complex(-rate, sign * swings) for rate in rates for sign in (1, -1)])
     at = SimpleNamespace(
         kind="centre", modes=(values, None), small=1e-6, without_stiffness=np.zeros(4, bool), name="low",
-        tree=SimpleNamespace(damping=(1.0,)), case=SimpleNamespace(robot=SimpleNamespace(is_read=True)),
+        tree=SimpleNamespace(damping=(1.0,)), case=SimpleNamespace(robot=SimpleNamespace(is_read=True, positions=())),
     )  # fmt: skip
     assert equilibria.kind_in_words(at).startswith(f"Low, held, is {name}: ")
 
