@@ -15,12 +15,13 @@ FILES = sorted((ROOT / "compare").rglob("*.py"))
 # what each part of compare may import of the others; of its own part: anything that makes no circle
 DIRECTIONS = {
     "coordinates": {"tmt"},
-    "case": {"tmt", "coordinates"},
+    "given": set(),
+    "case": {"tmt", "coordinates", "given"},
     "joint_map": {"coordinates", "judge"},
     "diagnosis": {"tmt", "coordinates", "joint_map", "judge"},
     "states": {"tmt", "robots", "case"},
     "robots": {"tmt", "case"},
-    "scene_file": {"case", "robots"},
+    "scene_file": {"case", "given", "robots"},
     "own_file": {"process"},
     "reference": {"robots", "engines", "process", "case", "joint_map", "own_file"},
     "engines": {"tmt", "case", "coordinates", "joint_map"},
@@ -29,7 +30,7 @@ DIRECTIONS = {
     "process": set(),
     "report": {"judge", "process"},
     "setup": {"tmt", "case", "states", "robots", "engines"},
-    "experiments": {"tmt", "truth", "engines", "judge", "case", "states", "robots", "setup"},
+    "experiments": {"tmt", "truth", "engines", "judge", "given", "case", "states", "robots", "setup"},
     "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
     "__main__": {
         "case",
