@@ -175,15 +175,17 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
+                of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
-                sections, causes = experiment.examine(asked, setup, folder, terminal, workers)
+                sections, causes, needless = experiment.examine(asked, setup, folder, terminal, workers)
             parts, unknown = Parts(), "No verdict could be made."
-            outcome = sections, len(EXPERIMENTS), causes, compared.compared
+            outcome = sections, len(EXPERIMENTS) - len(needless), causes, compared.compared
             words = parts.made("the verdict", unknown, verdict.verdict, *outcome)
+            reasons |= needless
             origin["seconds"] = round(time.perf_counter() - started, 1)
             report = verdict.Report(sections, robot, origin, words, causes, list(reasons.items()), compared)
             files.write(folder, report, parts)

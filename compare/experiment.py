@@ -25,18 +25,21 @@ ASKED_BY = {
     "mass": ("mass_matrix",),
     "gravity": ("gravity", "bias", "energy"),
 }
+DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
+NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
 
 def examine(
     names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers
-) -> tuple[list[Section], list[dict]]:
-    """The section of each experiment, its figures drawn, and the causes of what fails.
+) -> tuple[list[Section], list[dict], dict[str, str]]:
+    """The section of each experiment, its figures drawn, the causes of what fails, and what is skipped with its reason.
 
-    An experiment that raises is one failed check; the others go on.
+    An experiment that raises is one failed check; the others go on. A diagnosis beside other experiments is made where one of
+    these fails.
     """
     (folder / "figures").mkdir()
-    sections, drawings, causes = [], [], []
+    sections, drawings, causes, reasons = [], [], [], {}
     own, said = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
     crashed = {
@@ -45,6 +48,11 @@ def examine(
         if hasattr(experiment, "begin")
     }
     for name, experiment in modules.items():
+        asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
+        if name == "diagnosis" and len(modules) > 1 and not asked_for:
+            reasons[name] = NOTHING_FAILED
+            terminal.say(f"{name:<13} skipped: {NOTHING_FAILED}")
+            continue
         setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
@@ -54,14 +62,14 @@ def examine(
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
-        new = find_causes(setup) if failures(sections[-1:])[0] and not failures(sections[:-1])[0] else []
-        causes += new
+        new = new_causes(setup, sections, causes)
+        causes = new + causes
         say_outcome(terminal, sections[-1], time.perf_counter() - started, new)
     setup.progress("figures")
     for section, drawing in zip(sections, drawings):
         if drawing is not None:
             take_figures(terminal, section, drawing)
-    return sections, causes
+    return sections, causes, reasons
 
 
 def add_problems(result: Result, problems: Sequence, said: set) -> None:
@@ -82,6 +90,30 @@ def own_words(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
     robot = setup.robot
     title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if robot.own else experiment.TITLE
     return title, experiment.claim(robot), experiment.tolerance(robot)
+
+
+def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict]) -> list[dict]:
+    """The causes that are sought because the last of these sections is the first that fails, or the first of DIAGNOSED.
+
+    Where numbers are stated, a number that is read back as another one is the cause, and nothing else is sought.
+    """
+    failed = [section.name for section in sections if failures([section])[0]]
+    if not failed or failed[-1] != sections[-1].name:
+        return []
+    of_numbers = find_causes(setup) if len(failed) == 1 and not setup.robot.own else []
+    asks = failed[-1] in DIAGNOSED and not any(name in DIAGNOSED for name in failed[:-1])
+    if failed[-1] == "diagnosis":
+        asks = not known
+    if not asks or ((known or of_numbers) and not setup.robot.is_read) or setup.faults:
+        return of_numbers
+    return of_values(setup, [cause["place"] for cause in known]) + of_numbers
+
+
+def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
+    """What explains the values of Mbar, h and accelerations, but for places that are known as causes."""
+    diagnosis = module("diagnosis")
+    found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
+    return [diagnosis.record(cause) for cause in found.causes if cause.place not in known] if found else []
 
 
 def find_causes(setup: Setup) -> list[dict]:
@@ -127,7 +159,7 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
     lines = [f"  CAUSE {cause['text']}" for cause in causes]
-    if not (causes and section.name == "parameters"):  # there the causes are the checks
+    if not (causes and section.name in ("parameters", "diagnosis")):  # there the causes are the checks
         lines += [f"  FAIL {check}" for check in failed]
     for line in lines[:SHOWN]:
         terminal.say(line, "red")

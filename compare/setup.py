@@ -41,6 +41,7 @@ class Setup:
     progress: Callable = nothing  # says how far long work has come
     background: dict = field(default_factory=dict)  # work under way, by its name
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
+    faults: bool = False  # diagnosis: of made faults, in place of the robot's own differences
     size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
 
     @property

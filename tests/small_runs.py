@@ -57,7 +57,7 @@ def of_crane():
         robot = crane(folder)
         setup = experiment.Setup.small(robot, experiment.engines(load(robot.mjcf, robot.tree)))
         reasons = {name: reason for name in EXPERIMENTS if (reason := skipped(name, robot))}
-        sections, causes = experiment.examine(
+        sections, causes, _ = experiment.examine(
             [n for n in EXPERIMENTS if n not in reasons], setup, folder, lines, Here()
         )
         words = verdict.verdict(sections, len(EXPERIMENTS), causes)

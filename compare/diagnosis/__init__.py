@@ -6,6 +6,7 @@ of them. The search ends after the first rank in which something explains the va
 that does: they cannot be told apart.
 """
 
+import time
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -13,7 +14,9 @@ import numpy as np
 
 import tmt
 
-from .fit import Fitted, Search
+from ..judge.scale import EPS, FACTOR
+from ..judge.words import listed
+from .fit import Fitted, OutOfTime, Search
 from .model import Equations
 from .places import places
 from .slips import slips
@@ -23,6 +26,8 @@ from .words import Cause, of_fitted, of_variant
 STATES = 24
 FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
+SHOWN = 6  # entries in a sentence
+NEAREST = 12  # explanations that are kept though they do not explain
 BESIDE = 4  # conventions beside which a number is fitted
 
 
@@ -33,6 +38,10 @@ class Diagnosis(NamedTuple):
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
     left: float = 0.0  # of the difference that the nearest single number, term or pair leaves, a share
     digits: float = np.inf  # to which the values agree
+    entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[0][1]"
+    compared: int = 0  # entries in all
+    nearest: tuple[tuple[str, float], ...] = ()  # single explanations that leave least, and what they leave, a share
+    searched: str = ""  # what there was time for; "": everything
 
     @property
     def sentence(self) -> str:
@@ -42,11 +51,25 @@ class Diagnosis(NamedTuple):
         if self.causes:
             ties = "" if len(self.causes) == 1 else f" ({len(self.causes)} explanations that cannot be told apart)"
             return f"{'; or '.join(cause.text for cause in self.causes[:4])}{ties}."
+        if self.searched:
+            return f"Nothing of what there was time for explains this ({self.searched}). {self.where}"
         rounded = ""
         if self.digits >= 2.0:
-            rounded = f" The values agree to {int(self.digits)} digits: rounded constants would look like this."
+            rounded = (
+                f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
+            )
         share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
-        return f"No single number or term explains this, nor do two: {share} is left.{rounded}"
+        return f"No single number or term explains this, nor do two: {share} is left. {self.where}{rounded}"
+
+    @property
+    def where(self) -> str:
+        """Which entries differ."""
+        if len(self.entries) == self.compared:
+            return "Every entry differs."
+        if len(self.entries) > SHOWN:
+            shown = ", ".join(self.entries[:SHOWN])
+            return f"{len(self.entries)} of {self.compared} entries differ, the others agree: {shown}, ..."
+        return f"{listed(self.entries)} {'differs' if len(self.entries) == 1 else 'differ'}, the others agree."
 
 
 def packed(mass_matrix: np.ndarray | None, bias: np.ndarray | None, nv: int, states: int) -> np.ndarray:
@@ -58,30 +81,56 @@ def packed(mass_matrix: np.ndarray | None, bias: np.ndarray | None, nv: int, sta
 
 
 def diagnose(
-    tree: tmt.Tree, names: Sequence[str], q: np.ndarray, qd: np.ndarray, given: np.ndarray, tolerance: np.ndarray
+    tree: tmt.Tree,
+    names: Sequence[str],
+    q: np.ndarray,
+    qd: np.ndarray,
+    given: np.ndarray,
+    tolerance: np.ndarray,
+    seconds: float = np.inf,
 ) -> Diagnosis:
     """What explains given values that differ from those of a tree's equations.
 
-    names: of the joints. q: (states, nq), qd: (states, nv). given, tolerance: (states, entries), see `packed`.
+    names: of the joints. q: (states, nq), qd: (states, nv). given, tolerance: (states, entries), see `packed`. seconds: for the
+    search of numbers, terms and pairs.
     """
-    equations = Equations(tree, q, qd)
-    search = Search(equations, places(equations), given, tolerance)
+    equations, end = Equations(tree, q, qd), time.monotonic() + seconds
+    search = Search(equations, places(equations), given, tolerance, end)
     if not search.differs:
         return Diagnosis(False)
-    names, singles = tuple(names), search.singles()
+    differing = np.abs(search.off).max(axis=0) > 1.0
+    about = {
+        "entries": tuple(named(entry) for entry, off in zip(equations.entries, differing) if off),
+        "compared": int(search.known.any(axis=0).sum()),
+    }
+    names, singles, searched = tuple(names), [], ""
+    try:
+        singles = search.singles()
+    except OutOfTime:
+        searched = f"in {seconds:g} s options and conventions of joints, no numbers"
     fitted = [one for one in singles if one.ratio <= 1.0]
-    for rank, found in enumerate(ranks(search, names, fitted), start=1):
-        causes = list(found)
-        if causes:
-            return Diagnosis(True, tuple(cause._replace(tied=len(causes) - 1) for cause in causes))
+    nearest = sorted(singles, key=lambda one: one.left)[:NEAREST]
+    about["nearest"] = tuple((one.places[0].name, one.left) for one in nearest)
+    try:
+        for found in ranks(search, names, fitted, not searched):
+            causes = list(found)
+            if causes:
+                return Diagnosis(True, tuple(cause._replace(tied=len(causes) - 1) for cause in causes), **about)
+    except OutOfTime:
+        searched = f"in {seconds:g} s single numbers and terms, not every two of them"
     left = min([one.left for one in (*singles, *search.pair_fits)], default=1.0)
-    known = search.known
-    apart = np.abs(search.off[known]).max() * np.finfo(float).eps * 64
-    return Diagnosis(True, (), left, float(-np.log10(apart)))
+    apart = np.abs(search.off[search.known]).max() * EPS * FACTOR
+    return Diagnosis(True, (), left, float(-np.log10(apart)), searched=searched, **about)
 
 
-def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted]) -> Iterable[Iterable[Cause]]:
-    """The explanations of each rank, found when they are asked for."""
+def named(entry: tuple) -> str:
+    """An entry of Mbar or h, "M[0][1]": of Mbar the one above the diagonal stands for both."""
+    kind, *indices = entry
+    return kind + "".join(f"[{i}]" for i in sorted(indices))
+
+
+def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted], pairs: bool) -> Iterable[Iterable[Cause]]:
+    """The explanations of each rank, found when they are asked for; pairs: whether there is time for the last."""
     equations = search.equations
     of_joints = list(conventions(equations, names))
     explaining = explained(search, options(equations)) + explained_by_joints(search, of_joints)
@@ -93,6 +142,8 @@ def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted]) -> 
         *(of_fitted(one, 2) for one in singles if one.places[0].rank == 2),
         *(of_variant(variant, left) for variant, left in explained(search, slips(equations))),
     ]
+    if not pairs:
+        return
     found = [of_variant(variant, left) for variant, left in explained_by_joints(search, list(both(equations, names)))]
     found += [of_fitted(one, 3) for one in search.pairs() if one.ratio <= 1.0]
     simple = [variant for variant in (*options(equations), *of_joints) if variant.is_simple]
@@ -130,7 +181,7 @@ def beside(search: Search, variants: Sequence[Variant]) -> list[Cause]:
     tried = []
     here = [place for place in search.places if place.column is None]
     for variant in variants:
-        other = Search(variant.equations(), here, search.given, search.tolerance)
+        other = Search(variant.equations(), here, search.given, search.tolerance, search.end)
         tried.append((other.promise / search.size, len(tried), variant, other))
     found = []
     for left, _, variant, other in sorted(tried, key=lambda one: one[:2])[:BESIDE]:

@@ -1,5 +1,6 @@
 """Which change of one place, or of two, explains equations: least squares over the states, many places at once."""
 
+import time
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import combinations
@@ -12,8 +13,11 @@ from .places import Place
 
 ROUNDS = 25  # of a search from one start
 SETTLED = 1e-14  # a step of a place, of its size
+SEEN = 1e-100  # of the square of a derivative, in tolerances
+LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
 POLISHED = 16  # places with a quadratic influence that are fitted
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
+ROWS = 256  # of changes in one evaluation
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # further starts for the zero of a hinge
 
 
@@ -26,14 +30,26 @@ class Fitted(NamedTuple):
     left: float  # of the difference, a share: root of the sum of the squares
 
 
+class OutOfTime(Exception):
+    """A search has taken the time that it was given."""
+
+
 class Search:
     """Changes of places of the right equations that come closest to given values.
 
     given: (states, entries) as `Equations.values`; NaN where nothing is given. tolerance: of each entry, (states, entries).
+    end: of time.monotonic(), when the search is over: OutOfTime.
     """
 
-    def __init__(self, equations: Equations, places: Sequence[Place], given: np.ndarray, tolerance: np.ndarray):
-        self.equations, self.places = equations, list(places)
+    def __init__(
+        self,
+        equations: Equations,
+        places: Sequence[Place],
+        given: np.ndarray,
+        tolerance: np.ndarray,
+        end: float = np.inf,
+    ):
+        self.equations, self.places, self.end = equations, list(places), end
         self.given, self.tolerance = given, tolerance
         self.known = np.isfinite(given)
         self.weight = np.where(self.known, 1.0 / tolerance, 0.0)
@@ -52,6 +68,12 @@ class Search:
 
     def values(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Of each row of changes, (rows, states, entries): x (rows, k), of the places which (rows, k)."""
+        if len(which) > ROWS:
+            return np.concatenate(
+                [self.values(which[k : k + ROWS], x[k : k + ROWS]) for k in range(0, len(which), ROWS)]
+            )
+        if time.monotonic() > self.end:
+            raise OutOfTime
         changes, columns = {}, []
         for row in range(len(which)):
             for place, change in zip(which[row], x[row]):
@@ -80,7 +102,7 @@ class Search:
             J = J * size[moving][:, :, None]
             normal = np.einsum("rim,rjm->rij", J, J)
             diagonal = np.einsum("rii->ri", normal)
-            diagonal = np.where(diagonal > 0.0, diagonal, 1.0)  # a place that nothing is seen of stays
+            diagonal = np.where(diagonal > SEEN, diagonal, 1.0)  # a place that nothing is seen of stays
             scaled = normal / np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
             scaled += np.eye(x.shape[1]) * damping[moving][:, None, None]
             down = np.einsum("rim,rm->ri", J, left[moving].reshape(len(moving), -1)) / np.sqrt(diagonal)
@@ -91,7 +113,7 @@ class Search:
             better = sums < best[moving]
             now = moving[better]
             x[now], left[now], best[now] = tried[better], after[better], sums[better]
-            damping[moving] = np.clip(np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), 1e-16, 1e8)
+            damping[moving] = np.clip(np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), LEAST, 1e8)
             going = (np.abs(step).max(axis=1) > SETTLED) & (damping[moving] < 1e6)
             moving = moving[going]
             if not len(moving):

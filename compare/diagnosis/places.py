@@ -23,6 +23,7 @@ TOGETHER = {  # terms that are often left out together, and what they are called
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
 EVERY = "every body"
+MOST_SPEEDS = 12  # of which every product has its coefficients: there are nv^2 (nv + 1) / 2
 
 
 class Place(NamedTuple):
@@ -70,7 +71,7 @@ def numbers(equations: Equations) -> list[Place]:
             add("number", f"inertia {name} of {body}", "inertia", (b, i, j), "kg m2", size, *mirrored)
     carried = [[b for b, joint in enumerate(tree.body_hinge) if joint == i] for i in range(len(tree.parent))]
     following = [[j for j, parent in enumerate(tree.parent) if parent == i] for i in range(len(tree.parent))]
-    for i, (joint, (kind, at, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
+    for i, (joint, (kind, _, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
         for k, axis in enumerate(XYZ):
             add("number", f"offset {axis} of {joint}", "offset", (i, k), "m", length)
             if kind != "slide":
@@ -116,7 +117,7 @@ def coefficients(equations: Equations) -> list[Place]:
         Place(2, "coefficient", f"M[{i}][{j}]", 1.0, "times", 1.0, entry=at["M", i, j], column=values["M", i, j])
         for i, j in zip(*map(np.ndarray.tolist, equations.triangle))
     ]
-    of_rates, weight = products_of_rates(equations)
+    of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, at_rest(equations))
     for i in range(nv):
         found.append(
             Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i])
@@ -127,6 +128,12 @@ def coefficients(equations: Equations) -> list[Place]:
             column = column[:, i] * equations.qd[:, j] * equations.qd[:, k]
             found.append(Place(2, "coefficient", name, 1.0, "times", 1.0, entry=at["h", i], column=column))
     return [place for place in found if np.abs(place.column).max() > 0.0 and len(place.column) == states]
+
+
+def at_rest(equations: Equations) -> np.ndarray:
+    """h without rates, (states, nv)."""
+    still = Equations(equations.tree, equations.q, np.zeros_like(equations.qd))
+    return still.values()[0][:, -equations.nv :]
 
 
 def products_of_rates(equations: Equations) -> tuple[dict, np.ndarray]:

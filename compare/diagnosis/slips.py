@@ -10,7 +10,7 @@ import numpy as np
 from tmt import method
 
 from .model import Equations, Path
-from .places import EVERY
+from .places import EVERY, at_rest
 from .variants import Variant
 
 
@@ -105,7 +105,7 @@ def slips(equations: Equations) -> Iterator[Variant]:
                 lambda i=swapped: parts.values(inertia=i),
             )
         yield slip(f"CoM of {body}", "where it is", "at the joint", lambda b=b: com_at_joint(equations, b))
-    for i, (joint, (kind, _, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
+    for joint, (kind, _, by) in zip(tree.hinge_names, tree.coordinates.joints):
         if kind != "ball":
             stated = np.array(tree.axis[by.start])
             for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0)):
@@ -155,12 +155,6 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
     for name, forms in named.items():
         for explains, *factors in forms:
             yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, lambda f=factors: values(*f))
-
-
-def at_rest(equations: Equations) -> np.ndarray:
-    """h without rates, (states, nv)."""
-    still = Equations(equations.tree, equations.q, np.zeros_like(equations.qd))
-    return still.values()[0][:, -equations.nv :]
 
 
 def slip(name: str, stated: str, explains: str, values: Callable[[], np.ndarray]) -> Variant:

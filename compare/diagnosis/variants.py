@@ -142,8 +142,17 @@ def both(equations: Equations, names: tuple[str, ...]) -> Iterator[Variant]:
             for turned in combinations(straight, count):
                 joints = [Joint(name, -1.0 if name in turned else 1.0) for name in order]
                 made = JointMap(Coordinates(names, tree.kind), joints)
-                yield Variant(3, "order and sign", "order and senses of the joints", ", ".join(names),
-                              ", ".join(map(str, joints)), lambda m=made: Equations(tree, equations.q, equations.qd, m), made, False)  # fmt: skip
+                stated, explains = ", ".join(names), ", ".join(map(str, joints))
+                yield Variant(
+                    3,
+                    "order and sign",
+                    "order and senses of the joints",
+                    stated,
+                    explains,
+                    lambda m=made: Equations(tree, equations.q, equations.qd, m),
+                    made,
+                    False,
+                )
 
 
 def values_of(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:

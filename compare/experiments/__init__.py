@@ -18,6 +18,7 @@ EXPERIMENTS = {
     "gravity": "the torque that holds each posture",
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
     "trajectory": "five seconds of motion, the same scheme in tmt for every integrator",
+    "diagnosis": "what explains a difference: one number, one term, a convention; alone, without a file: made faults",
     "speed": "time against error: every method, every step, and what to use",
     "stability": "step limits, departure from unstable postures, where each method fails",
     "reduction": "what each scene needs of the model, and what the rest costs",

@@ -72,7 +72,7 @@ def verdict(
         text = f"{compared} do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
         if causes:
             more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
-            others = sum(check.experiment != "parameters" for check in differing)
+            others = sum(check.experiment not in ("parameters", "diagnosis") for check in differing)
             further = "further " if len(differing) > others else ""
             follow = f" {others} {further}checks fail as a consequence." if others else ""
             text += f"Cause: {causes[0]['text']}{more}.{follow}"

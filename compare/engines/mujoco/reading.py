@@ -23,7 +23,7 @@ from .values import refuse_values
 class Reading:
     """What a file is to be compared as."""
 
-    source: Path | str
+    source: Path | str | None  # a Path or MJCF text; None: a model that was compiled elsewhere
     name: str  # of the model, "": it has none that can stand in a line
     tree: tmt.Tree
     features: tuple[Feature, ...]  # of the file, in a fixed order; those that it has
@@ -40,11 +40,19 @@ class Reading:
     model: mujoco.MjModel = field(repr=False, compare=False)
 
 
-def read(source: Path | str) -> Reading:
-    """The reading of an MJCF file (a Path) or of MJCF text; ModelError, in one line, where it cannot be compared."""
+def read(source: Path | str | mujoco.MjModel) -> Reading:
+    """The reading of an MJCF file (a Path), of MJCF text or of a compiled model, of which a copy is taken.
+
+    ModelError, in one line, where it cannot be compared.
+    """
     try:
         refuse_callbacks()
-        model, warnings = compiled(source, lambda: without_fusing(editable(source)))
+        if isinstance(source, mujoco.MjModel):
+            model, warnings, source = mujoco.MjModel.__copy__(source), (), None
+        elif isinstance(source, Path | str):
+            model, warnings = compiled(source, lambda: without_fusing(editable(source)))
+        else:
+            raise ModelError(f"a {type(source).__name__} cannot be read; a path, MJCF text or an MjModel is expected")
         if not model.njnt:
             raise ValueError("it has no joint; at least one is expected")
         refuse(model)

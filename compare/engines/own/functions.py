@@ -84,6 +84,12 @@ def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Callable]:
     return {name: partial(getattr(tmt, OF_A_TREE.get(name, name)), model=tree) for name in ARGUMENTS}
 
 
+def is_function(value: object) -> bool:
+    """Whether a value is brought as a function, or in symbols; else it is numbers."""
+    of_pair = isinstance(value, tuple | list) and len(value) == 2 and hasattr(value[0], "free_symbols")
+    return callable(value) or hasattr(value, "free_symbols") or of_pair
+
+
 def function_of(name: str, value: object, symbols: object, coordinates: Coordinates) -> Callable:
     """One quantity as a function: as it is, or of a SymPy matrix, or of a pair of one and its symbols."""
     if callable(value) and not hasattr(value, "free_symbols"):

@@ -53,7 +53,7 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
             q = coordinates.random(rng, states)
             v = rng.uniform(-10.0, 10.0, (states, coordinates.nv))
             case = robot.case(words_of(locked), posture=posture_of(coordinates, q[0]), locked=locked)
-            for quantity, pair, apart, scale in differences(setup, case, q, v):
+            for quantity, pair, apart, scale in sub_block_differences(setup, case, q, v):
                 found.setdefault((quantity, pair), []).append((apart, scale))
         trees = robot.tree, robot.tree.lock(at_zero(robot.tree, locked)), case.tree
         names = "operations_whole", "operations_locked_at_zero", "operations_locked_at_angles"
@@ -125,7 +125,7 @@ def check_blocks(
     )
 
 
-def differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Iterator[tuple]:
+def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Iterator[tuple]:
     """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it.
 
     Of each state the difference that is closest to its tolerance, and its scale, as `mass` and `acceleration` have it.

@@ -1,0 +1,199 @@
+"""What a diagnosis says of made faults: a row for each, and counts by outcome."""
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+import tmt
+
+from ...diagnosis import STATES, Diagnosis, diagnose, packed
+from ...judge.check import Result
+from ...judge.entries import Entries
+from ...judge.scale import EPS, FACTOR
+from ...robots.arm import ARM
+from ...robots.six_hinges import SIX_HINGES
+from ...setup import Setup
+from .faults import Fault, by_composite, fault_list, values_of_fault
+from .generator import generated
+
+SHOWN = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
+PART = 12  # faults that a process is handed at once
+SAMPLE = 60  # faults of a quick run
+SEARCHED = 10.0  # s of one fault
+OTHERS = 3  # explanations that a reason names
+AT = {"search": 3, "again": 4}  # seeds of states
+
+
+def rows_of_faults(setup: Setup) -> Result:
+    """A row for each fault in tables/faults.csv; counts by outcome; a check that no outcome is wrong."""
+    result = Result("diagnosis", shown=SHOWN)
+    faults = made_faults()
+    if setup.size != "full":
+        faults = sampled(faults, setup.of(0, SAMPLE, SAMPLE // 4))
+    parts = [faults[k : k + PART] for k in range(0, len(faults), PART)]
+    table = []
+    for k, part in enumerate(setup.map(rows_of_part, parts)):
+        setup.progress(f"diagnosis: {min(PART * (k + 1), len(faults))} of {len(faults)} faults")
+        table += part
+    judge_faults(result, table)
+    return result
+
+
+def made_faults() -> list[Fault]:
+    """The list, and as many of the generator; neighbours take about as long."""
+    listed = [*fault_list("arm", ARM.tree, True), *fault_list("six hinges", SIX_HINGES, False)]
+    return [fault for pair in zip(listed, generated(len(listed))) for fault in pair]
+
+
+def sampled(faults: Sequence[Fault], count: int) -> list[Fault]:
+    """So many faults, of every kind and both sources."""
+    chosen = np.random.default_rng(2).permutation(len(faults))[:count]
+    return [faults[k] for k in sorted(chosen)]
+
+
+def judge_faults(result: Result, table: list[dict]) -> None:
+    """Counts, sentences and checks of rows of faults."""
+    result.tables["faults"] = table
+    groups = {}
+    for row in table:
+        groups.setdefault((row["robot"], row["kind"], row["source"], row["visible"], row["outcome"]), []).append(row)
+    for (robot, kind, source, visible, outcome), rows in groups.items():
+        about = {"robot": robot, "kind": kind, "source": source, "visible": visible, "outcome": outcome}
+        result.rows.append(about | {"faults": len(rows), "longest_s": max(row["seconds"] for row in rows)})
+    kinds = result.curves["outcomes"] = {}
+    for row in table:
+        kinds.setdefault(row["kind"], Counter())[row["outcome"] if row["visible"] else "invisible"] += 1
+    for source in ("list", "generator"):
+        rows = [row for row in table if row["source"] == source]
+        seen = Counter(row["outcome"] for row in rows if row["visible"])
+        wrong = sum(row["outcome"] == "wrong" for row in rows)
+        whose = {"list": "of the list", "generator": "of the generator"}[source]
+        result.check("made faults", f"{whose}: explained by something else", wrong, 0.0, "faults", rule="equal")
+        counts = ", ".join(f"{seen[outcome]} {outcome}" for outcome in ("right", "tied", "none", "wrong"))
+        unseen = sum(not row["visible"] for row in rows)
+        times = [row["seconds"] for row in rows] or [0.0]
+        result.notes.append(
+            f"Faults {whose}: {len(rows)}, of which {sum(seen.values())} change M or h: {counts}; {unseen} change neither at "
+            f"any state. The longest diagnosis took {max(times):.1f} s."
+        )
+
+
+def rows_of_part(faults: Sequence[Fault]) -> list[dict]:
+    return [row_of(fault) for fault in faults]
+
+
+def row_of(fault: Fault) -> dict:
+    """What a diagnosis says of one fault."""
+    q, qd = states_of(fault.tree, AT["search"])
+    started = time.perf_counter()
+    found, off = diagnosis_of(fault, q, qd)
+    seconds = time.perf_counter() - started
+    outcome, reason = judged_fault(fault, found)
+    if outcome == "invisible":
+        outcome, reason = "none", why_invisible(fault)
+    return {
+        "robot": fault.robot,
+        "fault": fault.name,
+        "kind": fault.kind,
+        "source": fault.source,
+        "size": fault.size,
+        "visible": found.differs,
+        "seen_by": ";".join(off),
+        "diagnosis": found.sentence if found.differs else "",
+        "outcome": outcome,
+        "reason": reason,
+        "seconds": seconds,
+    }
+
+
+def states_of(tree: tmt.Tree, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions within a turn or a metre, rates up to 3 per s, (states, nv) each."""
+    return tuple(np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES, len(tree.axis))))
+
+
+def diagnosis_of(fault: Fault, q: np.ndarray, qd: np.ndarray) -> tuple[Diagnosis, list[str]]:
+    """The diagnosis of a fault at states, and the experiments that see it."""
+    tree, nv = fault.tree, qd.shape[1]
+    scale = Entries(tree, q, qd)
+    sizes = np.broadcast_to(scale.mass_matrix, (len(q), nv, nv)), np.broadcast_to(scale.bias, (len(q), nv))
+    M, h = values_of_fault(fault, q, qd)
+    still = values_of_fault(fault, q, 0.0 * qd)[1]
+    right, weight = by_composite(tree, q, qd), by_composite(tree, q, 0.0 * qd)[1]
+    allowed = FACTOR * EPS * packed(*sizes, nv, len(q))
+    off = {
+        "mass": np.abs(M - right[0]) > FACTOR * EPS * sizes[0],
+        "gravity": np.abs(still - weight) > FACTOR * EPS * sizes[1],
+        "acceleration": np.abs(h - right[1]) > FACTOR * EPS * sizes[1],
+    }
+    found = diagnose(tree, tree.hinge_names, q, qd, packed(M, h, nv, len(q)), allowed, SEARCHED)
+    return found, [name for name, differs in off.items() if differs.any()]
+
+
+def judged_fault(fault: Fault, found: Diagnosis) -> tuple[str, str]:
+    """Outcome and reason: right if the fault alone is named, tied if others do exactly the same, wrong if it is not among these."""
+    if not found.differs:
+        return "invisible", ""
+    if not found.causes:
+        return "none", found.sentence
+    named = [cause for cause in found.causes if cause.place in fault.expected and has_values(fault, cause)]
+    others = [cause.place for cause in found.causes if cause not in named]
+    shown = "; ".join(others[:OTHERS]) + (f" and {len(others) - OTHERS} more" if len(others) > OTHERS else "")
+    if named:
+        return ("tied", f"the same at all states: {shown}") if others else ("right", "")
+    if explains_elsewhere(fault, found):
+        return "tied", f"simpler, and the same at all states: {shown}"
+    return "wrong", shown
+
+
+def has_values(fault: Fault, cause) -> bool:
+    """Whether a cause gives the numbers that were made."""
+    if not fault.values:
+        return True
+    if len(fault.values) == 1:
+        found = [float(cause.explains)]
+    else:
+        found = [float(value) for value in str(cause.explains).split(" and ")]
+        found = found if cause.place == fault.expected[0] else found[::-1]
+    return all(abs(x - y) <= 1e-6 * max(abs(y), 1e-3) for x, y in zip(found, fault.values))
+
+
+def explains_elsewhere(fault: Fault, found: Diagnosis) -> bool:
+    """Whether what explains a fault, another and no less simple one, explains it at states that the search did not have."""
+    again, _ = diagnosis_of(fault, *states_of(fault.tree, AT["again"]))
+    places = {cause.place for cause in again.causes}
+    lowest = min(cause.rank for cause in found.causes)
+    return lowest <= rank_of(fault) and any(cause.place in places for cause in found.causes)
+
+
+def rank_of(fault: Fault) -> int:
+    """Of what was made."""
+    return {"order": 1, "sign": 1, "zero": 1, "unit": 1, "option": 1, "pair": 3, "composition": 3}.get(fault.kind, 2)
+
+
+def why_invisible(fault: Fault) -> str:
+    """The reason for which neither M nor h changes at any state."""
+    tree, (q, qd) = fault.tree, states_of(fault.tree, AT["search"])
+    if fault.make[0] == "tree":
+        edited = fault.make[1]
+        if np.abs(tmt.com_positions(q, edited) - tmt.com_positions(q, tree)).max() > 1e-9 * max(1.0, np.abs(q).max()):
+            moved = tmt.com_positions(q, edited) - tmt.com_positions(q, tree)
+            if np.ptp(moved, axis=(0, 1)).max() < 1e-9:
+                return "all bodies are displaced by the same: M and h do not depend on where the robot stands"
+            return "positions differ, M and h do not: the robot is the same in a mirror, or displaced along an axis"
+        if np.array_equal(edited.inertia, tree.inertia):
+            return "M and h do not depend on it: what it moves lies on the axis"
+        turns = tmt.jacobians(q, tree)[1]
+        for b, body in enumerate(tree.body_names):
+            axes = [k for k in range(3) if np.abs(turns[:, b, k]).max() < 1e-12]
+            touched = {k for k in range(3) if np.any(np.array(edited.inertia[b])[k] != np.array(tree.inertia[b])[k])}
+            if touched & set(axes):
+                return f"{body} never turns about {' or '.join(XYZ_AXES[k] for k in sorted(touched & set(axes)))}"
+        return "M and h do not depend on it"
+    if fault.make[0] == "joints":
+        return "the robot is the same in a mirror: M and h are those of that joint turned the other way"
+    return "this term is zero, or comes out the same, at every state"
+
+
+XYZ_AXES = ("its x axis", "its y axis", "its z axis")
