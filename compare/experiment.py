@@ -113,7 +113,11 @@ def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
     """What explains the values of Mbar, h and accelerations, but for places that are known as causes."""
     diagnosis = module("diagnosis")
     found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
-    return [diagnosis.record(cause) for cause in found.causes if cause.place not in known] if found else []
+    return (
+        [diagnosis.record(cause, bool(setup.robot.own)) for cause in found.causes if cause.place not in known]
+        if found
+        else []
+    )
 
 
 def find_causes(setup: Setup) -> list[dict]:

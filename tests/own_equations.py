@@ -83,6 +83,7 @@ late = changed(bias=late_bias)
 skew = changed(mass_matrix=lambda q: mass_matrix(q) + [[0.0, 0.01], [0.0, 0.0]])
 changes = changed(mass_matrix=greedy)
 slowly = changed(mass_matrix=slow)
+slow_sign = changed(mass_matrix=slow, bias=sign.bias)
 mirrored = changed(bias=lambda q, qd: -bias(-q, -qd), joint_names=["-hip", "-knee"])
 swapped = changed(mass_matrix=lambda q: mass_matrix(q[::-1])[::-1, ::-1], bias=lambda q, qd: bias(q[::-1], qd[::-1])[::-1])
 

@@ -48,7 +48,7 @@ def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30):
     place = folder / f"out{len(list(folder.iterdir()))}"
     place.mkdir()
     lines = Lines()
-    sections, causes = experiment.examine(names, setup, place, lines, Here())
+    sections, causes, _ = experiment.examine(names, setup, place, lines, Here())
     return SimpleNamespace(sections=sections, causes=causes, lines=lines, setup=setup, reference=reference)
 
 
@@ -254,3 +254,37 @@ def test_a_file_shadows_no_package_and_finds_what_is_beside_it(folder):
     with pytest.raises(OwnFileError):
         own_object("broken.py:")
     assert sys.path == path
+
+
+# what explains a difference
+
+
+@pytest.mark.parametrize("asked, joints, says", [
+    ("mine.py:", "-hip,knee", "--joints=hip,knee"), ("mine.py:", "knee,hip", "--joints=hip,knee"),
+    ("mine.py:swapped", None, "--joints=knee,hip"), ("mine.py:swapped", "-knee,hip", "--joints=knee,hip"),
+])  # fmt: skip
+def test_joints_are_to_be_stated_in_place_of_what_was_stated(folder, asked, joints, says):
+    run = examined(folder, asked, ["diagnosis"], joints=joints)
+    # the mirror image of a double pendulum is the same
+    mirrored = "--joints=" + ",".join(f"-{name}" for name in says.removeprefix("--joints=").split(","))
+    assert any(f"(state it by {says})" in text or f"(state it by {mirrored})" in text for text in texts(run))
+    stated = says.removeprefix("--joints=")
+    assert not failed(examined(folder, asked, ["diagnosis"], joints=stated))
+
+
+def texts(run):
+    return [cause["text"] for cause in run.causes]
+
+
+def test_what_is_no_number_is_not_explained(folder):
+    run = examined(folder, "mine.py:nan", ["diagnosis"])
+    notes = run.sections[0].result.notes
+    assert any("Not all values are numbers" in note for note in notes)
+    assert not any("nothing to explain" in note.lower() for note in notes)
+    assert [check.quantity for check in failed(run)][0] == "bias gives what it should"
+
+
+def test_slow_equations_are_explained_without_what_takes_long(folder):
+    run = examined(folder, "mine.py:slow_sign", ["diagnosis"])
+    assert failed(run) and run.causes
+    assert "your equations are too slow for that" in " ".join(run.sections[0].result.notes)

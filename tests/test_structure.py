@@ -32,7 +32,7 @@ DIRECTIONS = {
     "process": set(),
     "report": {"judge", "process"},
     "setup": {"tmt", "case", "states", "robots", "engines"},
-    "experiments": {"tmt", "truth", "engines", "judge", "given", "case", "states", "robots", "setup"},
+    "experiments": {"diagnosis", "joint_map", "tmt", "truth", "engines", "judge", "given", "case", "states", "robots", "setup"},
     "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
     "__main__": {
         "case",
