@@ -12,7 +12,7 @@ from ...engines.own import OwnDynamics
 from ...joint_map import JointMap
 
 SECONDS_OF_CONDITIONS = 3.0
-CALLS, CALLS_FOR_A_JOINT = 30, 16  # of Mbar and h at each state, that the conditions take, about
+CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16  # of Mbar and h at each state, that the conditions take, about
 HOW_STATED = re.compile(r" \(state it as (?:joints=\[([^\]]*)\]|('[^']*'))\)")
 
 
@@ -25,7 +25,7 @@ def asked_conditions(
     """
     if not (np.isfinite(M).all() and np.isfinite(h).all()):
         return [], ""
-    calls = CALLS + CALLS_FOR_A_JOINT * given.coordinates.nv
+    calls = CALLS_OF_CONDITIONS + CALLS_FOR_A_JOINT * given.coordinates.nv
     count = given.equations.affordable(calls * len(q), SECONDS_OF_CONDITIONS) // calls
     if count == 0:
         return [], "Whether your h belongs to your M is not asked: your equations are too slow for that."
