@@ -4,7 +4,9 @@ import importlib
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
+from types import ModuleType
 
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
@@ -54,11 +56,11 @@ def examine(
         setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if setup.robot.own else experiment.TITLE
-        asked = title, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
+        asked, unsaid = attempt(name, partial(own_words, experiment), setup)
         if own:
             add_problems(crash or result, own.equations.problems, said)
-        sections.append(Section(name, *asked, crash or result))
+        sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
+        sections[-1].result.checks += unsaid.checks if unsaid else []
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
         new = new_causes(setup, sections, causes)
         causes = new + causes
@@ -83,6 +85,13 @@ def add_problems(result: Result, problems: Sequence, said: set) -> None:
     result.checks += others
 
 
+def own_words(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
+    """What an experiment says of itself: its title, its claim, its tolerance."""
+    robot = setup.robot
+    title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if robot.own else experiment.TITLE
+    return title, experiment.claim(robot), experiment.tolerance(robot)
+
+
 def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict]) -> list[dict]:
     """The causes that are sought because the last of these sections is the first that fails, or the first of DIAGNOSED.
 
@@ -104,7 +113,11 @@ def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
     """What explains the values of Mbar, h and accelerations, but for places that are known as causes."""
     diagnosis = module("diagnosis")
     found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
-    return [diagnosis.record(cause) for cause in found.causes if cause.place not in known] if found else []
+    return (
+        [diagnosis.record(cause, bool(setup.robot.own)) for cause in found.causes if cause.place not in known]
+        if found
+        else []
+    )
 
 
 def find_causes(setup: Setup) -> list[dict]:
@@ -129,8 +142,10 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
     try:
         section.figures, failed = drawing.result()
-    except (WorkerEnded, OSError):
+    except OSError:
         raise
+    except WorkerEnded:  # what was computed is kept
+        failed = [("number 1", "the process that draws was ended from outside")]
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:

@@ -144,9 +144,14 @@ def needless(postures: dict, robot: Robot) -> str:
         name: [posture for posture, of in postures.items() if (np.abs(of[name]) <= zero[posture]).all()]
         for name in robot.compared
     }
-    words = [
-        f"{capital(LABELS[name])} needs none, but for rounding, at: {', '.join(at) or 'no posture'}."
-        for name, at in rest.items()
-    ]
     first, second = rest
-    return " ".join(words) if rest[first] != rest[second] else "Both need" + words[0].partition(" needs")[2]
+    if rest[first] == rest[second]:
+        return needless_in_words("Both need", rest[first])
+    return " ".join(needless_in_words(f"{capital(LABELS[name])} needs", at) for name, at in rest.items())
+
+
+def needless_in_words(needs: str, postures: list) -> str:
+    """Where no torque is needed, in a sentence that begins with who needs."""
+    return (
+        f"{needs} none, but for rounding, at: {', '.join(postures)}." if postures else f"{needs} some at every posture."
+    )

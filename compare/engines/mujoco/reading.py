@@ -13,7 +13,7 @@ from .engine import Mujoco, methods_for
 from .file import compiled
 from .flags import NAMES
 from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks, take_away
-from .joints import Place, joint_places, kind_of, moved, own_name, reference_qpos
+from .joints import Place, joint_places, kind_of, moved, others_apart, own_name, reference_qpos
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
 from .values import refuse_values
@@ -178,7 +178,8 @@ def carriers(model: mujoco.MjModel, joints: Mapping) -> list[int]:
 
 def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     """The positions of the keyframes by their names, or `key 0`; the compiler has given quaternions length 1."""
-    names = [own_name(model.key(number).name, "key", number) for number in range(model.nkey)]
+    own = [model.key(number).name for number in range(model.nkey)]
+    names = [others_apart(name, "key", number, own) for number, name in enumerate(own)]
     return {name: qpos.copy() for name, qpos in zip(names, model.key_qpos)}
 
 

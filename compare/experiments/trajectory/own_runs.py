@@ -8,7 +8,7 @@ from .runs import recorded
 
 SECONDS_OF_RUNS = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all scenes together, about
 BESIDE_THEM = 1e-4  # s of an evaluation in a run, about, beside what the equations take themselves
-STAGES = 4  # evaluations in a step of RK4
+STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 
 
 def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], tuple[int, ...], list[str]]:
@@ -42,4 +42,4 @@ def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], tuple[
 
 def evaluations(case: Case, multiple: int) -> int:
     """Of the accelerations, for the run, the one that starts beside it, and the recorded states."""
-    return 2 * STAGES * case.steps * multiple + (STAGES + 1) * (recorded(case) + 1)
+    return 2 * STAGES_OF_RK4 * case.steps * multiple + (STAGES_OF_RK4 + 1) * (recorded(case) + 1)
