@@ -28,6 +28,7 @@ FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
 SHOWN = 6  # entries in a sentence
 NEAREST = 12  # explanations that are kept though they do not explain
+PROMISING = 6  # states at which it is estimated what a number beside a convention can do
 BESIDE = 4  # conventions beside which a number is fitted
 
 
@@ -147,7 +148,12 @@ def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted], pai
     found = [of_variant(variant, left) for variant, left in explained_by_joints(search, list(both(equations, names)))]
     found += [of_fitted(one, 3) for one in search.pairs() if one.ratio <= 1.0]
     simple = [variant for variant in (*options(equations), *of_joints) if variant.is_simple]
-    yield found + beside(search, simple)
+    try:
+        found += beside(search, simple)
+    except OutOfTime:
+        if not found:
+            raise
+    yield found
 
 
 def explained(search: Search, variants: Iterable[Variant]) -> list[tuple[Variant, float]]:
@@ -181,8 +187,13 @@ def beside(search: Search, variants: Sequence[Variant]) -> list[Cause]:
     tried = []
     here = [place for place in search.places if place.column is None]
     for variant in variants:
-        other = Search(variant.equations(), here, search.given, search.tolerance, search.end)
-        tried.append((other.promise / search.size, len(tried), variant, other))
+        equations, known = variant.equations(), (search.given, search.tolerance)
+        other = Search(equations, here, *known, search.end)
+        near = other
+        if isinstance(equations, Equations):
+            near = Search(equations.first(PROMISING), here, *(part[:PROMISING] for part in known), search.end)
+        size = np.linalg.norm(search.off[: len(near.given)])
+        tried.append((near.promise / size if size else 0.0, len(tried), variant, other))
     found = []
     for left, _, variant, other in sorted(tried, key=lambda one: one[:2])[:BESIDE]:
         if left < NEAR:

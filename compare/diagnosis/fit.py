@@ -12,6 +12,7 @@ from .model import TINY, Equations
 from .places import Place
 
 ROUNDS = 25  # of a search from one start
+FIRST_ROUNDS, FINALISTS = 5, 24  # of pairs: after these rounds so many go on
 SETTLED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
@@ -50,9 +51,10 @@ class Search:
         end: float = np.inf,
     ):
         self.equations, self.places, self.end = equations, list(places), end
-        self.given, self.tolerance = given, tolerance
+        least = tolerance[tolerance > 0.0].min(initial=1.0)
+        self.given, self.tolerance = given, np.where(tolerance > 0.0, tolerance, least)  # what is always 0 has no scale
         self.known = np.isfinite(given)
-        self.weight = np.where(self.known, 1.0 / tolerance, 0.0)
+        self.weight = np.where(self.known, 1.0 / self.tolerance, 0.0)
         self.right = equations.values()[0]
         self.off = self.weighted(self.right)
         self.size = float(np.linalg.norm(self.off))
@@ -92,12 +94,12 @@ class Search:
         steps = np.eye(x.shape[1]) * (1j * TINY)
         return np.stack([self.values(which, x + step).imag / TINY for step in steps], axis=1) * self.weight
 
-    def fitted(self, which: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def fitted(self, which: np.ndarray, x: np.ndarray, rounds: int = ROUNDS) -> tuple[np.ndarray, np.ndarray]:
         """The changes nearest to the starts x (rows, k) that come closest, and what is then left, (rows, states, entries)."""
         size = np.array([[self.places[place].size for place in row] for row in which])
         left = self.weighted(self.values(which, x))
         best, damping, moving = (left**2).sum(axis=(1, 2)), np.full(len(x), 1e-3), np.arange(len(x))
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             J = self.derivatives(which[moving], x[moving]).reshape(len(moving), x.shape[1], -1)
             J = J * size[moving][:, :, None]
             normal = np.einsum("rim,rjm->rij", J, J)
@@ -207,5 +209,7 @@ class Search:
         starts = coefficients[best][:, :2] / lengths[pairs[best]] * size[pairs[best]]
         which = np.concatenate([pairs[best]] * 2)
         starts = np.concatenate([starts, np.zeros_like(starts)])
-        self.pair_fits = self.outcome(which, *self.fitted(which, starts))
+        near, left = self.fitted(which, starts, FIRST_ROUNDS)
+        found = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
+        self.pair_fits = self.outcome(which[found], *self.fitted(which[found], near[found]))
         return self.pair_fits

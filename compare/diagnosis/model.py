@@ -5,6 +5,7 @@ arrays (changes, 1) beside positions (states,), real or complex; derivatives by 
 imaginary change of 1e-100 leaves, exact to rounding. Each term of each body has a factor, 1 where nothing is wrong with it.
 """
 
+from copy import copy
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -51,6 +52,12 @@ class Equations:
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
         self.stated["factor"] = np.ones((len(tree.mass), len(TERMS)))
         self.triangle = np.tril_indices(self.nv)
+
+    def first(self, states: int) -> "Equations":
+        """The same at the first states alone."""
+        part = copy(self)
+        part.q, part.qd = self.q[:states], self.qd[:states]
+        return part
 
     @property
     def entries(self) -> list[tuple]:
