@@ -137,26 +137,8 @@ class Search:
     @cached_property
     def nearest(self) -> list[tuple[float, float]]:
         """Of each place what the best change leaves, in tolerances, and that change, as far as the values are quadratic in it."""
-        first, second = (part.reshape(len(self.places), -1) for part in self.expansion)
-        r, found = self.off.ravel(), []
-        rr, ra, rb = r @ r, first @ r, second @ r
-        aa, ab, bb = (np.einsum("kn,kn->k", *pair) for pair in ((first, first), (first, second), (second, second)))
-        for k, place in enumerate(self.places):
-            cubic = [2.0 * bb[k], 3.0 * ab[k], aa[k] - 2.0 * rb[k], -ra[k]]
-            roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
-            roots = roots[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))].real
-            left = {
-                x: rr - 2.0 * x * ra[k] - 2.0 * x * x * rb[k] + x * x * aa[k] + 2.0 * x**3 * ab[k] + x**4 * bb[k]
-                for x in roots
-            }
-            best = min(left, key=left.get, default=0.0)
-            found.append((float(np.sqrt(max(0.0, left.get(best, rr)))), float(best) * place.size))
-        return found
-
-    @property
-    def promise(self) -> float:
-        """The least that one place leaves, about, in tolerances: directions and zeros beyond small changes are not seen."""
-        return min([left for left, _ in self.nearest], default=float(np.linalg.norm(self.off)))
+        found = nearest_changes(*self.expansion, self.off)
+        return [(left, best * place.size) for (left, best), place in zip(found, self.places)]
 
     def singles(self) -> list[Fitted]:
         """Each place alone, the smallest remainder first.
@@ -213,3 +195,24 @@ class Search:
         found = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
         self.pair_fits = self.outcome(which[found], *self.fitted(which[found], near[found]))
         return self.pair_fits
+
+
+def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> list[tuple[float, float]]:
+    """Of each place what the best change x leaves of off, |off - x first - x^2 second|, and x: a root of a cubic.
+
+    first, second: (places, states, entries), off: (states, entries), in tolerances.
+    """
+    (first, second), r, found = (part.reshape(len(part), -1) for part in (first, second)), off.ravel(), []
+    rr, ra, rb = r @ r, first @ r, second @ r
+    aa, ab, bb = (np.einsum("kn,kn->k", *pair) for pair in ((first, first), (first, second), (second, second)))
+    for k in range(len(first)):
+        cubic = [2.0 * bb[k], 3.0 * ab[k], aa[k] - 2.0 * rb[k], -ra[k]]
+        roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
+        roots = roots[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))].real
+        left = {
+            x: rr - 2.0 * x * ra[k] - 2.0 * x * x * rb[k] + x * x * aa[k] + 2.0 * x**3 * ab[k] + x**4 * bb[k]
+            for x in roots
+        }
+        best = min(left, key=left.get, default=0.0)
+        found.append((float(np.sqrt(max(0.0, left.get(best, rr)))), float(best)))
+    return found

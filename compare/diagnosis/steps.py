@@ -20,6 +20,7 @@ from .words import Cause, nice
 
 SEVERAL = 8.0  # sums of a step, each with its rounding
 ROUNDS_OF_DT = 30
+FEW_STAGES = 4  # of a scheme whose dt is fitted beside it
 FEW_STEPS = 3  # states at which dt is fitted
 ALMOST = 1e-6  # relative change of dt in a derivative by it
 
@@ -114,7 +115,7 @@ def diagnose_steps(tree: tmt.Tree, steps: Steps, scheme: str) -> tuple[float, tu
             text = f"dt: {nice(dt)} s in place of {nice(steps.dt)}"
             causes.append(cause(2, "number", "dt", steps.dt, dt, "s", values, text))
     if not causes:
-        for name in others:
+        for name in (name for name in others if method_named(name).stages <= FEW_STAGES):
             dt = fitted(name)
             values = stepped_once(method_named(name), tree, steps, dt)
             if ratio(values) <= 1.0:
