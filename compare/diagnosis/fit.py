@@ -12,7 +12,7 @@ from .model import TINY, Equations
 from .places import Place
 
 ROUNDS = 25  # of a search from one start
-FIRST_ROUNDS, FINALISTS = 5, 24  # of pairs: after these rounds so many go on
+FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds so many go on
 SETTLED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
@@ -158,7 +158,10 @@ class Search:
         for _, k, x in sorted(promising)[:POLISHED]:
             which.append([k])
             starts.append([x])
-        return self.outcome(np.array(which), *self.fitted(np.array(which), np.array(starts)))
+        which, (x, left) = np.array(which), self.fitted(np.array(which), np.array(starts), FIRST_ROUNDS)
+        near = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
+        x[near], left[near] = self.fitted(which[near], x[near])
+        return self.outcome(which, x, left)
 
     @cached_property
     def expansion(self) -> tuple[np.ndarray, np.ndarray]:

@@ -109,6 +109,7 @@ def diagnose_steps(tree: tmt.Tree, steps: Steps, scheme: str) -> tuple[float, tu
             values = stepped_once(altered, tree, steps, steps.dt)
             if ratio(values) <= 1.0:
                 causes.append(cause(2, "term", place, "right", explains, "", values, f"{place}: {explains}"))
+    if not causes:
         dt = fitted(scheme)
         values = stepped_once(method_named(scheme), tree, steps, dt)
         if ratio(values) <= 1.0:
