@@ -20,6 +20,7 @@ from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import in_one_line
 
+PROGRAM = "python -m compare"
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
@@ -45,7 +46,16 @@ def not_empty(text: str) -> str:
     return text
 
 
-def reference(text: str) -> str:
+def with_minus(arguments: Sequence[str]) -> list[str]:
+    """The arguments, a list of joints that begins with a minus as part of its option: it is none itself."""
+    given = list(arguments)
+    for k in range(len(given) - 1, 0, -1):
+        if given[k - 1] == "--joints" and given[k].startswith("-") and not given[k].startswith("--"):
+            given[k - 1 : k + 1] = [f"--joints={given[k]}"]
+    return given
+
+
+def stated_reference(text: str) -> str:
     """What a model is compared with: what has a colon is read later."""
     if text in ("arm", "model") or ":" in text:
         return text
@@ -57,7 +67,7 @@ def reference(text: str) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status."""
     parser = Parser(
-        prog="python -m compare",
+        prog=PROGRAM,
         description="Compare the TMT method with MuJoCo, on a human arm or on your robot, and write a report.",
         epilog="experiments:\n" + "".join(f"  {k:<13} {v}\n" for k, v in EXPERIMENTS.items()) + "\n" + EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -81,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--reference",
-        type=reference,
+        type=stated_reference,
         metavar="WHAT",
         help="what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); model, "
         "tmt's equations for the model as MuJoCo compiled it (default for any other); or your own equations, FILE.py:OBJECT "
@@ -91,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--joints",
         type=not_empty,
         metavar="LIST",
-        help="the joints as your own equations take them, in their order: elbow,-shoulder,wrist+90deg",
+        help="the joints as your own equations take them, in their order: first,-second,third+90deg",
     )
     parser.add_argument(
         "--scenes",
@@ -99,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="FILE",
         help="scenes of your own (TOML), beside those of the robot in trajectory, speed and reduction",
     )
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(with_minus(sys.argv[1:] if arguments is None else arguments))
     if options.scenes and options.experiment not in (*FOLLOWING_SCENES, "all"):
         parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
     if options.joints and ":" not in (options.reference or ""):
@@ -117,9 +127,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         line = f"cannot go on: {described(error)}"
     interrupt.settle()
-    with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
-        print(in_one_line(" ".join(f"{parser.prog}: {line}".split())), file=sys.stderr, flush=True)
+    say_error(line)
     return 2
+
+
+def say_error(line: str) -> None:
+    """One line on stderr, if anybody is there to read it."""
+    with suppress(OSError, ValueError, AttributeError):
+        print(in_one_line(" ".join(f"{PROGRAM}: {line}".split())), file=sys.stderr, flush=True)
 
 
 class Refused(ValueError):
@@ -153,6 +168,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 from . import experiment
                 from .case import SEED
                 from .report import files, provenance, verdict
+                from .report.parts import Parts
                 from .setup import Setup, engines
 
                 workers.submit(experiment.warm_up)
@@ -166,18 +182,23 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
                 sections, causes, needless = experiment.examine(asked, setup, folder, terminal, workers)
-            words = verdict.verdict(sections, len(EXPERIMENTS) - len(needless), causes, compared.compared)
+            parts, unknown = Parts(), "No verdict could be made."
+            outcome = sections, len(EXPERIMENTS) - len(needless), causes, compared.compared
+            words = parts.made("the verdict", unknown, verdict.verdict, *outcome)
             reasons |= needless
             origin["seconds"] = round(time.perf_counter() - started, 1)
             report = verdict.Report(sections, robot, origin, words, causes, list(reasons.items()), compared)
-            files.write(folder, report)
+            files.write(folder, report, parts)
     except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()
-    terminal.say(words, "bold green" if verdict.passed(sections) else "bold red")
+    good = verdict.passed(sections) and not parts.broken
+    terminal.say(words, "bold green" if good else "bold red")
+    for line in parts.lines:
+        say_error(line)
     place = f" in place of that of `{before}`" if before not in (None, origin["command"]) else ""
     terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
-    return 0 if verdict.passed(sections) else 1
+    return 0 if good else 1
 
 
 def run_and_leave() -> None:

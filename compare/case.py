@@ -15,6 +15,9 @@ import tmt
 from tmt.lock import CLOSE_TO_ONE
 
 from .coordinates import Coordinates
+from .coordinates import fastest_rates as fastest_rates
+from .coordinates import rates_at as rates_at
+from .given import WrongField, are_numbers, is_number, some
 
 SEED = 10  # of every random number in a report
 MOST_STEPS = 10_000_000  # of a run
@@ -79,8 +82,7 @@ class Scene:
     def refuse(self, name, wrong, accepted) -> None:
         """Raise ValueError if a field is wrong: what it is, and what is expected."""
         if wrong:
-            named, found = (shorten(" ".join(repr(getattr(self, field)).split())) for field in ("name", name))
-            raise ValueError(f"scene {named}: {name} is {found}; {accepted} is expected")
+            raise WrongField(self.name, name, getattr(self, name), accepted)
 
     @property
     def steps(self) -> int:
@@ -101,7 +103,7 @@ class Case:
         of_kinds = {"hinge": "deg", "slide": "m", "ball": "a quaternion"}
         units = ", ".join(of_kinds[kind] for kind in dict.fromkeys(whole.all_kinds))
         if isinstance(scene.posture, str):
-            count = f"{whole.nq} numbers, one per joint ({', '.join(whole.positions)})"
+            count = f"{whole.nq} numbers, one per joint ({some(whole.positions)})"
             named = self.robot.postures or self.robot.positions
             postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and named]
             accepted = f"{', '.join(postures)} or {count}, in {units}" if postures else f"{count}, in {units}"
@@ -111,15 +113,15 @@ class Case:
             left_out = name != "torque" and value == ()
             known = isinstance(value, str) or len(value) == sizes[name] or left_out
             each = whole.positions if name == "posture" else whole.speeds
-            scene.refuse(name, not known, f"{sizes[name]} numbers, one per joint ({', '.join(each)}), in {unit}")
+            scene.refuse(name, not known, f"{sizes[name]} numbers, one per joint ({some(each)}), in {unit}")
         if not isinstance(scene.posture, str) and scene.posture:
             for joint in whole.places.balls:
                 wrong = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) > CLOSE_TO_ONE
                 scene.refuse("posture", wrong, "a quaternion w, x, y, z of length 1 for each ball")
         known = not isinstance(scene.damping, tuple) or len(scene.damping) == whole.nv
-        scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({', '.join(whole.speeds)}),")
+        scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
         unknown = [name for name in scene.locked if name not in names]
-        most = f"a tuple of at most {len(names) - 1} of {', '.join(names)}"
+        most = f"a tuple of at most {len(names) - 1} of {some(names)}"
         scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)
         moving = [
             name
@@ -236,23 +238,3 @@ class Case:
     def changed(self, **changes) -> "Case":
         """The same robot in a scene with other values."""
         return Case(self.robot, dataclasses.replace(self.scene, **changes))
-
-
-def is_number(value: object) -> bool:
-    """Whether a value is one finite real number; neither text nor true and false."""
-    try:
-        number = np.asarray(value)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
-
-
-def are_numbers(values: object) -> bool:
-    """Whether the values are such numbers in a row."""
-    row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
-    return row and all(is_number(value) for value in values)
-
-
-def shorten(text: str, length: int = 60) -> str:
-    """A text that may stand in one line."""
-    return text if len(text) <= length else text[: length - 4] + " ..."

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt import coordinates
+from tmt import Tree, coordinates
+from tmt.composite import mass_matrix_and_bias
 
 
 class Coordinates(NamedTuple):
@@ -102,3 +103,19 @@ class Coordinates(NamedTuple):
                 place = at if positions else by
                 values[place] = np.radians(values[place])
         return values
+
+
+def rates_at(tree: Tree, q: np.ndarray) -> tuple[float, float]:
+    """The fastest rates of decay by damping and of a swing by springs at positions q (nq,), 1/s."""
+    inertia, _ = mass_matrix_and_bias(tree, q.tolist(), [0.0] * tree.coordinates.nv)
+    return fastest_rates(tree, np.linalg.pinv(np.array(inertia), hermitian=True))
+
+
+def fastest_rates(tree: Tree, inverse: np.ndarray, added: tuple = ()) -> tuple[float, float]:
+    """The fastest rate of decay by the joints' own damping and what is added, and that of a swing by the springs, 1/s.
+
+    inverse: of Mbar, (nv, nv).
+    """
+    decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
+    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
+    return float(decay), float(np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max()))

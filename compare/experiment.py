@@ -4,7 +4,9 @@ import importlib
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
+from types import ModuleType
 
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
@@ -17,6 +19,12 @@ from .robots import Robot
 from .setup import Setup as Setup
 from .setup import engines as engines
 
+# which of a user's own equations an experiment asks; others ask all
+ASKED_BY = {
+    "kinematics": ("com_positions", "jacobians"),
+    "mass": ("mass_matrix",),
+    "gravity": ("gravity", "bias", "energy"),
+}
 DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
@@ -32,7 +40,7 @@ def examine(
     """
     (folder / "figures").mkdir()
     sections, drawings, causes, reasons = [], [], [], {}
-    own, said = setup.engines.get("own"), 0
+    own, said = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
     crashed = {
         name: attempt(name, experiment.begin, setup)[1]
@@ -48,11 +56,11 @@ def examine(
         setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
         started = time.perf_counter()
         result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if setup.robot.own else experiment.TITLE
-        asked = title, experiment.claim(setup.robot), experiment.tolerance(setup.robot)
+        asked, unsaid = attempt(name, partial(own_words, experiment), setup)
         if own:
-            said += add_problems(crash or result, own.equations.problems[said:])
-        sections.append(Section(name, *asked, crash or result))
+            add_problems(crash or result, own.equations.problems, said)
+        sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
+        sections[-1].result.checks += unsaid.checks if unsaid else []
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
         new = new_causes(setup, sections, causes)
         causes = new + causes
@@ -64,16 +72,24 @@ def examine(
     return sections, causes, reasons
 
 
-def add_problems(result: Result, problems: Sequence) -> int:
-    """What is wrong with a user's own equations, each a failed check before all others; how many there are.
+def add_problems(result: Result, problems: Sequence, said: set) -> None:
+    """What is wrong with those of a user's own equations that an experiment asks, each a failed check before all others.
 
-    problems: with quantity, state and text, see engines.own.
+    problems: with quantity and text, see engines.own; said: those that need not be said again, to which these are added.
     """
     others, result.checks = result.checks, []
-    for problem in problems:
-        result.check("", f"{problem.quantity} gives what it should", None, 0.0, "", problem.text, rule="equal")
+    for k, problem in enumerate(problems):
+        if k not in said and problem.quantity in ASKED_BY.get(result.experiment, (problem.quantity,)):
+            said.add(k)
+            result.check("", f"{problem.quantity} gives what it should", None, 0.0, "", problem.text, rule="equal")
     result.checks += others
-    return len(problems)
+
+
+def own_words(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
+    """What an experiment says of itself: its title, its claim, its tolerance."""
+    robot = setup.robot
+    title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if robot.own else experiment.TITLE
+    return title, experiment.claim(robot), experiment.tolerance(robot)
 
 
 def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict]) -> list[dict]:
@@ -97,7 +113,11 @@ def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
     """What explains the values of Mbar, h and accelerations, but for places that are known as causes."""
     diagnosis = module("diagnosis")
     found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
-    return [diagnosis.record(cause) for cause in found.causes if cause.place not in known] if found else []
+    return (
+        [diagnosis.record(cause, bool(setup.robot.own)) for cause in found.causes if cause.place not in known]
+        if found
+        else []
+    )
 
 
 def find_causes(setup: Setup) -> list[dict]:
@@ -122,8 +142,10 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
     try:
         section.figures, failed = drawing.result()
-    except (WorkerEnded, OSError):
+    except OSError:
         raise
+    except WorkerEnded:  # what was computed is kept
+        failed = [("number 1", "the process that draws was ended from outside")]
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:
@@ -137,7 +159,7 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
     most = f"uses {max(used):.2g} of a tolerance" if any(used) and not failed else ""
-    word = f"{len(failed)} FAILED" if failed else "ok"
+    word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
     lines = [f"  CAUSE {cause['text']}" for cause in causes]

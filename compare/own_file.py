@@ -53,7 +53,7 @@ def module_of(place: str, stated: str) -> tuple[ModuleType, str]:
         raise OwnFileError(f"{place}: it is a folder; a Python file is expected")
     if not path.is_file():
         beside = path.parent.glob("*.py") if path.parent.is_dir() else ()
-        raise OwnFileError(f"{place}: no such file{near(path.name, (other.name for other in beside))}")
+        raise OwnFileError(f"{place}: no such file{close_names(path.name, (other.name for other in beside))}")
     path = path.resolve()
     # a name that nothing else has: a file numpy.py shadows no package
     name = f"compare_own_{path.stem}"
@@ -77,7 +77,7 @@ def module_named(name: str) -> ModuleType:
         raise OwnFileError(f"{name}: {described(error, with_place=False)}") from None
     if found is None:
         known = (path.stem for path in Path().glob("*.py"))
-        raise OwnFileError(f"{name}: no such module{near(name, known)}")
+        raise OwnFileError(f"{name}: no such module{close_names(name, known)}")
     with raised_in(found.origin or name, name):
         return importlib.import_module(name)
 
@@ -91,7 +91,7 @@ def part_of(module: ModuleType, place: str, name: str) -> object:
         except AttributeError:
             names = [other for other in dir(found) if not other.startswith("_")]
             inside = f" in {known}" if known else ""
-            raise OwnFileError(f"{place}: there is no {part!r}{inside}{near(part, names)}") from None
+            raise OwnFileError(f"{place}: there is no {part!r}{inside}{close_names(part, names)}") from None
         known = f"{known}.{part}" if known else part
     return found
 
@@ -122,7 +122,7 @@ def file_of(module: ModuleType, place: str) -> str:
     return getattr(module, "__file__", None) or place
 
 
-def near(name: str, known: Iterable[str]) -> str:
+def close_names(name: str, known: Iterable[str]) -> str:
     """Names that are close to one, in words."""
     close = difflib.get_close_matches(name, list(known), 3, 0.6)
     return f"; there is {' and '.join(close)}" if close else ""

@@ -97,5 +97,5 @@ def own_engine(asked: str, robot: Robot, mujoco: Engine, joints: str | None) -> 
             equations = OwnEquations(source, coordinates, stated, robot.tree)
             equations.try_at(q, *rng.uniform(-1.0, 1.0, (2, len(q), coordinates.nv)))
     except OwnError as error:
-        raise OwnFileError(f"{asked}: {error}") from None
+        raise OwnFileError(f"{asked.rstrip(':')}: {error}") from None
     return Own(equations, (method.scheme for method in mujoco.methods.values()))

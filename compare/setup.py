@@ -79,6 +79,6 @@ class Setup:
         count = own.equations.affordable(self.states, SECONDS_OF_OWN) if own else self.states
         sample = samples.random(self.robot, count, self.exact_states)
         if count < self.states:
-            slow = f"{count:,} random states in place of {self.states:,}: your equations take {own.equations.seconds:.2g} s a state."
-            sample.notes = (slow, *sample.notes)
+            takes = f"your equations take {own.equations.seconds:.2g} s a state"
+            sample.notes = (f"{count:,} random states in place of {self.states:,}: {takes}.", *sample.notes)
         return sample

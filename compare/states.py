@@ -76,9 +76,9 @@ def named(robot: Robot) -> Sample:
     return Sample(robot.tree, name, q, speeds, torques, known, tuple(robot.poses), notes)
 
 
-def random(robot: Robot, states: int, exact_states: int) -> Sample:
+def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sample:
     """Random states: positions within the joints' ranges, speeds and torques within `largest_speeds_and_torques`."""
-    rng, asked, exact_asked = np.random.default_rng(SEED), states, exact_states
+    rng, asked, exact_asked = np.random.default_rng(seed), states, exact_states
     states = min(asked, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
     exact_states = min(exact_asked, states, affordable(robot) - of_named(robot))
     notes = [f"{states:,} random states in place of {asked:,}: so many bodies and joints take long."] * (states < asked)

@@ -1,9 +1,7 @@
-from functools import cache
-
 import numpy as np
 import pytest
 from hypothesis import settings
-from small_runs import JOBS, Beside, of_arm
+from small_runs import Beside, jobs, of_arm
 
 from compare import experiment
 from compare.engines.mujoco import load
@@ -26,10 +24,11 @@ def engines(mujoco):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def beside(request):
+def beside(request, tmp_path_factory):
     """Where all tests are run, what takes long is computed beside them from the start."""
-    files = {item.path.name for item in request.session.items}
-    beside = Beside(JOBS if {"test_agreement.py", "test_second_robot.py", "test_judge_check.py"} <= files else ())
+    files, folder = {item.path.name for item in request.session.items}, tmp_path_factory.mktemp("beside")
+    all_run = {"test_agreement.py", "test_second_robot.py", "test_judge_check.py"} <= files
+    beside = Beside(folder, jobs(folder) if all_run else ())
     yield beside
     beside.end()
 
@@ -37,7 +36,7 @@ def beside(request):
 @pytest.fixture(scope="session")
 def small(beside):
     """small(name): the result of an experiment in a small run, every path with few states and steps; made once."""
-    return cache(lambda name: beside.result(of_arm, name))
+    return lambda name: beside.result(of_arm, name)
 
 
 @pytest.fixture

@@ -3,6 +3,9 @@
 The tests run one after the other. Where all of them are run, `Beside` computes these at the same time, on the other core.
 """
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, partial
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,6 +13,7 @@ from types import SimpleNamespace
 
 from crane import crane
 from model_edits import EDITS, failing
+from runs import in_shell, on_terminal
 
 from compare import experiment
 from compare.engines.mujoco import load, parse
@@ -18,6 +22,7 @@ from compare.report import files, verdict
 from compare.robots.arm import ARM
 
 
+@cache
 def of_arm(name):
     """The result of an experiment on the arm, every path with few states and steps."""
     return module(name).rows(experiment.Setup.small(ARM, experiment.engines(load(ARM.mjcf, ARM.tree))))
@@ -65,20 +70,90 @@ def of_crane():
     return SimpleNamespace(sections=sections, reasons=reasons, lines=lines, texts=texts, sizes=sizes)
 
 
-JOBS = (  # in the order in which the tests ask for them
-    *((of_arm, name) for name in ("reduction", "stability")),
-    (on_the_moon, "stability"),
-    *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
-    (of_crane,),
-    *((failing, old, new) for old, new, _ in EDITS.values()),
-)
+def report_of_arm():
+    """Of all experiments on the arm: lines of the verdict, captions, report.md, names of figures, what could not be drawn."""
+    with TemporaryDirectory() as place:
+        folder, sections, lost = Path(place), [], []
+        (folder / "figures").mkdir()
+        for name in EXPERIMENTS:
+            of = module(name)
+            section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
+            section.figures, failed = experiment.draw(name, section.result, ARM, folder / "figures")
+            sections, lost = [*sections, section], lost + failed
+        words = verdict.verdict(sections, len(EXPERIMENTS))
+        files.write(folder, verdict.Report(sections, ARM, {"command": "a small run"}, words))
+        text = (folder / "report.md").read_text(encoding="utf-8")
+        drawn = {path.stem for path in (folder / "figures").iterdir()}
+    captions = [caption for section in sections for _, caption in section.figures]
+    return SimpleNamespace(words=words, captions=captions, text=text, drawn=drawn, lost=lost)
+
+
+def quick_run(folder):
+    """A quick run of everything, on a terminal, from a folder that is not the project's."""
+    folder.mkdir()
+    return on_terminal(["all", "--quick"], 80, "xterm", folder)
+
+
+def runs_on_terminals(plain, umlauts):
+    """Runs that wait for nothing of each other: of the arm and of a heavy one, on terminals and in a shell, in two folders."""
+    plain.mkdir()
+    umlauts.mkdir(parents=True)
+    for name in (umlauts / "Käfer.xml", umlauts / os.fsdecode(b"\xff.xml")):
+        name.write_bytes(ARM.mjcf.read_bytes())
+    (plain / "heavy.xml").write_text(ARM.mjcf.read_text().replace('mass="1.5"', 'mass="1.6"'))
+    arm, heavy = ("mass", "--quick", "--out"), ("mass", "--quick", "--mjcf", "heavy.xml", "--out")
+    old = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"
+    calls = {("arm", *at): partial(on_terminal, [*arm, f"arm{at}"], *at, plain) for at in [(40, "xterm"), (80, "dumb")]}
+    calls |= {
+        ("heavy", *at): partial(on_terminal, [*heavy, f"heavy{at}"], *at, plain) for at in [(80, "xterm"), (40, "dumb")]
+    }
+    calls |= {
+        "ascii, head": partial(in_shell, "PYTHONIOENCODING=ascii compare mass --quick --mjcf Käfer.xml --out Öl | head -1;"
+                               "exit ${PIPESTATUS[0]}", umlauts),
+        "C": partial(in_shell, f"{old} compare mass --quick --mjcf Käfer.xml --out 'Öl im C'", umlauts),
+        "bytes, full": partial(in_shell, f"{old} compare mass --quick --mjcf $'\\xff.xml' --out $'\\xfe'"
+                               " >/dev/full 2>&1", umlauts),
+        "closed": partial(in_shell, "compare mass --quick --mjcf heavy.xml --out closed <&- >&- 2>&-", plain),
+    }  # fmt: skip
+    with ThreadPoolExecutor(2) as pool:
+        under_way = {name: pool.submit(call) for name, call in calls.items()}
+    return {name: run.result() for name, run in under_way.items()}
+
+
+def jobs(folder) -> list[tuple]:
+    """All of these and some of test modules, which are collected by now, in the order in which the tests ask for them."""
+    from test_reduction import leg
+    from test_seeded_errors import IN_THE_MJCF, failing_in
+    from test_speed_run import with_and_without
+    from test_stability_small import SPARE, lacking
+
+    return [
+        (of_arm, "reduction"),
+        (leg,),
+        (with_and_without,),
+        (of_arm, "stability"),
+        (on_the_moon, "stability"),
+        *((lacking, name) for name in SPARE),
+        *((failing_in, name) for name in IN_THE_MJCF),
+        *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
+        (runs_on_terminals, *terminal_folders(folder)),
+        (report_of_arm,),
+        (quick_run, folder / "anywhere"),
+        (of_crane,),
+        *((failing, old, new) for old, new, _ in EDITS.values()),
+    ]
+
+
+def terminal_folders(folder) -> tuple[Path, Path]:
+    """Where `runs_on_terminals` runs."""
+    return folder / "plain", folder / "Zoë" / "Über"
 
 
 class Beside:
-    """A further process, or none: then what is asked for is computed at once."""
+    """A further process, or none: then what is asked for is computed at once. folder: where it may write."""
 
-    def __init__(self, jobs):
-        self.pool = get_context("spawn").Pool(1) if jobs else None
+    def __init__(self, folder, jobs):
+        self.folder, self.pool = folder, get_context("spawn").Pool(1) if jobs else None
         self.under_way = {job: self.pool.apply_async(job[0], job[1:]) for job in jobs}
 
     def result(self, *job):

@@ -6,17 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_runs import report_of_arm
 from trees import mjcf, random_tree
 
 import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.parameters import parameters
-from compare.experiment import draw
-from compare.experiments import EXPERIMENTS, module
+from compare.experiments import EXPERIMENTS
 from compare.experiments.parameters import stated
 from compare.judge.scale import EPS, FACTOR, bias_scale, reaches
-from compare.report import files
-from compare.report.verdict import Report, Section, verdict
 from compare.robots import Robot
 from compare.robots.arm import ARM
 
@@ -37,25 +35,16 @@ def test_a_run_that_diverges_is_no_movement(small):
     assert any(at is not None for at in ended) and max(moved) < 100.0
 
 
-def test_a_report_of_all_experiments_has_every_figure(small, tmp_path):
+def test_a_report_of_all_experiments_has_every_figure(small, beside):
     """Every figure of a full run is drawn, and the report is written, in one process."""
-    (tmp_path / "figures").mkdir()
-    sections = []
-    for name in EXPERIMENTS:
-        of = module(name)
-        section = Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), small(name))
-        section.figures, failed = draw(name, section.result, ARM, tmp_path / "figures")
-        assert failed == []
-        sections.append(section)
-    words = verdict(sections, len(EXPERIMENTS))
-    assert words.startswith(f"The two models agree: all {sum(len(s.result.checks) for s in sections)} checks pass.")
-    files.write(tmp_path, Report(sections, ARM, {"command": "a small run"}, words))
-    drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
+    made = beside.result(report_of_arm)
+    assert made.lost == []
+    checks = sum(len(small(name).checks) for name in EXPERIMENTS)
+    assert made.words.startswith(f"The two models agree: all {checks} checks pass.")
     of_more_scenes = {"speed_ball_catch_free", "speed_bent_damped"}
-    assert drawn | of_more_scenes == {path.stem for path in (ROOT / "reports/example/figures").iterdir()}
-    captions = [caption for section in sections for _, caption in section.figures]
-    assert len(captions) == len(drawn) and all(caption.endswith((".", ")")) for caption in captions)
-    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert made.drawn | of_more_scenes == {path.stem for path in (ROOT / "reports/example/figures").iterdir()}
+    captions, text = made.captions, made.text
+    assert len(captions) == len(made.drawn) and all(caption.endswith((".", ")")) for caption in captions)
     assert not {"nan", "None", "inf"} & set(re.findall(r"[A-Za-z]+", "\n".join(captions) + text))
     assert "not run" not in text and "no result" not in text
 

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import tmt
-from compare.case import Case, Scene, shorten
+from compare.case import Case, Scene
 from compare.engines.mujoco import parse
+from compare.given import shorten
 from compare.judge.run import required_time
 from compare.robots import Robot
 from compare.robots.arm import ARM

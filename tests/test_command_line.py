@@ -4,27 +4,32 @@ import json
 import os
 import re
 import sys
+from concurrent.futures import Future
 from functools import partial
 from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
-from runs import ROOT, on_terminal, readable_lines, words
+from runs import ROOT, readable_lines, words
+from sections import GOOD, section
+from small_runs import quick_run
 
 from compare import __main__ as command_line
 from compare import experiment
 from compare.__main__ import main
 from compare.experiments import EXPERIMENTS
 from compare.judge.check import Result
+from compare.process.workers import WorkerEnded
+from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory):
-    """One quick run of everything, on a terminal, from a folder that is not the project's."""
-    folder = tmp_path_factory.mktemp("anywhere")
-    return on_terminal(["all", "--quick"], 80, "xterm", folder), folder
+def ran(beside):
+    """One quick run of everything, and its folder."""
+    folder = beside.folder / "anywhere"
+    return beside.result(quick_run, folder), folder
 
 
 def test_all_passes_and_says_so_at_a_glance(ran):
@@ -262,6 +267,42 @@ def test_a_model_that_an_experiment_does_not_expect_gets_a_report(tmp_path, caps
     assert capsys.readouterr().err == ""
 
 
+def test_a_report_of_which_a_part_breaks_is_kept_and_not_complete(tmp_path, capsys, monkeypatch):
+    def rows(setup):
+        result = Result("odd", shown=["a", "b"], rows=[{"a": 1.5}])
+        result.check("zero", "a", 0.5, 1.0, "m")
+        return result
+
+    experiments = SimpleNamespace(rows=rows, figures=lambda result, robot: (), **asked("odd"))
+    monkeypatch.setitem(sys.modules, "compare.experiments.odd", experiments)
+    only(monkeypatch, "odd", "published")
+    assert main(["all", "--quick", "--out", str(tmp_path / "out")]) == 1
+    out, err = capsys.readouterr()
+    assert "odd           ok" in out and "published     ok" in out
+    for line, name in zip(err.splitlines(), ("report.md", "index.html"), strict=True):
+        said = f"This report is not complete: odd in {name} could not be made, KeyError: "
+        assert line.startswith(f"python -m compare: {said}") and "(compare/report/tables.py:" in line
+        assert said in (tmp_path / "out" / name).read_text(encoding="utf-8").replace("&quot;", '"').replace("\\", "")
+    assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
+    results = json.loads((tmp_path / "out/results.json").read_text())
+    assert not results["passed"] and results["checks"][0]["passed"]
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.md", "index.html", "figures"}
+
+
+def test_an_experiment_that_cannot_say_what_it_asks_keeps_its_numbers(tmp_path, monkeypatch):
+    def rows(setup):
+        return Result("mute", rows=[{"a": 1.5}])
+
+    experiments = SimpleNamespace(rows=rows, figures=lambda result, robot: (), **asked("mute"))
+    experiments.claim = lambda robot: robot.wings
+    monkeypatch.setitem(sys.modules, "compare.experiments.mute", experiments)
+    only(monkeypatch, "mute")
+    assert main(["mute", "--quick", "--out", str(tmp_path / "out")]) == 1
+    assert pd.read_csv(tmp_path / "out/tables/mute.csv")["a"].tolist() == [1.5]
+    check = json.loads((tmp_path / "out/results.json").read_text())["checks"][0]
+    assert check["quantity"] == "runs to its end" and "wings" in check["note"]
+
+
 def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):
     def killed(setup):
         return list(setup.map(os._exit, [3]))
@@ -271,6 +312,16 @@ def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsy
     assert main(["broken", "--quick", "--out", str(tmp_path / "out")]) == 2
     assert "a process that computes beside was ended from outside" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_computed_is_kept_though_the_process_that_draws_is_ended(capsys):
+    drawn = section("mass", GOOD)
+    drawing = Future()
+    drawing.set_exception(WorkerEnded("no longer there"))
+    experiment.take_figures(Terminal(), drawn, drawing)
+    assert [check.passed for check in drawn.result.checks] == [True, False]
+    said = "FAIL mass: figure number 1 is drawn: no, the process that draws was ended from outside"
+    assert said in " ".join(capsys.readouterr().out.split())
 
 
 def test_an_experiment_that_cannot_serve_a_robot_is_skipped_or_refused(tmp_path, capsys, monkeypatch):

@@ -49,7 +49,7 @@ def test_a_robot_is_compared_and_what_is_off_is_said(tmp_path, capsys):
         "switched_off",
     ]
     text = (tmp_path / "report.md").read_text(encoding="utf-8")
-    assert text.startswith(f"{first}\n\n{second}\n")
+    assert text.startswith(f"{first}\n\n{second}\n\n# TMT and MuJoCo compared on gripper.xml\n")
 
 
 @pytest.mark.parametrize("arguments, says", [

@@ -100,6 +100,23 @@ def test_another_source_is_compiled_anew(folder, tmp_path, monkeypatch):
         assert compiled(importlib.import_module("scaled").scaled)(1.5) == 1.5 * factor
 
 
+def test_another_source_of_what_is_called_is_compiled_anew(folder, tmp_path, monkeypatch):
+    """The machine code of a function has in it that of the functions of other modules that it calls, and their numbers."""
+    sources = {
+        "factors": "FACTOR = {}\n",
+        "inner": "from factors import FACTOR\nfrom tmt.machine_code import compiled\n\n\n"
+        "@compiled\ndef scaled(x):\n    return FACTOR * x\n",
+        "outer": "from inner import scaled\n\n\ndef twice(x):\n    return 2.0 * scaled(x)\n",
+    }
+    monkeypatch.syspath_prepend(tmp_path)
+    for factor in (2.0, 30.0):
+        for name, source in sources.items():
+            (tmp_path / f"{name}.py").write_text(source.format(factor))
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        assert compiled(importlib.import_module("outer").twice)(1.5) == 3.0 * factor
+
+
 WAYS = ["nothing", "folder", "machine code", "its folder", "link", "owner"]
 
 

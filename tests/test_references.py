@@ -39,7 +39,7 @@ def test_any_other_and_whoever_asks_for_it_with_tmts_equations(asked, path):
     reference, robot, mujoco, reading = compared_with(asked, path and str(path))
     file = str(path or "mjcf/arm.xml")
     assert reference.lines == (f"reference: model; {file} compared with tmt's equations for the model as compiled",)
-    assert (reference.kind, reference.name, robot.described) == ("model", file, file)
+    assert (reference.kind, reference.name, robot.described) == ("model", file, Path(file).name)
     assert robot.is_read and mujoco.bare and reading.tree == robot.tree
 
 
@@ -111,4 +111,4 @@ def test_a_report_says_what_a_robot_of_a_file_consists_of_and_what_is_switched_o
         write(tmp_path, Report([section("mass", GOOD)], robot, {"command": "c"}, "words", reference=reference))
         text = (tmp_path / "report.md").read_text(encoding="utf-8")
         assert joints in text and off in text and "modelled twice" not in text
-        assert f"# TMT and MuJoCo compared on {PATHS[name]}" in text
+        assert f"# TMT and MuJoCo compared on {PATHS[name].name}" in text

@@ -10,6 +10,7 @@ from models import PATHS, random_tree
 
 import tmt
 from compare.engines.mujoco import engine, read
+from compare.experiments.speed.settings import scenes_of as scenes_of_speed
 from compare.robots.file import COARSER, DURATION, added_damping, coarsest, robot_of, scenes_from
 
 ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2
@@ -37,6 +38,16 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     assert alone.ranges == (None,) * 3 and alone.is_read
 
 
+def test_no_keyframe_takes_the_place_of_another_posture():
+    names = ["qpos0", "key qpos0", "key key qpos0", "key middle", "middle"]
+    keys = {name: np.full(3, 0.1 * (i + 1)) for i, name in enumerate(names)}
+    poses = robot_of(reading_of(tmt.ARM, keyframes=keys), "my.xml").poses
+    assert len(poses) == 6 and not poses["qpos0"].any()
+    assert poses["key qpos0"].tolist() == keys["key qpos0"].tolist()
+    assert poses["key key key qpos0"].tolist() == keys["qpos0"].tolist()
+    assert poses["key key middle"].tolist() == keys["middle"].tolist()
+
+
 def test_quaternions_of_one_turn_are_one_posture():
     reading = read(PATHS["pendulum_ball"])
     keys = {"turned": -np.array(reading.qpos0)}
@@ -49,7 +60,7 @@ def test_quaternions_of_one_turn_are_one_posture():
 def test_its_name_is_the_models_or_the_files():
     assert robot_of(reading_of(tmt.ARM), "folder/my arm.xml").name == "my arm"
     named = robot_of(reading_of(tmt.ARM, name="lift"), "folder/my arm.xml")
-    assert (named.name, named.described, named.mjcf) == ("lift", "folder/my arm.xml", Path("folder/my arm.xml"))
+    assert (named.name, named.described, named.mjcf) == ("lift", "my arm.xml", Path("folder/my arm.xml"))
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -65,6 +76,13 @@ def test_every_scene_is_one_of_the_robot_in_both_engines(name):
     is_free = any(feature.feature == "free" for feature in robot.features)
     thrown = [scene for scene in robot.scenes if scene.name.endswith("thrown")]
     assert bool(thrown) == is_free and not any("full only" in scene.tags for scene in thrown)
+    regular = [scene.name for scene in robot.scenes if "regular" in scene.tags]
+    assert regular == [scene.name for scene in (thrown or robot.scenes) if "speed" in scene.tags][:1]
+    # a fall in which nothing else moves shows no error of a method
+    moving = [scene.name for scene in scenes_of_speed(robot)]
+    assert (f"{robot.scenes[0].posture}, let go" in moving) == (
+        name not in ("free_body", "quadruped", "humanoid29_free")
+    )
 
 
 def test_what_rests_where_it_is_let_go_is_set_going():

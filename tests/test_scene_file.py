@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from models import PATHS
 
 from compare.case import Case
+from compare.reference import compared_with
 from compare.robots.arm import ARM
 from compare.scene_file import SceneError, read_scenes
 
+PENDULUM = compared_with("model", str(PATHS["pendulum_ball"])).robot
 WHOLE = """
 [[scene]]
 name = "thrown up"
@@ -51,8 +54,8 @@ def test_every_key_is_read(tmp_path):
     "text, says",
     [
         ("x = 1", "x is unknown"),
-        ("[scene]\nname = 'a'", "no list of scenes"),
-        ("", "no list of scenes"),
+        ("[scene]\nname = 'a'", "no array of scenes"),
+        ("", "no array of scenes"),
         ("[[scene]\n", r"is not TOML: .*line 1"),
         ("[[scene]]\nposture = 'bent'", "scene 1: it has no name"),
         ("[[scene]]\nname = 'a'\nfoo = 1", r"scene 1 \('a'\): foo is unknown; known are name, posture"),
@@ -75,13 +78,46 @@ def test_every_key_is_read(tmp_path):
         ("[[scene]]\nname = 'a'\n[[scene]]\nname = 'a'", r"scene 2 \('a'\): the name is that of scene 1"),
         ("[[scene]]\nname = 'bent, free'", "that of a scene of arm"),
         ("[[scene]]\nname = ''", "a text that is not empty"),
-        ("[[scene]]\nname = 3", "name is 3"),
+        ("[[scene]]\nname = 3", "name is 3; a string in one line is expected"),
+        ("[[scene]]\nname = { a = true }", r"name is \{a = true\}; a string in one line is expected"),
+        ("[[scene]]\nname = 'a'\nq = { a = [1, nan] }", r"q is \{a = \[1, nan\]\}; 3 numbers"),
+        ("[[scene]]\nname = 'a'\nlocked = 'alpha'", "locked is 'alpha'; an array of names is expected"),
+        (
+            "[[scene]]\nname = 'a'\ngravity = [true]",
+            r"gravity is \[true\]; true, the model's own, or false, none is expected",
+        ),
+        (
+            "[[scene]]\nname = 'a'\ndamping = 'x'",
+            "damping is 'x'; a number of at least 0 N m s/rad, or an array with one",
+        ),
     ],
 )
 def test_what_cannot_be_is_one_line_with_file_and_entry(tmp_path, text, says):
     with pytest.raises(SceneError, match=says) as error:
         from_text(tmp_path, text)
     assert str(error.value).startswith(("cannot read", str(tmp_path / "my.toml"))) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("length", [0.99901, 0.9999990001, 1.0, 1.00099])
+def test_a_quaternion_of_few_digits_is_made_one_of_length_1(tmp_path, length):
+    turn = np.array([0.5, 0.5, -0.5, 0.5])
+    (scene,) = balls(tmp_path, [*(length * turn), 1.0, 0.0, 0.0, 0.0])
+    assert np.allclose(Case(PENDULUM, scene).q, [*turn, 1.0, 0.0, 0.0, 0.0], rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("length", [0.99899, 1.00101, 0.0])
+def test_a_quaternion_of_another_length_is_refused_with_that(tmp_path, length):
+    q = [*(length * np.array([0.5, 0.5, -0.5, 0.5])), 1.0, 0.0, 0.0, 0.0]
+    said = rf"scene 1 \('a'\): q is \[.*; the quaternion of upper has the length {length:g}, 1 within 0.001 is expected"
+    with pytest.raises(SceneError, match=said):
+        balls(tmp_path, q)
+
+
+def balls(tmp_path, q):
+    """The scenes of a file with one scene of two balls at this position."""
+    path = tmp_path / "my.toml"
+    path.write_text(f"[[scene]]\nname = 'a'\nq = {list(map(float, q))}\n")
+    return read_scenes(path, PENDULUM)
 
 
 def test_a_file_that_cannot_be_read(tmp_path):

@@ -16,8 +16,7 @@ def random_tree(rng, bodies=4, damping=0.0) -> Tree:
             offset.append(rng.uniform(-0.4, 0.4, 3))
             axis.append(rng.normal(size=3))
         body_hinge.append(before)
-        spread = rng.uniform(-0.1, 0.1, (6, 3))  # six point masses: a tensor that a body can have
-        inertias.append(sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in spread))
+        inertias.append(possible_tensor(rng))
     n = len(parent)
     return Tree(
         hinge_names=[f"hinge{i}" for i in range(n)],
@@ -25,12 +24,7 @@ def random_tree(rng, bodies=4, damping=0.0) -> Tree:
         offset=offset,
         axis=axis,
         damping=rng.uniform(0.0, 1.0, n) * damping,
-        body_names=[f"body{b}" for b in range(bodies)],
-        body_hinge=body_hinge,
-        mass=rng.uniform(0.5, 2.0, bodies),
-        com=rng.uniform(-0.3, 0.3, (bodies, 3)),
-        inertia=inertias,
-        gravity=rng.normal(size=3) * 5.0,
+        **random_bodies(rng, body_hinge, inertias),
     )
 
 
@@ -64,8 +58,7 @@ def tree_of_kinds(rng, bodies=4, along_axes=False, kinds=("hinge", "slide", "bal
             if chosen == ["free"] and name == "slide":
                 axis[-1] = np.eye(3)[len(axis) - 1]
         body_hinge.append(before)
-        spread = rng.uniform(-0.1, 0.1, (6, 3))  # six point masses: a tensor that a body can have
-        inertias.append(sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in spread))
+        inertias.append(possible_tensor(rng))
     n, nv = len(parent), len(axis)
     rest = [x for name in kind for x in (unit_quaternion(rng) if name == "ball" else [rng.uniform(-0.5, 0.5)])]
     return Tree(
@@ -74,18 +67,31 @@ def tree_of_kinds(rng, bodies=4, along_axes=False, kinds=("hinge", "slide", "bal
         offset=offset,
         axis=axis,
         damping=rng.uniform(0.0, 0.5, nv),
-        body_names=[f"body{b}" for b in range(bodies)],
-        body_hinge=body_hinge,
-        mass=rng.uniform(0.5, 2.0, bodies),
-        com=rng.uniform(-0.3, 0.3, (bodies, 3)),
-        inertia=inertias,
-        gravity=rng.normal(size=3) * 5.0,
+        **random_bodies(rng, body_hinge, inertias),
         kind=kind,
         armature=rng.uniform(0.0, 0.1, nv) * rng.integers(0, 2, nv),
         stiffness=rng.uniform(0.0, 3.0, n) * rng.integers(0, 2, n),
         rest=rest,
         reference=[0.0 if name == "ball" else rng.uniform(-0.5, 0.5) for name in kind],
     )
+
+
+def possible_tensor(rng) -> np.ndarray:
+    """A tensor that a body can have: that of six point masses."""
+    return sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in rng.uniform(-0.1, 0.1, (6, 3)))
+
+
+def random_bodies(rng, body_hinge, inertias) -> dict:
+    """What a Tree says of bodies on these joints, and gravity."""
+    count = len(body_hinge)
+    return {
+        "body_names": [f"body{b}" for b in range(count)],
+        "body_hinge": body_hinge,
+        "mass": rng.uniform(0.5, 2.0, count),
+        "com": rng.uniform(-0.3, 0.3, (count, 3)),
+        "inertia": inertias,
+        "gravity": rng.normal(size=3) * 5.0,
+    }
 
 
 def unit_quaternion(rng) -> np.ndarray:

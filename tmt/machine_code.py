@@ -10,9 +10,11 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import version
+from types import ModuleType
 
 from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.dispatcher import Dispatcher
 
 from .cache import NotOwn, complain, own_folder, own_machine_code
 
@@ -25,7 +27,7 @@ class Place(CompileResultCacheImpl):
 
     def __init__(self, function):
         module = sys.modules[function.__module__]
-        source = "\n".join([version("numba"), sys.version, inspect.getsource(module)])
+        source = "\n".join([version("numba"), sys.version, *sources(module)])
         self.stamp = hashlib.sha256(source.encode()).hexdigest()
         name = module.__name__.rpartition(".")[2]
         self.path = own_machine_code(own_folder(), name)
@@ -47,6 +49,19 @@ class Place(CompileResultCacheImpl):
 
     def ensure_cache_path(self):
         """It is there since the function was made."""
+
+
+def sources(module: ModuleType) -> list[str]:
+    """What the machine code of a module's functions is made from: its source, the numbers in it, and those of what it calls."""
+    modules, found = [module], []
+    for each in modules:
+        found.append(inspect.getsource(each))
+        for name, value in sorted(vars(each).items()):
+            if isinstance(value, int | float):
+                found.append(f"{name} = {value!r}")
+            elif isinstance(value, Dispatcher) and (other := sys.modules[value.__module__]) not in modules:
+                modules.append(other)
+    return found
 
 
 class Cache(FunctionCache):

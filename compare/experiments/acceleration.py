@@ -143,6 +143,6 @@ def total_energy(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     from .figures import draw_distances  # matplotlib is for the process that draws
 
-    quantities = ["bias", "qdd", "energy", "potential energy", "energy above the zero position's"]
+    quantities = ["bias", "qdd", "energy", "potential energy"]
     known = [quantity for quantity in quantities if quantity in result.curves["random states"]]
     yield partial(draw_distances, result, "random states", known)

@@ -46,20 +46,31 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
         ax.set_ylabel("share of states")
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    worst = max((curves[q][f"{label} to MuJoCo"][-1], q) for q in quantities)
+    worst, of_worst = max((largest_of(curves[q][f"{label} to MuJoCo"]), q) for q in quantities)
     against = ""
     if exact:
-        ours, theirs = (max(curves[q][f"{engine} to exact"][-1] for q in quantities) for engine in (label, "MuJoCo"))
+        ours, theirs = (
+            max(largest_of(curves[q][f"{engine} to exact"]) for q in quantities) for engine in (label, "MuJoCo")
+        )
         known = len(curves[quantities[0]][f"{label} to exact"])
         against = (
-            f" Against the exact value, at the first {known} of the states, {label} is at most {ours:.3g} eps off and MuJoCo at "
-            f"most {theirs:.3g}."
+            f" Against the exact value, at the first {known} of the states, {label} is {eps_in_words(ours)} off and "
+            f"MuJoCo at most {theirs:.3g}."
         )
     caption = (
-        f"Share of the {sample} whose difference is at most so many eps. The engines are at most {worst[0]:.3g} eps apart "
-        f"({worst[1]}).{against} Differences of exactly zero are drawn at {ZERO_AT:g}."
+        f"Share of the {sample} whose difference is at most so many eps. The engines are {eps_in_words(worst)} apart "
+        f"({of_worst}).{against} Differences of exactly zero are drawn at {ZERO_AT:g}."
     )
     return f"{result.experiment}_distances", fig, caption
+
+
+def largest_of(curve: np.ndarray) -> float:
+    """The last of sorted differences; inf where one is no number, as one's own equations may give."""
+    return float(curve[-1]) if np.isfinite(curve[-1]) else np.inf
+
+
+def eps_in_words(most: float) -> str:
+    return f"at most {most:.3g} eps" if np.isfinite(most) else "somewhere no number of eps"
 
 
 def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
@@ -133,9 +144,14 @@ def needless(postures: dict, robot: Robot) -> str:
         name: [posture for posture, of in postures.items() if (np.abs(of[name]) <= zero[posture]).all()]
         for name in robot.compared
     }
-    words = [
-        f"{capital(LABELS[name])} needs none, but for rounding, at: {', '.join(at) or 'no posture'}."
-        for name, at in rest.items()
-    ]
     first, second = rest
-    return " ".join(words) if rest[first] != rest[second] else "Both need" + words[0].partition(" needs")[2]
+    if rest[first] == rest[second]:
+        return needless_in_words("Both need", rest[first])
+    return " ".join(needless_in_words(f"{capital(LABELS[name])} needs", at) for name, at in rest.items())
+
+
+def needless_in_words(needs: str, postures: list) -> str:
+    """Where no torque is needed, in a sentence that begins with who needs."""
+    return (
+        f"{needs} none, but for rounding, at: {', '.join(postures)}." if postures else f"{needs} some at every posture."
+    )

@@ -24,7 +24,7 @@ UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E
 
 def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
     """The robot with the axes of its joints in two postures, from the method's own frames."""
-    poses = {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
+    poses = sketched(robot)
     parts = {name: (chains(robot, q), tmt.com_positions(q, robot.tree)) for name, q in poses.items()}
     size = max(np.ptp(np.concatenate([*lines, coms]), axis=0).max() for lines, coms in parts.values()) or 1.0  # m
     few = max(len(robot.joints), len(robot.tree.mass)) <= SKETCHED_BY_NAME
@@ -60,6 +60,11 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
     return file_name(robot.name), fig, sketch_in_words(robot, few)
 
 
+def sketched(robot: Robot) -> dict[str, np.ndarray]:
+    """The postures that are drawn, by name."""
+    return {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
+
+
 def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
     """The axes of hinges as arrows, the directions of slides as dashed lines through them, balls as a dot in a circle.
 
@@ -67,7 +72,7 @@ def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
     """
     tree, lines = robot.tree, joint_lines(robot)
     fontsize = 13 if all(len(robot.symbol(joint)) <= 2 for joint in robot.joints) else 9
-    for joint, (kind, _, by) in zip(robot.joints, tree.coordinates.joints):
+    for joint, free, (kind, _, by) in zip(robot.joints, free_parts(tree), tree.coordinates.joints):
         colour = lines[joint][0] if few else KIND_COLOURS[kind]
         origin, axis = arrows[by.start]
         if kind == "ball":
@@ -79,7 +84,7 @@ def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
             ax.plot(*np.stack([origin - axis, origin]).T, color=colour, linewidth=1.2, linestyle="--")
         if few and kind == "ball":
             ax.text(
-                *(origin + 0.2 * np.linalg.norm(axis) * (RIGHTWARD + UPWARD)),
+                *(origin + 0.2 * np.linalg.norm(axis) * (RIGHTWARD - 2.0 * UPWARD if free else RIGHTWARD + UPWARD)),
                 plain(joint),
                 color=colour,
                 fontsize=fontsize,
@@ -91,11 +96,12 @@ def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
 def sketch_in_words(robot: Robot, few: bool) -> str:
     """The caption of the sketch: what each of a few joints does, or how many there are of each kind."""
     bodies = [f"the {body} ({number})" for number, body in enumerate(robot.tree.body_names, start=1)]
-    kinds = robot.tree.kind
+    kinds, (posture, *others) = robot.tree.kind, sketched(robot)
+    at = f", at {posture}" if robot.is_read and others else ""
     if few and set(kinds) == {"hinge"}:
         return (
-            f"The {robot.name} and its hinges, drawn from the method's own kinematics: {', then '.join(hinges(robot))}. Dots: "
-            f"centres of mass of {listed(bodies)}."
+            f"The {robot.name} and its hinges, drawn from the method's own kinematics{at}: {', then '.join(hinges(robot))}. "
+            f"Dots: centres of mass of {listed(bodies)}."
         )
     signs = {
         "hinge": "an arrow along its axis",
@@ -108,7 +114,7 @@ def sketch_in_words(robot: Robot, few: bool) -> str:
         if kind in kinds
     ]
     free = "; a free body is three slides and a ball" if any(free_parts(robot.tree)) else ""
-    which = f": {', then '.join(hinges(robot))}" if few else ""
+    which = f"{at}: {', then '.join(hinges(robot))}" if few else ""
     of = listed(bodies) if few else f"{len(bodies)} bodies"
     return (
         f"The {robot.name}, drawn from the method's own kinematics: {listed(counted)}{free}{which}. Sticks: from joint to joint, "
@@ -180,8 +186,11 @@ def label_directions(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
 
 
 def hinges(robot: Robot) -> list[str]:
-    """What each hinge turns about, or slide moves along, and where it is at the reference, in words, in their order."""
-    rest = robot.posture()
+    """What each hinge turns about, or slide moves along, and where it is, in words, in their order.
+
+    At the reference; of a file's robot where it is drawn, in the first posture.
+    """
+    rest = next(iter(sketched(robot).values())) if robot.is_read else robot.posture()
     landmarks = robot.landmarks(rest) if robot.landmarks else {"origin": np.zeros(3)}
     words = []
     way = {"hinge": " about ", "slide": " along ", "ball": ""}

@@ -6,12 +6,17 @@ from functools import partial
 import numpy as np
 
 from ..engines import LABELS
+from ..engines.mujoco.accelerations import convective_accelerations
 from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
-from ..judge.scale import reaches
+from ..judge.scale import EPS, FACTOR, reaches
 from ..judge.words import listed
 from ..robots import Robot
 from ..setup import Setup
+from ..states import Sample
+
+RATED, RATE_STEP = 20, 1e-6  # states at most, and step in s, of central differences of a Jacobian along the motion
+CLEARLY = 1e3  # of two ways, one is wrong if it is off by so many times more
 
 TITLE = "Kinematics: do the bodies move alike?"
 
@@ -82,7 +87,12 @@ def rows(setup: Setup) -> Result:
         if "jacobians" in brings:
             found["T_b"], found["B_b"] = zip(*(dynamics.jacobians(q) for dynamics in engines))
         if "convective_terms" in brings:
-            found["v_conv"], found["w_conv"] = zip(*(dynamics.convective_terms(q, qd) for dynamics in engines))
+            convective = [dynamics.convective_terms(q, qd) for dynamics in engines]
+            wrong = wrong_rates(setup, sample, convective[1][0], scale.v_conv) if tree.coordinates.balls else ""
+            if wrong:
+                convective[1] = convective_accelerations(engines[1], q, qd)
+                result.notes.append(wrong)
+            found["v_conv"], found["w_conv"] = zip(*convective)
         of_quantities = {
             "x_b": ("m", scale.positions, "com_positions"),
             "omega_b": ("rad/s", scale.angular_velocities, "angular_velocities"),
@@ -96,6 +106,30 @@ def rows(setup: Setup) -> Result:
             result.agree(sample, quantity, of, ours, theirs, size, truth=truth)
         result.notes += sample.notes
     return result
+
+
+def wrong_rates(setup: Setup, sample: Sample, found: np.ndarray, scale: np.ndarray) -> str:
+    """A sentence if mj_jacDot is not the rate of MuJoCo's own Jacobian, and accelerations at qacc = 0 are; else "".
+
+    found: v_conv by mj_jacDot, (states, m, 3). Decided at the first states, by central differences of mj_jacBodyCom along the
+    motion: MuJoCo's mj_jacDot of 4.0 leaves out what a ball does to a slide that comes after it in the same body.
+    """
+    few, dynamics = sample.first(RATED), setup.compared()["mujoco"]
+    q, qd, found, scale = few.q, few.qd, found[: len(few.q)], scale[: len(few.q)]
+    other, _ = convective_accelerations(dynamics, q, qd)
+    if (np.abs(found - other) <= FACTOR * EPS * scale).all():
+        return ""
+    move = setup.robot.coordinates.move
+    later, sooner = (dynamics.jacobians(move(q, dt * qd))[0] for dt in (RATE_STEP, -RATE_STEP))
+    rate = np.einsum("sbci,si->sbc", later - sooner, qd) / (2.0 * RATE_STEP)
+    by_rates, by_accelerations = (float(np.abs(values - rate).max()) for values in (found, other))
+    if by_accelerations > by_rates / CLEARLY:
+        return ""
+    return (
+        f"{sample.name}: MuJoCo's mj_jacDot is wrong here: times the rates it is up to {by_rates:.2g} m/s2 off the central "
+        f"difference of MuJoCo's own mj_jacBodyCom, and its accelerations of the bodies at qacc = 0 (mj_objectAcceleration) are "
+        f"{by_accelerations:.1g} m/s2 off. MuJoCo's convective terms are taken from these accelerations."
+    )
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

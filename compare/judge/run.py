@@ -1,11 +1,15 @@
 """What can be said of one run: how far it went, when it left its start, when it diverged."""
 
+from functools import lru_cache
+
 import numpy as np
 
 import tmt
+from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 
-from ..case import Case, Coordinates
+from ..case import Case, Coordinates, rates_at
 from .check import Result
+from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale
 
 LEFT = 0.1  # rad or m: a held model that is so far from its posture has left it
@@ -100,14 +104,26 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     of 1.
     """
     tree, coordinates = case.tree, case.coordinates
-    has = 2.0 * gravity_scale(case.robot.tree) + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
+    # what slides have moved at the start belongs to the reach; what they move from there is the way that they have gone
+    has = (
+        2.0 * gravity_scale(case.robot.tree, case.posture)
+        + tmt.energy(q[0], case.v, tree)
+        - tmt.potential_energy(q[0], tree)
+    )
     if tree.has_springs:
         has = has + tmt.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     gone = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
-    nothing = FACTOR * EPS * (np.trace(tmt.mass_matrix(q[0], tree)) + np.sum(tree.stiffness))
+    nothing = FACTOR * EPS * (sum_of_inertias(tree, tuple(q[0].tolist())) + np.sum(tree.stiffness))
     return np.maximum(has, np.maximum.accumulate(np.abs(done) + gone)) + nothing
+
+
+@lru_cache(maxsize=64)
+def sum_of_inertias(tree: tmt.Tree, q: tuple[float, ...]) -> float:
+    """The trace of Mbar at positions (nq,), kg m2 and kg: kept, for many runs start from the same ones."""
+    inertia, _ = mass_matrix_and_bias(tree, list(q), [0.0] * tree.coordinates.nv)
+    return float(np.trace(np.array(inertia, dtype=float)))
 
 
 def number_or_none(number: float | None) -> float | None:
@@ -118,3 +134,21 @@ def number_or_none(number: float | None) -> float | None:
 def number_or_nan(number: float | None) -> float:
     """A number from a table: NaN, which leaves a gap in a figure and fails a check, where there is none."""
     return np.nan if number is None else number
+
+
+def leaves_no_digits(robot: object) -> str | None:
+    """Why no run of a file's robot can be compared: rounding grows beyond what is judged in two steps; or None.
+
+    A force that moves a joint at the rate r is rounded by 64 eps of itself, and a step multiplies what is off by (r dt)^2, where
+    that is far more than 1: after two of them it is 64 eps (r dt)^4 of 1 rad or 1 m.
+    """
+    if not robot.is_read or not robot.scenes:
+        return None
+    case = min(robot.cases, key=lambda case: case.scene.dt)
+    rate, dt = max(rates_at(case.tree, case.q)), case.scene.dt
+    if not FACTOR * EPS * (rate * dt) ** 4 > NARROW:
+        return None
+    return (
+        f"the {robot.name}'s fastest rate, {rate:.1e} per second, is {rate * dt:.1e} over a step of {dt:.1e} s, the finest of "
+        "its scenes: rounding alone leaves no digits after two steps"
+    )

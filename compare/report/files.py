@@ -1,38 +1,70 @@
 """Results to files: CSV, JSON, Markdown and HTML."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from . import markdown, page
 from .folder import files, save
-from .page import markdown, page
+from .parts import Parts
 from .verdict import Report, passed
 
 
-def write(folder: Path, report: Report) -> None:
-    """All files of a report, the figures excepted, into a folder that has those."""
+def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
+    """All files of a report, the figures excepted, into a folder that has those; what could not be made of it.
+
+    A part that breaks is left out and named in all files; the others are written.
+    """
+    parts = Parts() if parts is None else parts
     (folder / "tables").mkdir()
     for section in report.sections:
         for name, rows in section.tables.items():
-            save(folder / "tables" / f"{name}.csv", for_csv(pd.DataFrame(rows, dtype=object)).to_csv(index=False))
-    checks = [check.record() for section in report.sections for check in section.result.checks]
-    save(folder / "report.md", markdown(report))
-    save(folder / "index.html", page(folder, report))
+            text = parts.made(f"tables/{name}.csv", None, csv, rows)
+            if text is not None:
+                save(folder / "tables" / f"{name}.csv", text)
+    made = [check for section in report.sections for check in section.result.checks]
+    checks = records(parts, "check", [check.record() for check in made])
+    fields = ("rank", "place", "stated", "found", "text")
+    causes = records(parts, "cause", [{name: cause[name] for name in fields} for cause in report.causes])
+    paragraphs, texts = markdown.markdown_body(report, parts), page.page_body(folder, report, parts)
+    html = parts.made("index.html", None, page.page, report, texts, parts)
+    text = parts.made("the head of report.md", None, markdown.markdown, report, paragraphs, parts)
+    save(folder / "report.md", markdown.joined([*parts.lines, *paragraphs]) if text is None else text)
+    if html is not None:
+        save(folder / "index.html", html)
     reference = report.reference
     results = {
-        "passed": passed(report.sections),
+        "passed": passed(report.sections) and not parts.broken,
         "reference": None if reference is None else {"kind": reference.kind, "name": reference.name},
-        "checks": checks,
-        "causes": [
-            {name: cause[name] for name in ("rank", "place", "stated", "found", "text")} for cause in report.causes
-        ],
+        "checks": checks + [check.record() for check in parts.checks],
+        "causes": causes,
         "skipped": [{"experiment": name, "reason": reason} for name, reason in report.skipped],
         # its files: what may be replaced by the next report
         "provenance": report.origin | {"files": [*files(folder), "results.json"]},
     }
     save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
+    return parts
+
+
+def records(parts: Parts, name: str, found: Sequence[dict]) -> list[dict]:
+    """Those of the records that can be written as JSON."""
+    written = []
+    for number, record in enumerate(found, start=1):
+        written += parts.made(f"{name} {number} in results.json", [], as_json, record)
+    return written
+
+
+def as_json(record: dict) -> list[dict]:
+    """A record with what JSON knows, alone in a list. TypeError, ValueError if it has anything else."""
+    return [json.loads(json.dumps(record, allow_nan=False))]
+
+
+def csv(rows: Sequence[dict]) -> str:
+    """A table as CSV."""
+    return for_csv(pd.DataFrame(rows, dtype=object)).to_csv(index=False)
 
 
 def for_csv(table: pd.DataFrame) -> pd.DataFrame:

@@ -62,9 +62,11 @@ def verdict(
     experiments: how many there are in all; compared: what agrees or does not.
     """
     checks = [check for section in sections for check in section.result.checks]
-    names = ", ".join(section.name for section in sections)
-    ran = "" if len(sections) == experiments else f" in {names} ({len(sections)} of {experiments} experiments)"
     differing, broke = failures(sections)
+    failing = {check.experiment for check in differing}
+    names = ", ".join(section.name for section in sections if not differing or section.name in failing)
+    is_whole, some = len(sections) == experiments, f"{len(sections)} of {experiments} experiments"
+    ran = "" if is_whole else f" in {names} ({some}{' ran' if differing else ''})"
     stopped = f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."
     if differing:
         text = f"{compared} do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
@@ -78,7 +80,8 @@ def verdict(
             text += f"First: {differing[0]}."
         return f"{text} {stopped}" if broke else text
     if broke:
-        return f"Not everything could be compared{ran}; the other {len(checks) - len(broke)} checks pass. {stopped}"
+        left = "" if is_whole else f" ({some})"
+        return f"Not everything could be compared{left}; the other {len(checks) - len(broke)} checks pass. {stopped}"
     text = f"{compared} agree{ran}: all {len(checks)} checks pass."
     top = worst(sections)
     if top is None or top.value == 0.0:
@@ -98,4 +101,4 @@ def outcome(section: Section) -> str:
         return f"It does not hold: {len(differing)} of {len(checks)} checks fail."
     if broke:
         return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
-    return f"It holds: all {len(checks)} checks pass."
+    return f"It holds: all {len(checks)} checks pass." if checks else "It is not decided: nothing was compared."

@@ -63,8 +63,8 @@ class Robot:
 
     Scenes may have tags: "full only": a quick run leaves it out; "digits": compared with many digits of its own scheme (a small
     run takes the last of them); "speed": followed by every method; "regular": errors fall regularly there from coarse steps on;
-    "fewer joints": some of its joints never move; "own": a user's, or one made for a file, of which nothing is expected but
-    agreement. A scene without tags is part of every run.
+    "fewer joints": some of its joints never move; "falls": a free body falls and nothing else moves; "own": a user's, or one
+    made for a file, of which nothing is expected but agreement. A scene without tags is part of every run.
     """
 
     name: str

@@ -9,7 +9,7 @@ import numpy as np
 import tmt
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
 
-from ..case import Coordinates, Scene
+from ..case import Coordinates, Scene, fastest_rates
 from . import Robot
 
 DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
@@ -45,7 +45,7 @@ def robot_of(reading: Reading, shown: str) -> Robot:
         positions=found,
         ranges=tuple(reading.ranges),
         scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt),
-        described=shown,
+        described=Path(shown).name or shown,
         features=tuple(reading.features),
     )
 
@@ -58,7 +58,12 @@ def named_positions(reading: Reading) -> dict[str, tuple]:
         if known and kind != "ball":
             middle[at] = np.mean(known)
     own = {"qpos0": reading.qpos0, "middle": middle}
-    keys = {f"key {name}" if name in own else name: q for name, q in reading.keyframes.items()}
+    keys = {}
+    for name, q in reading.keyframes.items():
+        apart = name
+        while apart in own or (apart != name and apart in reading.keyframes):  # no key may take another's place
+            apart = f"key {apart}"
+        keys[apart] = q
     found = {}
     for name, q in (keys | own).items():
         if not any(np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in found.values()):
@@ -67,9 +72,10 @@ def named_positions(reading: Reading) -> dict[str, tuple]:
 
 
 def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[Scene, ...]:
-    """The scenes: held at a posture by what balances gravity and springs, let go, let go with damping, a free body thrown.
+    """The scenes: held at a posture by what balances gravity and springs, a free body thrown, let go, let go with damping.
 
-    Of each nothing is expected but agreement, for as long as rounding allows. What rests where it is let go is set going.
+    Of each nothing is expected but agreement, for as long as rounding allows. What rests where it is let go is set going. A free
+    body that is let go may only fall, and none of its joints moves: it is thrown where errors are to be seen.
     start, q: the posture, its name and position (nq,); dt: s, of the file.
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
@@ -83,13 +89,15 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[S
     timing = {"duration": DURATION, "dt": DURATION / coarsest(tree, inverse, dt), "judged": 0.0}
     damped = timing | {"dt": DURATION / coarsest(tree, inverse, dt, added)}
     made = [] if rests else [Scene(f"{start}, held", start, "hold", tags=("own",), **timing)]
+    tags = ("own", "speed", "regular")
+    if free := free_bodies(coordinates):
+        made.append(Scene(f"{start}, thrown", start, speed=thrown(coordinates), tags=tags, **timing))
+        turns = np.delete(accelerations, [k for slides, _ in free for k in slides])
+        tags = ("own", "speed") if rests or np.abs(turns).max() >= STILL else ("own", "falls")
     made += [
-        Scene(f"{start}, {how}", start, tags=("own", "speed", "regular"), **speed, **timing),
+        Scene(f"{start}, {how}", start, tags=tags, **speed, **timing),
         Scene(f"{start}, {how}, damped", start, damping=added, tags=("own", "full only"), **speed, **damped),
     ]
-    # never left out: a body that is only let go falls without turning, and none of its joints moves
-    if speed_thrown := thrown(coordinates):
-        made.append(Scene(f"{start}, thrown", start, speed=speed_thrown, tags=("own",), **timing))
     return tuple(made)
 
 
@@ -109,10 +117,7 @@ def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = ()) 
     No step is longer than 1 over the fastest rate, 1/s, of the joints' own damping, what is added, and the springs.
     inverse: of Mbar, (nv, nv).
     """
-    decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
-    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
-    swing = np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max())
-    least = DURATION * max(1.0 / (COARSER * dt), decay, swing)
+    least = DURATION * max(1.0 / (COARSER * dt), *fastest_rates(tree, inverse, added))
     count = LEAST_STEPS
     while count < min(0.999 * least, MOST_STEPS_OF_A_FILE):
         count *= 2
@@ -120,14 +125,19 @@ def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = ()) 
 
 
 def thrown(coordinates: Coordinates) -> tuple[float, ...]:
-    """Speeds, (nv,) m/s and deg/s, of free bodies that are thrown up and tumble; () if there are none.
+    """Speeds, (nv,) m/s and deg/s, of free bodies that are thrown up and tumble; () if there are none."""
+    speed, free = np.zeros(coordinates.nv), free_bodies(coordinates)
+    for slides, turn in free:
+        speed[slides[-1]] = THROWN_UP
+        speed[turn] = TUMBLING
+    return tuple(map(float, speed)) if free else ()
+
+
+def free_bodies(coordinates: Coordinates) -> list[tuple[list[int], slice]]:
+    """Where the speeds of each free body stand: of its three slides, and of its turn.
 
     A free body is three slides and a ball in a row.
     """
     kinds, joints = coordinates.all_kinds, coordinates.places.joints
     free = [i for i in range(3, len(kinds)) if kinds[i - 3 : i + 1] == ("slide", "slide", "slide", "ball")]
-    speed = np.zeros(coordinates.nv)
-    for i in free:
-        speed[joints[i - 1].qd] = THROWN_UP
-        speed[joints[i].qd] = TUMBLING
-    return tuple(map(float, speed)) if free else ()
+    return [([joints[k].qd.start for k in range(i - 3, i)], joints[i].qd) for i in free]

@@ -19,9 +19,11 @@ import numpy as np
 
 import tmt
 from tmt.cache import own_file
+from tmt.methods import METHODS
 from tmt.reference_run import trajectory
 
-from ..case import Case, Coordinates
+from ..case import Case, Coordinates, rates_at
+from .steps import growth_of
 
 TABLE = Path(__file__).with_name("reference.csv")
 RECORDS = 64  # of a run, and its start
@@ -34,6 +36,7 @@ UNUSABLE = (
     csv.Error,
 )  # of a cache folder: none, not the user's own; or of what is in it
 DOUBLES, MOST_DOUBLINGS = "dopri8", 5  # the method of a run in doubles; how often its steps are doubled at most
+DIVERGES = 1.05  # growth in a step: in the thousands of steps of a run a number overflows
 ABOUT = ["scene", "key", "steps", "halving_difference", "t_s"]
 
 
@@ -105,7 +108,7 @@ def in_doubles(case: Case) -> Reference:
         if before is not None:
             apart = case.coordinates.difference(after[0], before[0]), after[1] - before[1]
             found.append((np.abs(np.concatenate(apart, axis=1)).max(), after, count))
-            if len(found) > 1 and not found[-1][0] < found[-2][0] / 2.0:
+            if len(found) > 1 and np.isfinite(found[-2][0]) and not found[-1][0] < found[-2][0] / 2.0:
                 break
         before, count = after, 2 * count
     apart, path, count = min(found, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
@@ -117,6 +120,20 @@ def in_doubles(case: Case) -> Reference:
     high = np.concatenate(path, axis=1)
     times = np.linspace(0.0, case.duration, RECORDS + 1)
     return Reference(times, high, np.zeros_like(high), float(apart), count, case.coordinates)
+
+
+def has_no_reference(robot: object) -> str | None:
+    """Why a run in doubles cannot follow a file's robot: with its finest steps too the fastest mode diverges; or None."""
+    for case in robot.cases if robot.is_read else ():
+        count = -(-case.steps // RECORDS) * RECORDS << MOST_DOUBLINGS
+        decay, swing = rates_at(case.tree, case.q)
+        grown = np.abs(growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * case.duration / count)).max()
+        if not grown <= DIVERGES:
+            return (
+                f"the {robot.name}'s fastest rate, {max(decay, swing):.1e} per second, is too fast for the reference's finest "
+                f"step, {case.duration / count:.1e} s"
+            )
+    return None
 
 
 def committed(case: Case) -> Reference | None:

@@ -6,23 +6,33 @@ union of two such sets is one too, so there is a largest, and it is found by tak
 until none does. "For all values" is decided on the expressions of the traced method, where the acceleration must fold to
 the number 0; "moves" is decided by one state at which 50 digits give another value than 0. A joint of which neither can
 be said is kept: sin of the double nearest to pi is not 0, and terms that only cancel in sum do not fold.
+
+With 50 digits the numbers of the robot are what their doubles are exactly, its sums of masses too, and directions and
+quaternions have length 1 in all digits: a value that is not 0 is then none of rounding.
 """
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import mpmath
 import numpy as np
 
-from tmt import Tree, method
+import tmt
+from tmt import method
+from tmt.exact import exact_tree
 from tmt.reference import DIGITS
+from tmt.space import solve
 from tmt.trace import Tape
 
 from ..case import SEED, Case
 
 TRIALS = 3  # random states of the other joints, with 50 digits
-EVERY_TRIAL = 6  # up to which every trial is made
-ZERO = mpmath.mpf(10) ** (10 - DIGITS)  # rad/s2: what 50 digits leave of an acceleration that vanishes
+EVERY_TRIAL = 6  # joints, up to which every trial is made
+# what 50 digits leave of an acceleration that vanishes, of the largest one at that state, which is taken as at least 1
+ZERO = mpmath.mpf(10) ** (10 - DIGITS)
+MOST_FOLDED = 20  # speeds up to which accelerations are traced; of more the forces alone
 
 
 class Needed(NamedTuple):
@@ -35,7 +45,6 @@ class Needed(NamedTuple):
 
 def needed(case: Case) -> Needed:
     """Which joints of the case its motion needs."""
-    tree = case.tree
     names, coordinates = case.joints, case.coordinates
     joints = dict(zip(names, coordinates.places.joints))
     units = {name: coordinates.units[joint.qd.start] for name, joint in joints.items()}
@@ -44,59 +53,94 @@ def needed(case: Case) -> Needed:
     while still := tuple(name for name in names if name not in moves and name not in undecided):
         when = "at the start" if len(still) == len(names) else "when the others move"
         largest = dict.fromkeys(still, 0.0)
-        rng = np.random.default_rng(SEED)
-        for _ in range(TRIALS):
+        rng, alone = np.random.default_rng(SEED), len(still) == len(names)
+        # where all are still there is one state, and of many joints an evaluation takes long
+        for _ in range(1 if alone or coordinates.nv > MOST_FOLDED else TRIALS):
             (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
-            for name, values in exact_accelerations(case, tree, still, q, qd).items():
+            for name, values in exact_accelerations(case, still, q, qd).items():
                 largest[name] = max(largest[name], *map(abs, values))
-            if len(names) > EVERY_TRIAL and min(largest.values()) > ZERO:
-                break  # of many joints an evaluation takes long, and nothing is left to be found
+            if len(names) > EVERY_TRIAL and min(largest.values()) > 0.0:
+                break  # nothing is left to be found
         found = {
             name: f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
             for name, a in largest.items()
-            if a > ZERO
+            if a > 0.0
         }
         moves |= found
         if not found:
-            unfolded = tuple(name for name, parts in folded(case, tree, still).items() if any(n != 0.0 for n in parts))
+            unfolded = tuple(name for name, parts in folded(case, still).items() if any(n != 0.0 for n in parts))
             if not unfolded:
                 break
             undecided += unfolded
     return Needed(still, moves, undecided)
 
 
-def accelerations(case: Case, tree: Tree, still: Sequence[str], scalar: Callable, q: Sequence, qd: Sequence) -> dict:
-    """Accelerations of the joints in `still`, at their start and at rest, the others at q, qd: tuples by name, over any scalar.
+def forces(case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence) -> tuple[list, list]:
+    """Mbar qdd (nv,) and the position: joints in `still` at their start and at rest, the others at q, qd.
 
-    A torque that holds is the model's own bias (and springs) at the start, over the same scalar: not its rounded value.
+    tree: the case's, of numbers that agree with those of start (nq,), q and qd. A torque that holds is the model's own bias
+    (and springs) at the start, over the same numbers: not its rounded value.
     """
-    start = [scalar(float(value)) for value in case.q]
     q, qd, joints = list(q), list(qd), dict(zip(case.joints, tree.coordinates.joints))
     for name in still:
         _, at, by = joints[name]
-        q[at], qd[by] = start[at], [scalar(0.0)] * len(qd[by])
+        q[at], qd[by] = start[at], [0.0 * start[0]] * len(qd[by])
+    springs = [0.0] * len(qd)
+    tau = [0.0 * start[0] + float(torque) for torque in case.tau]
+    if tree.has_springs:
+        springs = method.spring_torque(tree, q)
     if case.scene.torque == "hold":
         tau = method.bias(method.bodies(tree, start), tree.gravity)
-        tau = [h + spring for h, spring in zip(tau, method.spring_torque(tree, start))] if tree.has_springs else tau
-    else:
-        tau = [scalar(float(torque)) for torque in case.tau]
-    found = method.acceleration(tree, q, qd, tau)
-    return {name: tuple(found[joints[name].qd]) for name in still}
+        if tree.has_springs:  # what a spring needs more than at the start, 0 of one that is there
+            springs = [now - before for now, before in zip(springs, method.spring_torque(tree, start))]
+    h = method.bias(method.bodies(tree, q, qd), tree.gravity)
+    return [t - d * v - hi - spring for t, d, v, hi, spring in zip(tau, tree.damping, qd, h, springs)], q
 
 
-def exact_accelerations(case: Case, tree: Tree, still: Sequence[str], q: np.ndarray, qd: np.ndarray) -> dict:
-    """The accelerations with 50 digits, rad/s2."""
+def exact_accelerations(case: Case, still: Sequence[str], q: np.ndarray, qd: np.ndarray) -> dict:
+    """The accelerations of the joints in `still` with 50 digits, rad/s2 or m/s2: tuples by name; 0 where they vanish."""
     with mpmath.workdps(DIGITS):
-        q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd))
-        return accelerations(case, tree, still, mpmath.mpf, q, qd)
+        tree = exact_tree(case.tree, mpmath.mpf)
+        start, q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (case.q, q, qd))
+        for joint in tree.coordinates.balls:
+            for turns in (start, q):
+                length = mpmath.sqrt(sum(part * part for part in turns[joint.q]))
+                turns[joint.q] = [part / length for part in turns[joint.q]]
+        found, q = forces(case, tree, still, start, q, qd)
+        if max(map(abs, found)) > ZERO:
+            still_tree = dataclasses.replace(case.tree, damping=np.zeros(len(qd)))
+            found = solve(exact_mass_matrix(still_tree, tuple(q)), found)
+        vanish = ZERO * max(1, *map(abs, found))
+        found = [a if abs(a) > vanish else mpmath.mpf(0) for a in found]
+        return of_joints(case, still, found)
 
 
-def folded(case: Case, tree: Tree, still: Sequence[str]) -> dict:
-    """The numbers to which the traced accelerations fold; None where one remains an expression."""
-    tape, sizes = Tape(), {"q": tree.coordinates.nq, "qd": tree.coordinates.nv}
+@lru_cache(maxsize=8)
+def exact_mass_matrix(tree: tmt.Tree, q: tuple) -> list:
+    """Mbar at a position with the digits that are set: scenes of a robot ask for the same ones."""
+    tree = exact_tree(tree, mpmath.mpf)
+    return method.mass_matrix(method.bodies(tree, q), tree.armature)
+
+
+def folded(case: Case, still: Sequence[str]) -> dict:
+    """The numbers to which the traced accelerations of the joints in `still` fold; None where one remains an expression."""
+    tape, tree = Tape(), case.tree
+    sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv}
     q, qd = (tape.inputs(*(f"{name}{i}" for i in range(count))) for name, count in sizes.items())
-    found = accelerations(case, tree, still, tape.lift, q, qd)
-    return {name: tuple(tape.lift(a).number for a in parts) for name, parts in found.items()}
+    force, q = forces(case, tree, still, [tape.lift(float(value)) for value in case.q], q, qd)
+    numbers = [tape.lift(part).number for part in force]
+    if any(number != 0.0 for number in numbers):  # else Mbar, which is regular, has nothing to solve
+        found = [None] * len(qd)
+        if len(qd) <= MOST_FOLDED:
+            found = solve(method.mass_matrix(method.bodies(tree, q), tree.armature), force)
+        numbers = [None if a is None else tape.lift(a).number for a in found]
+    return of_joints(case, still, numbers)
+
+
+def of_joints(case: Case, names: Sequence[str], values: Sequence) -> dict:
+    """Of one value for each speed of a case those of some joints, tuples by name."""
+    joints = dict(zip(case.joints, case.tree.coordinates.joints))
+    return {name: tuple(values[joints[name].qd]) for name in names}
 
 
 def reduced(case: Case, need: Needed | None = None) -> Case | None:

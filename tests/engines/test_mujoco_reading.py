@@ -179,6 +179,14 @@ def test_a_run_has_the_whole_weight():
         assert not np.allclose(run_of(mjcf(LEVER), integrator), run_of(mjcf(), integrator))
 
 
+def test_what_has_no_name_is_called_as_nothing_else():
+    body = '<body><joint name="joint 1" axis="0 1 0"/><joint/><geom size="0.1" pos="0.1 0 0"/></body>'
+    key = '<keyframe><key name="key 1" qpos="1 0"/><key qpos="2 0"/></keyframe>'
+    found = read(f"<mujoco><worldbody>{body}</worldbody>{key}</mujoco>")
+    assert found.tree.hinge_names == ("joint 1", "unnamed joint 1")
+    assert {name: q[0] for name, q in found.keyframes.items()} == {"key 1": 1.0, "unnamed key 1": 2.0}
+
+
 def test_keyframes_keep_their_names():
     keys = '<keyframe><key name="a" qpos="1"/><key qpos="2"/><key name="c" qpos="3"/></keyframe>'
     found = read(mjcf(after=keys)).keyframes
@@ -210,6 +218,10 @@ REFUSED = {
     "gravity": (mjcf(before='<option gravity="0 nan 0"/>'), "its gravity has a number that is not finite"),
     "posture": (mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'), "its keyframe 'up' has a number that is not"),
     "same axis twice": (mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "turn together"),
+    "a column taken": (
+        mjcf('<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'),
+        "two of its joints are called 'w x'",
+    ),
     "a name taken": (
         mjcf('<body><freejoint name="r"/><geom size="0.1"/><body><joint name="r x"/><geom size="0.1"/></body></body>'),
         "two of its joints are called 'r x'",

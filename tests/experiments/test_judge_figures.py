@@ -55,11 +55,13 @@ def test_the_figure_of_holding_torques_says_whose_they_are_and_where_none_is_nee
     assert "at most 6.0e+00 N m apart. Both need none, but for rounding, at: hanging." in caption
     one = {"zero": both(0 * ours, ours), "bent": both(ours, ours + 0.99 * 64 * EPS * WEIGHT)}
     assert draw.needless(one, ARM) == (
-        "TMT needs none, but for rounding, at: zero. MuJoCo needs none, but for rounding, at: no posture."
+        "TMT needs none, but for rounding, at: zero. MuJoCo needs some at every posture."
     )
-    for share, said in ((0.99, "bent"), (1.01, "no posture")):
+    for share, said in ((0.99, "bent"), (1.01, None)):
         rest = np.full(3, share * 64 * EPS * WEIGHT)
-        assert draw.needless({"bent": both(rest, rest)}, ARM) == f"Both need none, but for rounding, at: {said}."
+        assert draw.needless({"bent": both(rest, rest)}, ARM) == (
+            f"Both need none, but for rounding, at: {said}." if said else "Both need some at every posture."
+        )
 
 
 def test_the_map_of_the_condition_number_says_whose_maximum_is_where():

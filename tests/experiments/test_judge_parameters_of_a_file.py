@@ -56,6 +56,16 @@ def test_numbers_that_an_option_changes_are_no_checks_and_are_said():
     assert units["lift", "damping"] == "N s/m" and units["turn", "damping"] == "N m s/rad"
 
 
+@pytest.mark.parametrize("source", [TOTAL, *PATHS.values()], ids=["total", *PATHS])
+def test_a_number_that_is_not_the_stated_one_has_what_asked_for_it(source):
+    rows = [row for row in result_of(source).rows if row["of"] != "file"]
+    assert rows and all(isinstance(row["asked_by"], str) for row in rows)
+    changed = [
+        row for row in rows if row["stated"] is None or abs(row["difference"]) > 1e-5 * max(1, abs(row["stated"]))
+    ]
+    assert all(row["asked_by"] for row in changed) and (source is not TOTAL or changed)
+
+
 def test_a_number_that_differs_for_no_reason_is_a_failed_check_and_a_cause():
     result = Result("parameters")
     number = Stated("arm", "mass", 2.0, 2.5, "")
@@ -98,7 +108,7 @@ def test_what_is_switched_off_is_said_with_its_reason():
     ]
     assert treatments_in_words(features) == [
         "Modelled: hinge (2).", "Switched off in MuJoCo for the comparison: limit (2), there are none.",
-        "The open tree is compared: off are the equalities a and b.",
+        "The open tree is compared: the equalities a and b are off.",
     ]  # fmt: skip
     assert treatments_in_words(features[:1]) == ["Modelled: hinge (2)."]
     assert changes_in_words([]) == []

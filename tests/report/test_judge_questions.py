@@ -1,10 +1,13 @@
 """The answers to the assignment's questions: which number is whose, what broke off, what is far from the truth."""
 
+from dataclasses import replace
+
 import pytest
 from sections import section
 
 from compare.judge.units import renamed
 from compare.report.questions import answers
+from compare.report.tables import questions
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
 
@@ -75,3 +78,13 @@ def test_what_to_use_gives_each_engine_its_own_time(unit):
     assert found[-1].startswith(
         f"What should I use? For 1e-06 {unit} over 4.5 s (bent): RK4, 9 steps (7 ms), or rk4 (2 ms)"
     )
+
+
+def test_where_no_question_is_of_an_assignment_there_is_no_column_for_its_parts():
+    line = {"scene": "bent", "target_rad": 1e-6, "mujoco": "RK4", "mujoco_ms": 7.0, "tmt": "rk4", "tmt_ms": 2.0}
+    ran = [section("speed", rows=[{"scene": "bent", "dt_s": 0.5, "steps": 9}], what_should_i_use=[line])]
+    for robot, columns in (
+        (ARM, ["part", "asked", "answered in", "answer"]),
+        (replace(ARM, questions=()), ["asked", "answered in", "answer"]),
+    ):
+        assert list(questions(ran, robot).columns) == columns

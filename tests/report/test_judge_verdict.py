@@ -28,6 +28,19 @@ def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
     assert "is 0.5 kg m2, 50 % of it (gravity: torque, zero)" in text
 
 
+def test_what_does_not_agree_is_named_and_nothing_else():
+    sections = [section("parameters", GOOD), section("mass", GOOD, BAD), section("gravity", GOOD)]
+    assert verdict.verdict(sections, 10).startswith(
+        "The two models do not agree in mass (3 of 10 experiments ran): 1 of 4 checks fail."
+    )
+    broken = section("speed")
+    broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no", rule="equal")
+    assert verdict.verdict([section("mass", GOOD), broken], 10) == (
+        "Not everything could be compared (2 of 10 experiments); the other 1 checks pass. "
+        "Broken off: speed, ValueError: no."
+    )
+
+
 class Lines(list):
     """A terminal that keeps what is said."""
 

@@ -3,45 +3,23 @@
 import json
 import os
 import re
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 
 import pytest
 from runs import ROOT, SECOND, compare, in_shell, on_terminal, readable_lines, screen, words
+from small_runs import runs_on_terminals, terminal_folders
 
 from compare.engines.mujoco import load
 from compare.robots.arm import ARM
 
 FIRST = "reference: arm; mjcf/arm.xml compared with the stated numbers"
 LINE = "interrupted; a report that was there is unchanged"
-HEAVY = ARM.mjcf.read_text().replace('mass="1.5"', 'mass="1.6"')
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
-    """Runs that wait for nothing of each other: of the arm and of a heavy one, on terminals and in a shell."""
-    plain, umlauts = tmp_path_factory.mktemp("plain"), tmp_path_factory.mktemp("Zoë") / "Über"
-    umlauts.mkdir()
-    for name in (umlauts / "Käfer.xml", umlauts / os.fsdecode(b"\xff.xml")):
-        name.write_bytes(ARM.mjcf.read_bytes())
-    (plain / "heavy.xml").write_text(HEAVY)
-    arm, heavy = ("mass", "--quick", "--out"), ("mass", "--quick", "--mjcf", "heavy.xml", "--out")
-    old = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"
-    calls = {("arm", *at): partial(on_terminal, [*arm, f"arm{at}"], *at, plain) for at in [(40, "xterm"), (80, "dumb")]}
-    calls |= {
-        ("heavy", *at): partial(on_terminal, [*heavy, f"heavy{at}"], *at, plain) for at in [(80, "xterm"), (40, "dumb")]
-    }
-    calls |= {
-        "ascii, head": partial(in_shell, "PYTHONIOENCODING=ascii compare mass --quick --mjcf Käfer.xml --out Öl | head -1;"
-                               "exit ${PIPESTATUS[0]}", umlauts),
-        "C": partial(in_shell, f"{old} compare mass --quick --mjcf Käfer.xml --out 'Öl im C'", umlauts),
-        "bytes, full": partial(in_shell, f"{old} compare mass --quick --mjcf $'\\xff.xml' --out $'\\xfe'"
-                               " >/dev/full 2>&1", umlauts),
-        "closed": partial(in_shell, "compare mass --quick --mjcf heavy.xml --out closed <&- >&- 2>&-", plain),
-    }  # fmt: skip
-    with ThreadPoolExecutor(2) as pool:
-        under_way = {name: pool.submit(call) for name, call in calls.items()}
-    return {name: run.result() for name, run in under_way.items()} | {"plain": plain, "umlauts": umlauts}
+def runs(beside):
+    """Runs of the arm and of a heavy one, on terminals and in a shell, and their two folders."""
+    plain, umlauts = terminal_folders(beside.folder)
+    return beside.result(runs_on_terminals, plain, umlauts) | {"plain": plain, "umlauts": umlauts}
 
 
 @pytest.mark.parametrize("columns, term", [(40, "xterm"), (80, "dumb")])

@@ -14,17 +14,34 @@ from .lock import clear, editable, with_names
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
 OF_THE_FORCES = bit(("GRAVITY",)) | bit(("DAMPER",)) | bit(("SPRING",))  # of the file, see take_away
+# what the file's default class would give to an added element otherwise, where the installed MuJoCo has it
+ITS_OWN = {
+    "geom": {
+        "contype": 1,
+        "conaffinity": 1,
+        "margin": 0.0,
+        "gap": 0.0,
+        "pos": [0.0] * 3,
+        "quat": [1.0, 0.0, 0.0, 0.0],
+    },
+    "motor": {
+        "ctrllimited": mujoco.mjtLimited.mjLIMITED_FALSE,
+        "forcelimited": mujoco.mjtLimited.mjLIMITED_FALSE,
+        "gear": [1.0] + [0.0] * 5,
+        "armature": 0.0,
+    },
+}
 MINIMAL = "nothing (minimal)"
 AGAIN = "nothing, timed again"
 CAPSULES = "default flags + capsules"
-ON_FLOOR = f"{CAPSULES} + floor in reach"
+ON_FLOOR, OFF_FLOOR = f"{CAPSULES} + floor in reach", f"{CAPSULES} + floor out of reach"
 
 
-def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> dict[str, Mujoco]:
+def with_additions(engine: Mujoco, radius: float, near: float, far: float | None) -> dict[str, Mujoco]:
     """Engines that have one thing more than the minimal model, the loaded one without contact and constraint stages.
 
-    radius: of the capsules, m; near, far: heights of a floor in reach and of one out of reach, m. No joint of these engines can
-    be locked.
+    radius: of the capsules, m; near, far: heights of a floor in reach and of one out of reach, m; None: no
+    floor is out of reach. No joint of these engines can be locked.
     """
     model = engine.model
     kinds = {joint_name(model, j): kind_of(model, j) for j in range(model.njnt)}
@@ -37,10 +54,11 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
             shape = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "fromto": [0.0] * 3 + list(end)}
             if np.linalg.norm(end) < radius:  # too short for a capsule
                 shape = {"type": mujoco.mjtGeom.mjGEOM_SPHERE}
-            spec.bodies[body].add_geom(**shape, size=[radius, 0.0, 0.0], mass=0.0)
+            spec.bodies[body].add_geom(**ITS_OWN["geom"] | shape, size=[radius, 0.0, 0.0], mass=0.0)
 
-    def floor(spec, height=far):
-        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, pos=[0.0, 0.0, height], size=[2.0, 2.0, 0.1])
+    def floor(spec, height=near if far is None else far):
+        plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "pos": [0.0, 0.0, height], "size": [2.0, 2.0, 0.1]}
+        spec.worldbody.add_geom(**ITS_OWN["geom"] | plane)
 
     def stage(spec, name):
         spec.option.disableflags &= ~int(FLAGS[name])
@@ -54,7 +72,11 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
                 spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
 
     def motor(spec):
-        spec.add_actuator(target=last, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        added = spec.add_actuator(target=last, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        added.set_to_motor()  # a default class of the file may have made it a servo, which pushes
+        for name, value in ITS_OWN["motor"].items():
+            if hasattr(added, name):
+                setattr(added, name, value)
 
     def default(spec):
         spec.option.disableflags &= OF_THE_FORCES if engine.bare else 0  # which are then taken away, as they were
@@ -76,7 +98,7 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float) -> di
         "a motor": motor,
         "default flags": default,
         CAPSULES: default_with(capsules),
-        f"{CAPSULES} + floor out of reach": default_with(capsules, floor),
+        **({} if far is None else {OFF_FLOOR: default_with(capsules, floor)}),
         ON_FLOOR: default_with(capsules, lambda spec: floor(spec, near)),
     }
     return {name: edited(engine, edit) for name, edit in edits.items()}

@@ -3,12 +3,15 @@
 A free joint is four joints of a Tree: slides along the world's three axes, read at the origin, and a ball.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from tmt.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
+
+from ...case import Coordinates
 
 KINDS = {
     mujoco.mjtJoint.mjJNT_HINGE: "hinge",
@@ -34,7 +37,18 @@ def own_name(name: str, what: str, number: int) -> str:
 
 
 def joint_name(model: mujoco.MjModel, number: int) -> str:
-    return own_name(model.joint(number).name, "joint", number)
+    """What a joint is called; one without a name as no other."""
+    return others_apart(model.joint(number).name, "joint", number, (model.joint(j).name for j in range(model.njnt)))
+
+
+def others_apart(name: str, what: str, number: int, names: Iterable[str]) -> str:
+    """own_name, and of one that is made up none of the names of the others."""
+    found = own_name(name, what, number)
+    if found != name:
+        taken = set(names)
+        while found in taken:
+            found = f"unnamed {found}"
+    return found
 
 
 def kind_of(model: mujoco.MjModel, number: int) -> str:
@@ -59,9 +73,12 @@ def joint_places(model: mujoco.MjModel) -> dict[str, Place]:
             nq, nv = NUMBERS[kind]
             found.append((name, Place(kind, number, range(q, q + nq), range(v, v + nv))))
             q, v = q + nq, v + nv
-    names = [name for name, _ in found]
-    if len(set(names)) < len(names):
-        raise ValueError(f"two of its joints are called {next(name for name in names if names.count(name) > 1)!r}")
+    coordinates = Coordinates(tuple(name for name, _ in found), tuple(place.kind for _, place in found))
+    for columns in (coordinates.names, coordinates.positions, coordinates.speeds):
+        if len(set(columns)) < len(columns):
+            twice = next(name for name in columns if columns.count(name) > 1)
+            parts = "a ball w has the speeds w x, w y, w z, and a free joint the parts w x, w y, w z, w turn"
+            raise ValueError(f"two of its joints are called {twice!r}; {parts}")
     return dict(found)
 
 

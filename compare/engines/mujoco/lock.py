@@ -34,9 +34,9 @@ class ModelError(ValueError):
         return " ".join(super().__str__().split())
 
 
-def name_of(source: Path | str) -> str:
-    """What a message calls a source, a Path or MJCF text."""
-    return str(source) if isinstance(source, Path) else "the text"
+def name_of(source: Path | str | None) -> str:
+    """What a message calls a source, a Path or MJCF text; None: a compiled model."""
+    return str(source) if isinstance(source, Path) else "the model" if source is None else "the text"
 
 
 def editable(source: Path | str) -> mujoco.MjSpec:

@@ -13,7 +13,7 @@ from .engine import Mujoco, methods_for
 from .file import compiled
 from .flags import NAMES
 from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks, take_away
-from .joints import Place, joint_places, kind_of, moved, own_name, reference_qpos
+from .joints import Place, joint_places, kind_of, moved, others_apart, own_name, reference_qpos
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
 from .values import refuse_values
@@ -23,7 +23,7 @@ from .values import refuse_values
 class Reading:
     """What a file is to be compared as."""
 
-    source: Path | str
+    source: Path | str | None  # a Path or MJCF text; None: a model that was compiled elsewhere
     name: str  # of the model, "": it has none that can stand in a line
     tree: tmt.Tree
     features: tuple[Feature, ...]  # of the file, in a fixed order; those that it has
@@ -40,11 +40,19 @@ class Reading:
     model: mujoco.MjModel = field(repr=False, compare=False)
 
 
-def read(source: Path | str) -> Reading:
-    """The reading of an MJCF file (a Path) or of MJCF text; ModelError, in one line, where it cannot be compared."""
+def read(source: Path | str | mujoco.MjModel) -> Reading:
+    """The reading of an MJCF file (a Path), of MJCF text or of a compiled model, of which a copy is taken.
+
+    ModelError, in one line, where it cannot be compared.
+    """
     try:
         refuse_callbacks()
-        model, warnings = compiled(source, lambda: without_fusing(editable(source)))
+        if isinstance(source, mujoco.MjModel):
+            model, warnings, source = mujoco.MjModel.__copy__(source), (), None
+        elif isinstance(source, Path | str):
+            model, warnings = compiled(source, lambda: without_fusing(editable(source)))
+        else:
+            raise ModelError(f"a {type(source).__name__} cannot be read; a path, MJCF text or an MjModel is expected")
         if not model.njnt:
             raise ValueError("it has no joint; at least one is expected")
         refuse(model)
@@ -170,7 +178,8 @@ def carriers(model: mujoco.MjModel, joints: Mapping) -> list[int]:
 
 def keyframes(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     """The positions of the keyframes by their names, or `key 0`; the compiler has given quaternions length 1."""
-    names = [own_name(model.key(number).name, "key", number) for number in range(model.nkey)]
+    own = [model.key(number).name for number in range(model.nkey)]
+    names = [others_apart(name, "key", number, own) for number, name in enumerate(own)]
     return {name: qpos.copy() for name, qpos in zip(names, model.key_qpos)}
 
 

@@ -10,9 +10,10 @@ from tmt.stepping import stepped
 from ...case import Case
 from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .equations import OwnEquations, Problem
-from .functions import ARGUMENTS, OwnError
+from .functions import ARGUMENTS, OwnError, is_function
+from .returned import state_in_words
 
-__all__ = ["ARGUMENTS", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem"]
+__all__ = ["ARGUMENTS", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem", "is_function", "state_in_words"]
 
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme
 
@@ -97,6 +98,10 @@ class OwnDynamics:
 
     def energy(self, q, v) -> np.ndarray:
         return self.equations.energy(*self.whole(q, v))
+
+    def potential_energy(self, q) -> np.ndarray:
+        """The energy at rest, J, (...); its zero is its own."""
+        return self.energy(q, np.zeros(self.coordinates.nv))
 
     def com_positions(self, q) -> np.ndarray:
         return self.equations.com_positions(*self.whole(q))

@@ -13,7 +13,7 @@ from ...case import Coordinates
 from ...joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
 from .functions import ARGUMENTS, STATE, OwnError, call, functions_of, names_of
-from .returned import SHAPES, converted, as_raised, same, state_in_words
+from .returned import SHAPES, as_raised, converted, same, state_in_words
 
 SKEW = 1e-9  # of the largest entry: from here on a mass matrix is not symmetric; less is a difference of entries
 AT_ONCE = 1.5  # times what one state takes: two or three at once take no more, and so do many

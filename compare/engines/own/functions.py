@@ -84,6 +84,12 @@ def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Callable]:
     return {name: partial(getattr(tmt, OF_A_TREE.get(name, name)), model=tree) for name in ARGUMENTS}
 
 
+def is_function(value: object) -> bool:
+    """Whether a value is brought as a function, or in symbols; else it is numbers."""
+    of_pair = isinstance(value, tuple | list) and len(value) == 2 and hasattr(value[0], "free_symbols")
+    return callable(value) or hasattr(value, "free_symbols") or of_pair
+
+
 def function_of(name: str, value: object, symbols: object, coordinates: Coordinates) -> Callable:
     """One quantity as a function: as it is, or of a SymPy matrix, or of a pair of one and its symbols."""
     if callable(value) and not hasattr(value, "free_symbols"):
@@ -103,7 +109,7 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
 
     try:
         symbols = list(sympy.flatten(symbols))
-        entries = [sympy.sympify(entry) for entry in sympy.flatten(matrix)]
+        entries = [sympy.sympify(entry) for entry in sympy.flatten([matrix])]
     except Exception as error:  # whatever SymPy makes of what is given
         raise OwnError(f"{name} is {shown(matrix)}; a SymPy matrix is expected ({shown(str(error))})") from None
     nq, nv = coordinates.nq, coordinates.nv
@@ -133,7 +139,7 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
         columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]
         columns += [np.zeros_like(columns[0])] * (len(plain) - len(columns))  # nothing depends on these
         values = np.broadcast_arrays(*evaluated(*columns), columns[0])[:-1]
-        return np.stack(values, axis=-1).reshape(*states[0].shape[:-1], *shape)
+        return np.stack(values, axis=-1).reshape((*states[0].shape[:-1], *shape))
 
     function.__name__ = name
     return function

@@ -9,7 +9,7 @@ import numpy as np
 import tmt
 
 from ...diagnosis import STATES, Diagnosis, diagnose, packed
-from ...diagnosis.consistency import Condition, conditions
+from ...diagnosis.consistency import Condition
 from ...diagnosis.forces import causes_of_forces
 from ...diagnosis.words import Cause
 from ...judge.check import Result
@@ -18,10 +18,12 @@ from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...setup import Setup
 from . import fault_table
+from .own_equations import asked_conditions, diagnosed_as_stated, for_command_line
 
 TITLE = "Diagnosis: what explains a difference?"
 SECONDS = 8.0  # of a search
 COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
+NO_NUMBERS = "not all values are numbers"
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
 
 
@@ -35,6 +37,7 @@ class Found(NamedTuple):
     ratio: float  # of a difference of Mbar or h to its tolerance, the largest
     of_forces: list[Cause]  # what else acts in the accelerations
     force_ratio: float  # of a force left over to its tolerance, the largest
+    unasked: str = ""  # why the conditions were not asked
 
     @property
     def causes(self) -> list[Cause]:
@@ -89,22 +92,32 @@ def search(setup: Setup) -> Found:
     M, h = np.asarray(given.mass_matrix(q)), np.asarray(given.bias(q, qd))
     allowed = tolerances(tree, q, qd)
     values = packed(M, h, tree.coordinates.nv, len(q))
-    asked = conditions(given.mass_matrix, given.bias, setup.robot.coordinates, q, qd) if name == "own" else []
-    diagnosis = diagnose(tree, setup.robot.joints, q, qd, values, allowed, SECONDS)
+    names, (asked, unasked) = setup.robot.joints, ([], "")
+    if name == "own":
+        asked, unasked = asked_conditions(given, q, qd, M, h)
+        joints, sizes = given.equations.joints, sizes_of(tree, q, qd)
+        diagnosis = diagnosed_as_stated(tree, names, joints, q, qd, (M, h), sizes, SECONDS)
+    else:
+        diagnosis = diagnose(tree, names, q, qd, values, allowed, SECONDS)
     right = packed(tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree), tree.coordinates.nv, len(q))
     off = np.abs(values - right) / allowed
     acting, size = left_over(tree, q, qd, tau, M, h, np.asarray(given.acceleration(q, qd, tau)))
     force_ratio = float(np.nan_to_num(np.abs(acting) / size, nan=np.inf).max())
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, size) if 1.0 < force_ratio < np.inf else []
     ratio = float(np.nan_to_num(off, nan=np.inf).max())
-    return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio)
+    return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked)
 
 
 def tolerances(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """64 eps of the scale of each entry of Mbar and h, (states, entries) as `packed` has them."""
+    return packed(*sizes_of(tree, q, qd), tree.coordinates.nv, len(q))
+
+
+def sizes_of(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same of Mbar, (states, nv, nv), and of h, (states, nv)."""
     scale, nv = Entries(tree, q, qd), tree.coordinates.nv
-    M = np.broadcast_to(scale.mass_matrix, (len(q), nv, nv))
-    return FACTOR * EPS * packed(M, np.broadcast_to(scale.bias, (len(q), nv)), nv, len(q))
+    M, h = np.broadcast_to(scale.mass_matrix, (len(q), nv, nv)), np.broadcast_to(scale.bias, (len(q), nv))
+    return FACTOR * EPS * M, FACTOR * EPS * h
 
 
 def left_over(tree: tmt.Tree, q, qd, tau, M, h, qdd) -> tuple[np.ndarray, np.ndarray]:
@@ -129,15 +142,17 @@ def rows(setup: Setup) -> Result:
         value, bound, unit = condition.value, condition.tolerance, condition.unit
         result.check(of, f"{whose} {condition.name}", value, bound, unit, note, rule=condition.rule)
     diagnosis = found.diagnosis
-    note = diagnosis.sentence if diagnosis.differs else "nothing to explain"
+    note = for_command_line(diagnosis.sentence, bool(setup.robot.own)) if diagnosis.differs else "nothing to explain"
+    note = note if np.isfinite(found.ratio) else NO_NUMBERS
     result.check(of, f"{whose} M and h, largest difference over its tolerance", found.ratio, 1.0, "", note)
-    note = "" if found.force_ratio <= 1.0 else found.sentence_of_forces
+    acting = found.sentence_of_forces if np.isfinite(found.force_ratio) else NO_NUMBERS
+    note = "" if found.force_ratio <= 1.0 else acting
     what = f"{whose} accelerations follow from M and h: force left over, over its tolerance"
     result.check(of, what, found.force_ratio, 1.0, "", note)
     result.rows = [{name: getattr(cause, name) for name in COLUMNS} for cause in found.causes]
     result.notes += sentences(found)
     result.curves["nearest"] = diagnosis.nearest
-    result.curves["causes"] = [record(cause) for cause in found.causes]
+    result.curves["causes"] = [record(cause, bool(setup.robot.own)) for cause in found.causes]
     return result
 
 
@@ -150,19 +165,24 @@ def sentences(found: Found) -> list[str]:
             said.append(
                 "Explanations that are listed together cannot be told apart by M and h, at any state that was tried."
             )
-    if found.force_ratio > 1.0:
+    if not np.isfinite([found.ratio, found.force_ratio]).all():
+        said.append(f"{NO_NUMBERS[0].upper()}{NO_NUMBERS[1:]}: what is said here is of the others.")
+    elif found.force_ratio > 1.0:
         said.append(found.sentence_of_forces)
-    return list(dict.fromkeys(said)) or ["There is nothing to explain: Mbar, h and accelerations agree."]
+    said = [for_command_line(text, found.engine == "own") for text in dict.fromkeys(said)]
+    return said + [found.unasked] * bool(found.unasked) or [
+        "There is nothing to explain: Mbar, h and accelerations agree."
+    ]
 
 
-def record(cause: Cause) -> dict:
+def record(cause: Cause, is_own: bool = False) -> dict:
     """A cause as a report has it."""
     return {
         "rank": cause.rank,
         "place": cause.place,
         "stated": cause.stated,
         "found": cause.explains,
-        "text": cause.text,
+        "text": for_command_line(cause.text, is_own),
     }
 
 

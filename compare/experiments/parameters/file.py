@@ -161,5 +161,7 @@ def treatments_in_words(features: Sequence) -> list[str]:
     if off:
         why = "; ".join(f"{f.feature} ({f.count}), {f.reason}" for f in off)
         sentences.append(f"Switched off in MuJoCo for the comparison: {why}.")
-    sentences += [f"The open tree is compared: off are the equalities {listed(f.names)}." for f in of[OPEN]]
+    for names in (feature.names for feature in of[OPEN]):
+        which = "the equality {} is" if len(names) == 1 else "the equalities {} are"
+        sentences.append(f"The open tree is compared: {which.format(listed(names))} off.")
     return sentences

@@ -8,13 +8,15 @@ from tmt.reference import DIGITS
 from ...case import Case
 from ...engines.mujoco import ModelError
 from ...judge.check import LOCKABLE, Result
+from ...judge.entries import has_own_scales
 from ...judge.rounding import NARROW
+from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...setup import Setup
 from . import exact_motion, sub_blocks
 from .cost import measure_costs
-from .needs import of_case
+from .needs import MOST_IN_A_BAND, of_case
 from .times import TWO_INTEGRATORS, time_models
 
 TITLE = "Reduction: no more model than a scene needs"
@@ -22,22 +24,31 @@ TITLE = "Reduction: no more model than a scene needs"
 
 def claim(robot: Robot) -> str:
     """What is claimed."""
-    one = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint"
+    one, joints = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint", robot.coordinates
+    runs = not robot.is_read or joints.nv <= MOST_IN_A_BAND
+    held = any(case.is_held for case in robot.cases)
+    swings = [case for case in exact_motion.pendulums(robot.cases) if exact_motion.is_compared(case)]
     return (
         f"A {one} may be locked if, with it at its start value and at rest, its acceleration vanishes for all values of the "
         f"other {one}s. The program finds these {one}s on the expressions of the traced method, which fold to the number 0, and "
-        f"confirms them with {DIGITS} digits at random states. The model without them has the same motion, in both engines. A "
-        "held posture needs no integrator: it stays. A single free hinge is a physical pendulum, whose angle is an elliptic "
-        "function of time. And whatever else is added in MuJoCo costs time, and changes nothing unless something is touched."
+        f"confirms them with {DIGITS} digits at random states. "
+        + "The model without them has the same motion, in both engines. " * runs
+        + "A held posture needs no integrator: it stays. " * held
+        + "A single free hinge is a physical pendulum, whose angle is an elliptic function of time. " * bool(swings)
+        + "And whatever else is added in MuJoCo costs time, and changes nothing unless something is touched."
     )
 
 
 def tolerance(robot: Robot) -> str:
     """What the differences are compared with."""
+    movements = movement_unit(robot.coordinates)
+    scales = f"{FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute terms of the bias,"
+    if has_own_scales(robot.tree, robot.is_read):
+        scales = "as in mass and acceleration, each entry its own,"
     return (
-        f"Sub-blocks of Mbar and bias: {FACTOR} eps x the largest entry of Mbar, and {FACTOR} eps x the sum of the absolute "
-        "terms of the bias, of the whole model. Runs of the smaller and the whole model, by the same method: the band of "
-        f"rounding of the whole one (see trajectory), judged while it is below {NARROW:g} rad, for as long as the scene states. "
+        f"Sub-blocks of Mbar and bias: {scales} of the whole model. Runs of the smaller and the whole model, by the same "
+        f"method: the band of rounding of the whole one (see trajectory), judged while it is below {NARROW:g} {movements}, for "
+        "as long as the scene states. "
         "Errors against an exact solution fall with the step at the method's order, and with the square of the amplitude where "
         "the solution is linear. Additions that exert no force leave the same bits. Timings are no checks."
     )
@@ -63,7 +74,8 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
 
 def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> None:
     """All parts of `rows`, one after the other."""
-    sub_blocks.compare_blocks(result, setup, angles=setup.of(10, 3, 1) if timed else 1)
+    angles = setup.of(10, 1 if setup.robot.is_read else 3, 1) if timed else 1
+    sub_blocks.compare_blocks(result, setup, angles)
     integrators = TWO_INTEGRATORS if timed else TWO_INTEGRATORS[-1:]
     models = [model for case in cases for model in of_case(result, case, setup, integrators)]
     exact_motion.swings(result, setup, cases)

@@ -9,12 +9,13 @@ import tmt
 
 from ...case import Case, Coordinates
 from ...engines import Setting
-from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, ON_FLOOR, contacts, with_additions
+from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, OFF_FLOOR, ON_FLOOR, contacts, with_additions
 from ...judge.check import Result
 from ...judge.run import movement_unit, step_in_words
 from ...judge.scale import reaches
 from ...judge.timing import fastest
 from ...judge.units import renamed
+from ...judge.words import capital
 from ...robots import Robot
 from ...setup import Setup
 from .times import TIMED_STEPS, TWO_INTEGRATORS
@@ -49,8 +50,14 @@ def measure_costs(result: Result, setup: Setup, rounds: int) -> None:
     rows = cost_rows(seconds, paths, touching, case.coordinates)
     result.tables["cost_in_mujoco"] = renamed(rows, movement_unit(case.coordinates))
     check_bits(result, f"{case.name}, {step_in_words(case, FALL_STEPS)}", result.tables["cost_in_mujoco"], pushed)
+    if OFF_FLOOR not in engines:
+        result.notes.append(
+            f"{capital(OFF_FLOOR)}: not looked at, for a robot whose slides nothing stops may fall to any floor."
+        )
     if not pushed:
-        result.notes.append(f"{case.name}: the floor that is in reach pushes no joint, nor does anything else.")
+        result.notes.append(
+            f"{case.name}: no contact pushes on a joint in this run, neither with the floor that is in reach nor between bodies."
+        )
 
 
 def fall_case(robot: Robot) -> Case:
@@ -66,8 +73,8 @@ def fall_case(robot: Robot) -> Case:
     return case.changed(duration=FALL_TIME, dt=FALL_TIME / FALL_STEPS, judged=None)
 
 
-def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
-    """Radius of capsules, heights of a floor in reach and of one out of reach of a Tree, m.
+def sizes(tree: tmt.Tree) -> tuple[float, float, float | None]:
+    """Radius of capsules, heights of a floor in reach and of one out of reach of a Tree, m; None: with slides none is.
 
     By the largest distance of a centre of mass from the base, to six digits, for the robot may reach twice as far; of the arm
     0.03, -0.4 and -2. At least by the largest radius of gyration: a centre of mass may be at the base.
@@ -78,7 +85,7 @@ def sizes(tree: tmt.Tree) -> tuple[float, float, float]:
     reach = max(reaches(dataclasses.replace(tree, offset=offset)).max(), *gyration)
     radius, near, far = (float(f"{part * reach:.6g}") for part in (1 / 15, 8 / 9, 40 / 9))
     lowest = min(height for *_, height in base)
-    return radius, lowest - near, lowest - far
+    return radius, lowest - near, None if "slide" in tree.kind else lowest - far
 
 
 def cost_rows(

@@ -34,15 +34,33 @@ OSCILLATION_STEPS, LESS_FINE = 8192, 1024  # at which the error of RK4 is far be
 
 def swings(result: Result, setup: Setup, cases: Sequence[Case]) -> None:
     """Each case in which one joint is free, a physical pendulum, against its elliptic function."""
+    for case in pendulums(cases):
+        t = times_of(case)
+        exact = elliptic(case, t)
+        if reason := not_compared(case, exact):
+            result.notes.append(f"{case.name}: not compared with an elliptic function, for {reason}.")
+        else:
+            of_pendulum(result, setup, case, t, exact)
+
+
+def pendulums(cases: Sequence[Case]) -> list[Case]:
+    """The cases in which one hinge is free and nothing but gravity acts."""
+    found = []
     for case in cases:
         tree, alone = case.tree, len(case.joints) == 1 and case.coordinates.all_kinds == ("hinge",)
         if alone and case.is_free and case.scene.gravity and not any(tree.damping) and not tree.has_springs:
-            t = np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
-            exact = elliptic(case, t)
-            if reason := not_compared(case, exact):
-                result.notes.append(f"{case.name}: not compared with an elliptic function, for {reason}.")
-            else:
-                of_pendulum(result, setup, case, t, exact)
+            found.append(case)
+    return found
+
+
+def is_compared(case: Case) -> bool:
+    """Whether a pendulum shows something beside its exact motion."""
+    return not_compared(case, elliptic(case, times_of(case))) is None
+
+
+def times_of(case: Case) -> np.ndarray:
+    """The times at which a pendulum is compared with its elliptic function, s."""
+    return np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
 
 
 def elliptic(case: Case, t: np.ndarray) -> np.ndarray:
@@ -176,7 +194,7 @@ def equilibrium(robot: Robot) -> str | None:
 def not_linear(tree: tmt.Tree) -> str | None:
     """Why small oscillations of a Tree are not compared with its linear modes, or None."""
     if any(tree.damping):
-        return "its damping"
+        return "it has damping"
     if set(tree.kind) != {"hinge"} or tree.has_springs:
         return "it has other joints than hinges, or springs"
     return f"it has {len(tree.axis)} joints" if len(tree.axis) > MOST_MODES else None

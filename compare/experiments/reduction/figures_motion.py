@@ -11,7 +11,7 @@ from ...robots import Robot
 SWING_LINES = {"RK4": (GREEN, "-"), "Euler": (BLUE, "--")}
 
 
-def draw_swing(result: Result, scene: str) -> tuple[str, Figure, str]:
+def draw_swing(result: Result, scene: str, beginning: str = "") -> tuple[str, Figure, str]:
     """Error of a swing of one joint against the elliptic function, over the step."""
     dt, errors, orders, stated = (result.curves["swings"][scene][key] for key in ("dt", "errors", "orders", "stated"))
     fig = Figure(figsize=(WIDTH, 3.0), layout="constrained")
@@ -33,7 +33,7 @@ def draw_swing(result: Result, scene: str) -> tuple[str, Figure, str]:
         return f"{integrator}: order {ours} and {theirs}, down to {last[0]:.1e} and {last[1]:.1e} rad"
 
     caption = (
-        f"{capital(scene)}: distance from the exact motion, an elliptic function of time. TMT and MuJoCo with "
+        f"{beginning or capital(scene)}: distance from the exact motion, an elliptic function of time. TMT and MuJoCo with "
         f"{'; '.join(map(found, SWING_LINES))}."
     )
     return file_name("reduction", scene), fig, caption

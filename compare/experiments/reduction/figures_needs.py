@@ -18,7 +18,10 @@ KINDS_OF_JOINT = {
     "needed": {"marker": "o", "color": BLUE},
     "never moves": {"marker": "o", "color": BLUE, "mfc": "none"},
     "declared locked": {"marker": "x", "color": GREY},
+    "not decided": {"marker": "d", "color": ORANGE, "mfc": "none"},
 }
+WIDTH_OF_LABEL = 10.0  # on the axis of times, as a ratio
+ALWAYS = 3  # of these kinds that the legend names
 TIME_MARKS = {"tmt": (-0.15, {"marker": "o", "color": GREEN}), "mujoco": (0.15, {"marker": "s", "color": ORANGE})}
 
 
@@ -48,8 +51,10 @@ def draw_needs(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     right.set(xscale="log", xlabel="time of an RK4 step, ns", xlim=(15, max(100000, 10 * slowest)))
     ticks = [100, 1000, 10000] if slowest < 1e5 else [100, 10**4, 10**6]
     right.set_xticks(ticks, [f"{tick}" for tick in ticks])
+    undecided = any(found.get("undecided") for found in scenes.values())
     handles = [
-        Line2D([], [], linestyle="none", label=kind, markersize=7, **style) for kind, style in KINDS_OF_JOINT.items()
+        Line2D([], [], linestyle="none", label=kind, markersize=7, **style)
+        for kind, style in list(KINDS_OF_JOINT.items())[: None if undecided else ALWAYS]
     ]
     above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "handletextpad": 0.2, "columnspacing": 1.0}
     left.legend(handles=handles, ncols=1, **above)
@@ -73,11 +78,14 @@ def kind_of_joint(joint: str, found: dict) -> str:
     """What a scene has to do with a joint."""
     if joint in found["locked"]:
         return "declared locked"
+    if joint in found.get("undecided", ()):
+        return "not decided"
     return "never moves" if joint in found["stays"] else "needed"
 
 
 def mark_times(ax: Axes, result: Result, name: str, y: float) -> None:
     """The time of a step of each engine in a scene, of the whole model and of the smallest one."""
+    idle = []  # where the whole model is drawn of which no run is needed
     for engine, (offset, style) in TIME_MARKS.items():
         times = [row["ns_per_step"] for row in rows_of(result, name, engine)]
         if not times:
@@ -85,12 +93,17 @@ def mark_times(ax: Axes, result: Result, name: str, y: float) -> None:
         whole, smallest = times[0], times[-1]
         ax.plot(whole, y + offset, mfc="none", **style)
         if smallest is None:
-            ax.text(whole * 1.25, y + offset, "no run needed", va="center", fontsize=8)
+            idle.append((whole, y + offset))
             continue
         ax.plot([smallest, whole], [y + offset] * 2, color=style["color"], linewidth=1)
         ax.plot(smallest, y + offset, markersize=3.5, **style)
         if len(times) > 1:
             ax.text(smallest / 1.15, y + offset, f"×{whole / smallest:.2f}", ha="right", va="center", fontsize=8)
+    if len(idle) == 2 and max(idle)[0] < WIDTH_OF_LABEL * min(idle)[0]:  # two labels would stand in each other
+        ax.text(min(idle)[0] / 1.4, y, "no run needed", ha="right", va="center", fontsize=8)
+        return
+    for x, height in idle:
+        ax.text(x * 1.25, height, "no run needed", va="center", fontsize=8)
 
 
 def gain(rows: list[dict], nv: int, one: str = "hinge") -> str:
@@ -146,7 +159,11 @@ def draw_costs(result: Result) -> tuple[str, Figure, str]:
     same = len({row["added"] for row in table} - changing - {MINIMAL, AGAIN})
     caption = (
         "What each addition costs in MuJoCo, a step of Euler and of RK4 as ratios to the minimal model: "
-        f"{'; '.join(words)}. The minimal model timed again differs by {100 * max(again, default=np.nan):.1f} %. The motion is "
-        f"changed by: {'; '.join(sorted(changing)) or 'none'}; {same} additions leave the same bits."
+        f"{'; '.join(words)}. The minimal model timed again differs by {100 * max(again, default=np.nan):.1f} %. "
+        + (
+            f"The motion is changed by: {'; '.join(sorted(changing))}; {same} additions leave the same bits."
+            if changing
+            else f"No addition changes the motion: all {same} leave the same bits."
+        )
     )
     return "reduction_cost_in_mujoco", fig, caption

@@ -14,24 +14,32 @@ from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, movement_unit, required_time, step_in_words
 from ...judge.words import capital
 from ...setup import Setup
-from ...truth.smallest import Needed, needed, reduced
+from ...states import seconds
+from ...truth.smallest import MOST_FOLDED, Needed, needed, reduced
 from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
 
-BOTH_INTEGRATORS = (
-    6  # speeds of the robot of a file whose runs by both integrators are compared, of more those by the last
-)
+# speeds of the robot of a file whose runs by both integrators are compared, of more those by the last
+BOTH_INTEGRATORS = 6
+JOINTS_NAMED, JOINTS_TABLE = 6, "tables/reduction_joints.csv"  # joints in a sentence
+SECONDS_OF_STATE = 2.0  # of an evaluation with 50 digits
 MOST_IN_A_BAND = 12  # speeds of the robot of a file whose runs are compared within a band of rounding
 
 
 def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str] = TWO_INTEGRATORS) -> list:
     """What the case needs, in words; runs of it and of a smaller model; the models to be timed, None for none at all."""
-    need = needed(case)
+    need = needed(case) if case.is_held or seconds(case.robot) <= SECONDS_OF_STATE else not_decided(case)
     smaller = reduced(case, need)
     stays = len(need.stays) == len(case.joints)
     models = [(case.name, case.changed(locked=()))]
     if smaller or case.locked or stays:
         models.append((case.name, None if stays else smaller or case))
-    result.curves["needs"][case.name] = {"locked": case.scene.locked, "stays": need.stays}
+    result.curves["needs"][case.name] = {
+        "locked": case.scene.locked,
+        "stays": need.stays,
+        "undecided": need.undecided,
+    }
+    if case.robot.is_read:
+        result.tables.setdefault("reduction_joints", []).extend(joint_rows(case, need))
     result.notes.append(need_in_words(case, need))
     if (smaller or stays) and case.robot.is_read and case.coordinates.nv > MOST_IN_A_BAND:
         result.notes.append(
@@ -45,13 +53,55 @@ def of_case(result: Result, case: Case, setup: Setup, integrators: Sequence[str]
     return models
 
 
+def not_decided(case: Case) -> Needed:
+    """Of a case whose evaluation with 50 digits takes too long: what moves at the start, and of the others nothing."""
+    moves = {
+        name: f"{name} has a speed at the start"
+        for name, joint in zip(case.joints, case.coordinates.places.joints)
+        if any(case.v[joint.qd])
+    }
+    return Needed((), moves, tuple(name for name in case.joints if name not in moves))
+
+
+def joint_rows(case: Case, need: Needed) -> list[dict]:
+    """A row for each joint of the robot: what the case has to do with it, and why."""
+    rows = []
+    for name in case.robot.joints:
+        what, why = "needed", need.moves.get(name, "")
+        if name in case.scene.locked:
+            what = "declared locked"
+        elif name in need.stays:
+            what = "never moves"
+        elif name in need.undecided:
+            what, why = "not decided", why_not_decided(case)
+        rows.append({"scene": case.name, "joint": name, "found": what, "why": why})
+    return rows
+
+
+def why_not_decided(case: Case) -> str:
+    """Why of a joint neither can be said, that it moves or that it stays."""
+    if not case.is_held and seconds(case.robot) > SECONDS_OF_STATE:
+        return f"one evaluation with {DIGITS} digits takes about {seconds(case.robot):.0f} s"
+    if case.coordinates.nv > MOST_FOLDED:
+        return f"the acceleration is 0 with {DIGITS} digits, and the expressions of so many joints are not traced"
+    return "the acceleration does not fold to 0"
+
+
+def first_named(names: Sequence[str], kind: str = "") -> list[str]:
+    """The first six of many, and how many more there are, which the table has."""
+    if len(names) <= JOINTS_NAMED + 1:
+        return list(names)
+    return [*names[:JOINTS_NAMED], f"and {len(names) - JOINTS_NAMED} more{kind} ({JOINTS_TABLE})"]
+
+
 def need_in_words(case: Case, need: Needed) -> str:
     """What a case needs and why, in a sentence."""
     names, locked = case.joints, case.scene.locked
-    reasons = list(need.moves.values())
+    reasons = first_named(list(need.moves.values()), " of such joints" * bool(need.undecided))
     if need.undecided:
-        reasons.append(f"of {', '.join(need.undecided)} it is not decided: the acceleration does not fold to 0")
-    why = capital("; ".join(reasons))
+        reasons.append(f"of {', '.join(first_named(need.undecided))} it is not decided: {why_not_decided(case)}")
+    why = "; ".join(reasons)
+    why = f": {why}" if case.robot.is_read else f". {capital(why)}"  # no sentence begins with a name of a user
     if len(need.stays) == len(names):
         torque = " under the exact torque that holds" if case.scene.torque == "hold" else ""
         return (
@@ -62,14 +112,17 @@ def need_in_words(case: Case, need: Needed) -> str:
     if not need.stays:
         one = joint_word(case)
         count = f"the one {one} that is free" if len(names) == 1 else f"all {len(names)} {one}s"
-        return f"{case.name}: {count}{declared}. {why}."
-    left, stays = (" and ".join(some) for some in ([name for name in names if name not in need.stays], need.stays))
+        return f"{case.name}: {count}{declared}{why}."
+    left, stays = (
+        " and ".join(first_named(of)) for of in ([name for name in names if name not in need.stays], need.stays)
+    )
     never, vanish = "never moves: at its start and at rest its acceleration folds", "and is"
     if len(need.stays) > 1:
         never, vanish = "never move: at their start and at rest their accelerations fold", "and are"
+    begins = f"There {stays}" if case.robot.is_read else capital(stays)
     return (
-        f"{case.name}: {left}{declared}. {capital(stays)} {never} to 0 for all values of the others, {vanish} 0 "
-        f"with {DIGITS} digits at random ones. {why}."
+        f"{case.name}: {left}{declared}. {begins} {never} to 0 for all values of the others, {vanish} 0 "
+        f"with {DIGITS} digits at random ones{why}."
     )
 
 
@@ -104,13 +157,21 @@ def compare_smaller(result: Result, case: Case, smaller: Case | None, setup: Set
         result.curves["apart"][case.name, engine, integrator] = float(apart[t <= until, :nv].max())
     if not smaller:
         moved = {LABELS[engine]: result.curves["apart"][case.name, engine, integrator] for engine in paths}
-        words = " and ".join(f"that of {engine} by {m:.1e} {unit}" if np.isfinite(m) else f"{engine} diverges"
-                             for engine, m in moved.items())  # fmt: skip
-        largest = "angle" if unit == "rad" else "movement"
         result.notes.append(
-            f"{case.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged, the largest {largest} "
-            f"{'moves' if unit == 'rad' else 'is'}: {words}."
+            f"{case.name}, {integrator}, with the torque in doubles: in the {until:.2f} s that are judged "
+            f"{moved_in_words(moved, unit)}."
         )
+
+
+def moved_in_words(moved: dict[str, float], unit: str) -> str:
+    """How far a joint moves at most in the run of each engine that should stay."""
+    if not any(moved.values()):
+        return f"no joint moves, by {' or '.join(moved)}"
+    words = (
+        f"{f'{m:.1e}' if m else '0'} {unit} by {name}" if np.isfinite(m) else f"unknown by {name}, which diverges"
+        for name, m in moved.items()
+    )
+    return f"the largest movement of a joint is {' and '.join(words)}"
 
 
 def free_places(case: Case, smaller: Case) -> list[int]:

@@ -8,16 +8,17 @@ import numpy as np
 import tmt
 
 from ...case import SEED, Case, Coordinates
-from ...judge.check import Result, closest, largest
-from ...judge.scale import EPS, FACTOR, bias_scale, mass_scale
+from ...judge.check import Result, closest, worst_of_each
+from ...judge.entries import scales
+from ...judge.scale import EPS, FACTOR
 from ...setup import Setup
+from ...states import seconds
 from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
-ALL_SUBSETS, RANDOM_SUBSETS = (
-    6,
-    20,
-)  # joints up to which all subsets are locked; of more each alone and so many at random
+# joints up to which all subsets are locked; of more each alone and so many at random
+ALL_SUBSETS, RANDOM_SUBSETS = 6, 20
+MOST_TO_LOCK = 2.0  # s that an exact state takes, up to which subsets are locked
 LARGE = 12  # speeds, of more fewer states are taken, and subsets in a run that is not full
 BLOCK_UNITS = {"Mbar": "kg m2", "bias": "N m"}
 WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}  # of a robot that has slides
@@ -28,27 +29,35 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     result.tables["reduction_subsets"] = []
     robot, rng = setup.robot, np.random.default_rng(SEED)
     coordinates, many = robot.coordinates, len(robot.joints) > ALL_SUBSETS
+    if robot.is_read and seconds(robot) > MOST_TO_LOCK:
+        result.notes.append(
+            f"No joints are locked: with the literal sum over {len(robot.tree.mass)} bodies each of so many subsets takes long."
+        )
+        return
+    counted = setup.of(True, not robot.is_read, True) and not many  # tracing takes half of the time
     sets, states = subsets(robot.joints), STATES_OF_SUBSET
     if many:
         large = coordinates.nv > LARGE
         angles, states = 1, setup.of(4 if large else STATES_OF_SUBSET, 2 if large else 4, 2)
         stride = setup.of(1, 6 if large else 3, 6)
         sets = sets[::stride]
-        chosen = f"each joint alone and {RANDOM_SUBSETS} chosen at random"
-        if stride > 1:
-            chosen = f"one in {stride} of {chosen}, all of which are those of a full run"
-        result.notes.append(f"Of the subsets of {len(robot.joints)} joints {len(sets)} are locked: {chosen}.")
+        listed = f"each of the {len(robot.joints)} joints alone, and {RANDOM_SUBSETS} sets of them chosen at random"
+        result.notes.append(
+            f"Not all sets of joints are locked in turn, but {listed}."
+            if stride == 1
+            else f"Not all sets of joints are locked in turn, but {len(sets)}, 1 in {stride} of those of a full run: {listed}."
+        )
     for locked in sets:
         found = {}  # (quantity, pair): differences and scales, a pair of arrays for each choice of angles
         for _ in range(angles):
             q = coordinates.random(rng, states)
             v = rng.uniform(-10.0, 10.0, (states, coordinates.nv))
             case = robot.case(words_of(locked), posture=posture_of(coordinates, q[0]), locked=locked)
-            for quantity, pair, apart, scale in differences(setup, case, q, v):
+            for quantity, pair, apart, scale in sub_block_differences(setup, case, q, v):
                 found.setdefault((quantity, pair), []).append((apart, scale))
         trees = robot.tree, robot.tree.lock(at_zero(robot.tree, locked)), case.tree
         names = "operations_whole", "operations_locked_at_zero", "operations_locked_at_angles"
-        counts = {name: None if many else operations(tree) for name, tree in zip(names, trees)}
+        counts = {name: operations(tree) if counted else None for name, tree in zip(names, trees)}
         units = WITH_SLIDES if "slide" in coordinates.all_kinds else BLOCK_UNITS
         for (quantity, pair), arrays in found.items():
             check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts, units[quantity])
@@ -116,8 +125,11 @@ def check_blocks(
     )
 
 
-def differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Iterator[tuple]:
-    """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it."""
+def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Iterator[tuple]:
+    """(quantity, pair of models, difference, scale) of the states q, v of all joints, those locked in the case set to it.
+
+    Of each state the difference that is closest to its tolerance, and its scale, as `mass` and `acceleration` have it.
+    """
     joints, tree = setup.robot.joints, setup.robot.tree
     places = dict(zip(joints, setup.robot.coordinates.places.joints))
     q, v = q.copy(), v.copy()
@@ -135,11 +147,14 @@ def differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Itera
         "Mbar": [left[name].mass_matrix(state[0]) for name in ("tmt", "mujoco")],
         "bias": [left[name].bias(*state) for name in ("tmt", "mujoco")],
     }
-    for quantity, scale in (("Mbar", mass_scale(tree, q)), ("bias", bias_scale(tree, q, v))):
+    of_states = scales(tree, setup.robot.is_read, q, v)
+    of_quantities = ("Mbar", of_states.mass_matrix, block), ("bias", of_states.bias, np.ix_(range(len(q)), free))
+    for quantity, scale, left_of in of_quantities:
+        scale = scale[left_of] if np.ndim(scale) > 1 else scale
         pairs = {
             "TMT, reduced to whole": (of_left[quantity][0], of_whole[quantity][0]),
             "MuJoCo, reduced to whole": (of_left[quantity][1], of_whole[quantity][1]),
             "reduced, TMT to MuJoCo": of_left[quantity],
         }
         for pair, (one, other) in pairs.items():
-            yield quantity, pair, largest(one - other), scale
+            yield quantity, pair, *worst_of_each(one - other, scale)

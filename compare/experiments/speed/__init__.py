@@ -11,14 +11,16 @@ from ...case import Case
 from ...engines import COMPARED, GRID, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
-from ...judge.run import diverged_at, movement_unit
+from ...judge.run import diverged_at, leaves_no_digits, movement_unit
 from ...judge.scale import FACTOR
 from ...judge.units import renamed, said
+from ...judge.words import scene_begins
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.reference import DOUBLES, Reference, committed, references
+from ...truth.reference import DOUBLES, Reference, committed, has_no_reference, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets, tumbling
+from .accuracy import fill_in, spread_in_words
 from .floors import floor
 from .settings import (
     absent_in_words,
@@ -74,7 +76,9 @@ def tolerance(robot: Robot) -> str:
 
 def skipped(robot: Robot) -> str | None:
     """Why it cannot serve a robot, or None."""
-    return None if scenes_of(robot) else f"the {robot.name} has no scene that every method follows"
+    if not scenes_of(robot):
+        return f"the {robot.name} has no scene that every method follows"
+    return leaves_no_digits(robot) or has_no_reference(robot)
 
 
 def begin(setup: Setup) -> None:
@@ -164,11 +168,11 @@ def rows_of_scene(
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
     found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
-    taking = methods(engines, size, which, case.robot)
+    taking, energy = methods(engines, size, which, case.robot), true_energy(case, reference)
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
-            found.append(row_of_run(case, case, engines, method, setting, reference, left))
+            found.append(row_of_run(case, case, engines, method, setting, reference, left, energy))
             now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
             if accuracy.gained_nothing(now, work, best, last, left) or too_long_next(method, case, work, size):
                 break
@@ -176,7 +180,14 @@ def rows_of_scene(
     smaller = None if case.robot.is_read else reduced(case)
     few = [method for method in taking if smaller and (method.engine, method.name) in SMALLER]
     setting = Setting(case.duration, SMALLER_STEPS)
-    return found + [row_of_run(smaller, case, engines, method, setting, reference) for method in few], left
+    runs = [row_of_run(smaller, case, engines, method, setting, reference, energy=energy) for method in few]
+    return found + runs, left
+
+
+def true_energy(case: Case, reference: Reference) -> np.ndarray:
+    """The energy of the reference of a scene at its times, J, (times,)."""
+    nq = case.coordinates.nq
+    return tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
 
 
 def row_of_run(
@@ -187,17 +198,19 @@ def row_of_run(
     setting: Setting,
     reference: Reference,
     left: float = 0.0,
+    energy: np.ndarray | None = None,
 ) -> dict:
     """A row: one run of a scene, or of the smaller model that has the motion of the whole one.
 
-    left: the least error that a reference in doubles shows; a smaller one is not known, and has this value.
+    left: the least error that a reference in doubles shows; a smaller one is not known, and has this value. energy: that of the
+    reference, J, (times,), where it is known.
     """
     joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
     places, nq = whole.coordinates.places, whole.coordinates.nq
     free = [[k for i in joints for k in range(*getattr(places.joints[i], part).indices(size))]
             for part, size in (("q", nq), ("qd", places.nv))]  # fmt: skip
     true = reference.high[:, :nq], reference.high[:, nq:]
-    energy = tmt.energy(*true, tree)
+    energy = true_energy(whole, reference) if energy is None else energy
     run, read = engines[method.engine].of(case).prepare(*case.start, case.tau, setting, method.name)
     with np.errstate(all="ignore"):
         motion = read(run())
@@ -228,24 +241,6 @@ def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
     return timing.in_turns(runs, rounds=setup.of(5, 2, 2))
 
 
-def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
-    """Give each row the least of its times; of those that have more than one, the median over the least."""
-    for row, of_row in zip(rows, times):
-        row["seconds"] = min(of_row)
-    return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]
-
-
-def spread_in_words(spread: Sequence[float]) -> list[str]:
-    """How the times of one setting differ, in words."""
-    if not spread:
-        return ["Each time is that of one run."]
-    return [
-        f"Each time is the least of several runs (one, if it takes longer than {timing.ONCE:g} s), in turns with all of its "
-        f"scene; where there are more than one, their median is {np.median(spread) - 1:.1%} above the least, for one setting "
-        f"in ten more than {np.quantile(spread, 0.9) - 1:.0%}. Errors come from runs of their own."
-    ]
-
-
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
     from . import figures_evaluations, figures_times  # matplotlib is for the process that draws
@@ -253,7 +248,7 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
     for scene in figures_times.scenes(result):
-        yield partial(figures_times.draw_times, result, scene)
+        yield partial(figures_times.draw_times, result, scene, beginning=scene_begins(scene, robot))
     yield partial(figures_times.draw_evaluations, result)
     yield partial(figures_times.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)

@@ -1,5 +1,7 @@
 """What of an evaluation can be compiled and timed in reasonable time, for a robot of any joints."""
 
+from functools import lru_cache
+
 import numpy as np
 
 import tmt
@@ -24,6 +26,7 @@ def most_states(tree: tmt.Tree) -> int:
     return int(10.0 ** np.floor(np.log10(MOST_RESULTS / (n * (n + 3) // 2))))
 
 
+@lru_cache(maxsize=8)
 def lengths(tree: tmt.Tree) -> list[int] | None:
     """Of the straight-line code of the literal and of the composite form; None: none is made for so many joints."""
     if not kernels.is_evaluated_straight(tree):
@@ -45,7 +48,7 @@ def left_out_in_words(tree: tmt.Tree) -> list[str]:
         ]
     if not literal_is_compiled(tree):
         return [
-            f"The literal form, whose {lengths(tree)[0]} operations would take too long to compile, is not, and neither is the "
+            f"The literal form is not timed: its {lengths(tree)[0]} operations would take too long to compile. Neither is the "
             "composite form with the library's sine."
         ]
     return []

@@ -79,7 +79,7 @@ def pareto(rows: list[dict], of: str) -> list[dict]:
     return front
 
 
-def draw_times(result: Result, scene: str) -> tuple[str, Figure, str]:
+def draw_times(result: Result, scene: str, beginning: str = "") -> tuple[str, Figure, str]:
     """One scene: worst error against time, a curve for each method, the Pareto front marked."""
     fig = Figure(figsize=(WIDTH, 5.2), layout="constrained")
     ax = fig.subplots()
@@ -115,7 +115,7 @@ def draw_times(result: Result, scene: str) -> tuple[str, Figure, str]:
     if lost:
         ax.plot([], [], "x", color="black", label="diverged (no error)")
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    caption = f"{capital(scene)}: {spoken(result, scene)}"
+    caption = f"{beginning or capital(scene)}: {spoken(result, scene)}"
     if lost:
         caption += f" {len(lost)} {'settings diverge' if len(lost) > 1 else 'setting diverges'} (crosses at the left)."
     return file_name("speed", scene), fig, caption
@@ -152,15 +152,17 @@ def spoken(result: Result, scene: str) -> str:
     """The message of a scene: how many times faster at the errors asked for."""
     unit = result.curves.get("unit", "rad")
     lines = [line for line in result.tables["what_should_i_use"] if line["scene"] == scene and line["ratio"]]
-    ratios = ", ".join(
-        f"{line['ratio']:.{0 if line['ratio'] >= 3.0 else 1}f} times as long for {value(line, 'target'):.0e} {unit}"
-        for line in lines
+    slower, faster = (
+        ", ".join(
+            f"{ratio:.{0 if ratio >= 3.0 else 1}f} times as long for {value(line, 'target'):.0e} {unit}"
+            for line in lines
+            if (ratio := line["ratio"] if longer else 1.0 / line["ratio"]) > 1.0 or (longer and ratio == 1.0)
+        )
+        for longer in (True, False)
     )
-    return (
-        f"MuJoCo's cheapest setting takes {ratios} as tmt's."
-        if ratios
-        else "no error asked for is reached by both MuJoCo and tmt."
-    )
+    said = [f"MuJoCo's cheapest setting takes {slower} as tmt's"] if slower else []
+    said += [f"tmt's cheapest setting takes {faster} as MuJoCo's"] if faster else []
+    return f"{'; '.join(said) or 'no error asked for is reached by both MuJoCo and tmt'}."
 
 
 def draw_evaluations(result: Result) -> tuple[str, Figure, str]:

@@ -175,7 +175,8 @@ def absent_in_words(row: dict, engines: Mapping[str, Engine]) -> str:
     """Who takes no part and why, in a sentence."""
     whole = row["method"] == ", ".join(engines[row["engine"]].methods)
     who = LABELS.get(row["engine"], row["engine"])
-    return f"{who if whole else row['engine'] + ' ' + row['method']} takes no part: {row['why_not']}."
+    takes = "takes" if whole or ", " not in row["method"] else "take"
+    return f"{who if whole else row['engine'] + ' ' + row['method']} {takes} no part: {row['why_not']}."
 
 
 def too_long_next(method: Method, case: Case, work: int, size: str) -> bool:

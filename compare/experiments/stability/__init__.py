@@ -8,6 +8,7 @@ import numpy as np
 
 from ...engines import same_scheme
 from ...judge.check import Result
+from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import held
@@ -37,20 +38,30 @@ def claim(robot: Robot) -> str:
 def tolerance(robot: Robot) -> str:
     """How far apart what is compared may be."""
     run, sought = "2000 steps, or more until a quarter holds a swing of the slowest mode", "without the prediction"
+    near, unit = "", choice.unit_of_movements(robot)
     if robot.is_read:
         run = f"{limits.GROWTH_STEPS} steps, 1000 of a quick run or with more than {MANY} speeds"
         sought = "among steps about the predicted one"
+        near = (
+            f", or from where such a run shows the growth, if that is more, up to {100 * limits.MOST_TOLERANCE:g} %: a limit "
+            "that shows later is not asked of runs; the notes say of which"
+        )
     return (
         "Amplification: that of TMT's method against MuJoCo's own derivative of its step (mjd_transitionFD; central "
-        "differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 rad + |q|) "
+        f"differences for RK4, which it refuses), within the rounding of a difference quotient, 64 eps (1 + |q|) "
         "max|J| / 1e-6. Limits: the largest dt at which no mode of the equations of motion grows by more than 0.1 % from the "
-        f"second to the last quarter of a run from 1e-6 rad ({run}), found by bisection {sought}, within 0.1 % of the predicted "
-        f"dt. Growth: 0.1 % over all steps. Departure (a {choice.joint_of(robot)} 0.1 {choice.unit_of_movements(robot)} away): "
+        f"second to the last quarter of a run from 1e-6 {unit} ({run}), found by bisection {sought}, within 0.1 % of the "
+        f"predicted dt{near}. Growth: 0.1 % over all steps. Departure (a {choice.joint_of(robot)} 0.1 {unit} away): "
         "within one step or 0.03 s"
         + (", and what forces that are not linear may add," if robot.is_read else "")
         + " of the first crossing of the method's linear map, whose angles are rounded to doubles at each step; where the map "
         "stays, the run stays."
     )
+
+
+def skipped(robot: Robot) -> str | None:
+    """Why it cannot serve a robot, or None."""
+    return leaves_no_digits(robot)
 
 
 def methods_of(setup: Setup) -> tuple:

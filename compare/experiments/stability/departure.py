@@ -77,7 +77,7 @@ def not_lost(at: Held, size: float) -> bool:
     """
     n, rate = at.nv, at.modes[0][0]
     measure = np.abs(at.measures[0][n:]) @ np.abs(np.linalg.inv(at.mass_matrix)).sum(axis=1)
-    return size * DEPARTURE_TOLERANCE * rate.real >= measure * EPS * gravity_scale(at.tree) / abs(rate)
+    return size * DEPARTURE_TOLERANCE * rate.real >= measure * EPS * gravity_scale(at.tree, at.q) / abs(rate)
 
 
 def curved_by(at: Held) -> float:

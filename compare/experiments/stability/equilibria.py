@@ -5,11 +5,14 @@ from itertools import product
 
 import numpy as np
 
+from tmt.methods import METHODS
+
 from ...engines import one_of_each_scheme
 from ...engines.mujoco.linear import NUDGE, transition
 from ...judge.check import Result
+from ...judge.rounding import step_rounding
 from ...judge.scale import EPS, FACTOR
-from ...judge.words import capital
+from ...judge.words import posture_begins
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import Held, held
@@ -44,7 +47,8 @@ def check_equilibria(result: Result, setup: Setup) -> None:
             for method, dt in product(one_of_each_scheme(mujoco), steps):
                 where = f"{name}, {method.name}, dt = {dt:.4g} s, damping {damping:g}"
                 theirs = transition(mujoco.of(at.case), at.q, at.tau, dt, method.name)
-                check_amplification(result, where, at.sizes, at.step(method.scheme, dt), theirs)
+                rounded = rounding_of_step(at, method.scheme, dt) if robot.is_read else 0.0
+                check_amplification(result, where, at.sizes, at.step(method.scheme, dt), theirs, rounded)
     result.tables["stability_modes"] = table
 
 
@@ -58,9 +62,18 @@ def kind_in_words(at: Held) -> str:
     if decays and any(at.tree.damping):
         texts.append(f"decays by {min(decays):.3g} to {max(decays):.4g} per second")
     if at.case.robot.is_read and at.without_stiffness.any():
-        texts.append(f"{at.without_stiffness.sum()} of {len(values)} rates are zero")
-    kind = at.kind if at.kind == "marginal" else f"a {at.kind}"
-    return f"{capital(at.name)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
+        zero = at.without_stiffness.sum()
+        texts.append(f"{zero} of {len(values)} rates {'is' if zero == 1 else 'are'} zero")
+    kind = at.kind if at.kind == "marginal" else f"a {decaying(at) or at.kind}"
+    return f"{posture_begins(at.name, at.case.robot)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
+
+
+def decaying(at: Held) -> str | None:
+    """What a centre is called of which every mode decays: a stable focus if one swings, else a stable node; None: it is not."""
+    values, small = at.modes[0], at.small
+    if at.kind != "centre" or not (values.real < -small).all():
+        return None
+    return "stable focus" if (np.abs(values.imag) > small).any() else "stable node"
 
 
 def few(texts: Sequence[str], between: str) -> str:
@@ -69,9 +82,24 @@ def few(texts: Sequence[str], between: str) -> str:
     return between.join(texts[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def check_amplification(result: Result, where: str, q: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> None:
-    """The check of one amplification: within what rounding does to a difference quotient."""
-    allowed = FACTOR * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max() / NUDGE
+def rounding_of_step(at: Held, scheme: str, dt: float) -> float:
+    """The bound of what rounding adds in one step from a held posture: of movements or of speeds, whichever is more.
+
+    By the scale of the forces, which has the reach: where an anchor is far away, that is more than the last digits of the angles.
+    """
+    rest = np.zeros((1, at.nv))
+    return float(step_rounding(METHODS[scheme], at.tree, at.q[None], rest, at.tau, dt).max())
+
+
+def check_amplification(
+    result: Result, where: str, q: np.ndarray, ours: np.ndarray, theirs: np.ndarray, rounded: float = 0.0
+) -> None:
+    """The check of one amplification: within what rounding does to a difference quotient.
+
+    rounded: the bound of the rounding of a step, where that may be more: a central quotient takes two steps, each so far off,
+    over twice the nudge.
+    """
+    allowed = max(FACTOR * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max(), rounded) / NUDGE
     quantity = "amplification of one step, TMT to MuJoCo"
     result.check(where, quantity, np.abs(ours - theirs).max(), allowed, "", rounding=True)
 

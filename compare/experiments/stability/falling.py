@@ -8,7 +8,6 @@ from scipy.integrate import quad
 from ...engines import LABELS, Engine, Method
 from ...judge.check import Result
 from ...judge.run import LEFT, departure
-from ...judge.words import capital
 from ...truth.linear import Held
 from .departure import span
 from .torques import own_torque
@@ -110,7 +109,7 @@ def falls_in_words(falls: list[dict], exponents: Sequence[float | None]) -> str:
         )
     one = max(falls, key=lambda row: row["perturbation_rad"])
     return (
-        f"{capital(one['scene'])}, held: the potential along the mode without stiffness is cubic, which predicts a time that "
+        f"Held at {one['scene']}: the potential along the mode without stiffness is cubic, which predicts a time that "
         f"goes with the power -1/2. In the runs {law}. From {one['perturbation_rad']:g} rad along the fall the law gives "
         f"{one['predicted_s']:.2f} s and the run takes {span([one['observed_s']])}."
     )

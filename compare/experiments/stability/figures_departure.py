@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from ...engines import LABELS
 from ...judge.check import Result
 from ...judge.run import LEFT, number_or_nan
-from ...judge.words import capital
+from ...judge.words import posture_begins
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from ...robots import Robot
 from .choice import coarsest_case, joint_of, step_text, unit_of_movements
@@ -88,8 +88,8 @@ def draw_falls(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     fig.legend(loc="outside upper center", ncols=5)
     off = [abs(late(row)) for row in rows if row["observed_s"] is not None]
     caption = (
-        f"{capital(posture)}, held: along the mode without stiffness the potential is cubic, and the time to leave is "
-        f"predicted from the cubic coefficient alone. {len(off)} of {len(rows)} runs of RK4 at {rows[0]['dt_s']:g} s leave"
-        + (f", at most {max(off):.3f} s off the prediction." if off else ".")
+        f"{posture_begins(posture, robot)}, held: along the mode without stiffness the potential is cubic, and the time to "
+        f"leave is predicted from the cubic coefficient alone. {len(off)} of {len(rows)} runs of RK4 at {rows[0]['dt_s']:g} s "
+        "leave" + (f", at most {max(off):.3f} s off the prediction." if off else ".")
     )
     return "stability_zero", fig, caption

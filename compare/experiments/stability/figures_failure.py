@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from ...engines import LABELS
 from ...judge.check import Result
-from ...judge.words import capital
+from ...judge.words import scene_begins
 from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH
 from ...robots import Robot
 from .choice import coarsest_case, fraction, step_text
@@ -97,8 +97,8 @@ def draw_silent(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     case = reset["case"]
     caption = (
-        f"{capital(case.name)}, by MuJoCo at dt = {fraction(case.duration, case.scene.dt)} s. Left: {reset_in_words(reset)} "
-        f"Right: {gain_in_words(gain)}"
+        f"{scene_begins(case.name, case.robot)}, by MuJoCo at dt = {fraction(case.duration, case.scene.dt)} s. "
+        f"Left: {reset_in_words(reset)} Right: {gain_in_words(gain)}"
     )
     return "stability_silent", fig, caption
 

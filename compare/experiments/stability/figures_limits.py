@@ -8,7 +8,7 @@ from ...engines import LABELS, Method
 from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
-from .choice import coarsest_case, damped, fraction
+from .choice import coarsest_case, damped, fraction, unit_of_movements
 from .departure import span
 from .growth import LINEAR_DEVIATION
 from .limits import apart
@@ -83,7 +83,8 @@ def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     expected = [row for row in rows if row["limit"] == "finite"]
     off = [apart(row) for row in expected if apart(row) is not None]
     caption = (
-        f"The largest dt at which no mode of the equations of motion grows in a run from {LINEAR_DEVIATION:g} rad, found by "
+        f"The largest dt at which no mode of the equations of motion grows in a run from {LINEAR_DEVIATION:g} "
+        f"{unit_of_movements(robot)}, found by "
         "bisection, beside the limit predicted from the amplification of one step. "
         f"{len(off)} of {len(expected)} predicted limits are observed"
         + (
@@ -148,7 +149,7 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     limiting, swing, step = "the fastest mode", "omega dt", f"dt = {fraction(case.duration, dt)} s"
     if robot.is_read:
         limiting, swing = "the mode that a step first lets grow", "|eigenvalue| dt"
-        step = f"the limit of dt at {centre}, where there is one, else {step}" if centre else step
+        step = f"the limit of dt at the posture {centre}, where there is one, else {step}" if centre else step
     caption = (
         "The upper half of the stability regions (grey: one step lets neither of a pair of conjugate eigenvalues "
         f"grow) with the eigenvalues of the held {robot.name} times {step}. "

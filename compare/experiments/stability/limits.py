@@ -4,8 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from tmt.methods import METHODS
+
 from ...engines import Engine, Method
 from ...judge.check import Result
+from ...judge.rounding import slope_rounding
+from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...truth.linear import Held
 from .choice import damped, who
@@ -23,6 +27,7 @@ BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 # relative, of the growth in all steps: the deviation reaches 1e-5 rad, and its square is not in a linear map
 GROWTH_TOLERANCE = 1e-3
+MOST_TOLERANCE = 0.1  # relative: a limit of a file's robot that runs show no nearer is not asked of them
 LIMIT_KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
 
 
@@ -43,7 +48,10 @@ def limits_and_growths(
         tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
         dt = 1e-2 if predicted is None else 1.001 * predicted  # just above the limit its mode grows fastest
         _, shape, _ = at.fastest_growing(method.scheme, dt)
-        seen, observed = observed_limit(method, engines, at, steps, tried_at(at, predicted))
+        open_end = why_undecided(at, tolerance if predicted else 0.0)
+        seen, observed = (
+            (None, None) if open_end else observed_limit(method, engines, at, steps, tried_at(at, predicted))
+        )
         if kind == "finite" and seen == "always_fails" and predicted < tried_at(at, predicted)[0]:
             kind, predicted = seen, None  # it fails at every step that is tried
         if kind == "always_fails":
@@ -52,7 +60,7 @@ def limits_and_growths(
             "scene": at.name, "engine": method.engine, "method": method.name, "damping": at.case.scene.damping,
             "mode_per_s": np.abs(at.modes[0]).max() if kind == "never_fails" else at.rate(shape),
             "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION,
-            "seen": seen, "allowed": tolerance,
+            "seen": seen, "allowed": tolerance, "undecided": open_end,
         })  # fmt: skip
     return {"rows": rows, "growths": growths}
 
@@ -143,6 +151,24 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
     return float(excess)
 
 
+def why_undecided(at: Held, tolerance: float) -> str | None:
+    """Why runs of a file's robot cannot show a limit, or None. tolerance: how far above it they show the growth, relative.
+
+    One eps of the forces pushes a mode of the rate r by an acceleration, and its equilibrium by that over r^2.
+    """
+    if not at.case.robot.is_read:
+        return None
+    if tolerance > MOST_TOLERANCE:
+        return f"a run of this length shows growth only more than {100 * MOST_TOLERANCE:g} % above them"
+    rates = np.abs(at.modes[0])[~at.without_stiffness]
+    pushed = slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2][0] / FACTOR
+    if len(rates) and pushed > GROWTH_MARGIN * LINEAR_DEVIATION * rates.min() ** 2:
+        return (
+            f"a rate of {rates.min():.1e} per second is so slow that rounding of the forces moves what it swings about"
+        )
+    return None
+
+
 def grows(early: np.ndarray, late: np.ndarray) -> bool:
     """Whether a deviation grows, by the shares of its modes in the second and the last quarter of a run.
 
@@ -156,11 +182,15 @@ def grows(early: np.ndarray, late: np.ndarray) -> bool:
 
 def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
     """The table of limits and that of growth per step, and a check for each row."""
-    late = {}
+    late, undecided, predicted_only = {}, {}, 0
     for row in (row for part in parts for row in part["rows"]):
-        seen, tolerance = row.pop("seen"), row.pop("allowed")
+        seen, tolerance, reason = row.pop("seen"), row.pop("allowed"), row.pop("undecided", None)
         result.rows.append(row)
         where = f"{row['scene']}, {who(row)}, damping {row['damping']:g}"
+        if seen is None:
+            undecided.setdefault(reason, []).append(where)
+            predicted_only += row["limit"] == "finite"
+            continue
         if row["limit"] == "finite":
             note = "" if seen == "finite" else f"it {LIMIT_KINDS[seen]}"
             result.check(where, "limit, observed / predicted - 1", apart(row), tolerance, "", note)
@@ -174,7 +204,8 @@ def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
         where, off = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s", row.pop("total_off")
         result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
     result.tables["stability_growth"] = growths
-    result.notes[:0] = limits_in_words(robot, result.rows) + late_in_words(late)
+    words = limits_in_words(robot, result.rows, predicted_only) + late_in_words(late) + undecided_in_words(undecided)
+    result.notes[:0] = words
     result.notes += growth_per_step_in_words(growths)
 
 
@@ -184,8 +215,8 @@ def apart(row: dict) -> float | None:
     return abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if known else None
 
 
-def limits_in_words(robot: Robot, rows: list[dict]) -> list[str]:
-    """How far observed limits are from the predicted ones, damping by damping."""
+def limits_in_words(robot: Robot, rows: list[dict], undecided: int = 0) -> list[str]:
+    """How far observed limits are from the predicted ones, damping by damping; undecided: how many no run was asked for."""
     expected = [row for row in rows if row["limit"] == "finite"]
     known = [row for row in expected if apart(row) is not None]
     if not expected:
@@ -195,11 +226,15 @@ def limits_in_words(robot: Robot, rows: list[dict]) -> list[str]:
         + (f"with {damped(robot, damping)} N m s/rad" if damping else damped(robot, damping))
         for damping in sorted({row["damping"] for row in known})
     )
-    missing = len(expected) - len(known)
+    missing = len(expected) - len(known) - undecided
+    if missing:
+        seen = f"In {missing} cases the runs show no finite limit."
+    else:
+        seen = f"Of {undecided} no run decides." if undecided else "The runs show each of them."
     return [
         f"{len(expected)} finite limits are predicted without a run. "
         + (f"{len(known)} are observed without the prediction; largest difference: {differences}. " if known else "")
-        + (f"In {missing} cases the runs show no finite limit." if missing else "The runs show each of them.")
+        + seen
     ]
 
 
@@ -211,4 +246,12 @@ def late_in_words(late: Mapping[str, float]) -> list[str]:
     return [
         f"With little damping a mode hardly grows just above its limit. So far above it a run of this length shows the growth, "
         f"and so far from the prediction an observed limit may be: {places}."
+    ]
+
+
+def undecided_in_words(undecided: Mapping[str, Sequence[str]]) -> list[str]:
+    """Which limits no run decides, {why: where}."""
+    return [
+        f"Limits that no run decides, and that are not checked, for {why}: {'; '.join(of)}."
+        for why, of in undecided.items()
     ]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...case import Case
-from ...judge.words import capital
+from ...judge.words import posture_begins
 from ...robots import Robot
 from ...truth.conserved import floats
 from ...truth.linear import Held, held
@@ -81,11 +81,13 @@ def subjects_of(robot: Robot) -> Subjects:
         left_out.append(f"{none} marginal: the law of leaving one is left out.")
     elif not marginal:
         left_out.append(
-            f"{capital(name)}, held, is marginal, but nothing pushes along its movements without stiffness: the law of leaving "
-            "it is left out."
+            f"{posture_begins(name, robot)}, held, is marginal, but nothing pushes along its movements without stiffness: the "
+            "law of leaving it is left out."
         )
     elif lawless:
-        left_out.append(f"{capital(name)}, held, is marginal, but {lawless}: the law of leaving it is left out.")
+        left_out.append(
+            f"{posture_begins(name, robot)}, held, is marginal, but {lawless}: the law of leaving it is left out."
+        )
     if not robot.claims and not robot.is_read:
         left_out.append(f"Nothing is claimed of the {robot.name}: there are no claims to repeat.")
     marginal, free = None if lawless else marginal, free_motion(robot)

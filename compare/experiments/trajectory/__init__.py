@@ -6,7 +6,7 @@ from functools import partial
 from ...engines import LABELS, one_of_each_scheme
 from ...judge.check import Result
 from ...judge.rounding import NARROW
-from ...judge.run import MOVES, movement_unit
+from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
 from ...setup import Setup
 from . import drift, errors, horizon, sentences
@@ -72,6 +72,11 @@ def tolerance_of_file(robot: Robot) -> str:
         "torque and of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same "
         "step."
     )
+
+
+def skipped(robot: Robot) -> str | None:
+    """Why it cannot serve a robot, or None."""
+    return leaves_no_digits(robot)
 
 
 def entries(setup: Setup) -> int:

@@ -64,9 +64,9 @@ def roundings(case: Case) -> tuple[float, float]:
     if case.tree.has_springs:
         off = case.coordinates.difference(case.q, np.array(case.tree.rest))
         springs = tmt.spring_torque(case.q, case.tree) @ off / 2.0
-    return DRIFT_ROUNDED * (gravity_scale(case.tree) + momenta @ np.abs(case.v) / 2 + springs), DRIFT_ROUNDED * momenta[
-        0
-    ]
+    return DRIFT_ROUNDED * (
+        gravity_scale(case.tree, case.q) + momenta @ np.abs(case.v) / 2 + springs
+    ), DRIFT_ROUNDED * momenta[0]
 
 
 def path_in(case: Case, dynamics: Dynamics, method: Method, count: int) -> tuple:

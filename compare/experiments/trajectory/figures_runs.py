@@ -11,7 +11,7 @@ from ...case import Case
 from ...engines import LABELS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit, step_in_words
-from ...judge.words import capital
+from ...judge.words import scene_begins
 from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name
 from .drift import DRIFT_DURATION, found_order
 from .figures_lines import differing_most, drawn, over_time
@@ -78,7 +78,11 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
         band = np.where(c["band"] < 1e3, c["band"], np.nan)
         lines = column[2]
         lines.semilogy(
-            c["t"][1:], np.maximum(ulp[1:], DRAWN_ZERO), color=BLUE, linewidth=0.8, label=f"{label}, start 1 ulp away"
+            c["t"][1:],
+            np.maximum(ulp[1:], DRAWN_ZERO),
+            color=BLUE,
+            linewidth=0.8,
+            label=f"{label}, start 1 ulp away{' (0: of 1)' if case.robot.is_read else ''}",
         )
         lines.semilogy(
             c["t"][1:], np.maximum(difference[1:], DRAWN_ZERO), color="black", linewidth=1, label=f"{label} to MuJoCo"
@@ -120,7 +124,7 @@ def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) ->
     errors, unit = result.curves["errors"].get(case.name), movement_unit(case.coordinates)
     count, label = case.coordinates.nv, result.label
     return (
-        f"{capital(case.name)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
+        f"{scene_begins(case.name, case.robot)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
             f"With {case.steps} steps of RK4 {label} is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true "

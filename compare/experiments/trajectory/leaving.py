@@ -58,12 +58,9 @@ def predicted_leaving(case: Case, push: np.ndarray) -> float | None:
 
 def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str, float | None]) -> list[str]:
     """A sentence for each engine: what the torque leaves, what becomes of it, when the robot left, and what the cause is."""
-    J, _ = linear_map(case)
-    rate = np.log(np.abs(np.linalg.eigvals(J)).max()) / (case.duration / case.steps)
     may, unit = allowed(case), movement_unit(case.coordinates)
-    per = " or ".join(f"{one}/s2" for one in unit.split(" or "))
-    grows = f"small deviations grow by up to e^{rate:.1f} per second" if rate > STEADY else "no small deviation grow"
-    sentences = [f"The linear map of RK4 lets {grows}."]
+    per = per_s2(unit)
+    sentences = [f"The linear map of RK4 lets {growing_in_words(case)}."]
     for name, push in accelerations_left(case, engines).items():
         if not np.isfinite(push).all():
             sentences.append(f"{capital(LABELS[name])} gives no acceleration there.")
@@ -75,11 +72,40 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
             else f"stay within {LEFT} {unit} for {case.duration:g} s"
         )
         why = cause_in_words(case, size, may, at, left[name])
+        left_over = f"{size:.1e}" if size else "0"
         sentences.append(
-            f"{capital(LABELS[name])}: the torque leaves an acceleration of {size:.1e} {per} (rounding allows {may:.1e}); by "
+            f"{capital(LABELS[name])}: the torque leaves an acceleration of {left_over} {per} (rounding allows {may:.1e}); by "
             f"that map alone the {case.robot.name} would {away}; it {left_in_words(left[name], unit)}{why}."
         )
     return sentences
+
+
+def growing_in_words(case: Case) -> str:
+    """What the linear map of RK4 lets small deviations do."""
+    J, _ = linear_map(case)
+    rate = np.log(np.abs(np.linalg.eigvals(J)).max()) / (case.duration / case.steps)
+    return f"small deviations grow by up to e^{rate:.1f} per second" if rate > STEADY else "no small deviation grow"
+
+
+def per_s2(unit: str) -> str:
+    """The unit of accelerations, by that of movements."""
+    return " or ".join(f"{one}/s2" for one in unit.split(" or "))
+
+
+def stays_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str, float | None]) -> str | None:
+    """What is said where the robot stays in every run and by the linear map, in one sentence; None: it leaves in one of them."""
+    pushes = accelerations_left(case, engines)
+    if not all(np.isfinite(push).all() for push in pushes.values()):
+        return None
+    if any(time is not None for time in (*left.values(), *(predicted_leaving(case, push) for push in pushes.values()))):
+        return None
+    unit = movement_unit(case.coordinates)
+    sizes = " and ".join(f"{LABELS[name]} {np.abs(push).max():.1e}" for name, push in pushes.items())
+    return (
+        f"the {case.robot.name} stays within {LEFT} {unit} for {case.duration:g} s in both engines, as it would by RK4's linear "
+        f"map, which lets {growing_in_words(case)}, under the acceleration that the torque leaves, {sizes} {per_s2(unit)} "
+        f"(rounding allows {allowed(case):.1e})"
+    )
 
 
 def left_in_words(left: float | None, unit: str = "rad") -> str:

@@ -7,7 +7,8 @@ from ...setup import Setup
 from .runs import recorded
 
 SECONDS_OF_RUNS = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all scenes together, about
-STAGES = 4  # evaluations in a step of RK4
+BESIDE_THEM = 1e-4  # s of an evaluation in a run, about, beside what the equations take themselves
+STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 
 
 def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], tuple[int, ...], list[str]]:
@@ -16,12 +17,13 @@ def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], tuple[
     if len(able) < len(cases):
         names = "; ".join(case.name for case in cases if case not in able)
         said.append(f"Your equations have gravity in them; scenes without it are left out: {names}.")
-    seconds = SECONDS_OF_RUNS[setup.size]
+    seconds, equations = SECONDS_OF_RUNS[setup.size], setup.engines["own"].equations
+    parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
+    each = BESIDE_THEM + sum(equations.times[part][0] for part in parts)
 
     def fits(count: int, finer: Sequence[int]) -> bool:
         """Whether there is time for the first scenes with these multiples of their steps."""
-        needed = sum(evaluations(case, multiple) for case in able[:count] for multiple in finer)
-        return setup.engines["own"].equations.affordable(needed, seconds) >= needed
+        return each * sum(evaluations(case, multiple) for case in able[:count] for multiple in finer) <= seconds
 
     count = max(k for k in range(len(able) + 1) if k == 0 or fits(k, setup.finer[:1]))
     finer = next(
@@ -40,4 +42,4 @@ def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], tuple[
 
 def evaluations(case: Case, multiple: int) -> int:
     """Of the accelerations, for the run, the one that starts beside it, and the recorded states."""
-    return 2 * STAGES * case.steps * multiple + (STAGES + 1) * (recorded(case) + 1)
+    return 2 * STAGES_OF_RK4 * case.steps * multiple + (STAGES_OF_RK4 + 1) * (recorded(case) + 1)

@@ -10,7 +10,7 @@ from tmt.methods import METHODS
 from ...case import Case, Coordinates
 from ...engines import LABELS, Dynamics, Engine, Method, compared
 from ...judge.check import Result
-from ...judge.rounding import band, slope_rounding, step_rounding
+from ...judge.rounding import NARROW, band, slope_rounding, step_rounding
 from ...judge.run import (
     check_movement,
     departure,
@@ -108,6 +108,14 @@ def follow(
             "Recorded states from which a step turns a hinge by more than half a turn are not compared in one step: "
             f"{'; '.join(fast)}."
         ]
+    unjudged = [row for row in result.rows if row["level"] == "open loop" and not row["judged_until_s"]]
+    if unjudged:
+        runs = "; ".join(f"{row['engine_integrator']}, {case.duration / row['dt_s']:.0f} steps" for row in unjudged)
+        result.notes.append(
+            f"{case.name}: no state of a run but its start is judged, as rounding may drive the next one apart by more than "
+            f"{NARROW:g} {movement_unit(case.coordinates)}, or the run has diverged there: {runs}. Nothing is said of these runs "
+            "beyond single steps."
+        )
     return result
 
 
@@ -119,7 +127,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
     ended = diverged_at(case, t, q, v)
     alive = t[::every] < (np.inf if ended is None else ended)
     states = [path[::every][alive] for path in (q, v)]
-    one_ulp_away = (np.nextafter(start, np.inf) for start in case.start)
+    one_ulp_away = (nudged(start, case.robot.is_read) for start in case.start)
     return TmtSide(
         t, q, v,
         band(stepping, tree, q, v, tau, dt, every, steps_afforded(case, entries)),
@@ -131,6 +139,12 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
         step_rounding(stepping, tree, *states, tau, dt),
         dynamics.run(*one_ulp_away, tau, dt, steps, scheme).q,
     )  # fmt: skip
+
+
+def nudged(start: np.ndarray, of_file: bool) -> np.ndarray:
+    """Numbers, one unit of their last place away; of a file's robot a zero, whose last place is far below all else, that of 1."""
+    away = np.nextafter(start, np.inf)
+    return np.where(start == 0.0, np.spacing(1.0), away) if of_file else away
 
 
 def compare_runs(

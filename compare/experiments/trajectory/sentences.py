@@ -11,10 +11,10 @@ from ...engines import LABELS, WHOSE, Engine
 from ...engines.mujoco.flags import INTEGRATORS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit
-from ...judge.words import capital
+from ...judge.words import scene_begins
 from ...robots import Robot
 from .errors import coarsest_run, deviations
-from .leaving import causes_in_words, left_in_words
+from .leaving import causes_in_words, left_in_words, stays_in_words
 from .runs import MOST_ENTRIES, STEPS_AT_MOST, counts, steps_afforded
 
 SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
@@ -41,11 +41,13 @@ def notes(
 def of_held(case: Case, engines: Mapping[str, Engine], curve: dict) -> str:
     """What a run of a held posture says, of what is claimed of it if it is."""
     claims = case.robot.claims.of_scenes if case.robot.claims else {}
-    about = f"Claim: {claims[case.name]}. Here" if case.name in claims else capital(case.name)
+    about = f"Claim: {claims[case.name]}. Here" if case.name in claims else scene_begins(case.name, case.robot)
     unit, named = movement_unit(case.coordinates), WHOSE | {"own": "yours"}
     ours, left = case.robot.compared[0], curve["left"]
     torque = "TMT's torque" if ours == "tmt" else "the torque that holds the compiled model"
     by = " and ".join(f"{named[name]} {rad(value, unit)}" for name, value in deviations(case, curve).items())
+    if case.robot.is_read and (stays := stays_in_words(case, engines, left)):
+        return f"{about}, under {torque}: {stays}; the farthest is {by}."
     return (
         f"{about}, under {torque}, in {case.duration:g} s {WHOSE[ours]} {case.robot.name} {left_in_words(left[ours], unit)}, "
         f"MuJoCo's {left_in_words(left['mujoco'], unit)}; the farthest is "
@@ -74,7 +76,12 @@ def of_integrators(robot: Robot, mujoco: Engine) -> list[str]:
 
 def rad(value: float | None, unit: str = "rad") -> str:
     """A movement in words; None: the run has diverged."""
-    return "no number (it diverged)" if value is None else f"{value:.1e} {unit}"
+    return "no number (it diverged)" if value is None else f"{short(value)} {unit}"
+
+
+def short(value: float) -> str:
+    """A size in words: 0 where it is exactly that."""
+    return f"{value:.1e}" if value else "0"
 
 
 def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
@@ -92,7 +99,7 @@ def of_errors(runs: dict, found: dict, cases: Mapping[str, Case]) -> list[str]:
         apart, unit = agreement(curve, case), movement_unit(case.coordinates)
         true = "rest" if cases[name].is_held else "more than 20 digits"
         lines.append(
-            f"{name} (true: {true}): {label} {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {apart:.1e} {unit} in the "
+            f"{name} (true: {true}): {label} {rad(ours, unit)}, MuJoCo {rad(theirs, unit)}, apart {short(apart)} {unit} in the "
             f"{curve['judged_until_s']:.2f} s that are judged"
         )
         if None not in (ours, theirs) and max(ours, theirs) > SAYS_NOTHING * apart:

@@ -99,6 +99,25 @@ def test_the_figure_of_needs_draws_the_times_of_each_engine(engines):
     assert figures_needs.gain([], 3) == "No smaller model was timed."
 
 
+def test_the_figure_of_needs_shows_of_which_joints_nothing_is_decided():
+    """And its legend names that kind only where there are such."""
+    for undecided, kinds in (((), 3), (("gamma",), 4)):
+        curves = {"needs": {"free": {"locked": (), "stays": ("beta",), "undecided": undecided}}}
+        _, fig, _ = figures_needs.draw_needs(Result("reduction", curves=curves), ARM)
+        assert [line.get_marker() for line in fig.axes[0].get_lines()][2] == "od"[len(undecided)]
+        assert len(fig.axes[0].get_legend().get_texts()) == kinds
+
+
+def test_where_no_run_is_needed_one_label_stands_for_engines_that_take_alike():
+    curves = {"needs": {"held": {"locked": (), "stays": JOINTS}}}
+    for slower, labels in ((1.5, 1), (30.0, 2)):
+        times = {"tmt": 100.0, "mujoco": 100.0 * slower}
+        common = {"scene": "held", "integrator": "RK4", "nv": 3, "speedup": None}
+        rows = [{"engine": engine, "ns_per_step": time, **common} for engine in times for time in (times[engine], None)]
+        _, fig, _ = figures_needs.draw_needs(Result("reduction", rows=rows, curves=curves), ARM)
+        assert [text.get_text() for text in fig.axes[1].texts] == ["no run needed"] * labels
+
+
 def test_the_figure_of_needs_shows_which_joints_stay():
     curves = {"needs": {"swing": {"locked": ("alpha",), "stays": ("beta",)}}}
     _, fig, caption = figures_needs.draw_needs(Result("reduction", curves=curves), ARM)

@@ -10,6 +10,7 @@ from compare.case import Scene
 from compare.engines.mujoco import ModelError, additions, engine, read
 from compare.experiments.reduction import cost
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
 
 
 def test_additions_are_there_and_only_a_touched_floor_changes_the_motion(mujoco):
@@ -50,8 +51,26 @@ def test_sizes_follow_the_robot_and_its_base():
 def test_a_body_with_its_centre_of_mass_at_the_base_has_a_size():
     reading = read('<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>')
     radius, near, far = cost.sizes(reading.tree)
-    assert radius == pytest.approx(np.sqrt(0.4) * 0.1 / 15, rel=1e-5) and far < near < 0.0
-    assert additions.with_additions(engine(reading), radius, near, far)
+    assert radius == pytest.approx(np.sqrt(0.4) * 0.1 / 15, rel=1e-5) and near < 0.0
+    engines = additions.with_additions(engine(reading), radius, near, far)
+    assert far is None and additions.ON_FLOOR in engines  # a body that falls reaches any floor
+    assert additions.OFF_FLOOR not in engines
+
+
+def test_what_is_added_takes_nothing_from_the_default_classes_of_the_file():
+    """A motor that were a servo would push, and geoms that may not touch would never do."""
+    reading = read(
+        '<mujoco><default><position kp="80"/><geom contype="0" conaffinity="0" margin="9"/></default><worldbody><body>'
+        '<joint name="j" axis="0 1 0"/><inertial pos="0.2 0 0" mass="1" diaginertia=".01 .01 .01"/></body></worldbody></mujoco>'
+    )
+    robot = robot_of(reading, "robot.xml")
+    engines = additions.with_additions(engine(reading), *cost.sizes(robot.tree))
+    case = robot.case("let go")
+    start = *case.start, case.tau, 1 / 256, 256, "Euler"
+    paths = {name: e.of(case).run(*start).q for name, e in engines.items()}
+    assert {n for n, path in paths.items() if not np.array_equal(path, paths[additions.MINIMAL])} == {
+        additions.ON_FLOOR
+    }
 
 
 def test_the_fall_is_the_regular_scene_else_a_free_one_else_a_posture():

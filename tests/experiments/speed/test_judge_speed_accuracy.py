@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from judged import BOTH
 from speed_rows import SCHEMES, known_rows, row
 
 from compare.experiments.speed import accuracy
@@ -72,6 +73,18 @@ def test_mujoco_comes_as_near_as_tmt(ours, theirs, passes):
     assert found == {"smallest error of MuJoCo's RK4, beside that of tmt's rk4": passes}
 
 
+@BOTH
+def test_where_mujocos_steps_end_before_its_errors_stop_tmts_are_no_finer(share, passes):
+    errors = [1e-6, 1e-7, 1e-8]
+    rows = [row("tmt", "rk4", e, 64 << k) for k, e in enumerate(errors)]
+    ends = [row("mujoco", "RK4", e, 64 << k) for k, e in enumerate([1e-6, share * 2e-7])]
+    quantity = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
+    assert smallest_errors([*ends, *rows], {"bent, free": 1e-20})[quantity] is passes
+    # where finer steps have gained nothing, more of them would not have either
+    stops = [*ends, row("mujoco", "RK4", 1e-6, 256)]
+    assert not smallest_errors([*stops, *rows], {"bent, free": 1e-20})[quantity]
+
+
 @pytest.mark.parametrize(
     "found, work, best, last, ends",
     [
@@ -138,7 +151,7 @@ def test_sentences_of_first_order_and_smaller_models():
     another = row("tmt", "rk4", 1e-3, 64, 0.5e-3, scene="bent, free, my own")  # a scene that is only called so
     assert accuracy.smaller_models_in_words([*rows, another]) == []
     floors = {"bent, free": 1e-14}
-    assert "Of the curves of all methods 1 come to within 30 times of it; in 0 of these" in accuracy.floors_in_words(
+    assert "Of the curves of all methods 1 comes to within 30 times of it; in 0 of these" in accuracy.floors_in_words(
         rows, floors)[0]  # fmt: skip
 
 

@@ -74,3 +74,22 @@ def test_an_empty_section_has_no_figures_and_none_raises():
     assert list(speed.figures(empty, ARM)) == []
     for draws in (draw.draw_evaluations, draw.draw_energy, lambda result: figures_evaluations.draw_cost(result, "arm")):
         assert len(draws(empty)) == 3
+
+
+def test_each_engine_is_said_to_take_longer_where_it_does():
+    def said(**ratios):
+        lines = [
+            {"scene": "a", "target_rad": target, "ratio": ratio}
+            for target, ratio in zip((1e-2, 1e-3, 1e-6), ratios.values())
+        ]
+        return draw.spoken(Result("speed", tables={"what_should_i_use": lines}), "a")
+
+    assert said(x=20.0, y=1.0) == (
+        "MuJoCo's cheapest setting takes 20 times as long for 1e-02 rad, 1.0 times as long for 1e-03 rad as tmt's."
+    )
+    assert said(x=0.1) == "tmt's cheapest setting takes 10 times as long for 1e-02 rad as MuJoCo's."
+    assert said(x=0.5, y=4.0, z=None) == (
+        "MuJoCo's cheapest setting takes 4 times as long for 1e-03 rad as tmt's; "
+        "tmt's cheapest setting takes 2.0 times as long for 1e-02 rad as MuJoCo's."
+    )
+    assert said() == "no error asked for is reached by both MuJoCo and tmt."

@@ -195,9 +195,23 @@ def test_no_order_is_measured_below_a_reference_in_doubles(doubles, shown):
     result = Result("speed", curves={"floors": {"s": 1e-9}, "doubles": doubles})
     result.rows = [
         {"scene": "s", "engine": "tmt", "method": "rk4", "dt_s": dt, "early": early}
-        for dt, early in ((2e-3, 1.6e-9), (1e-3, 1e-10))
+        for dt, early in ((4e-3, 2.56e-8), (2e-3, 1.6e-9), (1e-3, 1e-10))
     ]
     assert len(advice.orders(result, ["s"], [Method("tmt", "rk4", 4, "rk4")], complete=False)) == shown
+
+
+@pytest.mark.parametrize("change, asked", [(0.149, True), (0.151, False), (None, False)])
+def test_an_order_of_a_file_is_asked_where_it_has_settled(change, asked):
+    orders = [4.0 + 2.0 * (change or 0.0), 4.0 + (change or 0.0)][change is None :]
+    errors = 1e-4 / 2.0 ** np.cumsum([0.0, *orders])
+    result = Result("speed", curves={"floors": {"s": 1e-16}, "doubles": True})
+    result.rows = [
+        {"scene": "s", "engine": "tmt", "method": "rk4", "dt_s": 0.01 / 2**k, "early": error}
+        for k, error in enumerate(errors)
+    ]
+    advice.orders(result, ["s"], [Method("tmt", "rk4", 4, "rk4")], complete=False)
+    assert bool(result.checks) is asked and bool(result.notes) is not asked
+    assert asked or "s, tmt rk4." in result.notes[0]
 
 
 def test_errors_below_what_is_known_have_its_size(gripper):

@@ -1,16 +1,26 @@
 """The checks of amplification, limits and growth on rows just inside and just outside of each tolerance; no runs."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from judged import BOTH, only
+from models import PATHS
 
+from compare.engines.mujoco import reading
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import equilibria, figures_limits, limits
+from compare.experiments.stability.subjects import subjects_of
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.truth.linear import held
 
 EPS = 2.0**-52
 RK4 = Tmt().methods["rk4"]
+FAR = """<mujoco><worldbody><body><joint name="far" axis="0 1 0" pos="10000 0 0"/>
+  <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/><body pos="0 0 1"><joint name="near" axis="0 1 0"/>
+  <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="1"/></body></body></worldbody></mujoco>"""
 
 
 @BOTH
@@ -63,6 +73,47 @@ def test_a_limit_that_no_run_shows_fails_and_is_said(result):
 def test_the_largest_difference_of_a_limit_is_said():
     (text,) = limits.limits_in_words(ARM, [limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
     assert "largest difference: 0.500 % undamped" in text and text.startswith("3 finite limits")
+
+
+def test_a_limit_that_no_run_decides_is_said_and_not_checked(result):
+    open_row = limit_row(observed=None, seen=None, undecided="a reason") | {"engine": "mujoco", "method": "RK4"}
+    check_limits(result, limit_row(), open_row, limit_row(None, None, "never_fails", None, undecided="a reason"))
+    assert only(result) and "2 finite limits" in result.notes[0] and "Of 1 no run decides." in result.notes[0]
+    assert "not checked, for a reason: bent, MuJoCo RK4, damping 0; bent, TMT rk4, damping 0." in result.notes[1]
+    assert all("undecided" not in row for row in result.rows)
+
+
+@pytest.mark.parametrize("tolerance, decided", [(0.0999, True), (0.1001, False)])
+def test_a_limit_that_shows_far_above_it_only_is_not_decided(tolerance, decided):
+    robot = robot_of(reading.read(PATHS["arm7"]), "arm7.xml")
+    assert (limits.why_undecided(held(robot, "ready"), tolerance) is None) is decided
+    assert limits.why_undecided(held(ARM, "bent"), 1.0) is None
+
+
+def test_a_mode_so_slow_that_rounding_moves_it_is_not_decided():
+    robot = robot_of(reading.read(FAR), "far.xml")
+    assert "is so slow that rounding" in limits.why_undecided(held(subjects_of(robot).robot, "at rest"), 0.0)
+    near, far = (equilibria.rounding_of_step(at, "rk4", 0.01) for at in (held(ARM, "bent"), held(robot, "qpos0")))
+    assert far > 100.0 * near
+
+
+@BOTH
+def test_amplification_within_the_rounding_of_a_step_where_that_is_more(result, share, passes):
+    ours = np.eye(2)
+    equilibria.check_amplification(result, "", np.ones(1), ours, ours + share * 1e-9 / 1e-6, 1e-9)
+    assert only(result) is passes
+
+
+@pytest.mark.parametrize("rates, swings, name", [
+    ((1.0, 2.0), 0.0, "a stable node"), ((1.0, 2.0), 3.0, "a stable focus"), ((0.0, 2.0), 3.0, "a centre"),
+])  # fmt: skip
+def test_what_decays_is_a_node_or_a_focus(rates, swings, name):
+    values = np.array([complex(-rate, sign * swings) for rate in rates for sign in (1, -1)])
+    at = SimpleNamespace(
+        kind="centre", modes=(values, None), small=1e-6, without_stiffness=np.zeros(4, bool), name="low",
+        tree=SimpleNamespace(damping=(1.0,)), case=SimpleNamespace(robot=SimpleNamespace(is_read=True, positions=())),
+    )  # fmt: skip
+    assert equilibria.kind_in_words(at).startswith(f"Low, held, is {name}: ")
 
 
 @BOTH

@@ -48,7 +48,7 @@ def test_what_a_file_lacks_is_said(name, words):
 
 
 @pytest.mark.parametrize("source, marginal", [
-    (PATHS["free_body"], "Qpos0"), (PATHS["gripper"], "Open"), (SWING.format(keys=""), None),
+    (PATHS["free_body"], "Posture qpos0"), (PATHS["gripper"], "Posture open"), (SWING.format(keys=""), None),
 ])  # fmt: skip
 def test_a_marginal_posture_that_nothing_pushes_is_not_denied(source, marginal):
     left_out = subjects_of(read(source)[0]).left_out

@@ -4,9 +4,9 @@ import dataclasses
 
 from small_runs import on_the_moon
 
+from compare.engines.mujoco import load
 from compare.experiment import Setup, engines
 from compare.experiments import stability
-from compare.robots import Robot
 from compare.robots.arm import ARM
 
 
@@ -45,24 +45,26 @@ def test_on_the_moon_no_sentence_speaks_of_the_stated_arm(beside):
     assert not any("silent" in check.quantity for check in result.checks)  # nothing failed, so nothing has to be caught
 
 
-def lacking(mujoco, **changes) -> tuple[Robot, list, list]:
-    """The arm without claims and with changes, in a quick run: what is left out, and the names of the figures."""
-    robot = dataclasses.replace(ARM, claims=None, kinds={}, scenes=(), **changes)
-    result = stability.rows(Setup.quick(robot, engines(mujoco)))
+SPARE = {"up": {"up": ARM.postures["upright"]}, "down": {"down": ARM.postures["hanging"]}}  # one posture each
+
+
+def lacking(name) -> tuple[list, list]:
+    """The arm without claims and with one posture, in a quick run: what is left out, and the names of the figures."""
+    robot = dataclasses.replace(ARM, claims=None, kinds={}, scenes=(), postures=SPARE[name])
+    result = stability.rows(Setup.quick(robot, engines(load(ARM.mjcf, ARM.tree))))
     assert result.checks and all(check.passed for check in result.checks)
     names = [figure()[0] for figure in stability.figures(result, robot)]
     return [note for note in result.notes if "left out" in note or "no claims" in note], names
 
 
-def test_what_a_robot_lacks_is_left_out_with_a_reason(mujoco):
-    postures = {"up": ARM.postures["upright"]}
-    notes, figures = lacking(mujoco, postures=postures)
+def test_what_a_robot_lacks_is_left_out_with_a_reason(beside):
+    notes, figures = beside.result(lacking, "up")
     assert [note.split(":")[0] for note in notes] == [
         "None of the arm's named postures is a centre",
         "None of the arm's named postures is marginal",
         "Nothing is claimed of the arm",
     ]
     assert figures == ["stability_regions", "stability_departure"]
-    notes, figures = lacking(mujoco, postures={"down": ARM.postures["hanging"]})
+    notes, figures = beside.result(lacking, "down")
     assert "None of the arm's named postures is a saddle: departures from one are left out." in notes
     assert figures == ["stability_limits", "stability_regions", "stability_silent"]

@@ -1,0 +1,221 @@
+"""What is to be compared, checked: the model, the states, and each quantity in one's own equations and in MuJoCo."""
+
+import warnings
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from tmt.lock import CLOSE_TO_ONE
+from tmt.values import real_numbers, shown
+
+from ..case import is_number
+from ..coordinates import Coordinates
+from ..engines.own import ARGUMENTS, OwnEquations, is_function
+from ..joint_map import JointMap, joint_map
+from ..judge.check import over
+from ..judge.entries import Entries
+from ..judge.scale import EPS, FACTOR
+from ..robots.file import robot_of
+from ..states import random
+
+SYMBOLS_OF = {
+    "mass_matrix": "M",
+    "bias": "h",
+    "gravity": "g",
+    "acceleration": "qdd",
+}  # and what their entries are called
+OWN_SECONDS = 20.0  # s of one's own functions at random states
+
+
+class State(NamedTuple):
+    """A state in joints of one's own."""
+
+    number: int
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    tau: tuple[float, ...]
+
+
+class Compared(NamedTuple):
+    """One quantity at all states, (states, ...), in joints of one's own."""
+
+    own: np.ndarray
+    right: np.ndarray  # MuJoCo's
+    scale: np.ndarray
+    tolerance: np.ndarray
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Of the difference to the tolerance; 0 where both are 0, inf where one's own is no finite number."""
+        off = np.abs(self.own - self.right)
+        return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
+
+
+class Given:
+    """What `assert_agrees` and `differences` are given, with what it is compared with."""
+
+    def __init__(self, mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed):
+        brought = dict(zip(SYMBOLS_OF, (mass_matrix, bias, gravity, acceleration)))
+        brought = {name: value for name, value in brought.items() if value is not None}
+        if not brought:
+            raise ValueError(f"there is nothing to compare; {', '.join(SYMBOLS_OF)} or some of them are expected")
+        if not is_number(rtol) or rtol < 0.0:
+            raise ValueError(f"rtol is {shown(rtol)}; a number of at least 0 is expected")
+        self.rtol, self.brought = float(rtol), brought
+        self.read(mjcf)
+        self.are_stated = joints is not None
+        self.joints: JointMap = joint_map(self.coordinates, joints)
+        functions = {name: value for name, value in brought.items() if is_function(value)}
+        self.own = OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
+        if q is None:
+            alone = [f"{name} is an array of values" for name in brought if name not in functions]
+            alone += [f"{name} is given" for name, value in {"qd": qd, "tau": tau}.items() if value is not None]
+            if alone:
+                raise ValueError(f"{alone[0]}, but not q; q of shape (states, {self.coordinates.nq}) is expected")
+            self.take_random(states, seed)
+        else:
+            self.take_states(q, qd, tau)
+
+    # the model
+
+    def read(self, mjcf) -> None:
+        """Read the model."""
+        from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
+
+        if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
+            mjcf = Path(mjcf)
+        reading = read(mjcf)
+        self.robot = robot_of(reading, "the model")
+        self.mujoco = engine(reading).of(self.robot.case())
+        self.tree, self.coordinates = reading.tree, Coordinates(reading.tree.hinge_names, reading.tree.kind)
+
+    # the states
+
+    def take_random(self, states: int, seed: int) -> None:
+        """Random states, fewer where one's own functions take long."""
+        for name, value, least in (("states", states, 1), ("seed", seed, 0)):
+            if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+                raise ValueError(f"{name} is {shown(value)}; a whole number of at least {least} is expected")
+        sample = random(self.robot, states, 0, seed)
+        self.q, self.qd, self.tau = sample.q, sample.qd, sample.tau
+        self.own.try_at(self.q, self.qd, self.tau)
+        count = self.own.affordable(len(self.q), OWN_SECONDS)
+        if count < len(self.q):
+            said = f"{count} states in place of {states}: your functions take {self.own.seconds:.2g} s a state"
+            warnings.warn(said, stacklevel=5)
+            self.q, self.qd, self.tau = self.q[:count], self.qd[:count], self.tau[:count]
+
+    def take_states(self, q, qd, tau) -> None:
+        """The states that are given, in joints of one's own."""
+        nq, nv = self.coordinates.nq, self.coordinates.nv
+        own = {"q": rows_given("q", q, nq, None)}
+        count = len(own["q"])
+        for name, value in {"qd": qd, "tau": tau}.items():
+            needed = [of for of in self.brought if name in ("q", "qd", "tau")[: ARGUMENTS[of]]]
+            if value is None and needed:
+                raise ValueError(f"{needed[0]} depends on {name}; {name} of shape ({count}, {nv}) is expected, or 0.0")
+            own[name] = np.zeros((count, nv)) if value is None else rows_given(name, value, nv, count)
+        self.q = self.joints.positions(own["q"])
+        self.qd, self.tau = self.joints.speeds(own["qd"]), self.joints.forces(own["tau"])
+        for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
+            off = np.abs(np.linalg.norm(self.q[:, joint.q], axis=1) - 1.0).max() if joint.kind == "ball" else 0.0
+            if off > CLOSE_TO_ONE:
+                raise ValueError(f"q of {name} is no quaternion of length 1 at every state; w, x, y, z is expected")
+
+    @cached_property
+    def states(self) -> list[State]:
+        """The states, in joints of one's own."""
+        of = self.joints
+        own = of.own_positions(self.q), of.own_speeds(self.qd), of.own_forces(self.tau)
+        return [State(i, *map(tuple, state)) for i, state in enumerate(zip(*(part.tolist() for part in own)))]
+
+    # the quantities
+
+    @cached_property
+    def values(self) -> dict[str, np.ndarray]:
+        """One's own values of each quantity, in the model's joints."""
+        return {name: self.value(name, brought) for name, brought in self.brought.items()}
+
+    def value(self, name: str, brought: object) -> np.ndarray:
+        """One's own values of one quantity, in the model's joints, (states, ...)."""
+        if self.own is not None and self.own.has(name):
+            function = getattr(self.own, {"gravity": "gravity_balance"}.get(name, name))
+            return function(*(self.q, self.qd, self.tau)[: ARGUMENTS[name]])
+        values = self.table(name, brought)
+        return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
+
+    def table(self, name: str, brought: object) -> np.ndarray:
+        """An array of values, as it is given, (states, ...); rows of a table may be the rows of Mbar one after the other."""
+        count, nv = len(self.q), self.coordinates.nv
+        array = real_numbers(brought)
+        shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
+        if array is None:
+            raise ValueError(f"{name} is {shown(brought)}; real numbers of shape {shape} are expected, or a function")
+        accepted = [shape, (count, nv * nv)] if name == "mass_matrix" else [shape]
+        accepted += [shape[1:]] * (count == 1) + [(count,)] * (nv == 1)
+        if array.shape not in accepted:
+            raise ValueError(f"{name} has shape {array.shape}; {shape} is expected, its values at the given q")
+        return array.reshape(shape)
+
+    @cached_property
+    def compared(self) -> Mapping[str, Compared]:
+        """Each quantity in one's own equations and in MuJoCo."""
+        scale = Entries(self.tree, self.q, self.qd)
+        found = {}
+        for name, own in self.values.items():
+            state = (self.q, self.qd, self.tau)[: ARGUMENTS[name]]
+            right = getattr(self.mujoco, {"gravity": "gravity_balance"}.get(name, name))(*state)
+            try:
+                size = {
+                    "mass_matrix": lambda: scale.mass_matrix,
+                    "bias": lambda: scale.bias,
+                    "gravity": lambda: scale.weight,
+                    "acceleration": lambda right=right: scale.acceleration(scale.force(self.tau), right),
+                }[name]()
+            except np.linalg.LinAlgError:
+                raise ValueError(
+                    "Mbar of the model is singular at a state: there is no acceleration to compare"
+                ) from None
+            turned = self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
+            size = np.abs(turned(np.broadcast_to(size, right.shape)))
+            found[name] = Compared(turned(own), turned(right), size, (FACTOR * EPS + self.rtol) * size)
+        return found
+
+    def entries(self, name: str) -> dict[tuple, str]:
+        """What the entries of a quantity are called, by their place."""
+        names = [self.coordinates.speeds[i] for i in self.joints.v]
+        symbol = SYMBOLS_OF[name]
+        if name == "mass_matrix":
+            return {(i, j): f"{symbol}[{a}][{b}]" for i, a in enumerate(names) for j, b in enumerate(names)}
+        return {(i,): f"{symbol}[{a}]" for i, a in enumerate(names)}
+
+    @property
+    def fails(self) -> bool:
+        """Whether an entry is beyond its tolerance."""
+        return any((one.ratio > 1.0).any() for one in self.compared.values())
+
+    @property
+    def problems(self) -> list[str]:
+        """What else is wrong with one's own functions, a line each."""
+        return [problem.text for problem in self.own.problems] if self.own is not None else []
+
+
+def rows_given(name: str, values: object, size: int, count: int | None) -> np.ndarray:
+    """States as rows, (states, size); a number stands for all. ValueError for anything else. count: of states, None: any."""
+    array = real_numbers(values)
+    expected = f"({'states' if count is None else count}, {size})"
+    if array is None:
+        raise ValueError(f"{name} is {shown(values)}; real numbers of shape {expected} are expected")
+    if array.ndim == 0 and count is not None:
+        array = np.full((count, size), float(array))
+    elif array.ndim == 1:
+        array = array.reshape(-1, size) if array.shape == (size,) or size == 1 else array
+    if array.ndim != 2 or array.shape[1] != size or (count is not None and len(array) != count) or not len(array):
+        raise ValueError(f"{name} has shape {np.shape(values)}; {expected} is expected")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} has values that are not finite; finite numbers are expected")
+    return array

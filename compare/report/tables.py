@@ -1,0 +1,64 @@
+"""Tables of a report as text."""
+
+import math
+from collections.abc import Sequence
+
+import pandas as pd
+
+from .questions import answers
+from .verdict import Section
+
+DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
+DIGITS |= dict.fromkeys(
+    ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
+)
+
+LISTS = ("names", "hinges", "locked")  # columns with names of joints, which may be many
+LONGEST_LIST = 80  # characters of a list in a report; its file has all
+
+
+def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    """A table as text, with the digits that a reader needs."""
+    table = table if columns is None else table[columns]
+
+    def text(value, digits, is_list):
+        if isinstance(value, float):
+            if not math.isfinite(value):
+                return ""
+            return f"{value:.0f}" if value.is_integer() and 1.0 <= abs(value) < 1e7 else f"{value:.{digits}g}"
+        whole = "" if value is None else str(value)
+        return f"{whole[: LONGEST_LIST - 4]} ..." if is_list and len(whole) > LONGEST_LIST else whole
+
+    columns = {c: [text(v, DIGITS.get(c, 3), c in LISTS) for v in table[c].astype(object)] for c in table.columns}
+    return pd.DataFrame(columns).rename(columns=lambda c: c.replace("_", " "))
+
+
+def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
+    """The causes as a table for readers."""
+    return pd.DataFrame([(cause["rank"], cause["text"]) for cause in causes], columns=["rank", "cause"])
+
+
+def questions(sections: Sequence[Section], robot) -> pd.DataFrame:
+    """What was asked and the answers, as a table for readers; without the parts of an assignment where there are none."""
+    table = pd.DataFrame(answers(sections, robot), columns=["part", "asked", "answered in", "answer"])
+    return table if table["part"].any() else table.drop(columns="part")
+
+
+def asked_by(robot) -> str:
+    """The heading of the questions."""
+    return "The assignment's questions" if robot.questions else "Questions"
+
+
+def failing(section: Section) -> pd.DataFrame:
+    """The checks of a section that fail, as text."""
+    failed = [check.record() for check in section.result.checks if not check.passed]
+    return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
+
+
+def heading(name: str) -> str:
+    """A table's name as words."""
+    return {"what_should_i_use": "What should I use?"}.get(name, name.replace("_", " ").capitalize())
+
+
+def origins(origin: dict) -> pd.DataFrame:
+    return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
