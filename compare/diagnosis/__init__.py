@@ -16,9 +16,9 @@ import tmt
 
 from ..judge.scale import EPS, FACTOR
 from ..judge.words import listed
-from .fit import Fitted, OutOfTime, Search
-from .model import Equations
-from .places import places
+from .fit import Fitted, OutOfTime, Search, nearest_changes
+from .model import Equations, packing
+from .places import Place, places
 from .slips import slips
 from .variants import Variant, both, conventions, options, values_of
 from .words import Cause, of_fitted, of_variant
@@ -28,6 +28,7 @@ FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
 SHOWN = 6  # entries in a sentence
 NEAREST = 12  # explanations that are kept though they do not explain
+PROMISING = 6  # states at which it is estimated what a number beside a convention can do
 BESIDE = 4  # conventions beside which a number is fitted
 
 
@@ -144,10 +145,16 @@ def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted], pai
     ]
     if not pairs:
         return
-    found = [of_variant(variant, left) for variant, left in explained_by_joints(search, list(both(equations, names)))]
+    both_ways = both(equations, names, search.given, search.weight)
+    found = [of_variant(variant, left) for variant, left in explained(search, both_ways)]
     found += [of_fitted(one, 3) for one in search.pairs() if one.ratio <= 1.0]
     simple = [variant for variant in (*options(equations), *of_joints) if variant.is_simple]
-    yield found + beside(search, simple)
+    try:
+        found += beside(search, simple)
+    except OutOfTime:
+        if not found:
+            raise
+    yield found
 
 
 def explained(search: Search, variants: Iterable[Variant]) -> list[tuple[Variant, float]]:
@@ -178,13 +185,51 @@ def explained_by_joints(search: Search, variants: Sequence[Variant]) -> list[tup
 
 def beside(search: Search, variants: Sequence[Variant]) -> list[Cause]:
     """One option or convention together with one number or term, of the few that promise most."""
-    tried = []
     here = [place for place in search.places if place.column is None]
-    for variant in variants:
-        other = Search(variant.equations(), here, search.given, search.tolerance, search.end)
-        tried.append((other.promise / search.size, len(tried), variant, other))
     found = []
-    for left, _, variant, other in sorted(tried, key=lambda one: one[:2])[:BESIDE]:
+    for left, _, variant in sorted(promises(search, variants, here), key=lambda one: one[:2])[:BESIDE]:
         if left < NEAR:
+            other = Search(variant.equations(), here, search.given, search.tolerance, search.end)
             found += [of_fitted(one, 3, variant) for one in other.singles() if one.ratio <= 1.0]
+    return found
+
+
+def promises(search: Search, variants: Sequence[Variant], here: Sequence[Place]) -> list[tuple[float, int, Variant]]:
+    """The share that a variant with one of these places beside it leaves at few states, about, and its number.
+
+    Variants of the joints are evaluated together, as states.
+    """
+    of_joints, of_options = ([v for v in variants if bool(v.joints) is joined] for joined in (True, False))
+    equations, few = search.equations, min(PROMISING, len(search.given))
+    size = np.array([[place.size] for place in here])
+    which = np.arange(len(here))[:, None]
+    known, weight = search.known[:few], search.weight[:few]
+    given = np.where(known, search.given[:few], 0.0)
+
+    def promise(up, right, down, given, weight) -> float:
+        off = (given - right) * weight
+        near = nearest_changes((up - down) / 2.0 * weight, ((up + down) / 2.0 - right) * weight, off)
+        total = np.linalg.norm(search.off[: len(given)])
+        return min((left for left, _ in near), default=0.0) / total if total else 0.0
+
+    found = []
+    for variant in of_options:  # which may change more than the values at states
+        other = Search(variant.equations(), here, search.given, search.tolerance, search.end)
+        up, down = (other.values(which, sign * size) for sign in (1.0, -1.0))
+        whole = np.where(search.known, search.given, 0.0), search.weight
+        found.append((promise(up, other.right, down, *whole), len(found), variant))
+    if not of_joints:
+        return found
+    q, qd = equations.q[:few], equations.qd[:few]
+    states = [
+        np.concatenate(part) for part in zip(*((m.positions(q), m.speeds(qd)) for m in (v.joints for v in of_joints)))
+    ]
+    together = Equations(equations.tree, *states)
+    blank = np.zeros((len(states[0]), len(equations.entries)))
+    inner = Search(together, here, blank, blank + 1.0, search.end)
+    up, down = (inner.values(which, sign * size) for sign in (1.0, -1.0))
+    for k, variant in enumerate(of_joints):
+        part, (index, sense) = slice(k * few, (k + 1) * few), packing(variant.joints, equations)
+        values = [one[..., part, :][..., index] * sense for one in (up, inner.right, down)]
+        found.append((promise(*values, given, weight), len(found), variant))
     return found

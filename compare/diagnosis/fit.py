@@ -12,6 +12,7 @@ from .model import TINY, Equations
 from .places import Place
 
 ROUNDS = 25  # of a search from one start
+FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds so many go on
 SETTLED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
@@ -50,9 +51,10 @@ class Search:
         end: float = np.inf,
     ):
         self.equations, self.places, self.end = equations, list(places), end
-        self.given, self.tolerance = given, tolerance
+        least = tolerance[tolerance > 0.0].min(initial=1.0)
+        self.given, self.tolerance = given, np.where(tolerance > 0.0, tolerance, least)  # what is always 0 has no scale
         self.known = np.isfinite(given)
-        self.weight = np.where(self.known, 1.0 / tolerance, 0.0)
+        self.weight = np.where(self.known, 1.0 / self.tolerance, 0.0)
         self.right = equations.values()[0]
         self.off = self.weighted(self.right)
         self.size = float(np.linalg.norm(self.off))
@@ -92,12 +94,12 @@ class Search:
         steps = np.eye(x.shape[1]) * (1j * TINY)
         return np.stack([self.values(which, x + step).imag / TINY for step in steps], axis=1) * self.weight
 
-    def fitted(self, which: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def fitted(self, which: np.ndarray, x: np.ndarray, rounds: int = ROUNDS) -> tuple[np.ndarray, np.ndarray]:
         """The changes nearest to the starts x (rows, k) that come closest, and what is then left, (rows, states, entries)."""
         size = np.array([[self.places[place].size for place in row] for row in which])
         left = self.weighted(self.values(which, x))
         best, damping, moving = (left**2).sum(axis=(1, 2)), np.full(len(x), 1e-3), np.arange(len(x))
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             J = self.derivatives(which[moving], x[moving]).reshape(len(moving), x.shape[1], -1)
             J = J * size[moving][:, :, None]
             normal = np.einsum("rim,rjm->rij", J, J)
@@ -135,26 +137,8 @@ class Search:
     @cached_property
     def nearest(self) -> list[tuple[float, float]]:
         """Of each place what the best change leaves, in tolerances, and that change, as far as the values are quadratic in it."""
-        first, second = (part.reshape(len(self.places), -1) for part in self.expansion)
-        r, found = self.off.ravel(), []
-        rr, ra, rb = r @ r, first @ r, second @ r
-        aa, ab, bb = (np.einsum("kn,kn->k", *pair) for pair in ((first, first), (first, second), (second, second)))
-        for k, place in enumerate(self.places):
-            cubic = [2.0 * bb[k], 3.0 * ab[k], aa[k] - 2.0 * rb[k], -ra[k]]
-            roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
-            roots = roots[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))].real
-            left = {
-                x: rr - 2.0 * x * ra[k] - 2.0 * x * x * rb[k] + x * x * aa[k] + 2.0 * x**3 * ab[k] + x**4 * bb[k]
-                for x in roots
-            }
-            best = min(left, key=left.get, default=0.0)
-            found.append((float(np.sqrt(max(0.0, left.get(best, rr)))), float(best) * place.size))
-        return found
-
-    @property
-    def promise(self) -> float:
-        """The least that one place leaves, about, in tolerances: directions and zeros beyond small changes are not seen."""
-        return min([left for left, _ in self.nearest], default=float(np.linalg.norm(self.off)))
+        found = nearest_changes(*self.expansion, self.off)
+        return [(left, best * place.size) for (left, best), place in zip(found, self.places)]
 
     def singles(self) -> list[Fitted]:
         """Each place alone, the smallest remainder first.
@@ -174,7 +158,10 @@ class Search:
         for _, k, x in sorted(promising)[:POLISHED]:
             which.append([k])
             starts.append([x])
-        return self.outcome(np.array(which), *self.fitted(np.array(which), np.array(starts)))
+        which, (x, left) = np.array(which), self.fitted(np.array(which), np.array(starts), FIRST_ROUNDS)
+        near = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
+        x[near], left[near] = self.fitted(which[near], x[near])
+        return self.outcome(which, x, left)
 
     @cached_property
     def expansion(self) -> tuple[np.ndarray, np.ndarray]:
@@ -207,5 +194,28 @@ class Search:
         starts = coefficients[best][:, :2] / lengths[pairs[best]] * size[pairs[best]]
         which = np.concatenate([pairs[best]] * 2)
         starts = np.concatenate([starts, np.zeros_like(starts)])
-        self.pair_fits = self.outcome(which, *self.fitted(which, starts))
+        near, left = self.fitted(which, starts, FIRST_ROUNDS)
+        found = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
+        self.pair_fits = self.outcome(which[found], *self.fitted(which[found], near[found]))
         return self.pair_fits
+
+
+def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> list[tuple[float, float]]:
+    """Of each place what the best change x leaves of off, |off - x first - x^2 second|, and x: a root of a cubic.
+
+    first, second: (places, states, entries), off: (states, entries), in tolerances.
+    """
+    (first, second), r, found = (part.reshape(len(part), -1) for part in (first, second)), off.ravel(), []
+    rr, ra, rb = r @ r, first @ r, second @ r
+    aa, ab, bb = (np.einsum("kn,kn->k", *pair) for pair in ((first, first), (first, second), (second, second)))
+    for k in range(len(first)):
+        cubic = [2.0 * bb[k], 3.0 * ab[k], aa[k] - 2.0 * rb[k], -ra[k]]
+        roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)
+        roots = roots[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))].real
+        left = {
+            x: rr - 2.0 * x * ra[k] - 2.0 * x * x * rb[k] + x * x * aa[k] + 2.0 * x**3 * ab[k] + x**4 * bb[k]
+            for x in roots
+        }
+        best = min(left, key=left.get, default=0.0)
+        found.append((float(np.sqrt(max(0.0, left.get(best, rr)))), float(best)))
+    return found

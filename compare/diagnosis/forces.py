@@ -12,7 +12,7 @@ import numpy as np
 
 import tmt
 
-from .words import Cause, nice
+from .words import EXPLAINS, Cause, nice, together
 
 TURNING = ("N m s/rad", "N m/rad", "N m")
 UNITS_OF_FORCES = {"hinge": TURNING, "slide": ("N s/m", "N/m", "N"), "ball": TURNING}  # of damping, stiffness, force
@@ -106,10 +106,11 @@ def numbers_of_forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator
 def of_columns(chosen: tuple[Column, ...], x: np.ndarray, left: float, rank: int) -> Cause:
     """One number or two that explain the forces."""
     values = [column.stated + change for column, change in zip(chosen, x)]
-    text = " and ".join(
-        f"{column.name}: {nice(value)} {column.unit} in place of {nice(column.stated)} would explain it"
+    texts = [
+        f"{column.name}: {nice(value)} {column.unit} in place of {nice(column.stated)}{EXPLAINS}"
         for column, value in zip(chosen, values)
-    )
+    ]
+    text = texts[0] if len(texts) == 1 else together(texts)
     if len(chosen) == 1:
         (column,), (value,) = chosen, values
         return Cause(rank, "number", column.name, column.stated, float(value), column.unit, left, 0, text)

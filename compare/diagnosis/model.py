@@ -5,6 +5,7 @@ arrays (changes, 1) beside positions (states,), real or complex; derivatives by 
 imaginary change of 1e-100 leaves, exact to rounding. Each term of each body has a factor, 1 where nothing is wrong with it.
 """
 
+from copy import copy
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -51,6 +52,12 @@ class Equations:
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
         self.stated["factor"] = np.ones((len(tree.mass), len(TERMS)))
         self.triangle = np.tril_indices(self.nv)
+
+    def first(self, states: int) -> "Equations":
+        """The same at the first states alone."""
+        part = copy(self)
+        part.q, part.qd = self.q[:states], self.qd[:states]
+        return part
 
     @property
     def entries(self) -> list[tuple]:
@@ -103,12 +110,18 @@ class Equations:
         """Rows of the lower triangle of Mbar and h as one array, (changes, states, entries)."""
         flat = [*(M[i][j] for i, j in zip(*self.triangle)), *h]
         if self.joints is not None:
-            v, sense = self.joints.v, self.joints.sense
-            turned = [(max(v[i], v[j]), min(v[i], v[j]), sense[i] * sense[j]) for i, j in zip(*self.triangle)]
-            flat = [*(M[i][j] * s for i, j, s in turned), *(h[i] * s for i, s in zip(v, sense))]
+            flat = [flat[k] * s for k, s in zip(*packing(self.joints, self))]
         states = len(self.q)
         count = max([np.shape(value)[0] for value in flat if np.ndim(value) == 2], default=1)
         return np.stack([np.broadcast_to(value, (count, states)) for value in flat], axis=-1)
+
+
+def packing(joints: JointMap, equations: Equations) -> tuple[list[int], np.ndarray]:
+    """Which number of a state of a model's joints stands where in joints of one's own, and its sign."""
+    v, sense, (i, j) = joints.v, joints.sense, equations.triangle
+    high, low = np.maximum(v[i], v[j]), np.minimum(v[i], v[j])
+    index = np.concatenate([high * (high + 1) // 2 + low, len(i) + v])
+    return index.tolist(), np.concatenate([sense[i] * sense[j], sense])
 
 
 def unit(axis: list) -> list:

@@ -111,7 +111,7 @@ def terms(equations: Equations) -> list[Place]:
 def coefficients(equations: Equations) -> list[Place]:
     """Entries of Mbar, entries of gravity, and the coefficients of products of rates in h; 1 is right."""
     nv, states = equations.nv, len(equations.q)
-    values = {entry: equations.values()[0][:, k] for k, entry in enumerate(equations.entries)}
+    values = dict(zip(equations.entries, equations.values()[0].T))
     at = {entry: k for k, entry in enumerate(equations.entries)}
     found = [
         Place(2, "coefficient", f"M[{i}][{j}]", 1.0, "times", 1.0, entry=at["M", i, j], column=values["M", i, j])

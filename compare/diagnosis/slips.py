@@ -4,6 +4,7 @@ They are made on the Jacobians and convective terms of each body, of one body or
 """
 
 from collections.abc import Callable, Iterator
+from functools import cache
 
 import numpy as np
 
@@ -104,17 +105,7 @@ def slips(equations: Equations) -> Iterator[Variant]:
                 "so",
                 lambda i=swapped: parts.values(inertia=i),
             )
-        yield slip(f"CoM of {body}", "where it is", "at the joint", lambda b=b: com_at_joint(equations, b))
-    for joint, (kind, _, by) in zip(tree.hinge_names, tree.coordinates.joints):
-        if kind != "ball":
-            stated = np.array(tree.axis[by.start])
-            for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0)):
-                if abs(abs(stated[k]) - 1.0) > 1e-9:
-                    axis = "-" * (sign < 0.0) + "xyz"[k]
-                    shown = "(" + ", ".join(f"{a:.4g}" for a in stated) + ")"
-                    yield slip(
-                        f"axis of {joint}", shown, axis, lambda s=by.start, k=k, a=sign: with_axis(equations, s, k, a)
-                    )
+    yield from plain_numbers(equations)
     yield from lagrange(equations)
 
 
@@ -125,6 +116,7 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
         return
     i, j = equations.triangle
 
+    @cache
     def parts() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         slopes = -np.stack(
             [equations.values({Path("reference", (k,)): np.array([1e-100j])})[0].imag / 1e-100 for k in range(nv)],
@@ -186,12 +178,23 @@ def shifted(mass: float, com: np.ndarray) -> np.ndarray:
     return mass * (com @ com * np.eye(3) - np.outer(com, com))
 
 
-def com_at_joint(equations: Equations, body: int) -> np.ndarray:
-    com = equations.tree.com[body]
-    return equations.values({Path("com", (body, k)): np.array([-com[k]]) for k in range(3) if com[k]})
-
-
-def with_axis(equations: Equations, speed: int, k: int, sign: float) -> np.ndarray:
-    axis = np.array(equations.tree.axis[speed])
-    added = sign * np.eye(3)[k] - axis
-    return equations.values({Path("axis", (speed, i)): np.array([added[i]]) for i in range(3) if added[i]})
+def plain_numbers(equations: Equations) -> Iterator[Variant]:
+    """A centre of mass at its joint, an axis along another one of the frame's: evaluated together, as changes of numbers."""
+    tree, made = equations.tree, []  # name, stated, explains, what is added to numbers
+    for b, (body, com) in enumerate(zip(tree.body_names, tree.com)):
+        added = {Path("com", (b, k)): -com[k] for k in range(3) if com[k]}
+        made.append((f"CoM of {body}", "where it is", "at the joint", added))
+    for joint, (kind, _, by) in zip(tree.hinge_names, tree.coordinates.joints):
+        stated = np.array(tree.axis[by.start])
+        shown = "(" + ", ".join(f"{a:.4g}" for a in stated) + ")"
+        for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0)):
+            if kind != "ball" and abs(abs(stated[k]) - 1.0) > 1e-9:
+                added = dict(zip((Path("axis", (by.start, i)) for i in range(3)), sign * np.eye(3)[k] - stated))
+                made.append((f"axis of {joint}", shown, "-" * (sign < 0.0) + "xyz"[k], added))
+    changes = {path: np.zeros(len(made)) for *_, added in made for path in added}
+    for row, (*_, added) in enumerate(made):
+        for path, change in added.items():
+            changes[path][row] = change
+    values = np.broadcast_to(all_values := equations.values(changes), (len(made), *all_values.shape[1:]))
+    for row, (name, stated, explains, _) in enumerate(made):
+        yield slip(name, stated, explains, lambda r=row: values[r : r + 1])

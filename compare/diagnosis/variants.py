@@ -5,7 +5,8 @@ themselves, so that a number can be sought beside them; slips are of rank 2.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import combinations, permutations
+from functools import partial
+from itertools import combinations, permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -131,28 +132,41 @@ def orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tuple[str
             yield tuple(names[i] for i in order)
 
 
-def both(equations: Equations, names: tuple[str, ...]) -> Iterator[Variant]:
-    """An order and senses together, of up to six joints."""
-    tree = equations.tree
-    straight = [name for name, kind in zip(names, tree.kind) if kind != "ball"]
-    if len(names) > MOST_JOINTS:
+def both(equations: Equations, names: tuple[str, ...], given: np.ndarray, weight: np.ndarray) -> Iterator[Variant]:
+    """An order and senses together, of up to six hinges and slides: those that explain the first state.
+
+    given, weight: (states, entries), the weight 0 where nothing is given. There are tens of thousands of six joints: they are
+    evaluated as states.
+    """
+    tree, n = equations.tree, len(names)
+    if n > MOST_JOINTS or "ball" in tree.kind:
         return
-    for order in orders(names, tree.kind):
-        for count in range(1, len(straight) + 1):
-            for turned in combinations(straight, count):
-                joints = [Joint(name, -1.0 if name in turned else 1.0) for name in order]
-                made = JointMap(Coordinates(names, tree.kind), joints)
-                stated, explains = ", ".join(names), ", ".join(map(str, joints))
-                yield Variant(
-                    3,
-                    "order and sign",
-                    "order and senses of the joints",
-                    stated,
-                    explains,
-                    lambda m=made: Equations(tree, equations.q, equations.qd, m),
-                    made,
-                    False,
-                )
+    places = {name: i for i, name in enumerate(names)}
+    chosen = [[places[name] for name in order] for order in orders(names, tree.kind)]
+    turned = list(product((1.0, -1.0), repeat=n))[1:]
+    if not chosen:
+        return
+    order = np.repeat(chosen, len(turned), axis=0)
+    sense = np.tile(turned, (len(chosen), 1))
+    q, qd = np.empty_like(sense), np.empty_like(sense)
+    np.put_along_axis(q, order, sense * equations.q[0], axis=1)
+    np.put_along_axis(qd, order, sense * equations.qd[0], axis=1)
+    i, j = equations.triangle
+    for first in range(0, len(order), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        values = Equations(tree, q[part], qd[part]).values()[0]
+        P, S, rows = order[part], sense[part], np.arange(len(values))[:, None]
+        M = np.zeros((len(values), n, n))
+        M[:, i, j] = M[:, j, i] = values[:, : len(i)]
+        M = M[rows, P[:, i], P[:, j]] * S[:, i] * S[:, j]
+        h = values[:, len(i) :][rows, P] * S
+        off = np.abs(np.concatenate([M, h], axis=1) - np.nan_to_num(given[0])) * weight[0]
+        for k in np.flatnonzero(off.max(axis=1) <= 1.0):
+            joints = [Joint(names[at], float(s)) for at, s in zip(P[k], S[k])]
+            made = JointMap(Coordinates(names, tree.kind), joints)
+            stated, explains = ", ".join(names), ", ".join(map(str, joints))
+            how = partial(Equations, tree, equations.q, equations.qd, made)
+            yield Variant(3, "order and sign", "order and senses of the joints", stated, explains, how, made, False)
 
 
 def values_of(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:

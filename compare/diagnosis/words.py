@@ -10,6 +10,7 @@ from .places import Place
 from .variants import Variant
 
 FACTORS = {0.0: "missing", 0.5: "halved", 2.0: "doubled", -1.0: "of the other sign"}
+EXPLAINS = " would explain it"
 CLOSE = 1e-9  # a fitted factor, to one of these
 
 
@@ -49,7 +50,7 @@ def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause
         kinds, names = [beside.kind, *kinds], [beside.name, *names]
         stated, explains, units = [beside.stated, *stated], [beside.explains, *explains], ["", *units]
         texts = [of_variant(beside, 0.0).text, *texts]
-    text = " and ".join(texts)
+    text = texts[0] if len(texts) == 1 else together(texts)
     if len(texts) == 1:
         place = places[0]
         return Cause(rank, place.kind, place.name, place.stated, found[0], place.unit, fitted.left, 0, text)
@@ -58,6 +59,11 @@ def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause
         for parts in (kinds, names, stated, explains, units)
     ]
     return Cause(rank, *joined, fitted.left, 0, text)
+
+
+def together(texts: list[str]) -> str:
+    """Several that explain only with each other."""
+    return " and ".join(text.removesuffix(EXPLAINS) for text in texts) + ": together they" + EXPLAINS
 
 
 def said(place: Place, value: float) -> str:
@@ -72,7 +78,7 @@ def said(place: Place, value: float) -> str:
         joint = place.name.removeprefix("zero of ")
         how = Joint(joint, zero=zeroed(place, value), slides=place.unit == "m")
         return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)} (state it as {str(how)!r})"
-    return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)} would explain it"
+    return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)}{EXPLAINS}"
 
 
 def zeroed(place: Place, value: float) -> float:

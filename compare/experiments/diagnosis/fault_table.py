@@ -17,6 +17,7 @@ from ...robots.six_hinges import SIX_HINGES
 from ...setup import Setup
 from .faults import Fault, by_composite, fault_list, values_of_fault
 from .generator import generated
+from .wrong_motion import row_of_motion, wrong_motions
 
 SHOWN = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
 PART = 12  # faults that a process is handed at once
@@ -43,7 +44,9 @@ def rows_of_faults(setup: Setup) -> Result:
 
 def made_faults() -> list[Fault]:
     """The list, and as many of the generator; neighbours take about as long."""
-    listed = [*fault_list("arm", ARM.tree, True), *fault_list("six hinges", SIX_HINGES, False)]
+    robots = {"arm": (ARM.tree, True), "six hinges": (SIX_HINGES, False)}
+    listed = [fault for name, (tree, every_size) in robots.items() for fault in fault_list(name, tree, every_size)]
+    listed += [fault for name, (tree, _) in robots.items() for fault in wrong_motions(name, tree)]
     return [fault for pair in zip(listed, generated(len(listed))) for fault in pair]
 
 
@@ -87,9 +90,14 @@ def rows_of_part(faults: Sequence[Fault]) -> list[dict]:
 def row_of(fault: Fault) -> dict:
     """What a diagnosis says of one fault."""
     q, qd = states_of(fault.tree, AT["search"])
-    started = time.perf_counter()
-    found, off = diagnosis_of(fault, q, qd)
-    seconds = time.perf_counter() - started
+    if fault.make[0] in ("force", "step"):
+        visible, causes, seconds = row_of_motion(fault, q, qd)
+        found = Diagnosis(visible, tuple(causes))
+        off = [{"force": "acceleration", "step": "trajectory"}[fault.kind]] * visible
+    else:
+        started = time.perf_counter()
+        found, off = diagnosis_of(fault, q, qd)
+        seconds = time.perf_counter() - started
     outcome, reason = judged_fault(fault, found)
     if outcome == "invisible":
         outcome, reason = "none", why_invisible(fault)
@@ -132,7 +140,7 @@ def diagnosis_of(fault: Fault, q: np.ndarray, qd: np.ndarray) -> tuple[Diagnosis
 
 
 def judged_fault(fault: Fault, found: Diagnosis) -> tuple[str, str]:
-    """Outcome and reason: right if the fault alone is named, tied if others do exactly the same, wrong if it is not among these."""
+    """Outcome and reason: right if the fault alone is named, tied if others do exactly the same, wrong if it is not named."""
     if not found.differs:
         return "invisible", ""
     if not found.causes:
@@ -142,7 +150,7 @@ def judged_fault(fault: Fault, found: Diagnosis) -> tuple[str, str]:
     shown = "; ".join(others[:OTHERS]) + (f" and {len(others) - OTHERS} more" if len(others) > OTHERS else "")
     if named:
         return ("tied", f"the same at all states: {shown}") if others else ("right", "")
-    if explains_elsewhere(fault, found):
+    if fault.make[0] not in ("force", "step") and explains_elsewhere(fault, found):
         return "tied", f"simpler, and the same at all states: {shown}"
     return "wrong", shown
 
@@ -174,7 +182,7 @@ def rank_of(fault: Fault) -> int:
 
 def why_invisible(fault: Fault) -> str:
     """The reason for which neither M nor h changes at any state."""
-    tree, (q, qd) = fault.tree, states_of(fault.tree, AT["search"])
+    tree, q = fault.tree, states_of(fault.tree, AT["search"])[0]
     if fault.make[0] == "tree":
         edited = fault.make[1]
         if np.abs(tmt.com_positions(q, edited) - tmt.com_positions(q, tree)).max() > 1e-9 * max(1.0, np.abs(q).max()):

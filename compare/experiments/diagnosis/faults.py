@@ -10,7 +10,7 @@ import numpy as np
 import tmt
 from tmt.composite import mass_matrix_and_bias
 
-from .derivation import ALL_TERMS, by_lagrange, derived
+from .derivation import by_lagrange, derived
 
 XYZ = "xyz"
 OF_INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
