@@ -19,17 +19,17 @@ def message(given: Given, cause: str) -> str:
         lines = ["", "Equal to MuJoCo, but"]
     for name, one in given.compared.items():
         if (one.ratio > 1.0).any():
-            lines += of_quantity(given, name, one)
+            lines += lines_of_quantity(given, name, one)
     lines += given.problems
     if cause:
         lines.append(f"Probable cause: {cause}")
     if given.fails:
-        lines += of_digits(given)
-        lines.append(of_joints(given))
+        lines += line_of_digits(given)
+        lines.append(line_of_joints(given))
     return "\n".join(lines)
 
 
-def of_quantity(given: Given, name: str, one: Compared) -> list[str]:
+def lines_of_quantity(given: Given, name: str, one: Compared) -> list[str]:
     """The entries of one quantity that are off."""
     ratio = one.ratio
     count, worst = int((ratio > 1.0).sum()), np.unravel_index(int(np.argmax(ratio)), ratio.shape)
@@ -47,7 +47,7 @@ def of_quantity(given: Given, name: str, one: Compared) -> list[str]:
     ]
 
 
-def of_digits(given: Given) -> list[str]:
+def line_of_digits(given: Given) -> list[str]:
     """To how many digits all agree, and what to state if the constants are rounded."""
     worst = max(float(over(np.abs(one.own - one.right), one.scale).max()) for one in given.compared.values())
     if not 0.0 < worst <= 10.0**-LEAST_DIGITS:
@@ -58,7 +58,7 @@ def of_digits(given: Given) -> list[str]:
     return [f"Yours agree to {digits} digits of their terms: if your constants are rounded, state rtol={rtol:g}."]
 
 
-def of_joints(given: Given) -> str:
+def line_of_joints(given: Given) -> str:
     """In which joints it was compared, and how others are stated."""
     joints = given.joints.joints
     text = f"Compared with joints={[str(joint) for joint in joints]}"

@@ -15,7 +15,7 @@ from .functions import ARGUMENTS, STATE, OwnError, call, functions_of, names_of
 from .returned import SHAPES, Problem, and_more, as_raised, converted, same, state_in_words
 
 SKEW = 1e-9  # of the largest entry: from here on a mass matrix is not symmetric; less is a difference of entries
-FAR = 2.0**49  # rad and so on: beyond it a run has diverged, and what is found there is no fault of its equations
+DIVERGED = 2.0**49  # rad and so on: beyond it a run has diverged, and what is found there is no fault of its equations
 AT_ONCE = 1.5  # times what one state takes: two or three at once take no more, and so do many
 TIMED, SLOW = 64, 0.01  # states that are tried together to see what one takes; unless so few take as long as this, s
 
@@ -243,7 +243,7 @@ class OwnEquations:
 
     def note(self, name: str, what: str, given: list[np.ndarray], where) -> None:
         """Add a problem at those of the states (states, n), in one's own joints, at which it was found."""
-        where = np.logical_and.reduce([where, *((np.abs(part) <= FAR).all(axis=1) for part in given)])
+        where = np.logical_and.reduce([where, *((np.abs(part) <= DIVERGED).all(axis=1) for part in given)])
         if not where.any():
             return
         first = int(np.argmax(where))
