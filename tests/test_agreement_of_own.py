@@ -348,6 +348,15 @@ def test_the_probable_cause_of(brought, cause):
     assert cause in message_of(**brought)
 
 
+def test_the_cause_is_sought_where_there_are_values(rng):
+    q, qd = rng.uniform(-2.0, 2.0, (2, 50, 2))
+    values = np.array([wrong_bias(*state) for state in zip(q, qd)])
+    values[:30] = np.nan
+    assert "Probable cause: h[0], coefficient of qd1^2: yours is -1 times the right one.\n" in message_of(
+        mass_matrix=mass_matrix, bias=values, q=q, qd=qd
+    )
+
+
 def test_values_of_accelerations_alone_have_no_cause_of_their_own(given):
     values = given.values["acceleration"] * [1.0, 1.1]
     assert "give mass_matrix and bias too" in message_of(acceleration=values, **given.states)
