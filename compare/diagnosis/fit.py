@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .model import TINY, Equations
-from .places import Place
+from .places import OF_ZERO, Place
 
 ROUNDS = 25  # of a search from one start
 FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds so many go on
@@ -151,7 +151,7 @@ class Search:
             if place.is_quadratic:
                 promising.append((left, k, best))
             else:
-                turned = TURNED if place.kind == "zero" else (-1.0, 1.0)
+                turned = TURNED if place.kind == OF_ZERO else (-1.0, 1.0)
                 near = [0.0, best, *turned]
                 which += [[k]] * len(near)
                 starts += [[x] for x in near]

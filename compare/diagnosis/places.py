@@ -23,6 +23,7 @@ TOGETHER = {  # terms that are often left out together, and what they are called
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
 EVERY = "every body"
+OF_ZERO = "zero position"  # the kind of a place
 MOST_SPEEDS = 12  # of which every product has its coefficients: there are nv^2 (nv + 1) / 2
 
 
@@ -80,7 +81,7 @@ def numbers(equations: Equations) -> list[Place]:
                 add("number", f"anchor {axis} of {joint}", "offset", (i, k), "m", length, *stays)
         if kind != "ball":
             unit = "m" if kind == "slide" else "rad"
-            add("zero", f"zero of {joint}", "reference", (i,), unit, length if kind == "slide" else 1.0, rank=1)
+            add(OF_ZERO, f"zero of {joint}", "reference", (i,), unit, length if kind == "slide" else 1.0, rank=1)
             for k, axis in enumerate(XYZ):
                 add("number", f"axis {axis} of {joint}", "axis", (by.start, k), "", 0.5)
         for speed in range(by.start, by.stop):

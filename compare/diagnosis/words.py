@@ -6,7 +6,7 @@ import numpy as np
 
 from ..joint_map import Joint
 from .fit import Fitted
-from .places import Place
+from .places import OF_ZERO, Place
 from .variants import Variant
 
 FACTORS = {0.0: "missing", 0.5: "halved", 2.0: "doubled", -1.0: "of the other sign"}
@@ -74,7 +74,7 @@ def said(place: Place, value: float) -> str:
             return f"{place.name}: yours is {nice(value)} times the right one"
         return f"{place.name}: {near[0] if near else f'{nice(value)} times'}"
     unit = f" {place.unit}" if place.unit else ""
-    if place.kind == "zero":
+    if place.kind == OF_ZERO:
         joint = place.name.removeprefix("zero of ")
         how = Joint(joint, zero=zeroed(place, value), slides=place.unit == "m")
         return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)} (state it as {str(how)!r})"

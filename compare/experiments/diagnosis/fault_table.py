@@ -9,14 +9,16 @@ import numpy as np
 import tmt
 
 from ...diagnosis import STATES, Diagnosis, diagnose, packed
+from ...diagnosis.places import OF_ZERO
 from ...judge.check import Result
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots.arm import ARM
 from ...robots.six_hinges import SIX_HINGES
 from ...setup import Setup
-from .faults import Fault, by_composite, fault_list, values_of_fault
+from .faults import Fault, fault_list
 from .generator import generated
+from .made_values import by_composite, values_of_fault
 from .wrong_motion import row_of_motion, wrong_motions
 
 SHOWN = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
@@ -24,6 +26,9 @@ PART = 12  # faults that a process is handed at once
 SAMPLE = 60  # faults of a quick run
 SEARCHED = 10.0  # s of one fault
 OTHERS = 3  # explanations that a reason names
+RANKS = dict.fromkeys(("order", "sign", OF_ZERO, "unit", "option"), 1) | dict.fromkeys(
+    ("pair", "composition"), 3
+)  # else 2
 AT = {"search": 3, "again": 4}  # seeds of states
 
 
@@ -177,7 +182,7 @@ def explains_elsewhere(fault: Fault, found: Diagnosis) -> bool:
 
 def rank_of(fault: Fault) -> int:
     """Of what was made."""
-    return {"order": 1, "sign": 1, "zero": 1, "unit": 1, "option": 1, "pair": 3, "composition": 3}.get(fault.kind, 2)
+    return RANKS.get(fault.kind, 2)
 
 
 def why_invisible(fault: Fault) -> str:

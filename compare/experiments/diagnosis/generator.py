@@ -4,6 +4,7 @@ import numpy as np
 
 import tmt
 
+from ...diagnosis.places import OF_ZERO
 from .derivation import ALL_TERMS
 from .faults import TERM_NAMES, Fault, changed, numbers_of, own_joints
 
@@ -97,7 +98,7 @@ def term(rng, tree, robot) -> Fault:
 def convention(rng, tree, robot) -> Fault | None:
     """An order, or senses, or a zero."""
     n, names = len(tree.axis), tree.hinge_names
-    kind = str(rng.choice(["order", "sign", "zero"]))
+    kind = str(rng.choice(["order", "sign", OF_ZERO]))
 
     def fault(name, kind, size, expected, values, *make):
         return Fault(robot, tree, name, kind, "generator", size, tuple(expected), tuple(values), make)
@@ -116,7 +117,7 @@ def convention(rng, tree, robot) -> Fault | None:
         return own_joints(fault, place, kind, [place], tree, sense=tuple(sense))
     i = int(rng.integers(n))
     zero = tuple(float(rng.uniform(-1.5, 1.5)) if j == i else 0.0 for j in range(n))
-    return own_joints(fault, f"zero of {names[i]} {zero[i]:+.3g}", kind, [f"zero of {names[i]}"], tree, zero=zero)
+    return own_joints(fault, f"zero of {names[i]} {zero[i]:+.3g}", kind, [f"zero of {names[i]}"], tree, at_zero=zero)
 
 
 def composition(rng, tree, robot) -> Fault | None:
@@ -136,5 +137,5 @@ def composition(rng, tree, robot) -> Fault | None:
     zero, sense = np.zeros(n), np.ones(n)
     zero[i], sense[j] = rng.uniform(-1.5, 1.5), -1.0
     expected = [f"sense of {names[j]} and zero of {names[i]}"]
-    own = {"sense": tuple(sense), "zero": tuple(zero)}
+    own = {"sense": tuple(sense), "at_zero": tuple(zero)}
     return own_joints(fault, f"sense of {names[j]}, zero of {names[i]}", "composition", expected, tree, **own)
