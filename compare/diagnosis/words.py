@@ -45,7 +45,7 @@ def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause
         [f"{x:.12g}" for x in found],
         [p.unit for p in places],
     )
-    texts = [said(place, value) for place, value in zip(places, found)]
+    texts = [place_text(place, value) for place, value in zip(places, found)]
     if beside:
         kinds, names = [beside.kind, *kinds], [beside.name, *names]
         stated, explains, units = [beside.stated, *stated], [beside.explains, *explains], ["", *units]
@@ -66,7 +66,7 @@ def together(texts: list[str]) -> str:
     return " and ".join(text.removesuffix(EXPLAINS) for text in texts) + ": together they" + EXPLAINS
 
 
-def said(place: Place, value: float) -> str:
+def place_text(place: Place, value: float) -> str:
     """One place with the value that would explain the difference."""
     if place.unit == "times":
         near = [word for factor, word in FACTORS.items() if abs(value - factor) <= CLOSE]

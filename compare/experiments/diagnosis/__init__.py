@@ -8,7 +8,7 @@ import numpy as np
 
 import tmt
 
-from ...diagnosis import STATES, Diagnosis, diagnose, packed
+from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.consistency import Condition
 from ...diagnosis.forces import causes_of_forces
 from ...diagnosis.words import Cause
@@ -22,7 +22,7 @@ from .own_equations import asked_conditions, diagnosed_as_stated, for_command_li
 
 TITLE = "Diagnosis: what explains a difference?"
 SECONDS = 8.0  # of a search
-COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
+CAUSE_COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
 NO_NUMBERS = "not all values are numbers"
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
 
@@ -86,11 +86,11 @@ def diagnosed(setup: Setup) -> Found:
 
 def search(setup: Setup) -> Found:
     """The same, computed."""
-    tree, sample, name = setup.robot.tree, setup.random.first(STATES), "own" if setup.robot.own else "mujoco"
+    tree, sample, name = setup.robot.tree, setup.random.first(STATES_ASKED), "own" if setup.robot.own else "mujoco"
     given = setup.engines[name].of(setup.robot.case())
     q, qd, tau = sample.q, sample.qd, sample.tau
     M, h = np.asarray(given.mass_matrix(q)), np.asarray(given.bias(q, qd))
-    allowed = tolerances(tree, q, qd)
+    allowed = packed_tolerances(tree, q, qd)
     values = packed(M, h, tree.coordinates.nv, len(q))
     names, (asked, unasked) = setup.robot.joints, ([], "")
     if name == "own":
@@ -108,7 +108,7 @@ def search(setup: Setup) -> Found:
     return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked)
 
 
-def tolerances(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+def packed_tolerances(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """64 eps of the scale of each entry of Mbar and h, (states, entries) as `packed` has them."""
     return packed(*sizes_of(tree, q, qd), tree.coordinates.nv, len(q))
 
@@ -135,7 +135,7 @@ def rows(setup: Setup) -> Result:
     """One row for each explanation; one check of what is asked, whose note is the cause. Of made faults see fault_table."""
     if setup.faults:
         return fault_table.rows_of_faults(setup)
-    result, found = Result("diagnosis", shown=COLUMNS), diagnosed(setup)
+    result, found = Result("diagnosis", shown=CAUSE_COLUMNS), diagnosed(setup)
     of, whose = f"{found.states} random states", WHOSE_VALUES[found.engine]
     for condition in found.conditions:
         note = "" if condition.is_met else condition.text
@@ -149,7 +149,7 @@ def rows(setup: Setup) -> Result:
     note = "" if found.force_ratio <= 1.0 else acting
     what = f"{whose} accelerations follow from M and h: force left over, over its tolerance"
     result.check(of, what, found.force_ratio, 1.0, "", note)
-    result.rows = [{name: getattr(cause, name) for name in COLUMNS} for cause in found.causes]
+    result.rows = [{name: getattr(cause, name) for name in CAUSE_COLUMNS} for cause in found.causes]
     result.notes += sentences(found)
     result.curves["nearest"] = diagnosis.nearest
     result.curves["causes"] = [record(cause, bool(setup.robot.own)) for cause in found.causes]

@@ -8,7 +8,7 @@ import numpy as np
 
 import tmt
 
-from ...diagnosis import STATES, Diagnosis, diagnose, packed
+from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.places import OF_ZERO
 from ...judge.check import Result
 from ...judge.entries import Entries
@@ -21,7 +21,7 @@ from .generator import generated
 from .made_values import by_composite, values_of_fault
 from .wrong_motion import row_of_motion, wrong_motions
 
-SHOWN = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
+SHOWN_OF_FAULTS = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
 PART = 12  # faults that a process is handed at once
 SAMPLE = 60  # faults of a quick run
 SEARCHED = 10.0  # s of one fault
@@ -34,7 +34,7 @@ AT = {"search": 3, "again": 4}  # seeds of states
 
 def rows_of_faults(setup: Setup) -> Result:
     """A row for each fault in tables/faults.csv; counts by outcome; a check that no outcome is wrong."""
-    result = Result("diagnosis", shown=SHOWN)
+    result = Result("diagnosis", shown=SHOWN_OF_FAULTS)
     faults = made_faults()
     if setup.size != "full":
         faults = sampled(faults, setup.of(0, SAMPLE, SAMPLE // 4))
@@ -94,7 +94,7 @@ def rows_of_part(faults: Sequence[Fault]) -> list[dict]:
 
 def row_of(fault: Fault) -> dict:
     """What a diagnosis says of one fault."""
-    q, qd = states_of(fault.tree, AT["search"])
+    q, qd = search_states(fault.tree, AT["search"])
     if fault.make[0] in ("force", "step"):
         visible, causes, seconds = row_of_motion(fault, q, qd)
         found = Diagnosis(visible, tuple(causes))
@@ -121,9 +121,9 @@ def row_of(fault: Fault) -> dict:
     }
 
 
-def states_of(tree: tmt.Tree, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def search_states(tree: tmt.Tree, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Positions within a turn or a metre, rates up to 3 per s, (states, nv) each."""
-    return tuple(np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES, len(tree.axis))))
+    return tuple(np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES_ASKED, len(tree.axis))))
 
 
 def diagnosis_of(fault: Fault, q: np.ndarray, qd: np.ndarray) -> tuple[Diagnosis, list[str]]:
@@ -174,7 +174,7 @@ def has_values(fault: Fault, cause) -> bool:
 
 def explains_elsewhere(fault: Fault, found: Diagnosis) -> bool:
     """Whether what explains a fault, another and no less simple one, explains it at states that the search did not have."""
-    again, _ = diagnosis_of(fault, *states_of(fault.tree, AT["again"]))
+    again, _ = diagnosis_of(fault, *search_states(fault.tree, AT["again"]))
     places = {cause.place for cause in again.causes}
     lowest = min(cause.rank for cause in found.causes)
     return lowest <= rank_of(fault) and any(cause.place in places for cause in found.causes)
@@ -187,7 +187,7 @@ def rank_of(fault: Fault) -> int:
 
 def why_invisible(fault: Fault) -> str:
     """The reason for which neither M nor h changes at any state."""
-    tree, q = fault.tree, states_of(fault.tree, AT["search"])[0]
+    tree, q = fault.tree, search_states(fault.tree, AT["search"])[0]
     if fault.make[0] == "tree":
         edited = fault.make[1]
         if np.abs(tmt.com_positions(q, edited) - tmt.com_positions(q, tree)).max() > 1e-9 * max(1.0, np.abs(q).max()):

@@ -9,9 +9,8 @@ import numpy as np
 
 import tmt
 
-from ...diagnosis.places import OF_ZERO
+from ...diagnosis.places import OF_ZERO, XYZ
 
-XYZ = "xyz"
 OF_INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 TERM_NAMES = {
     "translation": "T' m T of {}", "rotation": "B' I B of {}", "gravity": "gravity term T' m g of {}",
@@ -56,7 +55,7 @@ def fault_list(robot: str, tree: tmt.Tree, every_size: bool) -> Iterator[Fault]:
     def fault(name, kind, size, expected, values, *make) -> Fault:
         return Fault(robot, tree, name, kind, "list", size, tuple(expected), tuple(values), make)
 
-    for place, field, index, scale in numbers_of(tree):
+    for place, field, index, scale in tree_numbers(tree):
         for share in (0.1, 1e-4, -2.0) if every_size else (0.07,):
             if (made := changed(tree, field, index, share, scale)) is not None:
                 edited, value, size = made
@@ -87,7 +86,7 @@ def fault_list(robot: str, tree: tmt.Tree, every_size: bool) -> Iterator[Fault]:
     yield from pairs_of(robot, tree)
 
 
-def numbers_of(tree: tmt.Tree) -> Iterator[tuple[str, str, tuple, float]]:
+def tree_numbers(tree: tmt.Tree) -> Iterator[tuple[str, str, tuple, float]]:
     """Place, field of the Tree, index and natural size of each number."""
     length = max(np.abs(tree.offset).max(), np.abs(tree.com).max(), 1e-3)
     for b, body in enumerate(tree.body_names):
@@ -192,7 +191,7 @@ def entries_of(robot: str, tree: tmt.Tree) -> Iterator[Fault]:
 
 def pairs_of(robot: str, tree: tmt.Tree, count: int = 12) -> Iterator[Fault]:
     """Two numbers together, drawn once for all."""
-    rng, numbers = np.random.default_rng(1), list(numbers_of(tree))
+    rng, numbers = np.random.default_rng(1), list(tree_numbers(tree))
     made = 0
     while made < count:
         first, second = (numbers[k] for k in rng.choice(len(numbers), 2, replace=False))
