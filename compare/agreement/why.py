@@ -6,7 +6,7 @@ import numpy as np
 
 import tmt
 
-from ..diagnosis import STATES, Diagnosis, diagnose, packed
+from ..diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ..diagnosis.consistency import conditions
 from ..diagnosis.forces import causes_of_forces
 from ..judge.check import over
@@ -88,7 +88,7 @@ def first_broken(given: Given, values: Values) -> str:
 def some_states(given: Given) -> np.ndarray:
     """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
     worst = np.max([one.ratio.reshape(len(given.q), -1).max(axis=1) for one in given.compared.values()], axis=0)
-    order = np.argsort(~np.isfinite(worst), kind="stable")[: STATES - 1]
+    order = np.argsort(~np.isfinite(worst), kind="stable")[: STATES_ASKED - 1]
     return np.unique([int(np.argmax(np.where(np.isfinite(worst), worst, -1.0))), *order])
 
 

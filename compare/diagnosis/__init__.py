@@ -18,16 +18,16 @@ from ..judge.scale import EPS, FACTOR
 from ..judge.words import listed
 from .fit import Fitted, OutOfTime, Search, nearest_changes
 from .model import Equations, packing
-from .places import Place, places
+from .places import Place, all_places
 from .slips import slips
-from .variants import Variant, both, conventions, options, values_of
+from .variants import Variant, both, conventions, program_options, values_of
 from .words import Cause, of_fitted, of_variant
 
-STATES = 24
+STATES_ASKED = 24
 FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
-SHOWN = 6  # entries in a sentence
-NEAREST = 12  # explanations that are kept though they do not explain
+ENTRIES_SHOWN = 6  # entries in a sentence
+KEPT = 12  # explanations that are kept though they do not explain
 PROMISING = 6  # states at which it is estimated what a number beside a convention can do
 BESIDE = 4  # conventions beside which a number is fitted
 
@@ -67,8 +67,8 @@ class Diagnosis(NamedTuple):
         """Which entries differ."""
         if len(self.entries) == self.compared:
             return "Every entry differs."
-        if len(self.entries) > SHOWN:
-            shown = ", ".join(self.entries[:SHOWN])
+        if len(self.entries) > ENTRIES_SHOWN:
+            shown = ", ".join(self.entries[:ENTRIES_SHOWN])
             return f"{len(self.entries)} of {self.compared} entries differ, the others agree: {shown}, ..."
         return f"{listed(self.entries)} {'differs' if len(self.entries) == 1 else 'differ'}, the others agree."
 
@@ -96,12 +96,12 @@ def diagnose(
     search of numbers, terms and pairs.
     """
     equations, end = Equations(tree, q, qd), time.monotonic() + seconds
-    search = Search(equations, places(equations), given, tolerance, end)
+    search = Search(equations, all_places(equations), given, tolerance, end)
     if not search.differs:
         return Diagnosis(False)
     differing = np.abs(search.off).max(axis=0) > 1.0
     about = {
-        "entries": tuple(named(entry) for entry, off in zip(equations.entries, differing) if off),
+        "entries": tuple(entry_name(entry) for entry, off in zip(equations.entries, differing) if off),
         "compared": int(search.known.any(axis=0).sum()),
     }
     names, singles, searched = tuple(names), [], ""
@@ -110,7 +110,7 @@ def diagnose(
     except OutOfTime:
         searched = f"in {seconds:g} s options and conventions of joints, no numbers"
     fitted = [one for one in singles if one.ratio <= 1.0]
-    nearest = sorted(singles, key=lambda one: one.left)[:NEAREST]
+    nearest = sorted(singles, key=lambda one: one.left)[:KEPT]
     about["nearest"] = tuple((one.places[0].name, one.left) for one in nearest)
     try:
         for found in ranks(search, names, fitted, not searched):
@@ -124,7 +124,7 @@ def diagnose(
     return Diagnosis(True, (), left, float(-np.log10(apart)), searched=searched, **about)
 
 
-def named(entry: tuple) -> str:
+def entry_name(entry: tuple) -> str:
     """An entry of Mbar or h, "M[0][1]": of Mbar the one above the diagonal stands for both."""
     kind, *indices = entry
     return kind + "".join(f"[{i}]" for i in sorted(indices))
@@ -134,7 +134,7 @@ def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted], pai
     """The explanations of each rank, found when they are asked for; pairs: whether there is time for the last."""
     equations = search.equations
     of_joints = list(conventions(equations, names))
-    explaining = explained(search, options(equations)) + explained_by_joints(search, of_joints)
+    explaining = explained(search, program_options(equations)) + explained_by_joints(search, of_joints)
     yield [
         *(of_variant(variant, left) for variant, left in explaining),
         *(of_fitted(one, 1) for one in singles if one.places[0].rank == 1),
@@ -148,7 +148,7 @@ def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted], pai
     both_ways = both(equations, names, search.given, search.weight)
     found = [of_variant(variant, left) for variant, left in explained(search, both_ways)]
     found += [of_fitted(one, 3) for one in search.pairs() if one.ratio <= 1.0]
-    simple = [variant for variant in (*options(equations), *of_joints) if variant.is_simple]
+    simple = [variant for variant in (*program_options(equations), *of_joints) if variant.is_simple]
     try:
         found += beside(search, simple)
     except OutOfTime:

@@ -58,7 +58,7 @@ def conditions(
     of_rates = (ahead + behind) / 2.0 - weight
     found.append(quadratic(of_rates, doubled - weight, size))
     if found[0].is_met:
-        found.append(power(mass_matrix, coordinates, q, qd, of_rates, floors, size))
+        found.append(power_balance(mass_matrix, coordinates, q, qd, of_rates, floors, size))
     return [condition for condition in found if condition is not None]
 
 
@@ -141,7 +141,7 @@ def quadratic(of_rates: np.ndarray, doubled: np.ndarray, floor: np.ndarray) -> C
     return Condition("h is quadratic in the rates", float(off[s, i]), float(allowed[s]), "N m", s, text)
 
 
-def power(
+def power_balance(
     mass_matrix: Callable,
     coordinates: Coordinates,
     q: np.ndarray,

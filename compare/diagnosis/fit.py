@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .model import TINY, Equations
-from .places import Place
+from .places import OF_ZERO, Place
 
 ROUNDS = 25  # of a search from one start
 FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds so many go on
-SETTLED = 1e-14  # a step of a place, of its size
+CONVERGED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
 POLISHED = 16  # places with a quadratic influence that are fitted
@@ -116,7 +116,7 @@ class Search:
             now = moving[better]
             x[now], left[now], best[now] = tried[better], after[better], sums[better]
             damping[moving] = np.clip(np.where(better, damping[moving] * 0.05, damping[moving] * 10.0), LEAST, 1e8)
-            going = (np.abs(step).max(axis=1) > SETTLED) & (damping[moving] < 1e6)
+            going = (np.abs(step).max(axis=1) > CONVERGED) & (damping[moving] < 1e6)
             moving = moving[going]
             if not len(moving):
                 break
@@ -151,7 +151,7 @@ class Search:
             if place.is_quadratic:
                 promising.append((left, k, best))
             else:
-                turned = TURNED if place.kind == "zero" else (-1.0, 1.0)
+                turned = TURNED if place.kind == OF_ZERO else (-1.0, 1.0)
                 near = [0.0, best, *turned]
                 which += [[k]] * len(near)
                 starts += [[x] for x in near]

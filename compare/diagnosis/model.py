@@ -18,7 +18,7 @@ from tmt.space import Vector
 from ..joint_map import JointMap
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
-TERMS = (
+BODY_TERMS = (
     "translation",
     "rotation",
     "gravity",
@@ -50,7 +50,7 @@ class Equations:
             self.q, self.qd = joints.positions(self.q), joints.speeds(self.qd)
         self.nv = len(tree.axis)
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
-        self.stated["factor"] = np.ones((len(tree.mass), len(TERMS)))
+        self.stated["factor"] = np.ones((len(tree.mass), len(BODY_TERMS)))
         self.triangle = np.tril_indices(self.nv)
 
     def first(self, states: int) -> "Equations":
@@ -80,7 +80,7 @@ class Equations:
                 row = row[place]
             row[last] = row[last] + np.asarray(added)[:, None]
         turned = {path.index[0] for path in changes if path.field == "axis"}
-        numbers["axis"] = [unit(axis) if k in turned else axis for k, axis in enumerate(numbers["axis"])]
+        numbers["axis"] = [unit_direction(axis) if k in turned else axis for k, axis in enumerate(numbers["axis"])]
         tree = self.tree
         changed = SimpleNamespace(
             **numbers, parent=tree.parent, coordinates=tree.coordinates, body_hinge=tree.body_hinge, moves=tree.moves
@@ -124,7 +124,7 @@ def packing(joints: JointMap, equations: Equations) -> tuple[list[int], np.ndarr
     return index.tolist(), np.concatenate([sense[i] * sense[j], sense])
 
 
-def unit(axis: list) -> list:
+def unit_direction(axis: list) -> list:
     """A direction at length 1."""
     x, y, z = axis
     length = np.sqrt(x * x + y * y + z * z)

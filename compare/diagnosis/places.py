@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .model import TERMS, Equations, Path
+from .model import BODY_TERMS, Equations, Path
 
 XYZ = "xyz"
 INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
@@ -22,7 +22,8 @@ TOGETHER = {  # terms that are often left out together, and what they are called
     "all rates of {} in the bias": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
-EVERY = "every body"
+EVERY_BODY = "every body"
+OF_ZERO = "zero position"  # the kind of a place
 MOST_SPEEDS = 12  # of which every product has its coefficients: there are nv^2 (nv + 1) / 2
 
 
@@ -30,14 +31,14 @@ class Place(NamedTuple):
     """One number that can be wrong."""
 
     rank: int
-    kind: str  # "zero", "number", "term", "coefficient"
+    kind: str  # "number", "term", "coefficient"
     name: str
     stated: float
     unit: str
     size: float  # of a change that matters, for starts of a search
     moves: tuple[tuple[Path, float], ...] = ()  # entries of the tree, and how far they go with a change of 1
-    entry: int | None = None  # of the values of a state, with a column of its own instead
-    column: np.ndarray | None = None  # (states,)
+    entry: int | slice | None = None  # of the values of a state, with a column of its own instead
+    column: np.ndarray | None = None  # (states,), of several entries (states, entries)
 
     @property
     def is_quadratic(self) -> bool:
@@ -45,9 +46,30 @@ class Place(NamedTuple):
         return not any(path.field in ("axis", "reference") for path, _ in self.moves)
 
 
-def places(equations: Equations) -> list[Place]:
+def all_places(equations: Equations) -> list[Place]:
     """All of them."""
-    return [*numbers(equations), *terms(equations), *coefficients(equations)]
+    return [*numbers(equations), *terms(equations), *coefficients(equations), *forces_in_bias(equations)]
+
+
+def forces_in_bias(equations: Equations) -> list[Place]:
+    """Damping and springs of joints, which do not belong in h."""
+    tree, nv, found = equations.tree, equations.nv, []
+    first = len(equations.entries) - nv
+
+    def add(name, unit, entry, column):
+        found.append(Place(2, "force", f"{name} in h", 0.0, unit, 1.0, entry=entry, column=column))
+
+    for i, (joint, (kind, at, by)) in enumerate(zip(tree.hinge_names, tree.coordinates.joints)):
+        of_speed, of_length = ("N s/m", "N/m") if kind == "slide" else ("N m s/rad", "N m/rad")
+        for v in range(by.start, by.stop):
+            name = joint if kind != "ball" else f"{joint} {XYZ[v - by.start]}"
+            add(f"damping of {name}", of_speed, first + v, equations.qd[:, v])
+        if kind != "ball":
+            stretched = equations.q[:, at.start] - tree.reference[i]
+            add(f"stiffness of {joint}", of_length, first + by.start, stretched)
+    if nv > 1:
+        add("the same damping of every joint", "N m s/rad", slice(first, first + nv), equations.qd)
+    return found
 
 
 def numbers(equations: Equations) -> list[Place]:
@@ -80,7 +102,7 @@ def numbers(equations: Equations) -> list[Place]:
                 add("number", f"anchor {axis} of {joint}", "offset", (i, k), "m", length, *stays)
         if kind != "ball":
             unit = "m" if kind == "slide" else "rad"
-            add("zero", f"zero of {joint}", "reference", (i,), unit, length if kind == "slide" else 1.0, rank=1)
+            add(OF_ZERO, f"zero of {joint}", "reference", (i,), unit, length if kind == "slide" else 1.0, rank=1)
             for k, axis in enumerate(XYZ):
                 add("number", f"axis {axis} of {joint}", "axis", (by.start, k), "", 0.5)
         for speed in range(by.start, by.stop):
@@ -98,12 +120,12 @@ def terms(equations: Equations) -> list[Place]:
     bodies = equations.tree.body_names
     groups = {body: [b] for b, body in enumerate(bodies)}
     if len(bodies) > 1:
-        groups[EVERY] = list(range(len(bodies)))
+        groups[EVERY_BODY] = list(range(len(bodies)))
     called = {name: (term,) for term, name in OF_TERM.items()} | TOGETHER
     found = []
     for name, together in called.items():
         for body, which in groups.items():
-            moves = tuple((Path("factor", (b, TERMS.index(term))), 1.0) for b in which for term in together)
+            moves = tuple((Path("factor", (b, BODY_TERMS.index(term))), 1.0) for b in which for term in together)
             found.append(Place(2, "term", name.format(body), 1.0, "times", 1.0, moves))
     return found
 
@@ -117,7 +139,7 @@ def coefficients(equations: Equations) -> list[Place]:
         Place(2, "coefficient", f"M[{i}][{j}]", 1.0, "times", 1.0, entry=at["M", i, j], column=values["M", i, j])
         for i, j in zip(*map(np.ndarray.tolist, equations.triangle))
     ]
-    of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, at_rest(equations))
+    of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, bias_at_rest(equations))
     for i in range(nv):
         found.append(
             Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i])
@@ -130,7 +152,7 @@ def coefficients(equations: Equations) -> list[Place]:
     return [place for place in found if np.abs(place.column).max() > 0.0 and len(place.column) == states]
 
 
-def at_rest(equations: Equations) -> np.ndarray:
+def bias_at_rest(equations: Equations) -> np.ndarray:
     """h without rates, (states, nv)."""
     still = Equations(equations.tree, equations.q, np.zeros_like(equations.qd))
     return still.values()[0][:, -equations.nv :]

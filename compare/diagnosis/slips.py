@@ -11,7 +11,7 @@ import numpy as np
 from tmt import method
 
 from .model import Equations, Path
-from .places import EVERY, at_rest
+from .places import EVERY_BODY, bias_at_rest
 from .variants import Variant
 
 
@@ -69,7 +69,9 @@ def slips(equations: Equations) -> Iterator[Variant]:
     """Each slip, of each body alone and of all together."""
     parts, tree = Parts(equations), equations.tree
     bodies = range(len(tree.mass))
-    groups = {name: [b] for b, name in enumerate(tree.body_names)} | ({EVERY: list(bodies)} if len(bodies) > 1 else {})
+    groups = {name: [b] for b, name in enumerate(tree.body_names)} | (
+        {EVERY_BODY: list(bodies)} if len(bodies) > 1 else {}
+    )
     v_alone, w_alone = parts.of_one_rate()
     turned = np.einsum("sbcd,sbdi->sbci", parts.R, parts.B)
     to_world = {"omega": "sbcd,sbd->sbc", "w_conv": "sbcd,sbd->sbc"}
@@ -125,7 +127,11 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
         M = np.zeros((len(equations.q), nv, nv, nv))
         M[:, :, i, j] = M[:, :, j, i] = slopes[:, :, : len(i)]
         qd = equations.qd
-        return np.einsum("skij,sk,sj->si", M, qd, qd), np.einsum("skij,si,sj->sk", M, qd, qd) / 2.0, at_rest(equations)
+        return (
+            np.einsum("skij,sk,sj->si", M, qd, qd),
+            np.einsum("skij,si,sj->sk", M, qd, qd) / 2.0,
+            bias_at_rest(equations),
+        )
 
     def values(of_Mdot: float, of_gradient: float) -> np.ndarray:
         Mdot_qd, gradient, weight = parts()

@@ -16,10 +16,10 @@ import tmt
 from ..coordinates import Coordinates
 from ..joint_map import PER_UNIT, Joint, JointMap
 from ..judge.words import listed
-from .model import TERMS, Equations
+from .model import BODY_TERMS, Equations
 
-TOGETHER = 2000  # maps of the joints in one evaluation
-MOST_JOINTS = 6  # of which every order and every set of senses is tried; of more two exchanged, and one turned
+MAPS_AT_ONCE = 2000  # maps of the joints in one evaluation
+MOST_PERMUTED = 6  # of which every order and every set of senses is tried; of more two exchanged, and one turned
 
 
 class Variant(NamedTuple):
@@ -45,12 +45,12 @@ class Recast:
         return self.change(self.equations.values(changes))
 
 
-def options(equations: Equations) -> Iterator[Variant]:
+def program_options(equations: Equations) -> Iterator[Variant]:
     """What an option or a convention of the whole file or program changes."""
     tree, nv = equations.tree, equations.nv
     terms = {
-        "gravity": (TERMS.index("gravity"),),
-        "rates": tuple(map(TERMS.index, ("convective", "Euler", "gyroscopic"))),
+        "gravity": (BODY_TERMS.index("gravity"),),
+        "rates": tuple(map(BODY_TERMS.index, ("convective", "Euler", "gyroscopic"))),
     }
 
     def with_factor(of: str, factor: float) -> Callable:
@@ -99,11 +99,11 @@ def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Varian
         made = JointMap(coordinates, joints)
         return Variant(1, kind, name, stated, explains, lambda: Equations(tree, q, qd, made), made, is_simple)
 
-    for order in orders(names, tree.kind):
+    for order in other_orders(names, tree.kind):
         exchanged = [name for name, other in zip(names, order) if name != other]
         simple = len(exchanged) == 2
         yield variant("order", "order of the joints", ", ".join(names), ", ".join(order), map(Joint, order), simple)
-    most = len(straight) if len(straight) <= MOST_JOINTS else 1
+    most = len(straight) if len(straight) <= MOST_PERMUTED else 1
     for count in range(1, most + 1):
         for turned in combinations(straight, count):
             joints = [Joint(name, -1.0 if name in turned else 1.0) for name in names]
@@ -117,9 +117,9 @@ def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Varian
                 yield variant("unit", name, "rad", unit, joints)
 
 
-def orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+def other_orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     """Other orders of joints in which each stands where one of its kind stood."""
-    if len(names) <= MOST_JOINTS:
+    if len(names) <= MOST_PERMUTED:
         tried = permutations(range(len(names)))
     else:
         tried = [list(range(len(names)))[::-1]]
@@ -139,10 +139,10 @@ def both(equations: Equations, names: tuple[str, ...], given: np.ndarray, weight
     evaluated as states.
     """
     tree, n = equations.tree, len(names)
-    if n > MOST_JOINTS or "ball" in tree.kind:
+    if n > MOST_PERMUTED or "ball" in tree.kind:
         return
     places = {name: i for i, name in enumerate(names)}
-    chosen = [[places[name] for name in order] for order in orders(names, tree.kind)]
+    chosen = [[places[name] for name in order] for order in other_orders(names, tree.kind)]
     turned = list(product((1.0, -1.0), repeat=n))[1:]
     if not chosen:
         return
@@ -152,8 +152,8 @@ def both(equations: Equations, names: tuple[str, ...], given: np.ndarray, weight
     np.put_along_axis(q, order, sense * equations.q[0], axis=1)
     np.put_along_axis(qd, order, sense * equations.qd[0], axis=1)
     i, j = equations.triangle
-    for first in range(0, len(order), TOGETHER):
-        part = slice(first, first + TOGETHER)
+    for first in range(0, len(order), MAPS_AT_ONCE):
+        part = slice(first, first + MAPS_AT_ONCE)
         values = Equations(tree, q[part], qd[part]).values()[0]
         P, S, rows = order[part], sense[part], np.arange(len(values))[:, None]
         M = np.zeros((len(values), n, n))
@@ -172,8 +172,8 @@ def both(equations: Equations, names: tuple[str, ...], given: np.ndarray, weight
 def values_of(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:
     """What the first states give with each map of the joints, (states, entries): evaluated together."""
     q, qd = equations.q[:states], equations.qd[:states]
-    for first in range(0, len(maps), TOGETHER):
-        some = maps[first : first + TOGETHER]
+    for first in range(0, len(maps), MAPS_AT_ONCE):
+        some = maps[first : first + MAPS_AT_ONCE]
         inner = Equations(
             equations.tree,
             *(np.concatenate([move(m) for m in some]) for move in (lambda m: m.positions(q), lambda m: m.speeds(qd))),

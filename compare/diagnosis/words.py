@@ -6,7 +6,7 @@ import numpy as np
 
 from ..joint_map import Joint
 from .fit import Fitted
-from .places import Place
+from .places import OF_ZERO, Place
 from .variants import Variant
 
 FACTORS = {0.0: "missing", 0.5: "halved", 2.0: "doubled", -1.0: "of the other sign"}
@@ -45,7 +45,7 @@ def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause
         [f"{x:.12g}" for x in found],
         [p.unit for p in places],
     )
-    texts = [said(place, value) for place, value in zip(places, found)]
+    texts = [place_text(place, value) for place, value in zip(places, found)]
     if beside:
         kinds, names = [beside.kind, *kinds], [beside.name, *names]
         stated, explains, units = [beside.stated, *stated], [beside.explains, *explains], ["", *units]
@@ -66,7 +66,7 @@ def together(texts: list[str]) -> str:
     return " and ".join(text.removesuffix(EXPLAINS) for text in texts) + ": together they" + EXPLAINS
 
 
-def said(place: Place, value: float) -> str:
+def place_text(place: Place, value: float) -> str:
     """One place with the value that would explain the difference."""
     if place.unit == "times":
         near = [word for factor, word in FACTORS.items() if abs(value - factor) <= CLOSE]
@@ -74,7 +74,7 @@ def said(place: Place, value: float) -> str:
             return f"{place.name}: yours is {nice(value)} times the right one"
         return f"{place.name}: {near[0] if near else f'{nice(value)} times'}"
     unit = f" {place.unit}" if place.unit else ""
-    if place.kind == "zero":
+    if place.kind == OF_ZERO:
         joint = place.name.removeprefix("zero of ")
         how = Joint(joint, zero=zeroed(place, value), slides=place.unit == "m")
         return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)} (state it as {str(how)!r})"

@@ -8,21 +8,22 @@ import numpy as np
 
 import tmt
 
-from ...diagnosis import STATES, Diagnosis, diagnose, packed
+from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.consistency import Condition
 from ...diagnosis.forces import causes_of_forces
 from ...diagnosis.words import Cause
-from ...judge.check import Result
+from ...judge.check import Result, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...setup import Setup
 from . import fault_table
 from .own_equations import asked_conditions, diagnosed_as_stated, for_command_line
+from .single_steps import Stepped, single_steps
 
 TITLE = "Diagnosis: what explains a difference?"
 SECONDS = 8.0  # of a search
-COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
+CAUSE_COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
 NO_NUMBERS = "not all values are numbers"
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
 
@@ -38,11 +39,12 @@ class Found(NamedTuple):
     of_forces: list[Cause]  # what else acts in the accelerations
     force_ratio: float  # of a force left over to its tolerance, the largest
     unasked: str = ""  # why the conditions were not asked
+    steps: tuple[Stepped, ...] = ()  # of MuJoCo's integrators, where all else agrees
 
     @property
     def causes(self) -> list[Cause]:
         """Of one rank each, those of Mbar and h first."""
-        return [*self.diagnosis.causes, *self.of_forces]
+        return [*self.diagnosis.causes, *self.of_forces, *(cause for one in self.steps for cause in one.causes)]
 
     @property
     def sentence_of_forces(self) -> str:
@@ -86,11 +88,11 @@ def diagnosed(setup: Setup) -> Found:
 
 def search(setup: Setup) -> Found:
     """The same, computed."""
-    tree, sample, name = setup.robot.tree, setup.random.first(STATES), "own" if setup.robot.own else "mujoco"
+    tree, sample, name = setup.robot.tree, setup.random.first(STATES_ASKED), "own" if setup.robot.own else "mujoco"
     given = setup.engines[name].of(setup.robot.case())
     q, qd, tau = sample.q, sample.qd, sample.tau
     M, h = np.asarray(given.mass_matrix(q)), np.asarray(given.bias(q, qd))
-    allowed = tolerances(tree, q, qd)
+    allowed = packed_tolerances(tree, q, qd)
     values = packed(M, h, tree.coordinates.nv, len(q))
     names, (asked, unasked) = setup.robot.joints, ([], "")
     if name == "own":
@@ -100,15 +102,17 @@ def search(setup: Setup) -> Found:
     else:
         diagnosis = diagnose(tree, names, q, qd, values, allowed, SECONDS)
     right = packed(tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree), tree.coordinates.nv, len(q))
-    off = np.abs(values - right) / allowed
+    off = over(np.abs(values - right), allowed)
     acting, size = left_over(tree, q, qd, tau, M, h, np.asarray(given.acceleration(q, qd, tau)))
-    force_ratio = float(np.nan_to_num(np.abs(acting) / size, nan=np.inf).max())
+    force_ratio = float(np.nan_to_num(over(np.abs(acting), size), nan=np.inf).max())
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, size) if 1.0 < force_ratio < np.inf else []
     ratio = float(np.nan_to_num(off, nan=np.inf).max())
-    return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked)
+    agrees = name == "mujoco" and max(ratio, force_ratio) <= 1.0
+    steps = tuple(single_steps(setup, q, qd, tau)) if agrees else ()
+    return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked, steps)
 
 
-def tolerances(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+def packed_tolerances(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """64 eps of the scale of each entry of Mbar and h, (states, entries) as `packed` has them."""
     return packed(*sizes_of(tree, q, qd), tree.coordinates.nv, len(q))
 
@@ -135,7 +139,7 @@ def rows(setup: Setup) -> Result:
     """One row for each explanation; one check of what is asked, whose note is the cause. Of made faults see fault_table."""
     if setup.faults:
         return fault_table.rows_of_faults(setup)
-    result, found = Result("diagnosis", shown=COLUMNS), diagnosed(setup)
+    result, found = Result("diagnosis", shown=CAUSE_COLUMNS), diagnosed(setup)
     of, whose = f"{found.states} random states", WHOSE_VALUES[found.engine]
     for condition in found.conditions:
         note = "" if condition.is_met else condition.text
@@ -149,7 +153,10 @@ def rows(setup: Setup) -> Result:
     note = "" if found.force_ratio <= 1.0 else acting
     what = f"{whose} accelerations follow from M and h: force left over, over its tolerance"
     result.check(of, what, found.force_ratio, 1.0, "", note)
-    result.rows = [{name: getattr(cause, name) for name in COLUMNS} for cause in found.causes]
+    for one in found.steps:
+        what = f"one step of {one.integrator} is that of {one.scheme}: largest difference over its tolerance"
+        result.check(of, what, one.ratio, 1.0, "", one.sentence)
+    result.rows = [{name: getattr(cause, name) for name in CAUSE_COLUMNS} for cause in found.causes]
     result.notes += sentences(found)
     result.curves["nearest"] = diagnosis.nearest
     result.curves["causes"] = [record(cause, bool(setup.robot.own)) for cause in found.causes]
@@ -169,6 +176,7 @@ def sentences(found: Found) -> list[str]:
         said.append(f"{NO_NUMBERS[0].upper()}{NO_NUMBERS[1:]}: what is said here is of the others.")
     elif found.force_ratio > 1.0:
         said.append(found.sentence_of_forces)
+    said += [one.sentence for one in found.steps if one.ratio > 1.0]
     said = [for_command_line(text, found.engine == "own") for text in dict.fromkeys(said)]
     return said + [found.unasked] * bool(found.unasked) or [
         "There is nothing to explain: Mbar, h and accelerations agree."

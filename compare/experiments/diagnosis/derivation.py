@@ -24,27 +24,27 @@ class Walk:
         self.joints = []  # origin, turn, angular velocity, acceleration of the origin, angular acceleration
         self.axes, self.slides = [], [kind == "slide" for kind in tree.kind]
         for i, parent in enumerate(tree.parent):
-            x, R, w, a, alpha = self.joints[parent] if parent >= 0 else world
+            x, R, w, a, spin_up = self.joints[parent] if parent >= 0 else world
             axis, angle, rate = R @ np.array(tree.axis[i]), q[:, i] - tree.reference[i], qd[:, i, None]
             arm = R @ np.array(tree.offset[i])
             if self.slides[i]:
                 arm = arm + axis * angle[:, None]
-            x, a = x + arm, a + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+            x, a = x + arm, a + np.cross(spin_up, arm) + np.cross(w, np.cross(w, arm))
             if self.slides[i]:
                 a = a + 2.0 * np.cross(w, axis * rate)
-                self.joints.append((x, R, w, a, alpha))
+                self.joints.append((x, R, w, a, spin_up))
             else:
-                alpha = alpha + np.cross(w, axis * rate)
-                self.joints.append((x, R @ turning_by(np.array(tree.axis[i]), angle), w + axis * rate, a, alpha))
+                spin_up = spin_up + np.cross(w, axis * rate)
+                self.joints.append((x, R @ turning_by(np.array(tree.axis[i]), angle), w + axis * rate, a, spin_up))
             self.axes.append(axis)
         self.world = world
 
     def body(self, b: int):
         """CoM, turn, angular velocity, acceleration of the CoM, angular acceleration, and the columns of T and B."""
         joint = self.tree.body_hinge[b]
-        x, R, w, a, alpha = self.joints[joint] if joint >= 0 else self.world
+        x, R, w, a, spin_up = self.joints[joint] if joint >= 0 else self.world
         arm = R @ np.array(self.tree.com[b])
-        x, a = x + arm, a + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+        x, a = x + arm, a + np.cross(spin_up, arm) + np.cross(w, np.cross(w, arm))
         T, B = np.zeros((2, self.states, 3, self.nv))
         while joint >= 0:
             axis = self.axes[joint]
@@ -53,7 +53,7 @@ class Walk:
             else:
                 T[:, :, joint], B[:, :, joint] = np.cross(axis, x - self.joints[joint][0]), axis
             joint = self.tree.parent[joint]
-        return R, w, a, alpha, T, B
+        return R, w, a, spin_up, T, B
 
 
 def turning_by(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -74,7 +74,7 @@ def derived(
         [Walk(tree, q, np.where(np.arange(walk.nv) == j, qd, 0.0)) for j in range(walk.nv)] if "rates" in slip else []
     )
     for b, mass in enumerate(tree.mass):
-        R, w, a, alpha, T, B = walk.body(b)
+        R, w, a, spin_up, T, B = walk.body(b)
         factor = {term: factors.get((b, term), 1.0) for term in ALL_TERMS}
         inertia = np.array(tree.inertia[b])
         Rt, here = np.swapaxes(R, 1, 2), b in bodies
@@ -87,7 +87,7 @@ def derived(
             c = np.array(tree.com[b])
             I = R @ (inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))) @ Rt
         elif here and slip == "R for R'":  # the components in body axes are taken by R where R' is right
-            w, alpha, B = (R @ R @ w[..., None])[..., 0], (R @ R @ alpha[..., None])[..., 0], R @ R @ B
+            w, spin_up, B = (R @ R @ w[..., None])[..., 0], (R @ R @ spin_up[..., None])[..., 0], R @ R @ B
         elif here and slip.startswith("exchanged"):
             order = [0, 1, 2]
             i, j = map("xyz".index, slip.split()[1:])
@@ -95,14 +95,16 @@ def derived(
             I = R @ inertia[order][:, order] @ Rt
         elif here and "rates" in slip:
             alone = [one.body(b) for one in single]
-            a_alone, alpha_alone = sum(one[2] for one in alone), sum(one[3] for one in alone)
+            a_alone, spin_up_alone = sum(one[2] for one in alone), sum(one[3] for one in alone)
             a = {"products of rates out of v": a_alone, "half the products of rates in v": (a + a_alone) / 2.0,
                  "squares of rates out of v": a - a_alone, "products of rates out of both": a_alone}.get(slip, a)  # fmt: skip
-            alpha = alpha_alone if slip in ("products of rates out of w", "products of rates out of both") else alpha
+            spin_up = (
+                spin_up_alone if slip in ("products of rates out of w", "products of rates out of both") else spin_up
+            )
         M += factor["translation"] * mass * np.swapaxes(T, 1, 2) @ T + factor["rotation"] * np.swapaxes(B, 1, 2) @ I @ B
         force = mass * (factor["convective"] * a - factor["gravity"] * g)
         spin = np.cross(w, (I @ w[..., None])[..., 0])
-        moment = factor["Euler"] * (I @ alpha[..., None])[..., 0] + factor["gyroscopic"] * spin
+        moment = factor["Euler"] * (I @ spin_up[..., None])[..., 0] + factor["gyroscopic"] * spin
         h += (np.swapaxes(T, 1, 2) @ force[..., None] + np.swapaxes(B, 1, 2) @ moment[..., None])[..., 0]
     return M, h
 

@@ -8,28 +8,33 @@ import numpy as np
 
 import tmt
 
-from ...diagnosis import STATES, Diagnosis, diagnose, packed
+from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
+from ...diagnosis.places import OF_ZERO
 from ...judge.check import Result
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots.arm import ARM
 from ...robots.six_hinges import SIX_HINGES
 from ...setup import Setup
-from .faults import Fault, by_composite, fault_list, values_of_fault
+from .faults import Fault, fault_list
 from .generator import generated
+from .made_values import by_composite, values_of_fault
 from .wrong_motion import row_of_motion, wrong_motions
 
-SHOWN = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
+SHOWN_OF_FAULTS = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
 PART = 12  # faults that a process is handed at once
 SAMPLE = 60  # faults of a quick run
 SEARCHED = 10.0  # s of one fault
 OTHERS = 3  # explanations that a reason names
+RANKS = dict.fromkeys(("order", "sign", OF_ZERO, "unit", "option"), 1) | dict.fromkeys(
+    ("pair", "composition"), 3
+)  # else 2
 AT = {"search": 3, "again": 4}  # seeds of states
 
 
 def rows_of_faults(setup: Setup) -> Result:
     """A row for each fault in tables/faults.csv; counts by outcome; a check that no outcome is wrong."""
-    result = Result("diagnosis", shown=SHOWN)
+    result = Result("diagnosis", shown=SHOWN_OF_FAULTS)
     faults = made_faults()
     if setup.size != "full":
         faults = sampled(faults, setup.of(0, SAMPLE, SAMPLE // 4))
@@ -89,7 +94,7 @@ def rows_of_part(faults: Sequence[Fault]) -> list[dict]:
 
 def row_of(fault: Fault) -> dict:
     """What a diagnosis says of one fault."""
-    q, qd = states_of(fault.tree, AT["search"])
+    q, qd = search_states(fault.tree, AT["search"])
     if fault.make[0] in ("force", "step"):
         visible, causes, seconds = row_of_motion(fault, q, qd)
         found = Diagnosis(visible, tuple(causes))
@@ -116,9 +121,9 @@ def row_of(fault: Fault) -> dict:
     }
 
 
-def states_of(tree: tmt.Tree, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def search_states(tree: tmt.Tree, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Positions within a turn or a metre, rates up to 3 per s, (states, nv) each."""
-    return tuple(np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES, len(tree.axis))))
+    return tuple(np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES_ASKED, len(tree.axis))))
 
 
 def diagnosis_of(fault: Fault, q: np.ndarray, qd: np.ndarray) -> tuple[Diagnosis, list[str]]:
@@ -169,7 +174,7 @@ def has_values(fault: Fault, cause) -> bool:
 
 def explains_elsewhere(fault: Fault, found: Diagnosis) -> bool:
     """Whether what explains a fault, another and no less simple one, explains it at states that the search did not have."""
-    again, _ = diagnosis_of(fault, *states_of(fault.tree, AT["again"]))
+    again, _ = diagnosis_of(fault, *search_states(fault.tree, AT["again"]))
     places = {cause.place for cause in again.causes}
     lowest = min(cause.rank for cause in found.causes)
     return lowest <= rank_of(fault) and any(cause.place in places for cause in found.causes)
@@ -177,12 +182,12 @@ def explains_elsewhere(fault: Fault, found: Diagnosis) -> bool:
 
 def rank_of(fault: Fault) -> int:
     """Of what was made."""
-    return {"order": 1, "sign": 1, "zero": 1, "unit": 1, "option": 1, "pair": 3, "composition": 3}.get(fault.kind, 2)
+    return RANKS.get(fault.kind, 2)
 
 
 def why_invisible(fault: Fault) -> str:
     """The reason for which neither M nor h changes at any state."""
-    tree, q = fault.tree, states_of(fault.tree, AT["search"])[0]
+    tree, q = fault.tree, search_states(fault.tree, AT["search"])[0]
     if fault.make[0] == "tree":
         edited = fault.make[1]
         if np.abs(tmt.com_positions(q, edited) - tmt.com_positions(q, tree)).max() > 1e-9 * max(1.0, np.abs(q).max()):

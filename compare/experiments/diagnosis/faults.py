@@ -8,11 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt.composite import mass_matrix_and_bias
 
-from .derivation import by_lagrange, derived
+from ...diagnosis.places import OF_ZERO, XYZ
 
-XYZ = "xyz"
 OF_INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 TERM_NAMES = {
     "translation": "T' m T of {}", "rotation": "B' I B of {}", "gravity": "gravity term T' m g of {}",
@@ -51,71 +49,13 @@ class Fault(NamedTuple):
     make: tuple  # how: see `values_of_fault`
 
 
-def values_of_fault(fault: Fault, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """M (states, nv, nv) and h (states, nv) as they are with a fault."""
-    how, *about = fault.make
-    if how == "tree":  # a changed Tree, by tmt's composite form
-        return by_composite(about[0], q, qd)
-    if how == "derived":
-        return derived(fault.tree, q, qd, *about)
-    if how == "lagrange":
-        return by_lagrange(fault.tree, q, qd, *about)
-    if how == "joints":
-        return in_own_joints(fault.tree, q, qd, *about)
-    M, h = by_composite(fault.tree, q, qd)
-    if how == "negative":
-        return M, -h
-    if how == "damped":
-        return M, h + about[0] * np.array(fault.tree.damping) * qd
-    entry, factor = about
-    if entry[0] == "M":
-        M[:, entry[1], entry[2]] *= factor
-        M[:, entry[2], entry[1]] = M[:, entry[1], entry[2]]
-    else:
-        h[:, entry[1]] += (factor - 1.0) * part_of_bias(fault.tree, q, qd, *entry[1:])
-    return M, h
-
-
-def by_composite(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    M, h = mass_matrix_and_bias(tree, list(q.T), list(qd.T))
-    states = len(q)
-    M = np.stack([np.stack([np.broadcast_to(x, states) for x in row], axis=-1) for row in M], axis=1)
-    return np.array(M), np.stack([np.broadcast_to(x, states) for x in h], axis=-1).copy()
-
-
-def in_own_joints(tree, q, qd, order, sense, zero, of_q, of_qd) -> tuple[np.ndarray, np.ndarray]:
-    """In joints of one's own: own = (sense x model's + zero) x unit, in this order; q and qd are taken as these."""
-    sense, back = np.array(sense), np.argsort(order)
-    model_q, model_qd = ((q / of_q - zero) * sense)[:, back], (qd / of_qd * sense)[:, back]
-    M, h = by_composite(tree, model_q, model_qd)
-    return M[:, order][:, :, order] * sense[:, None] * sense, h[:, order] * sense
-
-
-def part_of_bias(tree, q, qd, i: int, *rates: int) -> np.ndarray:
-    """Of h_i the part at rest, or that of the product of two rates, (states,)."""
-
-    def h(*at):
-        return by_composite(tree, q, np.broadcast_to(sum((np.eye(qd.shape[1])[j] for j in at), 0.0 * qd[0]), qd.shape))[
-            1
-        ][:, i]
-
-    if not rates:
-        return h()
-    j, k = rates
-    coefficient = h(j) - h() if j == k else h(j, k) - h(j) - h(k) + h()
-    return coefficient * qd[:, j] * qd[:, k]
-
-
-# the list
-
-
 def fault_list(robot: str, tree: tmt.Tree, every_size: bool) -> Iterator[Fault]:
     """Every kind of fault of one robot. every_size: numbers are changed by several sizes, and flipped."""
 
     def fault(name, kind, size, expected, values, *make) -> Fault:
         return Fault(robot, tree, name, kind, "list", size, tuple(expected), tuple(values), make)
 
-    for place, field, index, scale in numbers_of(tree):
+    for place, field, index, scale in tree_numbers(tree):
         for share in (0.1, 1e-4, -2.0) if every_size else (0.07,):
             if (made := changed(tree, field, index, share, scale)) is not None:
                 edited, value, size = made
@@ -146,7 +86,7 @@ def fault_list(robot: str, tree: tmt.Tree, every_size: bool) -> Iterator[Fault]:
     yield from pairs_of(robot, tree)
 
 
-def numbers_of(tree: tmt.Tree) -> Iterator[tuple[str, str, tuple, float]]:
+def tree_numbers(tree: tmt.Tree) -> Iterator[tuple[str, str, tuple, float]]:
     """Place, field of the Tree, index and natural size of each number."""
     length = max(np.abs(tree.offset).max(), np.abs(tree.com).max(), 1e-3)
     for b, body in enumerate(tree.body_names):
@@ -202,7 +142,8 @@ def tmt_edited(tree: tmt.Tree, field: str, index: tuple, size: float) -> tmt.Tre
 
 def own_joints(fault_of, name: str, kind: str, expected: Sequence[str], tree: tmt.Tree, **own) -> Fault:
     n = len(tree.axis)
-    asked = {"order": tuple(range(n)), "sense": (1.0,) * n, "zero": (0.0,) * n, "of_q": (1.0,) * n, "of_qd": (1.0,) * n}
+    one = (1.0,) * n
+    asked = {"order": tuple(range(n)), "sense": one, "at_zero": (0.0,) * n, "of_q": one, "of_qd": one}
     return fault_of(name, kind, None, expected, [], "joints", *(asked | own).values())
 
 
@@ -223,7 +164,7 @@ def conventions_of(robot: str, tree: tmt.Tree, most: int = 12) -> Iterator[Fault
         yield own_joints(fault, name, "sign", [name], tree, sense=sense)
     for i, zero in ((i, zero) for i in range(n) for zero in (np.pi / 2.0, -0.3)):
         at = tuple(zero if j == i else 0.0 for j in range(n))
-        yield own_joints(fault, f"zero of {names[i]} {zero:+.3g}", "zero", [f"zero of {names[i]}"], tree, zero=at)
+        yield own_joints(fault, f"zero of {names[i]} {zero:+.3g}", OF_ZERO, [f"zero of {names[i]}"], tree, at_zero=at)
     for which, of in [((i,), names[i]) for i in range(n)] + [(tuple(range(n)), "all hinges")]:
         units = tuple(degrees if j in which else 1.0 for j in range(n))
         yield own_joints(fault, f"{of} in deg", "unit", [f"unit of {of}"], tree, of_q=units, of_qd=units)
@@ -250,7 +191,7 @@ def entries_of(robot: str, tree: tmt.Tree) -> Iterator[Fault]:
 
 def pairs_of(robot: str, tree: tmt.Tree, count: int = 12) -> Iterator[Fault]:
     """Two numbers together, drawn once for all."""
-    rng, numbers = np.random.default_rng(1), list(numbers_of(tree))
+    rng, numbers = np.random.default_rng(1), list(tree_numbers(tree))
     made = 0
     while made < count:
         first, second = (numbers[k] for k in rng.choice(len(numbers), 2, replace=False))

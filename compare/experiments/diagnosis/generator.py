@@ -4,8 +4,9 @@ import numpy as np
 
 import tmt
 
+from ...diagnosis.places import OF_ZERO
 from .derivation import ALL_TERMS
-from .faults import TERM_NAMES, Fault, changed, numbers_of, own_joints
+from .faults import TERM_NAMES, Fault, changed, own_joints, tree_numbers
 
 SEED_OF_FAULTS = 13
 MOST_JOINTS_OF_TREE = 5
@@ -61,24 +62,24 @@ def random_fault(rng: np.random.Generator, k: int) -> Fault:
             return fault
 
 
-def drawn(rng, tree) -> tuple | None:
+def drawn_number(rng, tree) -> tuple | None:
     """A number of a tree changed by 1e-6 to 1 of its size: place, value, change, tree."""
-    numbers = list(numbers_of(tree))
+    numbers = list(tree_numbers(tree))
     place, field, index, scale = numbers[int(rng.integers(len(numbers)))]
     made = changed(tree, field, index, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.0), scale)
     return made and (place, made[1], made[2], made[0])
 
 
 def number(rng, tree, robot) -> Fault | None:
-    if (one := drawn(rng, tree)) is None:
+    if (one := drawn_number(rng, tree)) is None:
         return None
     place, value, size, edited = one
     return Fault(robot, tree, f"{place} {size:+.3g}", "number", "generator", size, (place,), (value,), ("tree", edited))
 
 
 def pair(rng, tree, robot) -> Fault | None:
-    one = drawn(rng, tree)
-    other = one and drawn(rng, one[3])
+    one = drawn_number(rng, tree)
+    other = one and drawn_number(rng, one[3])
     if not other or one[0] == other[0]:
         return None
     expected = f"{one[0]} and {other[0]}", f"{other[0]} and {one[0]}"
@@ -97,7 +98,7 @@ def term(rng, tree, robot) -> Fault:
 def convention(rng, tree, robot) -> Fault | None:
     """An order, or senses, or a zero."""
     n, names = len(tree.axis), tree.hinge_names
-    kind = str(rng.choice(["order", "sign", "zero"]))
+    kind = str(rng.choice(["order", "sign", OF_ZERO]))
 
     def fault(name, kind, size, expected, values, *make):
         return Fault(robot, tree, name, kind, "generator", size, tuple(expected), tuple(values), make)
@@ -116,7 +117,7 @@ def convention(rng, tree, robot) -> Fault | None:
         return own_joints(fault, place, kind, [place], tree, sense=tuple(sense))
     i = int(rng.integers(n))
     zero = tuple(float(rng.uniform(-1.5, 1.5)) if j == i else 0.0 for j in range(n))
-    return own_joints(fault, f"zero of {names[i]} {zero[i]:+.3g}", kind, [f"zero of {names[i]}"], tree, zero=zero)
+    return own_joints(fault, f"zero of {names[i]} {zero[i]:+.3g}", kind, [f"zero of {names[i]}"], tree, at_zero=zero)
 
 
 def composition(rng, tree, robot) -> Fault | None:
@@ -136,5 +137,5 @@ def composition(rng, tree, robot) -> Fault | None:
     zero, sense = np.zeros(n), np.ones(n)
     zero[i], sense[j] = rng.uniform(-1.5, 1.5), -1.0
     expected = [f"sense of {names[j]} and zero of {names[i]}"]
-    own = {"sense": tuple(sense), "zero": tuple(zero)}
+    own = {"sense": tuple(sense), "at_zero": tuple(zero)}
     return own_joints(fault, f"sense of {names[j]}, zero of {names[i]}", "composition", expected, tree, **own)

@@ -13,7 +13,8 @@ from ...diagnosis.steps import Steps, diagnose_steps
 from ...diagnosis.words import Cause
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
-from .faults import Fault, by_composite
+from .faults import Fault
+from .made_values import by_composite
 
 DT = 0.01  # s
 MOST_TORQUE = 5.0  # N m
