@@ -342,7 +342,8 @@ def test_the_message_in_the_manner_of_numpy_testing(given):
     ({"acceleration": lambda q, v, t: np.linalg.solve(mass_matrix(q), t - wrong_bias(q, v) - np.array([0.3, 0]) * v)},
      "h[0], coefficient of qd1^2: yours is -1 times the right one."),
     (RIGHT | {"acceleration": lambda q, v, t: acceleration(q, v, t) * [1.0, 1.1]}, "mass_matrix and bias agree"),
-    (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v}, "Your bias is linear in qd: is damping in it?"),
+    (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v}, "damping of every joint in h: 0.1 N m s/rad in place of 0"),
+    (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v[::-1]}, "Your bias is linear in qd: is damping in it?"),
 ])  # fmt: skip
 def test_the_probable_cause_of(brought, cause):
     assert cause in message_of(**brought)

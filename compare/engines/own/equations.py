@@ -248,8 +248,6 @@ class OwnEquations:
         if not where.any():
             return
         first = int(np.argmax(where))
-        text, state = (
-            what if what.startswith(name) else f"{name} {what}",
-            state_in_words([part[first] for part in given]),
-        )
+        text = what if what.startswith(name) else f"{name} {what}"
+        state = state_in_words([part[first] for part in given])
         self.found.setdefault((name, what), [state, text, 0])[2] += int(np.sum(where))
