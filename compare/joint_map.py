@@ -16,7 +16,7 @@ from .coordinates import Coordinates
 from .judge.words import listed
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
-STATED = re.compile(r"(?P<name>.+?)(?P<shift>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
+STATED = re.compile(r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
 FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
@@ -134,7 +134,7 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
     if rest not in kinds and rest.startswith("-"):
         rest, sign = rest[1:], -1.0
     if rest not in kinds and (match := STATED.fullmatch(rest)):
-        rest, value = match["name"], float(match["shift"])
+        rest, value = match["name"], float(match["offset"])
         zero = np.radians(value) if match["measure"] == "deg" else value
         if rest in kinds and (match["measure"] == "m") != (kinds[rest] == "slide"):
             raise JointsError(f"joint {text!r}: {rest} is a {kinds[rest]}, whose zero is not in {match['measure']}")

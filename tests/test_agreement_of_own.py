@@ -319,14 +319,14 @@ def test_the_message_in_the_manner_of_numpy_testing(given):
     values = given.values["bias"].copy()
     values[7, 1] += 0.25
     lines = message_of(bias=values, gravity=given.values["gravity"], **given.states).splitlines()
-    assert lines[:2] == ["", "Not equal to MuJoCo to tolerance (64 eps) x the scale of each entry"]
-    assert lines[2] == "bias: mismatched entries 1 / 24 (4.17 %), at 1 / 12 states"
+    assert lines[0] == "Not equal to MuJoCo to tolerance (64 eps) x the scale of each entry"
+    assert lines[1] == "bias: mismatched entries 1 / 24 (4.17 %), at 1 / 12 states"
     q, qd = (given.states[name][7] for name in ("q", "qd"))
-    assert lines[3].startswith(f"  worst: h[knee] at state 7, q = [{q[0]:.6g}, {q[1]:.6g}], qd = [{qd[0]:.6g}, {qd[1]:.6g}]")
-    assert float(lines[4].removeprefix("    yours:  ")) == values[7, 1]
-    assert float(lines[5].removeprefix("    MuJoCo: ")) == given.values["bias"][7, 1]
-    assert lines[6].startswith("    difference: 0.25, ") and "times its tolerance of" in lines[6]
-    assert lines[7].startswith("Probable cause: No single number or term explains this")
+    assert lines[2].startswith(f"  worst: h[knee] at state 7, q = [{q[0]:.6g}, {q[1]:.6g}], qd = [{qd[0]:.6g}, {qd[1]:.6g}]")
+    assert float(lines[3].removeprefix("    yours:  ")) == values[7, 1]
+    assert float(lines[4].removeprefix("    MuJoCo: ")) == given.values["bias"][7, 1]
+    assert lines[5].startswith("    difference: 0.25, ") and "times its tolerance of" in lines[5]
+    assert lines[6].startswith("Probable cause: No single number or term explains this")
     assert lines[-1] == (
         "Compared with joints=['hip', 'knee']; another order, or '-hip', 'hip+90deg' and 'hip in deg', can be stated."
     )
@@ -342,10 +342,20 @@ def test_the_message_in_the_manner_of_numpy_testing(given):
     ({"acceleration": lambda q, v, t: np.linalg.solve(mass_matrix(q), t - wrong_bias(q, v) - np.array([0.3, 0]) * v)},
      "h[0], coefficient of qd1^2: yours is -1 times the right one."),
     (RIGHT | {"acceleration": lambda q, v, t: acceleration(q, v, t) * [1.0, 1.1]}, "mass_matrix and bias agree"),
-    (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v}, "Your bias is linear in qd: is damping in it?"),
+    (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v}, "damping of every joint in h: 0.1 N m s/rad in place of 0"),
+    (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v[::-1]}, "Your bias is linear in qd: is damping in it?"),
 ])  # fmt: skip
 def test_the_probable_cause_of(brought, cause):
     assert cause in message_of(**brought)
+
+
+def test_the_cause_is_sought_where_there_are_values(rng):
+    q, qd = rng.uniform(-2.0, 2.0, (2, 50, 2))
+    values = np.array([wrong_bias(*state) for state in zip(q, qd)])
+    values[:30] = np.nan
+    assert "Probable cause: h[0], coefficient of qd1^2: yours is -1 times the right one.\n" in message_of(
+        mass_matrix=mass_matrix, bias=values, q=q, qd=qd
+    )
 
 
 def test_values_of_accelerations_alone_have_no_cause_of_their_own(given):
@@ -362,7 +372,7 @@ def test_a_function_that_changes_its_argument_does_not_agree():
         return M
 
     text = message_of(mass_matrix=changing)
-    assert text.splitlines()[1] == "Equal to MuJoCo, but" and "mass_matrix changes its argument q at q = [" in text
+    assert text.splitlines()[0] == "Equal to MuJoCo, but" and "mass_matrix changes its argument q at q = [" in text
 
 
 def test_one_that_raises_later_is_said():

@@ -7,16 +7,16 @@ from ..judge.check import over
 from ..judge.words import listed
 from .given import Compared, Given
 
-LEAST_DIGITS = 3  # in common: then the constants may be rounded
+LEAST_DIGITS = 2  # in common: then the constants may be rounded
 MOST_LISTED = 8  # joints
 
 
 def message(given: Given, cause: str) -> str:
     """How many entries of which quantity are off, the worst place, the probable cause, and what can be stated."""
     beside = f" + rtol={given.rtol:g}" if given.rtol else ""
-    lines = ["", f"Not equal to MuJoCo to tolerance (64 eps{beside}) x the scale of each entry"]
+    lines = [f"Not equal to MuJoCo to tolerance (64 eps{beside}) x the scale of each entry"]
     if not given.fails:
-        lines = ["", "Equal to MuJoCo, but"]
+        lines = ["Equal to MuJoCo, but"]
     for name, one in given.compared.items():
         if (one.ratio > 1.0).any():
             lines += lines_of_quantity(given, name, one)

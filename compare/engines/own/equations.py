@@ -238,7 +238,8 @@ class OwnEquations:
 
     def check_symmetry(self, M: np.ndarray, q: np.ndarray) -> None:
         """Note where a mass matrix, (states, nv, nv) at q (states, nq) in one's own joints, is not symmetric."""
-        skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2))
+        with np.errstate(invalid="ignore"):  # inf - inf
+            skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2))
         self.note("mass_matrix", "is not symmetric", [q], skew > SKEW * np.abs(M).max(axis=(1, 2)))
 
     def note(self, name: str, what: str, given: list[np.ndarray], where) -> None:
@@ -247,8 +248,6 @@ class OwnEquations:
         if not where.any():
             return
         first = int(np.argmax(where))
-        text, state = (
-            what if what.startswith(name) else f"{name} {what}",
-            state_in_words([part[first] for part in given]),
-        )
+        text = what if what.startswith(name) else f"{name} {what}"
+        state = state_in_words([part[first] for part in given])
         self.found.setdefault((name, what), [state, text, 0])[2] += int(np.sum(where))
