@@ -19,7 +19,7 @@ from ...robots import Robot
 from ...setup import Setup
 from . import fault_table
 from .own_equations import asked_conditions, diagnosed_as_stated, for_command_line
-from .single_steps import Stepped, single_steps
+from .single_steps import Stepped, steps_of_integrators
 
 TITLE = "Diagnosis: what explains a difference?"
 SECONDS = 8.0  # of a search
@@ -108,7 +108,7 @@ def search(setup: Setup) -> Found:
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, size) if 1.0 < force_ratio < np.inf else []
     ratio = largest_ratio(off)
     agrees = name == "mujoco" and max(ratio, force_ratio) <= 1.0
-    steps = tuple(single_steps(setup, q, qd, tau)) if agrees else ()
+    steps = tuple(steps_of_integrators(setup, q, qd, tau)) if agrees else ()
     return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked, steps)
 
 
