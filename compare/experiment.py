@@ -144,7 +144,7 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
 
 def quiet(robot: Robot) -> AbstractContextManager:
     """A block in which numpy says nothing of what is no number, where a user's own equations may give such: checks do."""
-    return np.errstate(all="ignore") if robot.own else nullcontext()
+    return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()
 
 
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:

@@ -12,6 +12,7 @@ from .model import TINY, Equations
 from .places import OF_ZERO, Place
 
 ROUNDS = 25  # of a search from one start
+LEADING, PARTNERS = 4, 8  # single places, and others tried beside each
 FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds so many go on
 CONVERGED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
@@ -58,7 +59,8 @@ class Search:
         self.right = equations.values()[0]
         self.off = self.weighted(self.right)
         self.size = float(np.linalg.norm(self.off))
-        self.pair_fits: list[Fitted] = []  # of `pairs`, once they are sought
+        self.single_fits: list[Fitted] = []  # of `singles` and `pairs`, once they are sought
+        self.pair_fits: list[Fitted] = []
 
     def weighted(self, values: np.ndarray) -> np.ndarray:
         """What is left of given values, in tolerances, (..., states, entries); 0 where nothing is given."""
@@ -161,7 +163,8 @@ class Search:
         which, (x, left) = np.array(which), self.fitted(np.array(which), np.array(starts), FIRST_ROUNDS)
         near = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
         x[near], left[near] = self.fitted(which[near], x[near])
-        return self.outcome(which, x, left)
+        self.single_fits = self.outcome(which, x, left)
+        return self.single_fits
 
     @cached_property
     def expansion(self) -> tuple[np.ndarray, np.ndarray]:
@@ -173,6 +176,25 @@ class Search:
         size = np.array([[place.size] for place in self.places])
         up, down = (self.values(which, sign * size) for sign in (1.0, -1.0))
         return (up - down) / 2.0 * self.weight, ((up + down) / 2.0 - self.right) * self.weight
+
+    def partners(self, leading: Fitted) -> tuple[np.ndarray, np.ndarray]:
+        """Places that explain most of what a fitted one leaves, beside it, and starts: (PARTNERS, 2) each.
+
+        They are found by derivatives where that place is fitted: it may have moved too far for those where it is stated.
+        """
+        first = next(k for k, place in enumerate(self.places) if place is leading.places[0])
+        which = np.array([[first, k] for k in range(len(self.places)) if k != first])
+        x = np.tile([leading.changes[0], 0.0], (len(which), 1))
+        left = self.weighted(self.values(which[:1], x[:1])).ravel()
+        J = np.nan_to_num(self.derivatives(which, x)).reshape(len(which), 2, -1)
+        lengths = np.linalg.norm(J, axis=2)
+        J = np.divide(J, lengths[:, :, None], out=np.zeros_like(J), where=lengths[:, :, None] > 0.0)
+        normal = np.einsum("rim,rjm->rij", J, J) + 1e-9 * np.eye(2)
+        down = J @ left
+        step = np.linalg.solve(normal, down[:, :, None])[:, :, 0]
+        best = np.argsort(-np.einsum("ri,ri->r", step, down))[:PARTNERS]
+        steps = np.divide(step, lengths, out=np.zeros_like(step), where=lengths > 0.0)
+        return which[best], (x + steps)[best]
 
     def pairs(self) -> list[Fitted]:
         """Two places together, of all pairs those that come closest where each change acts alone, fitted."""
@@ -192,8 +214,12 @@ class Search:
         best = np.argsort(-gained)[:CANDIDATES]
         size = np.array([place.size for place in self.places])
         starts = coefficients[best][:, :2] / lengths[pairs[best]] * size[pairs[best]]
-        which = np.concatenate([pairs[best]] * 2)
-        starts = np.concatenate([starts, np.zeros_like(starts)])
+        which, starts = [pairs[best]] * 2, [starts, np.zeros_like(starts)]
+        for one in sorted(self.single_fits, key=lambda one: one.left)[:LEADING]:
+            more = self.partners(one)
+            which.append(more[0])
+            starts.append(more[1])
+        which, starts = np.concatenate(which), np.concatenate(starts)
         near, left = self.fitted(which, starts, FIRST_ROUNDS)
         found = np.argsort(np.nan_to_num((left**2).sum(axis=(1, 2)), nan=np.inf))[:FINALISTS]
         self.pair_fits = self.outcome(which[found], *self.fitted(which[found], near[found]))

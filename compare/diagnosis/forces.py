@@ -48,7 +48,13 @@ def causes_of_forces(
         return float(np.linalg.norm(rest)) / size if (np.abs(rest) <= tolerance).all() else None
 
     causes = []
-    if size == 0.0:
+    tolerance = np.broadcast_to(tolerance, left_over.shape)
+    if (
+        size == 0.0
+        or not np.isfinite(left_over).all()
+        or not (tolerance > 0.0).all()
+        or not np.isfinite(tolerance).all()
+    ):
         return causes
     for place, stated, explains, force in forms(tree, q, qd, tau, h):
         if (left := left_by(force)) is not None:
@@ -61,7 +67,7 @@ def causes_of_forces(
             matrix = np.stack([column.force.ravel() for column in chosen], axis=1)
             if np.linalg.matrix_rank(matrix) < count:
                 continue
-            weight = (1.0 / np.broadcast_to(tolerance, left_over.shape)).ravel()
+            weight = (1.0 / tolerance).ravel()
             x = np.linalg.lstsq(matrix * weight[:, None], left_over.ravel() * weight, rcond=None)[0]
             if (left := left_by((matrix @ x).reshape(left_over.shape))) is not None:
                 causes.append(of_columns(chosen, x, left, 1 + count))

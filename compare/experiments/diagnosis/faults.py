@@ -50,7 +50,8 @@ class Fault(NamedTuple):
 
 
 def fault_list(robot: str, tree: tmt.Tree, every_size: bool) -> Iterator[Fault]:
-    """Every kind of fault of one robot. every_size: numbers are changed by several sizes, and flipped."""
+    """Every kind of fault of one robot. every_size: numbers are changed by several sizes, and flipped;
+    terms are omitted, halved and flipped, else one of these."""
 
     def fault(name, kind, size, expected, values, *make) -> Fault:
         return Fault(robot, tree, name, kind, "list", size, tuple(expected), tuple(values), make)
@@ -61,10 +62,11 @@ def fault_list(robot: str, tree: tmt.Tree, every_size: bool) -> Iterator[Fault]:
                 edited, value, size = made
                 yield fault(f"{place} {size:+.3g}", "number", size, [place], [value], "tree", edited)
     bodies = range(len(tree.mass))
-    for term, name in TERM_NAMES.items():
+    for t, (term, name) in enumerate(TERM_NAMES.items()):
         for which in [[b] for b in bodies] + [list(bodies)]:
             place = name.format(tree.body_names[which[0]] if len(which) == 1 else "every body")
-            for factor, word in ((0.0, "omitted"), (0.5, "halved"), (-1.0, "flipped")):
+            forms = ((0.0, "omitted"), (0.5, "halved"), (-1.0, "flipped"))
+            for factor, word in forms if every_size else [forms[(t + which[0]) % 3]]:
                 factors = {(b, term): factor for b in which}
                 yield fault(f"{place} {word}", "term", factor, [place], [factor], "derived", factors)
     for slip, name in SLIPS.items():

@@ -10,7 +10,7 @@ from .faults import TERM_NAMES, Fault, changed, own_joints, tree_numbers
 
 SEED_OF_FAULTS = 13
 MOST_JOINTS_OF_TREE = 5
-KINDS_OF_FAULTS = ("number", "number", "number", "term", "convention", "composition", "pair")
+KINDS_OF_FAULTS = ("number",) * 5 + ("term",) * 2 + ("convention",) * 2 + ("composition", "pair")
 
 
 def generated(count: int) -> list[Fault]:

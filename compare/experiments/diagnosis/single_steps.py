@@ -31,7 +31,7 @@ class Stepped(NamedTuple):
         return f"no scheme of tmt, no dt and no implicit term explains the steps of {self.integrator}"
 
 
-def single_steps(setup: Setup, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Stepped]:
+def steps_of_integrators(setup: Setup, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Stepped]:
     """Of every integrator of MuJoCo, with damping added; q, qd, tau: states. [] of a robot with many joints."""
     case, found = setup.robot.case("damped", damping=DAMPING_ADDED), []
     if setup.robot.coordinates.nv > MOST_SPEEDS_STEPPED:
