@@ -4,9 +4,12 @@ import importlib
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from types import ModuleType
+
+import numpy as np
 
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
@@ -129,13 +132,19 @@ def find_causes(setup: Setup) -> list[dict]:
 def attempt(name: str, act: Callable, setup: Setup) -> tuple:
     """What an experiment's function returns, and None; if it raises, None and a Result with one failed check."""
     try:
-        return act(setup), None
+        with quiet(setup.robot):
+            return act(setup), None
     except WorkerEnded:
         raise
     except Exception as error:
         result = Result(name, shown=[])
         result.check("", ENDS, None, 0.0, "", described(error), rule="equal")
         return None, result
+
+
+def quiet(robot: Robot) -> AbstractContextManager:
+    """A block in which numpy says nothing of what is no number, where a user's own equations may give such: checks do."""
+    return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()
 
 
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
@@ -185,11 +194,12 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
         for call in module(experiment).figures(result, robot):
             name, path = called(call), None
             try:
-                file, figure, caption = call()
+                with quiet(robot):
+                    file, figure, caption = call()
                 while file.casefold() in {other.casefold() for other, _ in drawn}:
                     file += "_"  # names that differ in signs alone may give one file
                 path = folder / f"{file}.png"
-                with writing(path):
+                with writing(path), quiet(robot):
                     figure.savefig(path)
                 drawn.append((file, caption))
             except OSError:

@@ -16,7 +16,7 @@ from .coordinates import Coordinates
 from .judge.words import listed
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
-STATED = re.compile(r"(?P<name>.+?)(?P<zero>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
+STATED = re.compile(r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
 FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
@@ -34,11 +34,12 @@ class Joint(NamedTuple):
     slides: bool = False
 
     def __str__(self):
-        zero = f"{self.zero:+.17g}m" if self.zero else ""
+        exact = f"{'+' * (self.zero > 0.0)}{float(self.zero)!r}"
+        zero = f"{exact}m" if self.zero else ""
         if self.zero and not self.slides:
             degrees = np.degrees(self.zero)
             whole = abs(degrees - round(degrees, 6)) <= 1e-9
-            zero = f"{round(degrees, 6):+g}deg" if whole else f"{self.zero:+.17g}rad"
+            zero = f"{round(degrees, 6):+.10g}deg" if whole else f"{exact}rad"
         return f"{'-' * (self.sign < 0.0)}{self.name}{zero}{' in ' * bool(self.unit)}{self.unit}"
 
 
@@ -133,7 +134,7 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
     if rest not in kinds and rest.startswith("-"):
         rest, sign = rest[1:], -1.0
     if rest not in kinds and (match := STATED.fullmatch(rest)):
-        rest, value = match["name"], float(match["zero"])
+        rest, value = match["name"], float(match["offset"])
         zero = np.radians(value) if match["measure"] == "deg" else value
         if rest in kinds and (match["measure"] == "m") != (kinds[rest] == "slide"):
             raise JointsError(f"joint {text!r}: {rest} is a {kinds[rest]}, whose zero is not in {match['measure']}")

@@ -141,6 +141,20 @@ def test_what_is_wrong_at_some_states_is_a_failed_check_with_the_state(folder, n
     assert all(check.quantity != "runs to its end" for check in failed(run))
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("name, says", [("singular", "mass_matrix is singular"), ("infinite", "bias is not finite")])
+def test_equations_without_any_use_are_compared_to_the_end(folder, name, says):
+    run = examined(folder, f"mine.py:{name}", ["mass", "gravity", "acceleration", "trajectory", "diagnosis"])
+    assert any(says in check.note for check in failed(run))
+    assert not any(check.quantity == "runs to its end" or check.quantity.startswith("figure") for check in failed(run))
+
+
+def test_gravity_of_ones_own_is_compared_with_the_bias_at_rest_too(folder):
+    run = examined(folder, "mine.py:doubled", ["gravity", "acceleration"])
+    assert {"holding torque", "yours: gravity - bias at rest"} <= {check.quantity for check in failed(run)}
+    assert {check.experiment for check in failed(run)} == {"gravity"}
+
+
 # what is left out
 
 
@@ -281,7 +295,7 @@ def test_what_is_no_number_is_not_explained(folder):
     notes = run.sections[0].result.notes
     assert any("Not all values are numbers" in note for note in notes)
     assert not any("nothing to explain" in note.lower() for note in notes)
-    assert [check.quantity for check in failed(run)][0] == "bias gives what it should"
+    assert failed(run)[0].quantity == "bias gives what it should"
 
 
 def test_slow_equations_are_explained_without_what_takes_long(folder):

@@ -106,7 +106,7 @@ class Given:
         count = self.own.affordable(len(self.q), OWN_SECONDS)
         if count < len(self.q):
             said = f"{count} states in place of {states}: your functions take {self.own.seconds:.2g} s a state"
-            warnings.warn(said, stacklevel=5)
+            warnings.warn(said, stacklevel=4)
             self.q, self.qd, self.tau = self.q[:count], self.qd[:count], self.tau[:count]
 
     def take_states(self, q, qd, tau) -> None:

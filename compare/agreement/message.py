@@ -7,28 +7,29 @@ from ..judge.check import over
 from ..judge.words import listed
 from .given import Compared, Given
 
-LEAST_DIGITS = 3  # in common: then the constants may be rounded
+LEAST_DIGITS = 2  # in common: then the constants may be rounded
+MOST_LISTED = 8  # joints
 
 
 def message(given: Given, cause: str) -> str:
     """How many entries of which quantity are off, the worst place, the probable cause, and what can be stated."""
     beside = f" + rtol={given.rtol:g}" if given.rtol else ""
-    lines = ["", f"Not equal to MuJoCo to tolerance (64 eps{beside}) x the scale of each entry"]
+    lines = [f"Not equal to MuJoCo to tolerance (64 eps{beside}) x the scale of each entry"]
     if not given.fails:
-        lines = ["", "Equal to MuJoCo, but"]
+        lines = ["Equal to MuJoCo, but"]
     for name, one in given.compared.items():
         if (one.ratio > 1.0).any():
-            lines += of_quantity(given, name, one)
+            lines += lines_of_quantity(given, name, one)
     lines += given.problems
     if cause:
         lines.append(f"Probable cause: {cause}")
     if given.fails:
-        lines += of_digits(given)
-        lines.append(of_joints(given))
+        lines += line_of_digits(given)
+        lines.append(line_of_joints(given))
     return "\n".join(lines)
 
 
-def of_quantity(given: Given, name: str, one: Compared) -> list[str]:
+def lines_of_quantity(given: Given, name: str, one: Compared) -> list[str]:
     """The entries of one quantity that are off."""
     ratio = one.ratio
     count, worst = int((ratio > 1.0).sum()), np.unravel_index(int(np.argmax(ratio)), ratio.shape)
@@ -46,7 +47,7 @@ def of_quantity(given: Given, name: str, one: Compared) -> list[str]:
     ]
 
 
-def of_digits(given: Given) -> list[str]:
+def line_of_digits(given: Given) -> list[str]:
     """To how many digits all agree, and what to state if the constants are rounded."""
     worst = max(float(over(np.abs(one.own - one.right), one.scale).max()) for one in given.compared.values())
     if not 0.0 < worst <= 10.0**-LEAST_DIGITS:
@@ -57,10 +58,12 @@ def of_digits(given: Given) -> list[str]:
     return [f"Yours agree to {digits} digits of their terms: if your constants are rounded, state rtol={rtol:g}."]
 
 
-def of_joints(given: Given) -> str:
+def line_of_joints(given: Given) -> str:
     """In which joints it was compared, and how others are stated."""
     joints = given.joints.joints
     text = f"Compared with joints={[str(joint) for joint in joints]}"
+    if len(joints) > MOST_LISTED and not given.are_stated:
+        text = f"Compared with the {len(joints)} joints in the order of the model"
     kinds = dict(zip(given.coordinates.names, given.coordinates.all_kinds))
     straight = [joint for joint in joints if kinds[joint.name] != "ball"]
     if given.are_stated or not straight:

@@ -125,8 +125,9 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
     which = "each named posture" if len(postures) == len(kept) else f"the first {len(postures)} of {len(kept)} postures"
     of = "" if len(shown) == len(speeds) else f", at the {len(shown)} of {len(speeds)} joints that need most"
     springs = " with its springs" if robot.tree.has_springs else ""
+    most = f"at most {apart:.1e}" if np.isfinite(apart) else "somewhere no number of"
     caption = (
-        f"Torque that holds {which}{springs}{of}: {LABELS[first]} (bars) and MuJoCo (black marks), at most {apart:.1e} "
+        f"Torque that holds {which}{springs}{of}: {LABELS[first]} (bars) and MuJoCo (black marks), {most} "
         f"{unit(robot.tree, 'N m', 'N')} apart. " + needless(kept, robot)
     )
     return "gravity_postures", fig, caption

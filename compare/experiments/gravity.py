@@ -104,6 +104,9 @@ def rows(setup: Setup) -> Result:
         q, scale = sample.q, scales(tree, is_read, sample.q)
         held, engine_held = ours.gravity_balance(q), theirs.gravity_balance(q)
         result.agree(sample, "holding torque", units, held, engine_held, scale.weight, truth="gravity_balance")
+        if "gravity" in setup.robot.own:
+            still = ours.bias(q, np.zeros(tree.coordinates.nv))
+            result.agree(sample, "yours: gravity - bias at rest", units, held, still, scale.weight)
         if tree.has_springs:
             held, engine_held = held + tmt.spring_torque(q, tree), theirs.inverse(q, 0.0, 0.0)
             result.agree(sample, "holding torque, springs too", units, held, engine_held, scale.holding)

@@ -9,9 +9,9 @@ from tmt.stepping import stepped
 
 from ...case import Case
 from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states
-from .equations import OwnEquations, Problem
+from .equations import OwnEquations
 from .functions import ARGUMENTS, OwnError, is_function
-from .returned import state_in_words
+from .returned import Problem, state_in_words
 
 __all__ = ["ARGUMENTS", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem", "is_function", "state_in_words"]
 

@@ -2,7 +2,6 @@
 
 import time
 import warnings
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,19 +12,12 @@ from ...case import Coordinates
 from ...joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
 from .functions import ARGUMENTS, STATE, OwnError, call, functions_of, names_of
-from .returned import SHAPES, as_raised, converted, same, state_in_words
+from .returned import SHAPES, Problem, and_more, as_raised, converted, same, state_in_words
 
 SKEW = 1e-9  # of the largest entry: from here on a mass matrix is not symmetric; less is a difference of entries
+DIVERGED = 2.0**49  # rad and so on: beyond it a run has diverged, and what is found there is no fault of its equations
 AT_ONCE = 1.5  # times what one state takes: two or three at once take no more, and so do many
 TIMED, SLOW = 64, 0.01  # states that are tried together to see what one takes; unless so few take as long as this, s
-
-
-class Problem(NamedTuple):
-    """Something wrong with equations that can be used all the same."""
-
-    quantity: str
-    state: str  # the first at which it was found, as the function was given it
-    text: str  # one line
 
 
 class OwnEquations:
@@ -52,9 +44,9 @@ class OwnEquations:
             self.joints = joints or joint_map(coordinates, names_of(source))
         except JointsError as error:
             raise OwnError(f"joint_names: {error}") from None
-        self.takes_batches: dict[str, bool] = {}  # of each function that was called
-        self.times: dict[str, tuple[float, float]] = {}  # s of one state, and of one more in a batch
-        self.shapes: dict[str, tuple] = {}  # of what each gives at one state
+        # of each function that was called: whether it takes batches, s of one state and of one more, the shape of its value
+        self.takes_batches: dict[str, bool] = {}
+        self.times, self.shapes = {}, {}
         self.found: dict[tuple[str, str], list] = {}  # (quantity, what): [state, text, at how many]
 
     def has(self, name: str) -> bool:
@@ -65,7 +57,7 @@ class OwnEquations:
     def problems(self) -> list[Problem]:
         """What was found wrong so far, each once."""
         return [
-            Problem(quantity, state, f"{text} at {state}" + (f", and at {count - 1} more states" if count > 1 else ""))
+            Problem(quantity, state, f"{text} at {state}{and_more(count - 1)}")
             for (quantity, _), (state, text, count) in self.found.items()
         ]
 
@@ -77,7 +69,7 @@ class OwnEquations:
     def affordable(self, states: int, seconds: float) -> int:
         """How many of so many states there is time for, at least 1, with each function called once at each."""
         each = sum(more for _, more in self.times.values())
-        return states if each == 0.0 else int(np.clip(seconds / each, 1, states))
+        return int(np.clip(seconds / each, 1, states)) if each else states
 
     # quantities at states
 
@@ -132,9 +124,11 @@ class OwnEquations:
         return tuple(self.joints.forces(part) for part in both)
 
     def try_at(self, q, v, tau) -> None:
-        """Call every function at the first of some states; OwnError if one cannot be used."""
+        """Call every function at the first of some states, as often as its time is known; OwnError if one cannot be used."""
+        given = self.own_states(rows_of_states(q, v, tau)[1])
         for name in self.functions:
-            self.asked(name, *(q, v, tau)[: ARGUMENTS[name]])
+            if name not in self.takes_batches:
+                self.first(name, given[: ARGUMENTS[name]])
 
     # how functions are called
 
@@ -154,7 +148,7 @@ class OwnEquations:
         self.note(name, "is not finite", given, bad)
         values = np.full((len(rows[0]), *found.shape[1:]), np.nan)
         values[finite] = found
-        return values.reshape(*batch, *values.shape[1:])
+        return values.reshape((*batch, *values.shape[1:]))
 
     def own_states(self, rows: list[np.ndarray]) -> list[np.ndarray]:
         """q, qd and tau, as many as there are, in one's own joints."""
@@ -231,8 +225,8 @@ class OwnEquations:
                 hint = f"; of the class {self.source.__name__} an object such as {self.source.__name__}() is expected"
             raise OwnError(f"{name} raised {as_raised(error)}{hint}") from error
         for symbol, before, after in zip(STATE, given, handed):
-            if not np.array_equal(before, after):
-                self.note(name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], [True])
+            changed = np.atleast_2d(before != after).any(axis=1)
+            self.note(name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], changed)
         expected = self.shapes.get(name, SHAPES[name](self.coordinates.nv))
         if name != "jacobians":
             return converted(name, value, expected, count)
@@ -244,12 +238,14 @@ class OwnEquations:
 
     def check_symmetry(self, M: np.ndarray, q: np.ndarray) -> None:
         """Note where a mass matrix, (states, nv, nv) at q (states, nq) in one's own joints, is not symmetric."""
-        skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2))
+        with np.errstate(invalid="ignore"):  # inf - inf
+            skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2))
         self.note("mass_matrix", "is not symmetric", [q], skew > SKEW * np.abs(M).max(axis=(1, 2)))
 
     def note(self, name: str, what: str, given: list[np.ndarray], where) -> None:
         """Add a problem at those of the states (states, n), in one's own joints, at which it was found."""
-        if not np.any(where):
+        where = np.logical_and.reduce([where, *((np.abs(part) <= DIVERGED).all(axis=1) for part in given)])
+        if not where.any():
             return
         first = int(np.argmax(where))
         text = what if what.startswith(name) else f"{name} {what}"

@@ -86,15 +86,21 @@ def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Callable]:
 
 def is_function(value: object) -> bool:
     """Whether a value is brought as a function, or in symbols; else it is numbers."""
-    of_pair = isinstance(value, tuple | list) and len(value) == 2 and hasattr(value[0], "free_symbols")
-    return callable(value) or hasattr(value, "free_symbols") or of_pair
+    return callable(value) or hasattr(value, "free_symbols") or is_pair(value)
+
+
+def is_pair(value: object) -> bool:
+    """Whether it is a SymPy matrix with the list of its symbols, and not two expressions."""
+    if not isinstance(value, tuple | list) or len(value) != 2 or not hasattr(value[0], "free_symbols"):
+        return False
+    return isinstance(value[1], tuple | list) or hasattr(value[1], "shape")
 
 
 def function_of(name: str, value: object, symbols: object, coordinates: Coordinates) -> Callable:
     """One quantity as a function: as it is, or of a SymPy matrix, or of a pair of one and its symbols."""
     if callable(value) and not hasattr(value, "free_symbols"):
         return value
-    if isinstance(value, tuple | list) and len(value) == 2 and hasattr(value[0], "free_symbols"):
+    if is_pair(value):
         value, symbols = value
     if symbols is None:
         raise OwnError(

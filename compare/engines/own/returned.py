@@ -3,6 +3,7 @@
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,15 @@ from .functions import STATE, OwnError
 
 SAME = 1e-12  # of the largest value: a batch gives what single states give, but for rounding
 MOST_SHOWN = 8  # numbers of a state in a message
+
+
+class Problem(NamedTuple):
+    """Something wrong with equations that can be used all the same."""
+
+    quantity: str
+    state: str  # the first at which it was found, as the function was given it
+    text: str  # one line
+
 
 SHAPES: dict[str, Callable] = {  # of one state; None: the number of bodies, which is what it gives at first
     "mass_matrix": lambda nv: (nv, nv),
@@ -55,6 +65,11 @@ def same(together: np.ndarray, singles: np.ndarray) -> bool:
 def state_in_words(state: list[np.ndarray]) -> str:
     """q, qd and tau, as many as there are, as they can be typed."""
     return ", ".join(f"{symbol} = {typed(part)}" for symbol, part in zip(STATE, state))
+
+
+def and_more(count: int) -> str:
+    """So many states beside the one that is named."""
+    return f", and at {count} more state{'s' * (count > 1)}" if count else ""
 
 
 def typed(values: np.ndarray) -> str:

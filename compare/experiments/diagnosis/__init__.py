@@ -104,12 +104,17 @@ def search(setup: Setup) -> Found:
     right = packed(tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree), tree.coordinates.nv, len(q))
     off = over(np.abs(values - right), allowed)
     acting, size = left_over(tree, q, qd, tau, M, h, np.asarray(given.acceleration(q, qd, tau)))
-    force_ratio = float(np.nan_to_num(over(np.abs(acting), size), nan=np.inf).max())
+    force_ratio = largest_ratio(over(np.abs(acting), size))
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, size) if 1.0 < force_ratio < np.inf else []
-    ratio = float(np.nan_to_num(off, nan=np.inf).max())
+    ratio = largest_ratio(off)
     agrees = name == "mujoco" and max(ratio, force_ratio) <= 1.0
     steps = tuple(steps_of_integrators(setup, q, qd, tau)) if agrees else ()
     return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked, steps)
+
+
+def largest_ratio(ratios: np.ndarray) -> float:
+    """The largest of them; inf where one is no number."""
+    return float(np.where(np.isfinite(ratios), ratios, np.inf).max())
 
 
 def packed_tolerances(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:

@@ -95,7 +95,7 @@ def begin(setup: Setup) -> None:
     spread, finer, left_out = setup.map, setup.finer, []
     if setup.robot.own:  # which stay in this process
         spread, exact = map, []
-        cases, finer, left_out = within_time(setup, cases)
+        cases, finer, left_out = within_time(setup, cases, entries(setup))
     schemes = [method.scheme for method in one_of_each_scheme(setup.engines["mujoco"])]
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = [] if setup.robot.own else setup.of(cases, [], cases)

@@ -59,6 +59,7 @@ AGREEMENTS = (
     ("gravity", "rows", '"holding torque"'),
     ("gravity", "rows", '"holding torque, springs too"'),
     ("gravity", "rows", 'f"{_1}: torque - dV/dq"'),
+    ("gravity", "rows", '"yours: gravity - bias at rest"'),
     ("gravity", "rows", '"MuJoCo: torque - dV/dq"'),
     ("gravity", "rows", 'f"qdd of MuJoCo under {_1} torque"'),
     ("acceleration", "rows", '"bias"'),

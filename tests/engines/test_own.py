@@ -1,0 +1,417 @@
+"""Equations of a user's own as an engine: what they may be, how they are asked, and what is said where they are wrong."""
+
+import dataclasses
+import subprocess
+import sys
+import time
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy
+from models import PATHS
+from sympy.physics.mechanics import dynamicsymbols
+
+import tmt
+from compare.case import Coordinates
+from compare.engines.mujoco import read
+from compare.engines.own import ARGUMENTS, Own, OwnEquations, OwnError
+from compare.engines.tmt import Tmt
+from compare.joint_map import joint_map
+from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+
+ROOT = Path(__file__).resolve().parents[2]
+COORDINATES = ARM.coordinates
+TWO = Coordinates(("hip", "knee"))
+NAMES = {"gravity": "gravity_balance"}
+
+
+def single(function):
+    """The function of one state alone: as a user writes it."""
+
+    def of_one(*state):
+        assert all(part.ndim == 1 for part in state)
+        return function(*state)
+
+    return of_one
+
+
+def as_lists(function):
+    """The same with lists and plain numbers for arrays."""
+    return single(lambda *state: np.array(function(*state)).tolist())
+
+
+def states(rng, count=6, n=3):
+    return rng.uniform(-2.0, 2.0, (3, count, n))
+
+
+def asked(own, name, state):
+    return getattr(own, NAMES.get(name, name))(*state[: ARGUMENTS[name]])
+
+
+def values(own, state):
+    """Every quantity at states."""
+    found = {name: asked(own, name, state) for name in ARGUMENTS if name != "jacobians"}
+    return found | dict(zip("TB", own.jacobians(state[0])))
+
+
+@pytest.mark.parametrize("make", [
+    lambda: tmt.ARM, lambda: tmt,
+    lambda: types.SimpleNamespace(**{n: getattr(tmt, NAMES.get(n, n)) for n in ARGUMENTS}),
+    lambda: {n: single(getattr(tmt, NAMES.get(n, n))) for n in ARGUMENTS},
+    lambda: {n: as_lists(getattr(tmt, NAMES.get(n, n))) for n in ARGUMENTS},
+])  # fmt: skip
+def test_an_object_a_module_a_mapping_and_a_tree_give_the_same(make, rng):
+    state = states(rng)
+    own = OwnEquations(make(), COORDINATES, joint_map(COORDINATES, None), ARM.tree)
+    for name in ("mass_matrix", "bias"):
+        assert own.has(name)
+    for name in filter(own.has, set(ARGUMENTS) - {"jacobians"}):
+        assert np.array_equal(asked(own, name, state), getattr(tmt, NAMES.get(name, name))(*state[: ARGUMENTS[name]]))
+    assert own.problems == []
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (7,), (2, 3)])
+@pytest.mark.parametrize("way", [single, lambda f: f])
+def test_any_batch_of_functions_that_take_one_state_or_many(batch, way, rng):
+    own = OwnEquations({n: way(getattr(tmt, NAMES.get(n, n))) for n in ARGUMENTS}, COORDINATES)
+    state = rng.uniform(-2.0, 2.0, (3, *batch, 3))
+    found, right = values(own, state), values(OwnEquations(tmt.ARM, COORDINATES), state)
+    for name in right:
+        assert found[name].shape == right[name].shape and np.array_equal(found[name], right[name]), name
+    if np.prod(batch) > 1:
+        assert set(own.takes_batches.values()) == {way is not single}
+
+
+def test_two_states_of_two_joints_are_not_taken_for_components(rng):
+    """q[0] of a (2, 2) batch is a state: shapes alone would not show it."""
+
+    def mass_matrix(q):
+        c = np.cos(q[1])
+        return np.array([[3.0 + 2.0 * c, 1.0 + c], [1.0 + c, 1.0]])
+
+    own = OwnEquations({"mass_matrix": mass_matrix}, TWO, required=())
+    for count in (2, 3, 5):
+        q = rng.uniform(-2, 2, (count, 2))
+        assert np.array_equal(own.mass_matrix(q), [mass_matrix(one) for one in q])
+    assert own.takes_batches == {"mass_matrix": False}
+
+
+def test_a_batch_of_the_right_shape_with_other_values_is_not_taken(rng):
+    """A norm of all states is that of none of them."""
+    own = OwnEquations({"bias": lambda q, v: np.sin(q) / (1.0 + np.linalg.norm(v))}, COORDINATES, required=())
+    q, v, _ = states(rng)
+    assert np.array_equal(own.bias(q, v), np.sin(q) / (1.0 + np.linalg.norm(v, axis=1, keepdims=True)))
+    assert own.takes_batches == {"bias": False}
+
+
+# SymPy
+
+q1, q2, u1, u2 = sympy.symbols("q1 q2 u1 u2")
+M2 = sympy.Matrix([[3 + 2 * sympy.cos(q2), 1 + sympy.cos(q2)], [1 + sympy.cos(q2), 1]])
+h2 = sympy.Matrix([-sympy.sin(q2) * (2 * u1 * u2 + u2**2), sympy.sin(q2) * u1**2])
+
+
+def plain(q, v):
+    c, s = np.cos(q[..., 1]), np.sin(q[..., 1])
+    one = np.ones_like(c)
+    M = np.stack([3 + 2 * c, 1 + c, 1 + c, one], -1).reshape(*c.shape, 2, 2)
+    return M, np.stack([-s * (2 * v[..., 0] * v[..., 1] + v[..., 1] ** 2), s * v[..., 0] ** 2], -1)
+
+
+@pytest.mark.parametrize("source", [
+    {"mass_matrix": M2, "bias": h2, "symbols": [q1, q2, u1, u2]},
+    types.SimpleNamespace(mass_matrix=M2, bias=h2, symbols=sympy.Matrix([q1, q2, u1, u2])),
+    {"mass_matrix": (M2, [q1, q2]), "bias": (h2, (q1, q2, u1, u2))},
+    {"mass_matrix": M2.tolist(), "bias": list(h2), "symbols": [[q1, q2], [u1, u2]]},
+])  # fmt: skip
+def test_sympy_matrices_with_their_symbols(source, rng):
+    own = OwnEquations(source, TWO)
+    q, v, _ = states(rng, 5, 2)
+    M, h = plain(q, v)
+    assert np.allclose(own.mass_matrix(q), M, atol=1e-15) and np.allclose(own.bias(q, v), h, atol=1e-14)
+    assert own.mass_matrix(q[0]).shape == (2, 2) and own.takes_batches["bias"]
+
+
+def test_sympy_symbols_may_be_functions_of_time(rng):
+    moving = dynamicsymbols("a b")
+    rates = [x.diff() for x in moving]
+    changed = dict(zip((q1, q2, u1, u2), (*moving, *rates)))
+    source = {"mass_matrix": M2.subs(changed), "bias": h2.subs(changed), "symbols": [*moving, *rates]}
+    q, v, _ = states(rng, 5, 2)
+    assert np.allclose(OwnEquations(source, TWO).bias(q, v), plain(q, v)[1], atol=1e-14)
+
+
+@pytest.mark.parametrize("source, said", [
+    ({"mass_matrix": M2}, "mass_matrix is Matrix.*a function mass_matrix\\(q\\) is expected, or a SymPy matrix with"),
+    ({"mass_matrix": M2 * sympy.Symbol("m"), "symbols": [q1, q2]}, "has the symbol m; a number is expected"),
+    ({"mass_matrix": M2 * u1, "symbols": [q1, q2, u1, u2]}, r"depends on u1; mass_matrix\(q\) is expected"),
+    ({"mass_matrix": M2, "symbols": [q1, q2, u1]}, "has the symbols q1, q2, u1; 2 of q, or 4 of q and qd"),
+    ({"mass_matrix": M2, "symbols": [q1, q1]}, "each once"),
+    ({"mass_matrix": M2[:1, :], "symbols": [q1, q2]}, r"2 entries; shape \(2, 2\) is expected"),
+])  # fmt: skip
+def test_sympy_that_does_not_fit(source, said):
+    with pytest.raises(OwnError, match=said) as error:
+        OwnEquations(source, TWO, required=())
+    assert "\n" not in str(error.value)
+
+
+# joints
+
+STATED = ["gamma+90deg", "-beta in deg", "alpha"]
+
+
+def turned(of):
+    """The arm's equations in other joints."""
+    return {
+        "mass_matrix": lambda q: of.own_mass_matrix(tmt.mass_matrix(of.positions(q))),
+        "bias": lambda q, v: of.own_forces(tmt.bias(of.positions(q), of.speeds(v))),
+        "acceleration": lambda q, v, t: of.own_forces(tmt.acceleration(of.positions(q), of.speeds(v), of.forces(t))),
+        "jacobians": lambda q: tuple(of.own_forces(part) for part in tmt.jacobians(of.positions(q))),
+    }
+
+
+@pytest.mark.parametrize("how", ["joints", "joint_names"])
+def test_joints_as_they_are_stated_or_as_the_object_names_them(how, rng):
+    state, of = states(rng), joint_map(COORDINATES, STATED)
+    source = turned(of) | ({"joint_names": tuple(STATED)} if how == "joint_names" else {})
+    own = OwnEquations(source, COORDINATES, of if how == "joints" else None, ARM.tree)
+    right = OwnEquations(tmt.ARM, COORDINATES, None, ARM.tree)
+    for name in ("mass_matrix", "bias", "acceleration"):
+        assert np.allclose(asked(own, name, state), asked(right, name, state), atol=1e-11), name
+    for found, known in zip(own.jacobians(state[0]), right.jacobians(state[0])):
+        assert np.allclose(found, known, atol=1e-14)
+
+
+def test_what_is_stated_goes_before_the_names_of_the_object():
+    source = turned(joint_map(COORDINATES, STATED)) | {"joint_names": ["gamma", "beta", "alpha"]}
+    own = OwnEquations(source, COORDINATES, joint_map(COORDINATES, STATED))
+    assert [str(joint) for joint in own.joints.joints] == STATED
+
+
+def test_a_tree_in_another_order_is_matched_by_its_names(rng):
+    reading = read(PATHS["mixed"])
+    robot = robot_of(reading, "mixed")
+    own = OwnEquations(reading.tree, robot.coordinates)
+    q, v, tau = robot.coordinates.random(rng, 4), *rng.normal(size=(2, 4, robot.coordinates.nv))
+    assert np.array_equal(own.acceleration(q, v, tau), tmt.acceleration(q, v, tau, reading.tree))
+
+
+@pytest.mark.parametrize("source, said", [
+    ({"joint_names": ["a", "b", "c"]}, "joint_names: there is no joint 'a'"), ({"joint_names": 3}, "joint_names is 3"),
+    ({"joint_names": "alpha"}, "joint_names: joints is 'alpha'; a list of names"),
+    ({"joint_names": ["alpha", "beta"]}, "joint_names: joints do not name gamma"),
+])  # fmt: skip
+def test_names_that_do_not_fit(source, said):
+    with pytest.raises(OwnError, match=said):
+        OwnEquations({"mass_matrix": tmt.mass_matrix, "bias": tmt.bias} | source, COORDINATES)
+
+
+# what is missing
+
+def test_what_is_missing_is_made_of_what_is_there(rng):
+    tree = dataclasses.replace(tmt.ARM, damping=(0.1, 0.2, 0.3), stiffness=(1.0, 0.0, 2.0), rest=(0.1, 0.0, 0.2))
+    source = {"mass_matrix": lambda q: tmt.mass_matrix(q, tree), "bias": lambda q, v: tmt.bias(q, v, tree)}
+    q, v, tau = states(rng)
+    own = OwnEquations(source, COORDINATES, tree=tree)
+    assert not own.has("acceleration") and not own.has("gravity")
+    assert np.allclose(own.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), atol=1e-11)
+    assert np.allclose(own.gravity_balance(q), tmt.gravity_balance(q, tree), atol=1e-14)
+    with pytest.raises(OwnError, match=r"have no energy\(q, qd\)"):
+        own.energy(q, v)
+
+
+def test_a_case_changes_own_equations_as_it_changes_the_others(rng):
+    own, right = Own(OwnEquations(tmt.ARM, COORDINATES, tree=ARM.tree)), Tmt()
+    for changes in ({}, {"gravity": False}, {"damping": 0.05}, {"posture": "bent", "locked": ("beta",)},
+                    {"posture": "bent", "locked": ("alpha",), "gravity": False, "damping": 0.02}):  # fmt: skip
+        case = ARM.case(**changes)
+        ours, theirs = own.of(case), right.of(case)
+        state = states(rng, 4, case.coordinates.nv)
+        for name in ("mass_matrix", "bias", "gravity", "acceleration"):
+            assert np.allclose(asked(ours, name, state), asked(theirs, name, state), atol=1e-11), (changes, name)
+        if changes and not changes.get("damping"):
+            continue  # what is compiled for them takes its time
+        motion, known = (d.run(*(part[:2] for part in state), 0.005, 20, "rk4") for d in (ours, theirs))
+        assert np.allclose(motion.states, known.states, atol=1e-10) and list(motion.ended) == [None, None]
+
+
+# motion
+
+def test_it_runs_by_the_same_rk4_as_tmt_balls_too(rng):
+    reading = read(PATHS["pendulum_ball"])
+    robot = robot_of(reading, "a ball")
+    own = Own(OwnEquations(reading.tree, robot.coordinates, tree=reading.tree), ("rk4_mean_speed",)).of(robot.case())
+    start = robot.coordinates.random(rng, 3), *rng.normal(size=(2, 3, robot.coordinates.nv))
+    for method in ("rk4", "rk4_mean_speed"):
+        motion = own.run(*start, 0.01, 30, method)
+        known = Tmt(("rk4_mean_speed",)).of(robot.case()).run(*start, 0.01, 30, method)
+        assert np.allclose(motion.states, known.states, atol=1e-11)
+        assert np.array_equal(motion.t, known.t) and motion.evaluations == known.evaluations == 3 * 30 * 4
+
+
+def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_number():
+    def bias(q, v):
+        assert np.isfinite(q).all() and np.isfinite(v).all()
+        return -1e3 * v[..., :1] ** 3 * np.ones(3)
+
+    own = Own(OwnEquations({"mass_matrix": lambda q: np.eye(3), "bias": bias}, COORDINATES))
+    motion = own.of(ARM.case()).run(np.zeros((2, 3)), [[0, 0, 0], [9, 0, 0]], np.zeros(3), 0.1, 20, "rk4")
+    assert motion.ended[0] is None and motion.ended[1].endswith("s: a number is not finite")
+    assert np.isfinite(motion.q[0]).all() and np.isnan(motion.q[1, -1]).all() and np.isfinite(motion.q[1, 0]).all()
+    assert own.equations.problems == []
+
+
+# equations that cannot be used
+
+class Called:
+    def mass_matrix(self, q): ...
+
+    bias = None
+
+
+@pytest.mark.parametrize("value, said", [
+    (lambda q: np.eye(2), r"mass_matrix has shape \(2, 2\); \(3, 3\) is expected, at q = \["),
+    (lambda q: 1.0, r"has shape \(\); \(3, 3\) is expected"), (lambda q: np.eye(3)[None], r"has shape \(1, 3, 3\)"),
+    (lambda q: None, r"is None; real numbers of shape \(3, 3\) are expected"), (lambda q: "M", "is 'M'; real numbers"),
+    (lambda q: [[1, 2], [3]], "real numbers of shape"), (lambda q: np.eye(3) * 1j, "is complex"),
+    (lambda q: np.eye(3) > 0, "real numbers of shape"), (lambda q: q[7], "raised IndexError: .* at q = "),
+    (lambda: 0, "raised TypeError"), (lambda q: sys.exit(3), "raised SystemExit: 3"),
+    (lambda q: np.linalg.inv(np.zeros((3, 3))), r"raised LinAlgError: Singular matrix \(test_own.py, line \d+\)"),
+    (4.0, r"mass_matrix is 4.0; a function mass_matrix\(q\) is expected"),
+])  # fmt: skip
+def test_what_cannot_be_used_is_one_line(value, said, rng):
+    with pytest.raises(OwnError, match=f"mass_matrix {said}|{said}") as error:
+        OwnEquations({"mass_matrix": value, "bias": tmt.bias}, COORDINATES).mass_matrix(states(rng)[0])
+    assert "\n" not in str(error.value) and str(error.value).startswith("mass_matrix ")
+
+
+@pytest.mark.parametrize("source, said", [
+    (np, "numpy has no mass_matrix; mass_matrix(q) and bias(q, qd) are expected"),
+    ({"mass_matrix": tmt.mass_matrix}, "the dict has no bias; mass_matrix(q) and bias(q, qd) are expected"),
+    (None, "the NoneType has no mass_matrix"), (Called, "the class Called has no bias"),
+    (dataclasses.replace(tmt.ARM.lock({"beta": 0.0})), "the Tree has 2 positions and 2 speeds (alpha, gamma); 3 and 3"),
+])  # fmt: skip
+def test_what_is_not_there_is_said(source, said):
+    with pytest.raises(OwnError) as error:
+        OwnEquations(source, COORDINATES)
+    assert str(error.value).startswith(said)
+
+
+def test_of_a_class_an_object_is_expected(rng):
+    with pytest.raises(OwnError, match=r"of the class Called an object such as Called\(\) is expected"):
+        OwnEquations(Called, COORDINATES, required=("mass_matrix",)).mass_matrix(states(rng)[0])
+
+
+def test_bodies_are_those_of_the_first_state(rng):
+    own = OwnEquations({"com_positions": lambda q: np.zeros((2, 2))}, COORDINATES, required=())
+    with pytest.raises(OwnError, match=r"has shape \(2, 2\); \(bodies, 3\) is expected"):
+        own.com_positions(states(rng)[0])
+
+
+# equations that can be used, with something wrong
+
+def problems(mass_matrix, q):
+    own = OwnEquations({"mass_matrix": mass_matrix}, COORDINATES, required=())
+    return own.mass_matrix(q), own.problems
+
+
+@pytest.mark.parametrize("way", [single, lambda f: f])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_values_that_are_not_finite(value, way, rng):
+    q = states(rng)[0]
+
+    def mass_matrix(q):
+        return np.where(q[..., 0, None, None] > 1.0, value, tmt.mass_matrix(q))
+
+    q[:, 0] = [0.0, 0.5, 1.5, 0.0, 2.0, 0.0]
+    M, (problem,) = problems(way(mass_matrix), q)
+    assert not np.isfinite(M[[2, 4]]).any() and np.isfinite(M[[0, 1, 3, 5]]).all()
+    assert problem.quantity == "mass_matrix" and problem.state.startswith("q = [1.5, ")
+    assert problem.text == f"mass_matrix is not finite at {problem.state}, and at 1 more state"
+
+
+def test_one_that_raises_later(rng):
+    q = states(rng)[0]
+    q[:, 0] = [0.0, 0.5, 1.5, 0.0, 2.0, 0.0]
+
+    def mass_matrix(q):
+        if q[0] > 1.0:
+            raise ValueError("too\nfar")
+        return tmt.mass_matrix(q)
+
+    M, (problem,) = problems(mass_matrix, q)
+    assert np.isnan(M[[2, 4]]).all() and np.isfinite(M[[0, 1, 3, 5]]).all()
+    assert "raised ValueError: too far (test_own.py, line " in problem.text and "\n" not in problem.text
+    assert problem.text.endswith("and at 1 more state")
+
+
+@pytest.mark.parametrize("way", [single, lambda f: f])
+def test_one_that_changes_its_argument_is_handed_copies(way, rng):
+    q = states(rng)[0]
+    before = q.copy()
+
+    def bias(q, v):
+        h = tmt.bias(q, v)
+        v *= 2.0
+        return h
+
+    own = OwnEquations({"bias": way(bias)}, COORDINATES, required=())
+    assert np.array_equal(own.bias(q, q), tmt.bias(before, before)) and np.array_equal(q, before)
+    assert [problem.text.split(" at ")[0] for problem in own.problems] == ["bias changes its argument qd"]
+    assert own.problems[0].state.startswith("q = [") and ", qd = [" in own.problems[0].state
+
+
+@pytest.mark.parametrize("skew, found", [(0.9e-9, 0), (1.1e-9, 1)])
+def test_a_mass_matrix_that_is_not_symmetric(skew, found, rng):
+    def mass_matrix(q):
+        M = tmt.mass_matrix(q)
+        M[..., 0, 1] += skew * np.abs(M).max(axis=(-1, -2))
+        return M
+
+    said = problems(mass_matrix, states(rng)[0])[1]
+    assert len(said) == found
+    assert all("is not symmetric at q = [" in problem.text and "5 more states" in problem.text for problem in said)
+
+
+def test_a_singular_mass_matrix_has_no_acceleration(rng):
+    q, v, tau = states(rng)
+    own = OwnEquations({"mass_matrix": lambda q: np.zeros((3, 3)), "bias": tmt.bias}, COORDINATES)
+    assert np.isnan(own.acceleration(q, v, tau)).all()
+    assert own.problems[0].text.startswith("mass_matrix is singular at q = [")
+
+
+def test_one_that_prints_is_left_alone(capsys, rng):
+    def mass_matrix(q):
+        print("here")
+        return tmt.mass_matrix(q)
+
+    assert problems(mass_matrix, states(rng)[0])[1] == [] and "here" in capsys.readouterr().out
+
+
+# time
+
+def test_slow_functions_are_asked_of_fewer_states(rng):
+    def mass_matrix(q):
+        assert q.ndim == 1
+        time.sleep(0.02)
+        return tmt.mass_matrix(q)
+
+    own = OwnEquations({"mass_matrix": mass_matrix, "bias": tmt.bias}, COORDINATES)
+    own.try_at(*states(rng, 100))
+    assert own.seconds >= 0.02 and 1 <= own.affordable(10_000, 1.0) <= 50
+    assert own.affordable(10_000, 0.0) == 1 and own.affordable(3, 1e9) == 3
+
+
+def test_functions_of_a_batch_are_asked_of_all(rng):
+    own = OwnEquations({"mass_matrix": lambda q: np.eye(3) + 0.0 * q[..., None], "bias": lambda q, v: v}, COORDINATES)
+    own.try_at(*states(rng, 100))
+    assert own.affordable(10_000, 10.0) == 10_000
+
+
+def test_neither_mujoco_nor_numba_is_imported():
+    program = "import sys, compare.engines.own; print({'mujoco', 'numba', 'sympy', 'scipy'} & set(sys.modules))"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
+    assert run.stdout == "set()\n", run.stderr

@@ -1,0 +1,39 @@
+"""Edits of how equations of one's own are asked, mapped to the joints of a model, and compared with MuJoCo in Python."""
+
+from ..edit import Edit
+
+EDITS = (
+    # how they are asked
+    Edit("own.equations", "OwnEquations.first", "same(_1, _2)", "True", "a batch that gives something else is taken"),
+    Edit("own.equations", "OwnEquations.called", "[np.array(part) for part in given]", "given", "no copies are handed over"),
+    Edit("own.equations", "OwnEquations.asked", "np.isfinite(found)", "(found == found)", "infinite values are no problem"),
+    Edit("own.equations", "SKEW", "1e-9", "1e-8", "M may be ten times less symmetric"),
+    Edit("own.equations", "OwnEquations.note", "_1 <= DIVERGED", "_1 <= np.inf", "a run that has diverged is a problem"),
+    Edit("own.equations", "OwnEquations.each", "np.arange(len(raised)) == i", "np.arange(len(raised)) >= 0",
+         "one state that raises counts as all"),
+    Edit("own.equations", "OwnEquations.acceleration", "tau - _1 - self.passive(q, v)", "tau - _1",
+         "damping and springs are left out"),
+    Edit("own.returned", "converted", "array.dtype.kind == 'c'", "False", "complex values are said to be no numbers"),
+    Edit("own.returned", "converted", "len(array.shape) != len(expected)", "False", "a batch of one is a state"),
+    Edit("engines.own", "OwnDynamics.acceleration", "case.added_damping * v", "0.0 * v", "damping of a scene is left out"),
+    Edit("engines.own", "OwnDynamics.bias", "h - self.equations.gravity_balance(q)", "h", "gravity stays on in h"),
+    # joints
+    Edit("joint_map", "JointMap.own_positions", "_1 * self.sign + self.zero", "_1 * self.sign - self.zero",
+         "a zero is taken the other way"),
+    Edit("joint_map", "JointMap.own_forces", "_1 * self.sense", "_1", "a force keeps its sense"),
+    Edit("joint_map", "JointMap.own_speeds", "_1 * self.of_v", "_1", "speeds stay in rad/s"),
+    Edit("joint_map", "put", "np.argsort(at)", "at", "an order is taken the other way"),
+    # the comparison
+    Edit("agreement.given", "Compared.ratio", "np.where(np.isfinite(off), off, np.inf)", "np.where(np.isfinite(off), off, 0.0)",
+         "NaN agrees"),
+    Edit("agreement.given", "Given.compared", "FACTOR * EPS + self.rtol", "FACTOR * EPS", "rtol is not added"),
+    Edit("agreement.given", "Given.compared", "FACTOR * EPS + self.rtol", "max(FACTOR, 96) * EPS + self.rtol",
+         "64 eps become 96"),
+    Edit("agreement.given", "Given.fails", "one.ratio > 1.0", "one.ratio > 2.0", "twice the tolerance agrees"),
+    Edit("agreement.given", "Given.value", "self.joints.mass_matrix(values)", "values", "a table of M keeps its own joints"),
+    Edit("agreement.given", "Given.take_states", "self.joints.speeds(own['qd'])", "own['qd']", "speeds keep their own joints"),
+    Edit("agreement", "assert_agrees", "given.fails or given.problems", "given.fails", "a changed argument agrees"),
+    Edit("agreement", "differences", "-one.ratio", "one.ratio", "the smallest ratio first"),
+    Edit("agreement.why", "some_states", "np.argsort(_1, kind='stable')", "np.arange(len(worst))",
+         "a cause is sought where there are no values"),
+)  # fmt: skip

@@ -1,0 +1,88 @@
+"""How joints of one's own are stated, and what is mapped between them and those of a model."""
+
+import numpy as np
+import pytest
+
+from compare.coordinates import Coordinates
+from compare.joint_map import Joint, JointsError, joint_map
+
+ARM = Coordinates(("hip", "knee", "rail"), ("hinge", "hinge", "slide"))
+MIXED = Coordinates(("rail", "turn", "knee"), ("slide", "ball", "hinge"))
+
+
+def test_without_a_statement_they_are_the_models():
+    of = joint_map(ARM, None)
+    assert of.is_same and [str(joint) for joint in of.joints] == ["hip", "knee", "rail"]
+    assert joint_map(ARM, ["hip", "knee", "rail"]).is_same
+
+
+@pytest.mark.parametrize("stated", [
+    ["knee", "hip", "rail"], ["-hip", "knee", "rail"], ["hip+90deg", "knee", "rail"], ["hip", "knee-0.1rad", "rail"],
+    ["hip", "knee", "rail+0.2m"], ["hip in deg", "knee", "rail"], ["hip", "knee in deg (rad/s)", "rail"],
+    ["rail-0.5m", "-knee+90deg in deg", "-hip-1.5rad"],
+])  # fmt: skip
+def test_what_is_stated_is_read_and_said_the_same(stated, rng):
+    of = joint_map(ARM, stated)
+    assert not of.is_same
+    again = joint_map(ARM, [str(joint) for joint in of.joints])
+    assert [joint[:2] for joint in again.joints] == [joint[:2] for joint in of.joints]
+    q = rng.normal(size=(5, 3))
+    assert np.array_equal(again.own_positions(q), of.own_positions(q))
+
+
+def test_positions_speeds_and_forces_of_ones_own():
+    of = joint_map(ARM, ["rail-0.5m", "-knee+90deg in deg", "hip in deg (rad/s)"])
+    q, v = np.array([0.1, np.radians(30.0), 2.0]), np.array([1.0, 2.0, 3.0])
+    assert np.allclose(of.own_positions(q), [1.5, 60.0, np.degrees(0.1)])
+    assert np.allclose(of.own_speeds(v), [3.0, -np.degrees(2.0), 1.0])
+    assert np.allclose(of.own_forces(v), [3.0, -2.0, 1.0])  # N m, whatever the unit of positions
+    M = np.arange(9.0).reshape(3, 3)
+    assert np.allclose(of.own_mass_matrix(M), [[8.0, -7.0, 6.0], [-5.0, 4.0, -3.0], [2.0, -1.0, 0.0]])
+
+
+@pytest.mark.parametrize("coordinates, stated", [
+    (ARM, ["rail+0.25m", "-knee+90deg in deg", "hip"]), (MIXED, ["-knee", "turn", "-rail+1m"]),
+    (MIXED, ["turn", "knee in deg", "rail"]),
+])  # fmt: skip
+def test_there_and_back(coordinates, stated, rng):
+    of = joint_map(coordinates, stated)
+    q, v = coordinates.random(rng, 20), rng.normal(size=(20, coordinates.nv))
+    M = rng.normal(size=(20, coordinates.nv, coordinates.nv))
+    assert np.allclose(of.positions(of.own_positions(q)), q, atol=1e-14)
+    assert np.allclose(of.speeds(of.own_speeds(v)), v, atol=1e-14)
+    assert np.array_equal(of.forces(of.own_forces(v)), v)
+    assert np.array_equal(of.mass_matrix(of.own_mass_matrix(M)), M)
+    power = np.einsum("si,si->s", v, v)
+    assert np.allclose(np.einsum("si,si->s", of.own_forces(v), of.own_speeds(v) / of.of_v), power)
+
+
+def test_a_joint_of_that_very_name_comes_first():
+    odd = Coordinates(("-hip", "hip", "hip+90deg", "x in deg"), ())
+    of = joint_map(odd, ["hip+90deg", "-hip", "x in deg", "hip"])
+    assert [joint.sign for joint in of.joints] == [1.0] * 4 and not any(joint.zero for joint in of.joints)
+
+
+@pytest.mark.parametrize("stated, said", [
+    (["hip", "knee"], "do not name rail; all 3"), (["hip", "hip", "rail"], "name 'hip' twice"),
+    (["hip", "knee", "foot"], "there is no joint 'foot'; hip, knee and rail are known"),
+    ("hip", "a list of names such as"), ([1, 2, 3], "a list of names such as"),
+    (["hip+1m", "knee", "rail"], "hip is a hinge, whose zero is not in m"),
+    (["hip", "knee", "rail+90deg"], "rail is a slide, whose zero is not in deg"),
+    (["hip", "knee", "rail in deg"], "rail is a slide, whose unit is m"),
+])  # fmt: skip
+def test_what_does_not_fit_is_said_in_a_line(stated, said):
+    with pytest.raises(JointsError, match=said.replace("+", r"\+")) as error:
+        joint_map(ARM, stated)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("stated", ["-turn", "turn+90deg", "turn in deg"])
+def test_of_a_ball_only_the_name_can_be_stated(stated):
+    with pytest.raises(JointsError, match="turn is a ball"):
+        joint_map(MIXED, ["rail", stated, "knee"])
+
+
+@pytest.mark.parametrize("zero, said", [(np.pi / 2, "hip+90deg"), (-0.3, "hip-0.3rad")])
+def test_a_zero_is_said_in_whole_degrees_where_it_is_one(zero, said):
+    assert str(Joint("hip", zero=zero)) == said
+    assert str(Joint("rail", zero=zero, slides=True)).endswith("m")

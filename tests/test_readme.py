@@ -1,0 +1,150 @@
+"""Every code block of the README: Python runs in a fresh folder, commands are parsed, what is shown is what is printed."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+import traceback
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.__main__ import main
+from compare.reference import compared_with
+from compare.robots.arm import ARM
+from compare.scene_file import read_scenes
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```(.*)\n((?:.*\n)*?)```$", README, re.MULTILINE)
+PENDULUM = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/>
+<body><joint name="knee" axis="1 0 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/></body></body></worldbody></mujoco>"""
+NUMBER = re.compile(r"(?<![\w])[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
+
+
+def blocks(language):
+    return [text for of, text in BLOCKS if of == language]
+
+
+def commands():
+    return [line for text in blocks("sh") for line in text.splitlines() if line.strip()]
+
+
+def run(text, folder, monkeypatch):
+    """The names that a Python block defines, run in a folder that has nothing but what its tests read."""
+    monkeypatch.chdir(folder)
+    names = {"__name__": "readme"}
+    exec(compile(text, "README.md", "exec"), names)
+    return names
+
+
+def test_every_block_says_what_it_is():
+    assert BLOCKS and {language for language, _ in BLOCKS} <= {"python", "sh", "text", "toml"}
+    assert len(BLOCKS) == README.count("\n```") / 2
+
+
+@pytest.mark.parametrize("text", blocks("python"), ids=lambda text: text.splitlines()[0])
+def test_python_runs_as_it_is_printed(text, tmp_path, monkeypatch):
+    """A block that fails does so with the message that the next block shows."""
+    following = BLOCKS[[block for _, block in BLOCKS].index(text) + 1]
+    try:
+        names = run(text, tmp_path, monkeypatch)
+    except AssertionError as error:
+        printed = "".join(traceback.format_exception_only(error))
+        assert following[0] == "text"
+        assert same(printed, following[1]), printed
+        return
+    assert not following[1].startswith("AssertionError")
+    assert os.listdir() == []
+    for name, function in names.items():
+        if name.startswith("test_"):
+            (tmp_path / "robot.xml").write_text(PENDULUM)
+            q = np.random.default_rng(1).uniform(-1.0, 1.0, (10, 2))
+            right = compared_with("model", "robot.xml")
+            M = right.mujoco.of(right.robot.case()).mass_matrix(q)
+            np.savetxt("export.csv", np.column_stack([q, M.reshape(10, 4)]), delimiter=",")
+            function()
+            np.savetxt("export.csv", np.column_stack([q, 1.01 * M.reshape(10, 4)]), delimiter=",")
+            with pytest.raises(AssertionError, match="mass_matrix: mismatched entries"):
+                function()
+
+
+def same(printed, shown):
+    """The same words, and the same numbers but for their last digits."""
+    one, other = ([line.rstrip() for line in text.strip().splitlines()] for text in (printed, shown))
+    numbers = [list(map(float, NUMBER.findall("\n".join(lines)))) for lines in (one, other)]
+    words = [NUMBER.sub("#", "\n".join(lines)) for lines in (one, other)]
+    return words[0] == words[1] and len(numbers[0]) == len(numbers[1]) and np.allclose(*numbers, rtol=1e-9)
+
+
+def test_what_is_shown_is_compared_by_words_and_by_numbers():
+    assert same("a: 1.5 \n b 2e+3", "a: 1.5000000000001\n b 2000")
+    assert not same("a: 1.5", "a: 1.501") and not same("a: 1.5", "b: 1.5") and not same("a 1", "a 1 1")
+
+
+def test_the_example_is_ten_lines():
+    assert sum(bool(line.strip()) for line in blocks("python")[0].splitlines()) == 10
+
+
+@pytest.mark.parametrize("line", commands())
+def test_commands_can_be_given(line, capsys, tmp_path, monkeypatch):
+    """Those of compare are parsed; what sets up an environment is left out, and what times runs once."""
+    if line.startswith("python3 -m venv"):
+        assert re.search(r"-m (compare all|pytest)$", line)
+        return
+    program, *arguments = shlex.split(line)
+    assert program == ".venv/bin/python" and arguments[0] == "-m"
+    if arguments[1] == "timeit":
+        arguments[arguments.index("-n") + 1] = "1"
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        ran = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=environment, cwd=tmp_path)
+        assert ran.returncode == 0 and "loop" in ran.stdout, ran.stderr
+        return
+    assert arguments[1] == "compare"
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments[2:], "--help"])
+    assert ended.value.code == 0 and "usage: python -m compare" in capsys.readouterr().out
+
+
+def test_inline_commands_can_be_given(capsys):
+    inline = re.findall(r"`(?:\.venv/bin/)?python -m compare ([^`\n]+)`", README)
+    assert len(inline) >= 3
+    for text in inline:
+        if "EXPERIMENT" not in text:
+            with pytest.raises(SystemExit) as ended:
+                main([*shlex.split(text), "--help"])
+            assert ended.value.code == 0, text
+    capsys.readouterr()
+
+
+def test_the_first_line_of_the_output_is_the_one_that_is_shown(tmp_path, monkeypatch):
+    (shown,) = (text.strip() for text in blocks("text") if text.startswith("reference:"))
+    monkeypatch.chdir(tmp_path)
+    Path("robot.xml").write_text(PENDULUM)
+    assert compared_with(None, "robot.xml").reference.lines[0] == shown
+
+
+@pytest.mark.parametrize("text", blocks("toml"))
+def test_scenes_are_read(text, tmp_path):
+    path = tmp_path / "my.toml"
+    path.write_text(text)
+    assert tomllib.loads(text)["scene"][0]["name"] == read_scenes(path, ARM)[0].name
+
+
+def test_own_equations_on_the_command_line_run_as_the_readme_has_them(tmp_path, monkeypatch, capsys):
+    """Its two lines, with the two pendulums of its example and quick."""
+    text = blocks("python")[0].rsplit("\n\n", 1)[0]
+    (tmp_path / "my_equations.py").write_text(text + "\n")
+    names = run(text, tmp_path, monkeypatch)
+    (tmp_path / "robot.xml").write_text(names["mjcf"])
+    lines = [shlex.split(line)[3:] for line in commands() if "--reference" in line]
+    assert len(lines) == 2
+    arguments = [*lines[0], "--quick", "--out", "out"]
+    arguments[0] = "diagnosis"
+    assert main(arguments) == 1
+    assert "coefficient of qd1^2" in Path("out/report.md").read_text(encoding="utf-8")
+    assert sorted(os.listdir()) == ["my_equations.py", "out", "robot.xml"]
+    capsys.readouterr()
