@@ -55,7 +55,7 @@ class Diagnosis(NamedTuple):
         if self.searched:
             return f"Nothing of what there was time for explains this ({self.searched}). {self.where}"
         rounded = ""
-        if self.digits >= 2.0:
+        if 2.0 <= self.digits < np.inf:
             rounded = (
                 f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
             )
