@@ -16,6 +16,7 @@ from ...judge.scale import EPS, FACTOR
 from ...robots.arm import ARM
 from ...robots.six_hinges import SIX_HINGES
 from ...setup import Setup
+from .confirmed import confirmed
 from .faults import Fault, fault_list
 from .generator import generated
 from .made_values import by_composite, values_of_fault
@@ -179,11 +180,18 @@ def has_values(fault: Fault, cause) -> bool:
 
 
 def explains_elsewhere(fault: Fault, found: Diagnosis) -> bool:
-    """Whether what explains a fault, another and no less simple one, explains it at states that the search did not have."""
-    again, _ = diagnosis_of(fault, *search_states(fault.tree, AT["again"]))
-    places = {cause.place for cause in again.causes}
-    lowest = min(cause.rank for cause in found.causes)
-    return lowest <= rank_of(fault) and any(cause.place in places for cause in found.causes)
+    """Whether what explains a fault, another and no less simple one, explains it at states that the search did not have.
+
+    Each cause is made by other code than the search's where that can be done; if none can, a second search must agree.
+    """
+    if min(cause.rank for cause in found.causes) > rank_of(fault):
+        return False
+    states = search_states(fault.tree, AT["again"])
+    verdicts = [confirmed(fault, cause, *states) for cause in found.causes]
+    if known := [verdict for verdict in verdicts if verdict is not None]:
+        return all(known)
+    places = {cause.place for cause in diagnosis_of(fault, *states)[0].causes}
+    return all(cause.place in places for cause in found.causes)
 
 
 def rank_of(fault: Fault) -> int:

@@ -152,7 +152,7 @@ def test_one_wrong_outcome_fails(outcomes, passes, source):
 
 
 def test_an_error_in_the_search_is_noticed(monkeypatch):
-    """A search that looks at one state alone takes what explains that state for the cause."""
+    """A search that takes what explains half of the difference for the cause."""
     from compare.diagnosis import fit
 
     def careless(self, which, x, left):
