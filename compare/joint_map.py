@@ -138,6 +138,9 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
         zero = np.radians(value) if match["measure"] == "deg" else value
         if rest in kinds and (match["measure"] == "m") != (kinds[rest] == "slide"):
             raise JointsError(f"joint {text!r}: {rest} is a {kinds[rest]}, whose zero is not in {match['measure']}")
+    name, measured, measure = rest.rpartition(" in ")
+    if rest not in kinds and measured and name.removeprefix("-") in kinds:
+        raise JointsError(f"joint {text!r}: the unit {measure!r} is not known; {', '.join(filter(None, PER_UNIT))} are")
     if rest not in kinds:
         raise JointsError(f"there is no joint {text!r}; {listed(coordinates.names)} are known, stated as {FORMS}")
     if kinds[rest] == "ball" and (sign, zero, unit) != (1.0, 0.0, ""):

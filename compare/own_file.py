@@ -12,14 +12,16 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from types import ModuleType
 
+from .judge.words import listed
 from .process.crash import described
 
 FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
+SHOWN_NAMES = 6  # of which none is close
 SHOWN_LINE = 60  # letters of a line that is no Python
 
 
@@ -53,7 +55,7 @@ def module_of(place: str, stated: str) -> tuple[ModuleType, str]:
         raise OwnFileError(f"{place}: it is a folder; a Python file is expected")
     if not path.is_file():
         beside = path.parent.glob("*.py") if path.parent.is_dir() else ()
-        raise OwnFileError(f"{place}: no such file{close_names(path.name, (other.name for other in beside))}")
+        raise OwnFileError(f"{place}: no such file{close_names(path.name, [other.name for other in beside])}")
     path = path.resolve()
     # a name that nothing else has: a file numpy.py shadows no package
     name = f"compare_own_{path.stem}"
@@ -90,6 +92,7 @@ def part_of(module: ModuleType, place: str, name: str) -> object:
             found = getattr(found, part)
         except AttributeError:
             names = [other for other in dir(found) if not other.startswith("_")]
+            names = [other for other in names if not inspect.ismodule(getattr(found, other, None))]
             inside = f" in {known}" if known else ""
             raise OwnFileError(f"{place}: there is no {part!r}{inside}{close_names(part, names)}") from None
         known = f"{known}.{part}" if known else part
@@ -122,10 +125,12 @@ def file_of(module: ModuleType, place: str) -> str:
     return getattr(module, "__file__", None) or place
 
 
-def close_names(name: str, known: Iterable[str]) -> str:
-    """Names that are close to one, in words."""
-    close = difflib.get_close_matches(name, list(known), 3, 0.6)
-    return f"; there is {' and '.join(close)}" if close else ""
+def close_names(name: str, known: Sequence[str]) -> str:
+    """Names that are close to one, or all of a few, in words."""
+    close = difflib.get_close_matches(name, known, 3, 0.6)
+    if not close and len(known) <= SHOWN_NAMES:
+        close = list(known)
+    return f"; there is {listed(close)}" if close else ""
 
 
 @contextmanager

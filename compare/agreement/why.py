@@ -63,7 +63,8 @@ def diagnosed_sentence(given: Given, values: Values) -> str:
     first = found(values.q, values.qd, values.mass_matrix, values.bias, of_M, of_h)
     if not first.differs:
         return ""
-    if any(STATED_SO in cause.text for cause in first.causes) and not joints.is_same:
+    is_of_joints = any(STATED_SO in cause.text for cause in first.causes)
+    if (is_of_joints or not first.causes) and not joints.is_same:
         M, h = values.mass_matrix, values.bias
         anew = found(
             joints.own_positions(values.q),
@@ -73,8 +74,11 @@ def diagnosed_sentence(given: Given, values: Values) -> str:
             np.abs(joints.own_mass_matrix(of_M)),
             np.abs(joints.own_forces(of_h)),
         )
-        if anew.causes:
-            return f"{anew.sentence} That is to take the place of joints={[str(joint) for joint in joints.joints]}."
+        stated = f"joints={[str(joint) for joint in joints.joints]}"
+        if not anew.differs:
+            return f"{stated} explains it: without it they agree."
+        if anew.causes and (is_of_joints or any(STATED_SO in cause.text for cause in anew.causes)):
+            return f"{anew.sentence} That is to take the place of {stated}."
     if not first.causes and (broken := first_broken(given, values)):
         return f"{broken} {first.sentence}"
     return first.sentence

@@ -21,7 +21,7 @@ from .model import Equations, packing
 from .places import Place, all_places
 from .slips import slips
 from .variants import Variant, both, conventions, program_options, values_of
-from .words import Cause, of_fitted, of_variant
+from .words import Cause, is_possible, of_fitted, of_variant
 
 STATES_ASKED = 24
 FEW = 2  # states at which many conventions are tried first
@@ -40,6 +40,7 @@ class Diagnosis(NamedTuple):
     left: float = 0.0  # of the difference that the nearest single number, term or pair leaves, a share
     digits: float = np.inf  # to which the values agree
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[0][1]"
+    states: tuple[int, int] = (0, 0)  # at how many they differ, and of how many
     compared: int = 0  # entries in all
     nearest: tuple[tuple[str, float], ...] = ()  # single explanations that leave least, and what they leave, a share
     searched: str = ""  # what there was time for; "": everything
@@ -64,6 +65,14 @@ class Diagnosis(NamedTuple):
 
     @property
     def where(self) -> str:
+        """Which entries differ, and at how many states if these are few."""
+        off, states = self.states
+        return self.which + (
+            f" They differ at {off} of {states} states only: look at those." if 3 * off < states else ""
+        )
+
+    @property
+    def which(self) -> str:
         """Which entries differ."""
         if len(self.entries) == self.compared:
             return "Every entry differs."
@@ -103,6 +112,7 @@ def diagnose(
     about = {
         "entries": tuple(entry_name(entry) for entry, off in zip(equations.entries, differing) if off),
         "compared": int(search.known.any(axis=0).sum()),
+        "states": (int((np.abs(search.off).max(axis=1) > 1.0).sum()), len(q)),
     }
     names, singles, searched = tuple(names), [], ""
     try:
@@ -110,6 +120,9 @@ def diagnose(
     except OutOfTime:
         searched = f"in {seconds:g} s options and conventions of joints, no numbers"
     fitted = [one for one in singles if one.ratio <= 1.0]
+    fitted = [one for one in fitted if is_possible(one)] or fitted
+    if sum(differing) == 1:  # the entry itself is the plainest
+        fitted.sort(key=lambda one: one.places[0].kind != "coefficient")
     nearest = sorted(singles, key=lambda one: one.left)[:KEPT]
     about["nearest"] = tuple((one.places[0].name, one.left) for one in nearest)
     try:

@@ -22,6 +22,7 @@ TOGETHER = {  # terms that are often left out together, and what they are called
     "all rates of {} in the bias": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
+OF_BIAS = ("gravity", "convective", "Euler", "gyroscopic")  # of the terms, those of h
 EVERY_BODY = "every body"
 OF_ZERO = "zero position"  # the kind of a place
 MOST_SPEEDS = 12  # of which every product has its coefficients: there are nv^2 (nv + 1) / 2
@@ -144,12 +145,33 @@ def coefficients(equations: Equations) -> list[Place]:
         found.append(
             Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i])
         )
+        for j in range(nv) if nv <= MOST_SPEEDS else ():
+            if j != i:
+                name = f"h[{j}] at rest in h[{i}]"
+                found.append(Place(2, "coefficient", name, 0.0, "times", 1.0, entry=at["h", i], column=weight[:, j]))
         for (j, k), column in of_rates.items():
             rates = f"qd{j}^2" if j == k else f"qd{j} qd{k}"
             name = f"h[{i}], coefficient of {rates}"
             column = column[:, i] * equations.qd[:, j] * equations.qd[:, k]
             found.append(Place(2, "coefficient", name, 1.0, "times", 1.0, entry=at["h", i], column=column))
+    found += terms_of_rows(equations) if nv <= MOST_SPEEDS else []
     return [place for place in found if np.abs(place.column).max() > 0.0 and len(place.column) == states]
+
+
+def terms_of_rows(equations: Equations) -> list[Place]:
+    """The factor of each term of each body in one row of h alone."""
+    nv, right = equations.nv, equations.values()[0]
+    names = [name for name in OF_TERM if name in OF_BIAS]
+    indices = [(b, BODY_TERMS.index(name)) for b in range(len(equations.tree.mass)) for name in names]
+    changes = {Path("factor", index): row for index, row in zip(indices, np.eye(len(indices)))}
+    added = equations.values(changes) - right  # of each term doubled, (terms, states, entries)
+    found = []
+    for (b, term), column in zip(indices, added[..., -nv:]):
+        for i in range(nv):
+            name = f"{OF_TERM[BODY_TERMS[term]].format(equations.tree.body_names[b])} in h[{i}]"
+            at = right.shape[1] - nv + i
+            found.append(Place(2, "term", name, 1.0, "times", 1.0, entry=at, column=column[:, i]))
+    return found
 
 
 def bias_at_rest(equations: Equations) -> np.ndarray:

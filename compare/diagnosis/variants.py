@@ -19,6 +19,7 @@ from ..judge.words import listed
 from .model import BODY_TERMS, Equations
 
 MAPS_AT_ONCE = 2000  # maps of the joints in one evaluation
+PARALLEL = 1e-9  # of a cosine from 1
 MOST_PERMUTED = 6  # of which every order and every set of senses is tried; of more two exchanged, and one turned
 
 
@@ -86,6 +87,37 @@ def program_options(equations: Equations) -> Iterator[Variant]:
         yield Variant(1, "option", "springs k (q - rest)", "not in h", "in h", with_bias(lambda h: h + pull))
     if any(tree.armature):
         yield Variant(1, "option", "armature", "on the diagonal of Mbar", "left out", without_rotors)
+    if (turns := absolute_angles(tree)) is not None:
+        yield Variant(1, "option", "angles", "between a body and the one before", "between a body and the world", partial(
+            Absolute, tree, equations.q, equations.qd, turns
+        ))  # fmt: skip
+
+
+def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
+    """Joint angles from the angles of bodies to the world, (nv, nv), in a row of parallel hinges; None: there is none."""
+    if set(tree.kind) != {"hinge"}:
+        return None
+    turns = np.eye(len(tree.axis))
+    for i, parent in enumerate(tree.parent):
+        along = float(np.dot(tree.axis[i], tree.axis[parent])) if parent >= 0 else 0.0
+        if abs(abs(along) - 1.0) < PARALLEL:
+            turns[i, parent] = -np.sign(along)
+    return turns if (turns != np.eye(len(turns))).any() else None
+
+
+class Absolute(Recast):
+    """Equations in angles of the bodies to the world: joint angles are turns @ angles."""
+
+    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, turns: np.ndarray):
+        inner = Equations(tree, q @ turns.T, qd @ turns.T)
+        i, j = inner.triangle
+
+        def change(values: np.ndarray) -> np.ndarray:
+            M = np.zeros((*values.shape[:-1], inner.nv, inner.nv), values.dtype)
+            M[..., i, j] = M[..., j, i] = values[..., : len(i)]
+            return np.concatenate([(turns.T @ M @ turns)[..., i, j], values[..., len(i) :] @ turns], axis=-1)
+
+        super().__init__(inner, change)
 
 
 def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Variant]:
@@ -118,7 +150,7 @@ def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Varian
 
 
 def other_orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Other orders of joints in which each stands where one of its kind stood."""
+    """Other orders of joints, in which balls stand where balls stood."""
     if len(names) <= MOST_PERMUTED:
         tried = permutations(range(len(names)))
     else:
@@ -128,7 +160,8 @@ def other_orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tup
             order[i], order[j] = j, i
             tried.append(order)
     for order in tried:
-        if all(kinds[i] == kind for i, kind in zip(order, kinds)) and list(order) != sorted(order):
+        alike = all((kinds[i] == "ball") == (kind == "ball") for i, kind in zip(order, kinds))
+        if alike and list(order) != sorted(order):
             yield tuple(names[i] for i in order)
 
 

@@ -11,6 +11,8 @@ from .variants import Variant
 
 FACTORS = {0.0: "missing", 0.5: "halved", 2.0: "doubled", -1.0: "of the other sign"}
 EXPLAINS = " would explain it"
+FITTED = 1e-11  # of the size of a place: what a fit may leave of a number that is 0
+NEVER_NEGATIVE = ("mass of", "armature of", "inertia xx", "inertia yy", "inertia zz")
 CLOSE = 1e-9  # a fitted factor, to one of these
 
 
@@ -38,7 +40,7 @@ def of_variant(variant: Variant, left: float) -> Cause:
 
 def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause:
     """A number, a term or a coefficient, or two of them."""
-    places, found = fitted.places, [place.stated + change for place, change in zip(fitted.places, fitted.changes)]
+    places, found = fitted.places, [value_of(place, change) for place, change in zip(fitted.places, fitted.changes)]
     kinds, names = [place.kind for place in places], [place.name for place in places]
     stated, explains, units = (
         [f"{place.stated:.12g}" for place in places],
@@ -61,6 +63,18 @@ def of_fitted(fitted: Fitted, rank: int, beside: Variant | None = None) -> Cause
     return Cause(rank, *joined, fitted.left, 0, text)
 
 
+def value_of(place: Place, change: float) -> float:
+    """What a changed place is; 0 where only the digits of a fit are left."""
+    value = place.stated + change
+    return 0.0 if abs(value) < FITTED * place.size else value
+
+
+def is_possible(fitted: Fitted) -> bool:
+    """Whether no mass, armature or moment of inertia is below zero."""
+    values = [(place, value_of(place, change)) for place, change in zip(fitted.places, fitted.changes)]
+    return not any(value < 0.0 and place.name.startswith(NEVER_NEGATIVE) for place, value in values)
+
+
 def together(texts: list[str]) -> str:
     """Several that explain only with each other."""
     return " and ".join(text.removesuffix(EXPLAINS) for text in texts) + ": together they" + EXPLAINS
@@ -70,6 +84,8 @@ def place_text(place: Place, value: float) -> str:
     """One place with the value that would explain the difference."""
     if place.unit == "times":
         near = [word for factor, word in FACTORS.items() if abs(value - factor) <= CLOSE]
+        if place.kind == "coefficient" and not place.stated:
+            return f"{place.name}: {nice(value)} times it is added in yours"
         if place.kind == "coefficient":
             return f"{place.name}: yours is {nice(value)} times the right one"
         return f"{place.name}: {near[0] if near else f'{nice(value)} times'}"

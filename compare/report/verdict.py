@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ..judge.check import DRAWN, ENDS, LOCKABLE, Check, Result
+from ..judge.words import listed
 
 
 @dataclass
@@ -45,7 +46,8 @@ def failures(sections: Sequence[Section]) -> tuple[list, list]:
 
 
 def passed(sections: Sequence[Section]) -> bool:
-    return not any(failures(sections))
+    """Whether something was compared, and no check fails."""
+    return any(section.result.checks for section in sections) and not any(failures(sections))
 
 
 def worst(sections: Sequence[Section]) -> Check | None:
@@ -62,6 +64,10 @@ def verdict(
     experiments: how many there are in all; compared: what agrees or does not.
     """
     checks = [check for section in sections for check in section.result.checks]
+    empty = listed([section.name for section in sections if not section.result.checks])
+    if not checks:
+        return f"Nothing was compared in {empty}: the notes there say why."
+    sections = [section for section in sections if section.result.checks]
     differing, broke = failures(sections)
     failing = {check.experiment for check in differing}
     names = ", ".join(section.name for section in sections if not differing or section.name in failing)
@@ -82,7 +88,7 @@ def verdict(
     if broke:
         left = "" if is_whole else f" ({some})"
         return f"Not everything could be compared{left}; the other {len(checks) - len(broke)} checks pass. {stopped}"
-    text = f"{compared} agree{ran}: all {len(checks)} checks pass."
+    text = f"{compared} agree{ran}: all {len(checks)} checks pass." + f" In {empty} nothing was compared." * bool(empty)
     top = worst(sections)
     if top is None or top.value == 0.0:
         return text
