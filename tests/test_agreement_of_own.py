@@ -358,6 +358,18 @@ def test_the_cause_is_sought_where_there_are_values(rng):
     )
 
 
+def test_there_is_no_cause_of_what_is_no_number():
+    text = message_of(mass_matrix=lambda q: np.full((2, 2), np.nan))
+    assert "cause" not in text and "mass_matrix is not finite at q = [" in text
+
+
+def test_one_triangle_alone_is_wrong(given):
+    values = given.values["mass_matrix"].copy()
+    values[:, 0, 1] += 0.1
+    text = message_of(mass_matrix=values, q=given.states["q"])
+    assert "Probable cause: Your M is not symmetric: M[0][1] is " in text and "entries 12 / 48" in text
+
+
 def test_values_of_accelerations_alone_have_no_cause_of_their_own(given):
     values = given.values["acceleration"] * [1.0, 1.1]
     assert "give mass_matrix and bias too" in message_of(acceleration=values, **given.states)

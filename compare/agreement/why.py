@@ -7,7 +7,7 @@ import numpy as np
 import tmt
 
 from ..diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
-from ..diagnosis.consistency import conditions
+from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import causes_of_forces
 from ..judge.check import over
 from ..judge.entries import Entries
@@ -32,7 +32,7 @@ class Values(NamedTuple):
 
 
 def cause_of(given: Given) -> str:
-    """The sentence."""
+    """The sentence; "" where there are no values of which it could be sought."""
     failing = [name for name, one in given.compared.items() if (one.ratio > 1.0).any()]
     if failing == ["acceleration"]:
         which = some_states(given)
@@ -56,7 +56,13 @@ def diagnosed_sentence(given: Given, values: Values) -> str:
         given_values, tolerance = (packed(*both, nv, len(q)) for both in ((M, h), (of_M, of_h)))
         return diagnose(given.tree, given.coordinates.names, q, qd, given_values, tolerance, SECONDS_OF_CAUSE)
 
+    if values.mass_matrix is not None and np.isfinite(values.mass_matrix).all():
+        mirrored = symmetric(values.mass_matrix, of_M.max(axis=(1, 2)))
+        if not mirrored.is_met:
+            return mirrored.text
     first = found(values.q, values.qd, values.mass_matrix, values.bias, of_M, of_h)
+    if not first.differs:
+        return ""
     if any(STATED_SO in cause.text for cause in first.causes) and not joints.is_same:
         M, h = values.mass_matrix, values.bias
         anew = found(
