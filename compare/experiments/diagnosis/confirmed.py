@@ -11,7 +11,7 @@ from .derivation import derived
 from .faults import SLIPS, TERM_NAMES, Fault, tmt_edited, tree_numbers
 from .made_values import by_composite, in_own_joints, values_of_fault
 
-SAME = 1e-5  # of a difference, that a cause may leave: its value is fitted
+SAME_EFFECT = 1e-5  # of a difference, that a cause may leave: its value is fitted
 
 
 def confirmed(fault: Fault, cause: Cause, q: np.ndarray, qd: np.ndarray) -> bool | None:
@@ -23,7 +23,7 @@ def confirmed(fault: Fault, cause: Cause, q: np.ndarray, qd: np.ndarray) -> bool
     off = [np.linalg.norm(a - b) for a, b in zip(given, right)]
     left = [np.linalg.norm(a - b) for a, b in zip(given, made)]
     sizes = [np.linalg.norm(part) for part in right]
-    return all(rest <= SAME * moved + 1e-12 * size for rest, moved, size in zip(left, off, sizes))
+    return all(rest <= SAME_EFFECT * moved + 1e-12 * size for rest, moved, size in zip(left, off, sizes))
 
 
 def with_cause(tree: tmt.Tree, cause: Cause, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -140,11 +140,13 @@ def diagnosis_of(fault: Fault, q: np.ndarray, qd: np.ndarray) -> tuple[Diagnosis
         "gravity": np.abs(still - weight) > FACTOR * EPS * sizes[1],
         "acceleration": np.abs(h - right[1]) > FACTOR * EPS * sizes[1],
     }
-    found = diagnose(tree, tree.hinge_names, q, qd, packed(M, h, nv, len(q)), tolerance_of(tree, q, qd), SEARCHED)
+    found = diagnose(
+        tree, tree.hinge_names, q, qd, packed(M, h, nv, len(q)), tolerance_of_values(tree, q, qd), SEARCHED
+    )
     return found, [name for name, differs in off.items() if differs.any()]
 
 
-def tolerance_of(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+def tolerance_of_values(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """64 eps of the scale of each entry of Mbar and h, (states, entries)."""
     scale, nv = Entries(tree, q, qd), qd.shape[1]
     M, h = np.broadcast_to(scale.mass_matrix, (len(q), nv, nv)), np.broadcast_to(scale.bias, (len(q), nv))

@@ -96,7 +96,7 @@ def test_mujoco_with_an_edited_number_is_named_too():
         assert text.count(old) == 1
         dynamics = parse(text.replace(old, new), ARM.tree).of(ARM.case())
         given = diagnosis.packed(dynamics.mass_matrix(q), dynamics.bias(q, qd), 3, len(q))
-        tolerance = fault_table.tolerance_of(ARM.tree, q, qd)
+        tolerance = fault_table.tolerance_of_values(ARM.tree, q, qd)
         found = diagnosis.diagnose(ARM.tree, ARM.joints, q, qd, given, tolerance)
         assert place in {cause.place for cause in found.causes}
 
