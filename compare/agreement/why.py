@@ -33,6 +33,8 @@ class Values(NamedTuple):
 
 def cause_of(given: Given) -> str:
     """The sentence; "" where there are no values of which it could be sought."""
+    if not all(np.isfinite(values).all() for values in given.values.values()):
+        return ""  # what explains the rest explains nothing
     failing = [name for name, one in given.compared.items() if (one.ratio > 1.0).any()]
     if failing == ["acceleration"]:
         which = some_states(given)

@@ -24,6 +24,7 @@ from .variants import Variant, both, conventions, program_options, values_of
 from .words import Cause, is_possible, of_fitted, of_variant
 
 STATES_ASKED = 24
+LEAST_STATES = 4  # different positions: of fewer, wrong numbers explain by luck
 FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
 ENTRIES_SHOWN = 6  # entries in a sentence
@@ -43,6 +44,7 @@ class Diagnosis(NamedTuple):
     states: tuple[int, int] = (0, 0)  # at how many they differ, and of how many
     compared: int = 0  # entries in all
     nearest: tuple[tuple[str, float], ...] = ()  # single explanations that leave least, and what they leave, a share
+    too_few: int = 0  # states, of which nothing can be told; 0: enough
     searched: str = ""  # what there was time for; "": everything
 
     @property
@@ -53,6 +55,9 @@ class Diagnosis(NamedTuple):
         if self.causes:
             ties = "" if len(self.causes) == 1 else f" ({len(self.causes)} explanations that cannot be told apart)"
             return f"{'; or '.join(cause.text for cause in self.causes[:4])}{ties}."
+        if self.too_few:
+            few = f"{self.too_few} state{'s' * (self.too_few > 1)}"
+            return f"No cause can be told from {few}: {LEAST_STATES} different positions are needed. {self.where}"
         if self.searched:
             return f"Nothing of what there was time for explains this ({self.searched}). {self.where}"
         rounded = ""
@@ -104,7 +109,14 @@ def diagnose(
     names: of the joints. q: (states, nq), qd: (states, nv). given, tolerance: (states, entries), see `packed`. seconds: for the
     search of numbers, terms and pairs.
     """
+    with np.errstate(all="ignore"):  # of values that are no numbers, or beyond the largest
+        return diagnosed(tree, tuple(names), q, qd, given, tolerance, seconds)
+
+
+def diagnosed(tree, names, q, qd, given, tolerance, seconds) -> Diagnosis:
+    """What `diagnose` says."""
     equations, end = Equations(tree, q, qd), time.monotonic() + seconds
+    tolerance = np.fmax(tolerance, FACTOR * EPS * np.abs(given))  # large values are rounded too
     search = Search(equations, all_places(equations), given, tolerance, end)
     if not search.differs:
         return Diagnosis(False)
@@ -114,7 +126,9 @@ def diagnose(
         "compared": int(search.known.any(axis=0).sum()),
         "states": (int((np.abs(search.off).max(axis=1) > 1.0).sum()), len(q)),
     }
-    names, singles, searched = tuple(names), [], ""
+    if len(np.unique(q, axis=0)) < LEAST_STATES:
+        return Diagnosis(True, too_few=len(q), **about)
+    singles, searched = [], ""
     try:
         singles = search.singles()
     except OutOfTime:
@@ -131,7 +145,7 @@ def diagnose(
             if causes:
                 return Diagnosis(True, tuple(cause._replace(tied=len(causes) - 1) for cause in causes), **about)
     except OutOfTime:
-        searched = f"in {seconds:g} s single numbers and terms, not every two of them"
+        searched = searched or f"in {seconds:g} s not everything was tried"
     left = min([one.left for one in (*singles, *search.pair_fits)], default=1.0)
     apart = np.abs(search.off[search.known]).max() * EPS * FACTOR
     return Diagnosis(True, (), left, float(-np.log10(apart)), searched=searched, **about)
@@ -174,6 +188,8 @@ def explained(search: Search, variants: Iterable[Variant]) -> list[tuple[Variant
     """The variants that leave nothing, and the share that they leave."""
     found = []
     for variant in variants:
+        if time.monotonic() > search.end:
+            raise OutOfTime
         left = search.weighted(variant.equations().values()[0])
         if np.abs(left).max() <= 1.0:
             found.append((variant, float(np.linalg.norm(left)) / search.size))

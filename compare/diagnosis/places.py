@@ -140,8 +140,13 @@ def coefficients(equations: Equations) -> list[Place]:
         Place(2, "coefficient", f"M[{i}][{j}]", 1.0, "times", 1.0, entry=at["M", i, j], column=values["M", i, j])
         for i, j in zip(*map(np.ndarray.tolist, equations.triangle))
     ]
+    whole, parts = equations.values()[0], len(equations.triangle[0])
+    for name, part in {"M": slice(parts), "h": slice(parts, None), "M and h": slice(None)}.items():
+        found.append(Place(2, "coefficient", f"all of {name}", 1.0, "times", 1.0, entry=part, column=whole[:, part]))
     of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, bias_at_rest(equations))
     for i in range(nv):
+        row = values["h", i]
+        found.append(Place(2, "coefficient", f"h[{i}]", 1.0, "times", 1.0, entry=at["h", i], column=row))
         found.append(
             Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i])
         )

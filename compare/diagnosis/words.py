@@ -82,19 +82,22 @@ def together(texts: list[str]) -> str:
 
 def place_text(place: Place, value: float) -> str:
     """One place with the value that would explain the difference."""
+    shown = nice(value)
+    if shown == nice(place.stated):
+        shown = f"{nice(place.stated)} {'+' if value > place.stated else '-'} {abs(value - place.stated):.2g}"
     if place.unit == "times":
         near = [word for factor, word in FACTORS.items() if abs(value - factor) <= CLOSE]
         if place.kind == "coefficient" and not place.stated:
-            return f"{place.name}: {nice(value)} times it is added in yours"
+            return f"{place.name}: {shown} times it is added in yours"
         if place.kind == "coefficient":
-            return f"{place.name}: yours is {nice(value)} times the right one"
-        return f"{place.name}: {near[0] if near else f'{nice(value)} times'}"
+            return f"{place.name}: yours is {shown} times the right one"
+        return f"{place.name}: {near[0] if near else f'{shown} times'}"
     unit = f" {place.unit}" if place.unit else ""
     if place.kind == OF_ZERO:
         joint = place.name.removeprefix("zero of ")
         how = Joint(joint, zero=zeroed(place, value), slides=place.unit == "m")
-        return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)} (state it as {str(how)!r})"
-    return f"{place.name}: {nice(value)}{unit} in place of {nice(place.stated)}{EXPLAINS}"
+        return f"{place.name}: {shown}{unit} in place of {nice(place.stated)} (state it as {str(how)!r})"
+    return f"{place.name}: {shown}{unit} in place of {nice(place.stated)}{EXPLAINS}"
 
 
 def zeroed(place: Place, value: float) -> float:

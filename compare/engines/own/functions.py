@@ -139,7 +139,10 @@ def of_symbols(name: str, matrix: object, symbols: object, coordinates: Coordina
     shape = {"mass_matrix": (nv, nv), "energy": (), "com_positions": (-1, 3)}.get(name, (nv,))
     if name == "jacobians" or (-1 not in shape and len(entries) != int(np.prod(shape))):
         raise OwnError(f"{name} is a SymPy object of {len(entries)} entries; shape {shape} is expected")
-    evaluated = sympy.lambdify(plain, entries, "numpy", cse=True)
+    try:
+        evaluated = sympy.lambdify(plain, entries, "numpy", cse=True)
+    except Exception as error:  # of expressions that have no numbers, such as zoo
+        raise OwnError(f"{name} cannot be made a function of {', '.join(map(str, plain))}: {error!r}") from None
 
     def function(*states: np.ndarray) -> np.ndarray:
         columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]
