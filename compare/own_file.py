@@ -78,7 +78,7 @@ def module_named(name: str) -> ModuleType:
     except Exception as error:  # of a package that it is in
         raise OwnFileError(f"{name}: {described(error, with_place=False)}") from None
     if found is None:
-        known = (path.stem for path in Path().glob("*.py"))
+        known = [path.stem for path in Path().glob("*.py")]
         raise OwnFileError(f"{name}: no such module{close_names(name, known)}")
     with raised_in(found.origin or name, name):
         return importlib.import_module(name)

@@ -54,7 +54,9 @@ def mass_matrix(q):
 def bias(q, qd, of_square=1.0):
     s, g = np.sin(q[1]), 9.81
     lower = g * np.sin(q[0] + q[1])
-    return np.array([-s * (2 * qd[0] * qd[1] + of_square * qd[1] ** 2) + 2.5 * g * np.sin(q[0]) + lower, s * qd[0] ** 2 + lower])
+    return np.array(
+        [-s * (2 * qd[0] * qd[1] + of_square * qd[1] ** 2) + 2.5 * g * np.sin(q[0]) + lower, s * qd[0] ** 2 + lower]
+    )
 
 
 def gravity(q):
@@ -92,6 +94,7 @@ def given(rng):
 
 # what may be brought
 
+
 @pytest.mark.parametrize("names", [NAMES, *((name,) for name in NAMES), ("mass_matrix", "bias"), ("gravity", "bias")])
 def test_the_right_equations_agree(names):
     brought = {name: RIGHT[name] for name in names}
@@ -108,7 +111,9 @@ def test_a_path_text_and_a_compiled_model_are_the_same(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     model = mujoco.MjModel.from_xml_string(PENDULUM)
     before = model.opt.disableflags, model.opt.integrator, model.dof_damping.copy()
-    found = [compare.differences(mjcf, bias=bias, seed=3) for mjcf in (PENDULUM, path, str(path), "pendulum.xml", model)]
+    found = [
+        compare.differences(mjcf, bias=bias, seed=3) for mjcf in (PENDULUM, path, str(path), "pendulum.xml", model)
+    ]
     assert all(one == found[0] for one in found[1:])
     assert (model.opt.disableflags, model.opt.integrator) == before[:2] and np.array_equal(model.dof_damping, before[2])
     assert os.listdir() == ["pendulum.xml"]  # no log, no cache
@@ -153,7 +158,9 @@ def test_one_joint_whose_table_has_one_column():
     inertial = '<inertial pos="1 0 0" mass="1" diaginertia="1 1 1"/>'
     text = f'<mujoco><worldbody><body><joint name="j" axis="0 1 0"/>{inertial}</body></worldbody></mujoco>'
     q = np.linspace(-1.0, 1.0, 5)
-    compare.assert_agrees(text, q=q, qd=0.0, mass_matrix=np.full(5, 2.0), bias=-9.81 * np.cos(q), gravity=-9.81 * np.cos(q))
+    compare.assert_agrees(
+        text, q=q, qd=0.0, mass_matrix=np.full(5, 2.0), bias=-9.81 * np.cos(q), gravity=-9.81 * np.cos(q)
+    )
     compare.assert_agrees(text, mass_matrix=lambda q: [[2.0]], gravity=lambda q: -9.81 * np.cos(q))
 
 
@@ -183,6 +190,7 @@ def test_functions_of_one_state_or_of_a_batch(batch):
 
 
 # the tolerance
+
 
 def scale_of(name, given):
     scale = Entries(TREE, *(given.states[part] for part in ("q", "qd")))
@@ -270,14 +278,20 @@ def turned():
         "mass_matrix": lambda q: of.own_mass_matrix(each(mass_matrix)(of.positions(q)))[0],
         "bias": lambda q, v: of.own_forces(each(bias)(of.positions(q), of.speeds(v)))[0],
         "gravity": lambda q: of.own_forces(each(gravity)(of.positions(q)))[0],
-        "acceleration": lambda q, v, t: of.own_forces(each(acceleration)(of.positions(q), of.speeds(v), of.forces(t)))[0],
+        "acceleration": lambda q, v, t: of.own_forces(each(acceleration)(of.positions(q), of.speeds(v), of.forces(t)))[
+            0
+        ],
     }, of
 
 
 def test_joints_as_they_are_stated_functions_and_arrays(given):
     functions, of = turned()
     compare.assert_agrees(PENDULUM, **functions, joints=STATED)
-    q, qd, tau = of.own_positions(given.states["q"]), of.own_speeds(given.states["qd"]), of.own_forces(given.states["tau"])
+    q, qd, tau = (
+        of.own_positions(given.states["q"]),
+        of.own_speeds(given.states["qd"]),
+        of.own_forces(given.states["tau"]),
+    )
     arrays = {name: of.own_forces(values) for name, values in given.values.items() if name != "mass_matrix"}
     arrays["mass_matrix"] = of.own_mass_matrix(given.values["mass_matrix"])
     compare.assert_agrees(PENDULUM, **arrays, q=q, qd=qd, tau=tau, joints=STATED)
@@ -315,6 +329,7 @@ def test_joints_that_are_stated_wrongly_are_stated_anew():
 
 # the message
 
+
 def test_the_message_in_the_manner_of_numpy_testing(given):
     values = given.values["bias"].copy()
     values[7, 1] += 0.25
@@ -322,7 +337,9 @@ def test_the_message_in_the_manner_of_numpy_testing(given):
     assert lines[0] == "Not equal to MuJoCo to tolerance (64 eps) x the scale of each entry"
     assert lines[1] == "bias: mismatched entries 1 / 24 (4.17 %), at 1 / 12 states"
     q, qd = (given.states[name][7] for name in ("q", "qd"))
-    assert lines[2].startswith(f"  worst: h[knee] at state 7, q = [{q[0]:.6g}, {q[1]:.6g}], qd = [{qd[0]:.6g}, {qd[1]:.6g}]")
+    assert lines[2].startswith(
+        f"  worst: h[knee] at state 7, q = [{q[0]:.6g}, {q[1]:.6g}], qd = [{qd[0]:.6g}, {qd[1]:.6g}]"
+    )
     assert float(lines[3].removeprefix("    yours:  ")) == values[7, 1]
     assert float(lines[4].removeprefix("    MuJoCo: ")) == given.values["bias"][7, 1]
     assert lines[5].startswith("    difference: 0.25, ") and "times its tolerance of" in lines[5]
@@ -400,6 +417,7 @@ def test_one_that_raises_later_is_said():
 
 # what cannot be compared
 
+
 @pytest.mark.parametrize("brought, said", [
     ({}, "there is nothing to compare"), ({"bias": bias, "rtol": -1.0}, "rtol is -1.0"),
     ({"bias": bias, "rtol": "x"}, "rtol is 'x'"), ({"bias": bias, "states": 0}, "states is 0; a whole number"),
@@ -449,6 +467,7 @@ def test_a_quaternion_of_another_length():
 
 # states and time
 
+
 def test_random_states_are_the_same_by_the_same_seed():
     one, same, other = (compare.differences(PENDULUM, bias=bias, seed=seed, states=5) for seed in (1, 1, 2))
     assert one == same and {d.state for d in one}.isdisjoint({d.state for d in other})
@@ -473,6 +492,7 @@ def test_slow_functions_are_compared_at_fewer_states_and_that_is_said(monkeypatc
 
 
 # the package
+
 
 def test_import_compare_loads_neither_mujoco_nor_numba():
     program = (

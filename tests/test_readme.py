@@ -100,7 +100,9 @@ def test_commands_can_be_given(line, capsys, tmp_path, monkeypatch):
     if arguments[1] == "timeit":
         arguments[arguments.index("-n") + 1] = "1"
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        ran = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=environment, cwd=tmp_path)
+        ran = subprocess.run(
+            [sys.executable, *arguments], capture_output=True, text=True, env=environment, cwd=tmp_path
+        )
         assert ran.returncode == 0 and "loop" in ran.stdout, ran.stderr
         return
     assert arguments[1] == "compare"

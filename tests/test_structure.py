@@ -24,7 +24,7 @@ DIRECTIONS = {
     "states": {"tmt", "robots", "case"},
     "robots": {"tmt", "case"},
     "scene_file": {"case", "given", "robots"},
-    "own_file": {"process"},
+    "own_file": {"process", "judge"},
     "reference": {"robots", "engines", "process", "case", "joint_map", "own_file"},
     "engines": {"tmt", "case", "coordinates", "joint_map"},
     "truth": {"tmt", "case"},

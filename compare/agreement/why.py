@@ -8,6 +8,7 @@ import tmt
 
 from ..diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ..diagnosis.consistency import conditions, symmetric
+from ..diagnosis.finding import LEAST_STATES
 from ..diagnosis.forces import causes_of_forces
 from ..judge.check import over
 from ..judge.entries import Entries
@@ -33,8 +34,8 @@ class Values(NamedTuple):
 
 def cause_of(given: Given) -> str:
     """The sentence; "" where there are no values of which it could be sought."""
-    if not all(np.isfinite(values).all() for values in given.values.values()):
-        return ""  # what explains the rest explains nothing
+    if len(some_states(given)) < min(LEAST_STATES, len(given.q)):
+        return ""  # too few of them are numbers
     failing = [name for name, one in given.compared.items() if (one.ratio > 1.0).any()]
     if failing == ["acceleration"]:
         which = some_states(given)
@@ -100,8 +101,10 @@ def first_broken(given: Given, values: Values) -> str:
 def some_states(given: Given) -> np.ndarray:
     """The numbers of as many states as a diagnosis takes: of those with finite values the first, and the worst."""
     worst = np.max([one.ratio.reshape(len(given.q), -1).max(axis=1) for one in given.compared.values()], axis=0)
-    order = np.argsort(~np.isfinite(worst), kind="stable")[: STATES_ASKED - 1]
-    return np.unique([int(np.argmax(np.where(np.isfinite(worst), worst, -1.0))), *order])
+    finite = np.flatnonzero(np.isfinite(worst))
+    if not len(finite):
+        return finite
+    return np.unique([finite[np.argmax(worst[finite])], *finite[: STATES_ASKED - 1]])
 
 
 def of_equations(given: Given, failing: list[str]) -> Values:

@@ -8,14 +8,13 @@ that does: they cannot be told apart.
 
 import time
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 import tmt
 
 from ..judge.scale import EPS, FACTOR
-from ..judge.words import listed
+from .finding import LEAST_STATES, Diagnosis
 from .fit import Fitted, OutOfTime, Search, nearest_changes
 from .model import Equations, packing
 from .places import Place, all_places
@@ -24,67 +23,11 @@ from .variants import Variant, both, conventions, program_options, values_of
 from .words import Cause, is_possible, of_fitted, of_variant
 
 STATES_ASKED = 24
-LEAST_STATES = 4  # different positions: of fewer, wrong numbers explain by luck
 FEW = 2  # states at which many conventions are tried first
 NEAR = 0.5  # of the difference: a convention with a number beside it that leaves more is not looked at
-ENTRIES_SHOWN = 6  # entries in a sentence
 KEPT = 12  # explanations that are kept though they do not explain
 PROMISING = 6  # states at which it is estimated what a number beside a convention can do
 BESIDE = 4  # conventions beside which a number is fitted
-
-
-class Diagnosis(NamedTuple):
-    """What explains a difference."""
-
-    differs: bool
-    causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
-    left: float = 0.0  # of the difference that the nearest single number, term or pair leaves, a share
-    digits: float = np.inf  # to which the values agree
-    entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[0][1]"
-    states: tuple[int, int] = (0, 0)  # at how many they differ, and of how many
-    compared: int = 0  # entries in all
-    nearest: tuple[tuple[str, float], ...] = ()  # single explanations that leave least, and what they leave, a share
-    too_few: int = 0  # states, of which nothing can be told; 0: enough
-    searched: str = ""  # what there was time for; "": everything
-
-    @property
-    def sentence(self) -> str:
-        """The finding."""
-        if not self.differs:
-            return "There is nothing to explain: the equations agree."
-        if self.causes:
-            ties = "" if len(self.causes) == 1 else f" ({len(self.causes)} explanations that cannot be told apart)"
-            return f"{'; or '.join(cause.text for cause in self.causes[:4])}{ties}."
-        if self.too_few:
-            few = f"{self.too_few} state{'s' * (self.too_few > 1)}"
-            return f"No cause can be told from {few}: {LEAST_STATES} different positions are needed. {self.where}"
-        if self.searched:
-            return f"Nothing of what there was time for explains this ({self.searched}). {self.where}"
-        rounded = ""
-        if 2.0 <= self.digits < np.inf:
-            rounded = (
-                f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
-            )
-        share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
-        return f"No single number or term explains this, nor do two: {share} is left. {self.where}{rounded}"
-
-    @property
-    def where(self) -> str:
-        """Which entries differ, and at how many states if these are few."""
-        off, states = self.states
-        return self.which + (
-            f" They differ at {off} of {states} states only: look at those." if 3 * off < states else ""
-        )
-
-    @property
-    def which(self) -> str:
-        """Which entries differ."""
-        if len(self.entries) == self.compared:
-            return "Every entry differs."
-        if len(self.entries) > ENTRIES_SHOWN:
-            shown = ", ".join(self.entries[:ENTRIES_SHOWN])
-            return f"{len(self.entries)} of {self.compared} entries differ, the others agree: {shown}, ..."
-        return f"{listed(self.entries)} {'differs' if len(self.entries) == 1 else 'differ'}, the others agree."
 
 
 def packed(mass_matrix: np.ndarray | None, bias: np.ndarray | None, nv: int, states: int) -> np.ndarray:
@@ -110,10 +53,10 @@ def diagnose(
     search of numbers, terms and pairs.
     """
     with np.errstate(all="ignore"):  # of values that are no numbers, or beyond the largest
-        return diagnosed(tree, tuple(names), q, qd, given, tolerance, seconds)
+        return explanation(tree, tuple(names), q, qd, given, tolerance, seconds)
 
 
-def diagnosed(tree, names, q, qd, given, tolerance, seconds) -> Diagnosis:
+def explanation(tree, names, q, qd, given, tolerance, seconds) -> Diagnosis:
     """What `diagnose` says."""
     equations, end = Equations(tree, q, qd), time.monotonic() + seconds
     tolerance = np.fmax(tolerance, FACTOR * EPS * np.abs(given))  # large values are rounded too
@@ -168,7 +111,7 @@ def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted], pai
     ]
     yield [
         *(of_fitted(one, 2) for one in singles if one.places[0].rank == 2),
-        *(of_variant(variant, left) for variant, left in explained(search, slips(equations))),
+        *(of_variant(variant, left) for variant, left in explained(search, slips(equations), bounded=True)),
     ]
     if not pairs:
         return
@@ -184,11 +127,11 @@ def ranks(search: Search, names: tuple[str, ...], singles: Sequence[Fitted], pai
     yield found
 
 
-def explained(search: Search, variants: Iterable[Variant]) -> list[tuple[Variant, float]]:
-    """The variants that leave nothing, and the share that they leave."""
+def explained(search: Search, variants: Iterable[Variant], bounded: bool = False) -> list[tuple[Variant, float]]:
+    """The variants that leave nothing, and the share that they leave. bounded: within the time of the search."""
     found = []
     for variant in variants:
-        if time.monotonic() > search.end:
+        if bounded and time.monotonic() > search.end:
             raise OutOfTime
         left = search.weighted(variant.equations().values()[0])
         if np.abs(left).max() <= 1.0:

@@ -75,7 +75,7 @@ def program_options(equations: Equations) -> Iterator[Variant]:
     yield Variant(1, "option", "gravity", "on", "off", with_factor("gravity", 0.0))
     yield Variant(1, "option", "sign of gravity", "+", "-", with_factor("gravity", -1.0))
     yield Variant(1, "option", "terms of the rates in the bias", "there", "left out", with_factor("rates", 0.0))
-    yield Variant(1, "option", "bias", "there", "zero", with_bias(np.zeros_like))
+    yield Variant(1, "option", "bias", "there", "left out", with_bias(np.zeros_like))
     negative = with_bias(lambda h: -h)
     yield Variant(1, "option", "sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", negative)
     if any(tree.damping):

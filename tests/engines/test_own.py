@@ -211,6 +211,7 @@ def test_names_that_do_not_fit(source, said):
 
 # what is missing
 
+
 def test_what_is_missing_is_made_of_what_is_there(rng):
     tree = dataclasses.replace(tmt.ARM, damping=(0.1, 0.2, 0.3), stiffness=(1.0, 0.0, 2.0), rest=(0.1, 0.0, 0.2))
     source = {"mass_matrix": lambda q: tmt.mass_matrix(q, tree), "bias": lambda q, v: tmt.bias(q, v, tree)}
@@ -240,6 +241,7 @@ def test_a_case_changes_own_equations_as_it_changes_the_others(rng):
 
 # motion
 
+
 def test_it_runs_by_the_same_rk4_as_tmt_balls_too(rng):
     reading = read(PATHS["pendulum_ball"])
     robot = robot_of(reading, "a ball")
@@ -265,6 +267,7 @@ def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_nu
 
 
 # equations that cannot be used
+
 
 class Called:
     def mass_matrix(self, q): ...
@@ -312,6 +315,7 @@ def test_bodies_are_those_of_the_first_state(rng):
 
 
 # equations that can be used, with something wrong
+
 
 def problems(mass_matrix, q):
     own = OwnEquations({"mass_matrix": mass_matrix}, COORDINATES, required=())
@@ -392,6 +396,7 @@ def test_one_that_prints_is_left_alone(capsys, rng):
 
 
 # time
+
 
 def test_slow_functions_are_asked_of_fewer_states(rng):
     def mass_matrix(q):

@@ -143,7 +143,7 @@ def test_an_engine_that_cannot_take_part_says_why_in_its_cells_and_is_nowhere_el
     ]
     for name, table in with_it.tables.items():
         assert "own" not in {row.get("engine") for row in table} and len(table) == len(without.tables[name])
-    assert with_it.notes[-1] == "own takes no part: own.py is not there."
+    assert with_it.notes[-1] == "yours takes no part: own.py is not there."
     assert not any("own" in note.split() or "own.py" in note for note in with_it.notes[:-1])
     assert figures[0] == figures[1] > 0
 

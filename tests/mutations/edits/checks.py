@@ -30,7 +30,7 @@ CHECKS = (
     ("reduction", "rows", "LOCKABLE"),
     ("sub_blocks", "check_blocks", "name"),
     ("trajectory", "compare_runs", '"time judged"'),
-    ("trajectory", "check_divergence", "f\"step of divergence, MuJoCo's, is {whose}\""),
+    ("trajectory", "check_divergence", 'f"step of divergence, MuJoCo\'s, is {whose}"'),
     ("judge.run", "check_movement", '"movement"'),
     ("trajectory", "check_same_bits", 'f"the same bits as {_1}"'),
     ("trajectory", "check_level", 'f"{_1}, {_2} to MuJoCo"'),
