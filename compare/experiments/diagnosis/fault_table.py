@@ -24,7 +24,7 @@ from .wrong_motion import row_of_motion, wrong_motions
 
 SHOWN_OF_FAULTS = ["robot", "kind", "source", "visible", "outcome", "faults", "longest_s"]
 PART = 12  # faults that a process is handed at once
-SAMPLE = 60  # faults of a quick run
+SAMPLE = 40  # faults of a quick run
 SEARCHED = 20.0  # s of one fault: what else the machine does must not change what is found
 OTHERS = 3  # explanations that a reason names
 RANKS = dict.fromkeys(("order", "sign", OF_ZERO, "unit", "option"), 1) | dict.fromkeys(
