@@ -34,6 +34,6 @@ EDITS = (
     Edit("agreement.given", "Given.take_states", "self.joints.speeds(own['qd'])", "own['qd']", "speeds keep their own joints"),
     Edit("agreement", "assert_agrees", "given.fails or given.problems", "given.fails", "a changed argument agrees"),
     Edit("agreement", "differences", "-one.ratio", "one.ratio", "the smallest ratio first"),
-    Edit("agreement.why", "some_states", "np.argsort(_1, kind='stable')", "np.arange(len(worst))",
+    Edit("agreement.why", "some_states", "np.flatnonzero(np.isfinite(worst))", "np.arange(len(worst))",
          "a cause is sought where there are no values"),
 )  # fmt: skip
