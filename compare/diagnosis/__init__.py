@@ -59,7 +59,8 @@ def diagnose(
 def explanation(tree, names, q, qd, given, tolerance, seconds) -> Diagnosis:
     """What `diagnose` says."""
     equations, end = Equations(tree, q, qd), time.monotonic() + seconds
-    tolerance = np.fmax(tolerance, FACTOR * EPS * np.abs(given))  # large values are rounded too
+    rounded = np.fmax(tolerance, FACTOR * EPS * np.abs(given))  # large values are rounded too
+    tolerance = np.where(tolerance > 0.0, rounded, 0.0)
     search = Search(equations, all_places(equations), given, tolerance, end)
     if not search.differs:
         return Diagnosis(False)

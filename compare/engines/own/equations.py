@@ -223,6 +223,8 @@ class OwnEquations:
             hint = ""
             if isinstance(self.source, type) and isinstance(error, TypeError) and "missing" in str(error):
                 hint = f"; of the class {self.source.__name__} an object such as {self.source.__name__}() is expected"
+            elif isinstance(error, TypeError) and "positional argument" in str(error):
+                hint = f"; {call(name)} is expected"
             raise OwnError(f"{name} raised {as_raised(error)}{hint}") from error
         for symbol, before, after in zip(STATE, given, handed):
             changed = np.atleast_2d(before != after).any(axis=1)

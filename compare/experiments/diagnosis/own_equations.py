@@ -52,7 +52,7 @@ def diagnosed_as_stated(
     own[1] = tuple(np.abs(part) for part in own[1])
     anew = found(joints.own_positions(q), joints.own_speeds(qd), *own)
     if not anew.differs:  # they are the model's
-        text = f"the joints: they are the model's as it has them (state it as joints={list(names)})"
+        text = f"joints as they are stated: all agrees with those of the model (state it as joints={list(names)})"
         cause = first.causes[0]._replace(place="the joints", explains="as the model has them", text=text)
         return first._replace(causes=(cause,))
     return anew if anew.causes else first
