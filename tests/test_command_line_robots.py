@@ -54,7 +54,7 @@ def test_a_robot_is_compared_and_what_is_off_is_said(tmp_path, capsys):
 
 @pytest.mark.parametrize("arguments, says", [
     (["mass", "--reference", "arm"], "hinges alpha, beta, gamma and no others are expected"),
-    (["published"], "published cannot serve arm7: no printed numbers of the arm7 are known"),
+    (["published"], "published cannot serve arm7: no printed numbers of the robot are known"),
 ])  # fmt: skip
 def test_what_is_of_the_arm_alone_gets_status_2(tmp_path, capsys, arguments, says):
     refused(capsys, [*arguments, "--mjcf", str(PATHS["arm7"]), "--out", str(tmp_path / "out")], says)
@@ -93,7 +93,7 @@ def test_in_all_what_cannot_serve_the_robot_is_skipped_with_the_reason(tmp_path,
     monkeypatch.setattr(command_line, "EXPERIMENTS", dict.fromkeys(("parameters", "published"), ""))
     assert main(["all", "--quick", "--mjcf", str(PATHS["loop"]), "--out", str(tmp_path)]) == 0
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
-    reason = "no printed numbers of the loop are known"
+    reason = "no printed numbers of the robot are known"
     assert results["skipped"] == [{"experiment": "published", "reason": reason}]
     assert f"published     skipped: {reason}" in capsys.readouterr().out.splitlines()
 

@@ -100,7 +100,7 @@ def sketch_in_words(robot: Robot, few: bool) -> str:
     at = f", at {posture}" if robot.is_read and others else ""
     if few and set(kinds) == {"hinge"}:
         return (
-            f"The {robot.name} and its hinges, drawn from the method's own kinematics{at}: {', then '.join(hinges(robot))}. "
+            f"The {robot.noun} and its hinges, drawn from the method's own kinematics{at}: {', then '.join(hinges(robot))}. "
             f"Dots: centres of mass of {listed(bodies)}."
         )
     signs = {
@@ -117,7 +117,7 @@ def sketch_in_words(robot: Robot, few: bool) -> str:
     which = f"{at}: {', then '.join(hinges(robot))}" if few else ""
     of = listed(bodies) if few else f"{len(bodies)} bodies"
     return (
-        f"The {robot.name}, drawn from the method's own kinematics: {listed(counted)}{free}{which}. Sticks: from joint to joint, "
+        f"The {robot.noun}, drawn from the method's own kinematics: {listed(counted)}{free}{which}. Sticks: from joint to joint, "
         f"and to the last centres of mass. Dots: centres of mass of {of}."
     )
 

@@ -27,7 +27,7 @@ def claim(robot: Robot) -> str:
     of = "in both" if has_potential(robot) else "in MuJoCo"
     return (
         f"{capital(whose)} holding torque is MuJoCo's qfrc_bias at rest{springs}; {of} it is the gradient of the engine's own "
-        f"potential energy; and {whose} torque, given to MuJoCo, leaves the {robot.name} at rest."
+        f"potential energy; and {whose} torque, given to MuJoCo, leaves the {robot.noun} at rest."
     )
 
 

@@ -107,7 +107,7 @@ def rows(setup: Setup) -> Result:
         result.curves["condition"] = condition_grid(robot, compared[ours].mass_matrix, degrees)
     elif not robot.is_read:
         result.notes.append(
-            f"Nothing is stated of where the condition number of Mbar of the {robot.name} is largest: that is neither checked "
+            f"Nothing is stated of where the condition number of Mbar of the {robot.noun} is largest: that is neither checked "
             "nor drawn."
         )
     return result

@@ -21,7 +21,7 @@ TITLE = "Published numbers: does either engine contradict the assignment?"
 
 def skipped(robot: Robot) -> str | None:
     """Why the experiment cannot serve a robot, or None."""
-    return None if robot.printed else f"no printed numbers of the {robot.name} are known"
+    return None if robot.printed else f"no printed numbers of the {robot.noun} are known"
 
 
 def claim(robot: Robot) -> str:

@@ -149,6 +149,6 @@ def leaves_no_digits(robot: object) -> str | None:
     if not FACTOR * EPS * (rate * dt) ** 4 > NARROW:
         return None
     return (
-        f"the {robot.name}'s fastest rate, {rate:.1e} per second, is {rate * dt:.1e} over a step of {dt:.1e} s, the finest of "
+        f"the {robot.noun}'s fastest rate, {rate:.1e} per second, is {rate * dt:.1e} over a step of {dt:.1e} s, the finest of "
         "its scenes: rounding alone leaves no digits after two steps"
     )

@@ -112,6 +112,11 @@ class Robot:
         return bool(self.features)
 
     @property
+    def noun(self) -> str:
+        """What a sentence calls it: a file may have any name."""
+        return "robot" if self.is_read else self.name
+
+    @property
     def coordinates(self) -> Coordinates:
         return Coordinates(self.joints, self.tree.kind)
 

@@ -130,7 +130,7 @@ def has_no_reference(robot: object) -> str | None:
         grown = np.abs(growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * case.duration / count)).max()
         if not grown <= DIVERGES:
             return (
-                f"the {robot.name}'s fastest rate, {max(decay, swing):.1e} per second, is too fast for the reference's finest "
+                f"the {robot.noun}'s fastest rate, {max(decay, swing):.1e} per second, is too fast for the reference's finest "
                 f"step, {case.duration / count:.1e} s"
             )
     return None

@@ -149,7 +149,7 @@ def small_oscillations(
     posture = equilibrium(robot)
     if posture is None:
         why = not_linear(tree) or "no named posture is stable without a torque"
-        result.notes.append(f"Small oscillations of the {robot.name} are not compared with its linear modes: {why}.")
+        result.notes.append(f"Small oscillations of the {robot.noun} are not compared with its linear modes: {why}.")
         return
     q, rest, away = robot.posture(posture), np.zeros(len(robot.joints)), np.ones(len(robot.joints))
     frequencies, _ = modes(tree, q)

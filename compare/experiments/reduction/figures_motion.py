@@ -60,7 +60,7 @@ def draw_small_oscillations(result: Result, robot: Robot) -> tuple[str, Figure, 
     least = " and ".join(f"{off[engine][-1]:.1e} ({LABELS[engine]})" for engine in off)
     halves = "" if small["sides"] == 1 else " Of two motions, let go on either side, half the difference is taken."
     caption = (
-        f"Small oscillations about {small['posture']} against the linear modes of the stated {robot.name} ({modes} rad/s): the "
+        f"Small oscillations about {small['posture']} against the linear modes of the stated {robot.noun} ({modes} rad/s): the "
         f"relative distance in {small['duration']:.3g} s goes with the amplitude to the power {powers}, where the same "
         f"{robot.name} has 2. It is {least} at {amplitude[-1]:g} rad.{halves}"
     )

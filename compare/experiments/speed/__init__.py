@@ -77,7 +77,7 @@ def tolerance(robot: Robot) -> str:
 def skipped(robot: Robot) -> str | None:
     """Why it cannot serve a robot, or None."""
     if not scenes_of(robot):
-        return f"the {robot.name} has no scene that every method follows"
+        return f"the {robot.noun} has no scene that every method follows"
     return leaves_no_digits(robot) or has_no_reference(robot)
 
 

@@ -116,7 +116,7 @@ def true_errors_in_words(rows: list[dict], steps: Mapping[str, int], robot: Robo
         alike = [s for s, pair in far.items() if None not in pair and abs(pair[0] - pair[1]) < ALIKE * pair[0]]
         other = [s for s in far if s not in alike]
         if alike:
-            text += f" {'; '.join(alike)}: both engines make this error. That they agree says nothing of the {robot.name}'s "
+            text += f" {'; '.join(alike)}: both engines make this error. That they agree says nothing of the {robot.noun}'s "
             text += "motion there."
         if other:
             text += f" {'; '.join(other)}: the errors are not the same."

@@ -76,11 +76,11 @@ def torques_in_words(robot: Robot, engine: str, rows: list[dict], own: dict, nea
             f"the residual of the torque, at most {off:.3g} ulps, pushes the unstable mode"
         )
         text += f" (the others are pushed by at most {max(against):.1e} rad/s2)" if against else ""
-    moved = f"the {robot.name} leaves after {span([own['observed_s']])}"
+    moved = f"the {robot.noun} leaves after {span([own['observed_s']])}"
     if own["moved_rad"] == 0.0:
         moved = "nothing moves"
     elif own["observed_s"] is None:
-        moved = f"the {robot.name} stays within {LEFT:g} rad"
+        moved = f"the {robot.noun} stays within {LEFT:g} rad"
     return (
         text
         + f"; under the torque nearest to its own bias ({number_or_nan(own['residual_ulps']):.2g} ulps off) {moved}"
@@ -141,7 +141,7 @@ def check_printed_torque(result: Result, robot: Robot, printed: list[dict]) -> N
     stay = sum(row["observed_s"] is None for row in printed)
     result.notes.append(
         f"The torque as printed, four decimals, in {len(printed)} runs of both engines at {claims.left} with steps from "
-        f"{max(row['dt_s'] for row in printed):.4g} s down: the {robot.name} leaves after "
+        f"{max(row['dt_s'] for row in printed):.4g} s down: the {robot.noun} leaves after "
         f"{span(row['observed_s'] for row in printed)}"
         + (
             f"; runs in which it stays: {stay}."

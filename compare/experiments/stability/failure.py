@@ -206,7 +206,7 @@ def gain_in_words(gain: dict) -> str:
     least = ", ".join(f"{'none' if v is None else f'{v:.4f} kg m2'} at {n} steps" for n, v in gain["definite"].items())
     text = (
         f"MuJoCo's `implicit`, {case.name}, at {fraction(case.duration, case.scene.dt)} s: in {case.duration:g} s the energy "
-        f"rises by {gain['gain']:.3g} J at most, with {gain['warnings']} warnings; the range of the {case.robot.name}'s "
+        f"rises by {gain['gain']:.3g} J at most, with {gain['warnings']} warnings; the range of the {case.robot.noun}'s "
         f"potential is {gain['range']:.1f} J. "
     )
     text += (

@@ -133,7 +133,7 @@ def finest_in_words(robot: Robot, rows: list[dict]) -> str:
     text = (
         f"From {min(still)} steps on nothing moves in {duration:g} s (drawn at {NOTHING_MOVES:g})."
         if still
-        else f"With every step the {robot.name} moves."
+        else f"With every step the {robot.noun} moves."
     )
     finest = (row for row in rows if round(duration / row["dt_s"]) == counts[0])
     last = max(finest, key=lambda row: number_or_nan(row["step_rad"]))

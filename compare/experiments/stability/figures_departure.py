@@ -52,7 +52,7 @@ def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     both = [row for row in rows if None not in (row["observed_s"], row["predicted_s"])]
     close = sum(abs(late(row)) <= near_row(row) for row in both)
     caption = (
-        f"How long the {robot.name} stays at {saddle}. Lines: first crossing of {LEFT:g} {unit} by each method's own linear map, "
+        f"How long the {robot.noun} stays at {saddle}. Lines: first crossing of {LEFT:g} {unit} by each method's own linear map, "
         "its angles rounded to doubles; the fastest mode alone gives a slope of "
         f"ln 10 / {rate:.3f} = {np.log(10) / rate:.3f} s for each power of ten. Marks: {len(rows)} runs. "
         f"{len(both)} leave as the map does, {close} of them within one step or {DEPARTURE_TOLERANCE:g} s"

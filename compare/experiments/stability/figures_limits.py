@@ -152,7 +152,7 @@ def draw_regions(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         step = f"the limit of dt at the posture {centre}, where there is one, else {step}" if centre else step
     caption = (
         "The upper half of the stability regions (grey: one step lets neither of a pair of conjugate eigenvalues "
-        f"grow) with the eigenvalues of the held {robot.name} times {step}. "
+        f"grow) with the eigenvalues of the held {robot.noun} times {step}. "
         + (f"Positive real parts, which grow in the exact motion too ({real}). " if real else "")
         + (f"Crosses: {limiting} of {centre} at the limit, {swing} = {', '.join(outside)}. " if outside else "")
         + "Of partitioned methods two different real eigenvalues do not have a region; their marks are a guide."

@@ -62,7 +62,7 @@ def subjects_of(robot: Robot) -> Subjects:
     name = of_kind(robot, "marginal")
     marginal = held(robot, name) if name and not (robot.is_read and held(robot, name).stays) else None
     lawless = without_law(marginal) if marginal else None
-    none = f"None of the {robot.name}'s named postures is"
+    none = f"None of the {robot.noun}'s named postures is"
     if still:
         left_out.append(
             f"At {still[0]} every rate is zero: no step is too large there, and there is no limit to look for."
@@ -89,7 +89,7 @@ def subjects_of(robot: Robot) -> Subjects:
             f"{posture_begins(name, robot)}, held, is marginal, but {lawless}: the law of leaving it is left out."
         )
     if not robot.claims and not robot.is_read:
-        left_out.append(f"Nothing is claimed of the {robot.name}: there are no claims to repeat.")
+        left_out.append(f"Nothing is claimed of the {robot.noun}: there are no claims to repeat.")
     marginal, free = None if lawless else marginal, free_motion(robot)
     if robot.is_read and (set(robot.tree.kind) != {"hinge"} or robot.tree.has_springs):
         free = None
@@ -103,12 +103,12 @@ def subjects_of(robot: Robot) -> Subjects:
 def left_out_of_a_file(robot: Robot, stays: object) -> list[str]:
     """What is left out of every robot that is read from a file."""
     words = [
-        f"The {robot.name} is read from a file, of which a report looks at modes, limits of steps, departures and silent "
+        f"The {robot.noun} is read from a file, of which a report looks at modes, limits of steps, departures and silent "
         "failures alone, with its own damping. Left out are methods that solve an equation in each step, the map of growth, the "
         "nonlinear edge and long runs: they would take most of the time of a report."
     ]
     if not stays:
-        words.append(f"No posture of the {robot.name} keeps a small deviation small: limits of steps are left out.")
+        words.append(f"No posture of the {robot.noun} keeps a small deviation small: limits of steps are left out.")
     return words
 
 
@@ -130,20 +130,20 @@ def looked_at(robot: Robot) -> tuple[Robot, list[str]]:
     if floats(robot.tree):
         if np.any(robot.tree.gravity):
             notes.append(
-                f"The {robot.name} has a free body, which has no rest under gravity: all that is held here is held without "
+                f"The {robot.noun} has a free body, which has no rest under gravity: all that is held here is held without "
                 "gravity."
             )
         return robot, notes
     found = at_rest(robot.tree, robot.posture(names[0]))
     if found is None:
-        notes.append(f"No posture was found at which the {robot.name} rests without torque: it sinks for ever.")
+        notes.append(f"No posture was found at which the {robot.noun} rests without torque: it sinks for ever.")
         return robot, notes
     known = [name for name in names if np.abs(robot.coordinates.difference(found, robot.posture(name))).max() < 1e-6]
     if not known:
         rest = REST if REST not in names else f"{REST} without torque"
         robot = replace(robot, positions={**robot.positions, rest: tuple(map(float, found))})
         notes.append(
-            f"Under no torque the {robot.name} rests at a posture that was found downhill from {names[0]}; it is called "
+            f"Under no torque the {robot.noun} rests at a posture that was found downhill from {names[0]}; it is called "
             f"{rest}."
         )
     return robot, notes

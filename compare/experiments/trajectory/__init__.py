@@ -53,7 +53,7 @@ def tolerance(robot: Robot) -> str:
         "run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's own "
         f"steps. Judged at the states of the coarsest step while the band of the angles is below {NARROW:g} rad and no run has "
         f"diverged; each scene states how long that must be. A free run must move by {MOVES:g} rad. A run has diverged if it "
-        f"stops, is not finite, or has gained more energy than the stated {robot.name}'s whole potential range and the kinetic "
+        f"stops, is not finite, or has gained more energy than the stated {robot.noun}'s whole potential range and the kinetic "
         "energy at the start. Where one diverges while the band is narrow, the other must do so at the same step."
     )
 
@@ -67,7 +67,7 @@ def tolerance_of_file(robot: Robot) -> str:
         f"the sum of the absolute terms of the force, and 8 eps of the sums of the step{ball}. Open loop: a band computed along "
         "the run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's "
         f"own steps. Judged while the band of the positions is below {NARROW:g} {unit} and no run has diverged. A run has "
-        f"diverged if it stops, is not finite, or has gained more energy than the {robot.name}'s motion can have exchanged: "
+        f"diverged if it stops, is not finite, or has gained more energy than the {robot.noun}'s motion can have exchanged: "
         "the whole potential range with the energy of speeds and springs at the start, or, where that is more, the work of the "
         "torque and of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same "
         "step."
@@ -138,7 +138,7 @@ def rows(setup: Setup) -> Result:
     horizon.many_digits(result, *work["exact"])
     if not (work["exact"][0] or setup.is_quick or setup.robot.own):
         result.notes.append(
-            f"No scene of this {setup.robot.name} is marked to be compared with many digits of its own scheme."
+            f"No scene of this {setup.robot.noun} is marked to be compared with many digits of its own scheme."
         )
     if work["growth"][0]:
         horizon.growth_of_errors(result, *work["growth"])

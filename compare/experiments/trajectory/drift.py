@@ -40,9 +40,9 @@ def measure_drift(result: Result, robot: Robot, engines: Mapping[str, Engine], s
     check_drifts(result, drifts, rounding)
     result.curves["drift"] = {"drifts": drifts, "steps": {method: steps[method.order] for method in methods}}
     if not drifts and robot.is_read:
-        result.notes.append(f"Of the scenes of this {robot.name} nothing is asked but agreement: no drift is measured.")
+        result.notes.append(f"Of the scenes of this {robot.noun} nothing is asked but agreement: no drift is measured.")
     elif not drifts:
-        result.notes.append(f"No scene of this {robot.name} is free and without damping: there is no drift to measure.")
+        result.notes.append(f"No scene of this {robot.noun} is free and without damping: there is no drift to measure.")
 
 
 def constants(case: Case) -> dict[tuple, Callable]:

@@ -37,7 +37,7 @@ def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str
     end = f"{curve['t'][-1]:g}"
     caption = (
         f"The assignment's Figure {number} redrawn: {case.name} with TMT's torque in both engines, RK4, "
-        f"dt = {end}/{len(curve['t']) - 1} s. In {end} s the {case.robot.name} of TMT {left_in_words(curve['left']['tmt'])}, "
+        f"dt = {end}/{len(curve['t']) - 1} s. In {end} s the {case.robot.noun} of TMT {left_in_words(curve['left']['tmt'])}, "
         f"that of MuJoCo {left_in_words(curve['left']['mujoco'])}. "
         f"The true motion is rest: of that TMT is at most {rad(ours)} off, MuJoCo {rad(theirs)}; while judged, to "
         f"{curve['judged_until_s']:.2f} s, they are {agreement(curve, case):.1e} rad apart."

@@ -75,7 +75,7 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
         left_over = f"{size:.1e}" if size else "0"
         sentences.append(
             f"{capital(LABELS[name])}: the torque leaves an acceleration of {left_over} {per} (rounding allows {may:.1e}); by "
-            f"that map alone the {case.robot.name} would {away}; it {left_in_words(left[name], unit)}{why}."
+            f"that map alone the {case.robot.noun} would {away}; it {left_in_words(left[name], unit)}{why}."
         )
     return sentences
 
@@ -102,7 +102,7 @@ def stays_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str,
     unit = movement_unit(case.coordinates)
     sizes = " and ".join(f"{LABELS[name]} {np.abs(push).max():.1e}" for name, push in pushes.items())
     return (
-        f"the {case.robot.name} stays within {LEFT} {unit} for {case.duration:g} s in both engines, as it would by RK4's linear "
+        f"the {case.robot.noun} stays within {LEFT} {unit} for {case.duration:g} s in both engines, as it would by RK4's linear "
         f"map, which lets {growing_in_words(case)}, under the acceleration that the torque leaves, {sizes} {per_s2(unit)} "
         f"(rounding allows {allowed(case):.1e})"
     )

@@ -69,8 +69,8 @@ def of_integrators(robot: Robot, mujoco: Engine) -> list[str]:
     said = [f"{' and '.join(names)}: {scheme}" for scheme, names in schemes.items()]
     lacking = [name for name in INTEGRATORS if name not in methods]
     return [
-        f"Their schemes in tmt, for this {robot.name}: {'; '.join(said)}.",
-        *(f"No scheme in tmt is that of MuJoCo's {name} for this {robot.name}: it is left out." for name in lacking),
+        f"Their schemes in tmt, for this {robot.noun}: {'; '.join(said)}.",
+        *(f"No scheme in tmt is that of MuJoCo's {name} for this {robot.noun}: it is left out." for name in lacking),
     ]
 
 
