@@ -103,7 +103,8 @@ def test_a_batch_of_the_right_shape_with_other_values_is_not_taken(rng):
     """A norm of all states is that of none of them."""
     own = OwnEquations({"bias": lambda q, v: np.sin(q) / (1.0 + np.linalg.norm(v))}, COORDINATES, required=())
     q, v, _ = states(rng)
-    assert np.array_equal(own.bias(q, v), np.sin(q) / (1.0 + np.linalg.norm(v, axis=1, keepdims=True)))
+    right = np.sin(q) / (1.0 + np.linalg.norm(v, axis=1, keepdims=True))
+    assert np.allclose(own.bias(q, v), right, rtol=1e-14, atol=0.0)
     assert own.takes_batches == {"bias": False}
 
 
