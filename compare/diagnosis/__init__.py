@@ -56,7 +56,15 @@ def diagnose(
         return explanation(tree, tuple(names), q, qd, given, tolerance, seconds)
 
 
-def explanation(tree, names, q, qd, given, tolerance, seconds) -> Diagnosis:
+def explanation(
+    tree: tmt.Tree,
+    names: tuple[str, ...],
+    q: np.ndarray,
+    qd: np.ndarray,
+    given: np.ndarray,
+    tolerance: np.ndarray,
+    seconds: float,
+) -> Diagnosis:
     """What `diagnose` says."""
     equations, end = Equations(tree, q, qd), time.monotonic() + seconds
     rounded = np.fmax(tolerance, FACTOR * EPS * np.abs(given))  # large values are rounded too
