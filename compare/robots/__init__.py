@@ -9,6 +9,7 @@ import numpy as np
 
 import tmt
 
+from ..actuators import Drive
 from ..case import Case, Coordinates, Scene
 
 
@@ -93,6 +94,7 @@ class Robot:
     remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
     # what a file has and how it is treated, see engines.mujoco.inventory; then the numbers are those that MuJoCo compiled
     features: tuple = ()
+    drive: Drive = field(default_factory=Drive)  # actuators and what else acts beside gravity and springs
     own: tuple[
         str, ...
     ] = ()  # what a user's own equations give, "mass_matrix" ..., where they are compared; (): tmt's are

@@ -1,6 +1,7 @@
 """A robot that is read from a file: its postures, and the scenes that any robot can play."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -9,12 +10,14 @@ import numpy as np
 import tmt
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
 
+from ..actuators import Drive
 from ..case import Coordinates, Scene, fastest_rates
 from . import Robot
 
 DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
 LEAST_STEPS, MOST_STEPS_OF_A_FILE = 64, 8192  # of a scene, by its coarsest step
 COARSER = 4  # than the file's own step
+OWN_POSTURES = "qpos0", "middle"  # their names
 STILL = 1e-6  # rad/s2 or m/s2: what accelerates less where it is let go stays
 THROWN_UP, TUMBLING = 2.0, (120.0, 60.0, -90.0)  # m/s, and deg/s about a free body's own axes
 SET_GOING = {"hinge": 60.0, "slide": 0.2, "ball": 60.0}  # deg/s or m/s
@@ -30,12 +33,14 @@ class Reading(Protocol):
     keyframes: Mapping[str, np.ndarray]
     qpos0: np.ndarray
     ranges: tuple
+    drive: Drive
     dt: float
 
 
 def robot_of(reading: Reading, shown: str) -> Robot:
     """The robot of a file that a report calls `shown`: its numbers are those that MuJoCo compiled."""
-    found = named_positions(reading)
+    keys = names_of_keys(reading)
+    found = named_positions(reading, keys)
     start = next(name for name in found if name != "qpos0" or len(found) == 1)
     return Robot(
         name=reading.name or Path(shown).stem or shown,
@@ -47,25 +52,33 @@ def robot_of(reading: Reading, shown: str) -> Robot:
         scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt),
         described=Path(shown).name or shown,
         features=tuple(reading.features),
+        drive=replace(reading.drive, controls={keys[name]: u for name, u in reading.drive.controls.items()}),
     )
 
 
-def named_positions(reading: Reading) -> dict[str, tuple]:
+def names_of_keys(reading: Reading) -> dict[str, str]:
+    """What the posture of each keyframe is called: as the keyframe, or apart from postures that have a name here."""
+    names = {}
+    for name in reading.keyframes:
+        apart = name
+        while apart in OWN_POSTURES or (
+            apart != name and apart in reading.keyframes
+        ):  # no key may take another's place
+            apart = f"key {apart}"
+        names[name] = apart
+    return names
+
+
+def named_positions(reading: Reading, names: Mapping[str, str]) -> dict[str, tuple]:
     """Postures by their names, (nq,) each: the keyframes, qpos0, and the middle of the ranges; of equal ones the first."""
     coordinates = Coordinates(reading.tree.hinge_names, reading.tree.kind)
     middle = np.array(reading.qpos0, dtype=float)
     for (kind, at, _), known in zip(coordinates.places.joints, reading.ranges):
         if known and kind != "ball":
             middle[at] = np.mean(known)
-    own = {"qpos0": reading.qpos0, "middle": middle}
-    keys = {}
-    for name, q in reading.keyframes.items():
-        apart = name
-        while apart in own or (apart != name and apart in reading.keyframes):  # no key may take another's place
-            apart = f"key {apart}"
-        keys[apart] = q
+    own = dict(zip(OWN_POSTURES, (reading.qpos0, middle)))
     found = {}
-    for name, q in (keys | own).items():
+    for name, q in ({names[key]: q for key, q in reading.keyframes.items()} | own).items():
         if not any(np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in found.values()):
             found[name] = tuple(map(float, q))
     return found

@@ -9,6 +9,8 @@ import numpy as np
 
 import tmt
 
+from ...actuators import Drive
+from .actuators import drive_of
 from .engine import Mujoco, methods_for
 from .file import compiled
 from .flags import NAMES
@@ -37,6 +39,7 @@ class Reading:
     integrator: str  # of the file, by MuJoCo's name
     dt: float  # s, of the file
     bodies: tuple[int, ...]  # the numbers of the Tree's bodies in the model
+    drive: Drive  # actuators, tendons, gravity compensation; controls by the names of `keyframes`
     model: mujoco.MjModel = field(repr=False, compare=False)
 
 
@@ -77,6 +80,7 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         integrator=integrator_name(model),
         dt=float(model.opt.timestep),
         bodies=tuple(bodies),
+        drive=drive_of(model, source, bodies, list(keyframes(model))),
         model=model,
     )
 

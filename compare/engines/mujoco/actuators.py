@@ -1,0 +1,220 @@
+"""What drives a file's robot, read from its compiled model: actuators, tendons, gravity compensation."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import mujoco
+import numpy as np
+
+from ...actuators import Actuator, Drive, Tendon
+from .flags import on
+from .joints import joint_name, kind_of, own_name
+from .lock import editable
+
+OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+WITH_LENGTH = (*OF_A_JOINT, mujoco.mjtTrn.mjTRN_SLIDERCRANK, mujoco.mjtTrn.mjTRN_TENDON, mujoco.mjtTrn.mjTRN_SITE)
+GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
+BIASES = {"NONE": 0, "AFFINE": 3}
+DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
+GROUPS = 31  # that can be switched off
+
+
+def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequence[str]) -> Drive:
+    """All that drives a compiled model.
+
+    source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of the keyframes.
+    """
+    count = getattr(model, "nactuator", model.nu)
+    return Drive(
+        actuators=tuple(actuator(model, i) for i in range(count)),
+        tendons=tuple(tendon(model, i) for i in range(model.ntendon) if pulls(model, i)),
+        compensation=tuple(map(float, model.body_gravcomp[list(bodies)])),
+        damping=own_damping(model, count),
+        controls={keys[k]: u for k, u in stated_controls(model, source).items()},
+        cut={
+            int(model.jnt_dofadr[j]): tuple(map(float, model.jnt_actfrcrange[j]))
+            for j in np.flatnonzero(model.jnt_actfrclimited)
+        },
+        unknown=unknown_springs(model),
+    )
+
+
+def actuator(m: mujoco.MjModel, i: int) -> Actuator:
+    """One actuator; its law is that of the compiled model."""
+    gain, bias, dynamics = (
+        kind(getattr(mujoco, enum), values[i])
+        for enum, values in (
+            ("mjtGain", m.actuator_gaintype),
+            ("mjtBias", m.actuator_biastype),
+            ("mjtDyn", m.actuator_dyntype),
+        )
+    )
+    place, inputs = control_of(m, i)
+    joint, moment = moment_of(m, i)
+    filters = dynamics in ("FILTER", "FILTEREXACT")
+    return Actuator(
+        name=own_name(m.actuator(i).name, "actuator", i),
+        joint=joint,
+        moment=moment,
+        gain=numbers(m.actuator_gainprm[i], GAINS.get(gain, 0)),
+        bias=numbers(m.actuator_biasprm[i], BIASES.get(bias, 0)),
+        dynamics=DYNAMICS.get(dynamics, "none"),
+        time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
+        control_range=between(m.actuator_ctrlrange[place]) if inputs and m.actuator_ctrllimited[place] else None,
+        activation_range=between(m.actuator_actrange[i]) if m.actuator_actlimited[i] else None,
+        force_range=between(m.actuator_forcerange[i]) if m.actuator_forcelimited[i] else None,
+        off=off(m, i),
+        refused=refused(m, i, gain, bias, dynamics, inputs),
+    )
+
+
+def control_of(m: mujoco.MjModel, i: int) -> tuple[int, int]:
+    """Where the control of an actuator stands, and how many numbers it is."""
+    if hasattr(m, "actuator_ctrlnum"):
+        return int(m.actuator_ctrladr[i]), int(m.actuator_ctrlnum[i])
+    return i, 1
+
+
+def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inputs: int) -> str:
+    """Why the law of an actuator is not known here; "" if it is."""
+    if m.actuator_plugin[i] >= 0:
+        return "a plugin"
+    for word, known in ((dynamics, DYNAMICS), (gain, GAINS), (bias, BIASES)):
+        if word not in known:
+            return {"DCMOTOR": "a DC motor", "USER": "a law of the user's own"}.get(
+                word, f"a law of the kind {word.lower()}"
+            )
+    if inputs != 1:
+        return f"{inputs} controls"
+    if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
+        return "a delay"
+    if np.any(getattr(m, "actuator_dampingpoly", np.zeros((i + 1, 1)))[i]):
+        return "polynomial damping"
+    transmission = mujoco.mjtTrn(m.actuator_trntype[i])
+    if transmission not in WITH_LENGTH:
+        return f"a transmission of the kind {transmission.name.removeprefix('mjTRN_').lower()}"
+    if transmission not in OF_A_JOINT and np.any(getattr(m, "actuator_damping", np.zeros(i + 1))[i]):
+        return "damping of its own at no joint"
+    return ""
+
+
+def off(m: mujoco.MjModel, i: int) -> str:
+    """Why an actuator exerts nothing, or ""."""
+    if not on(m, "ACTUATION"):
+        return "the file disables actuation"
+    group = int(m.actuator_group[i])
+    if 0 <= group < GROUPS and m.opt.disableactuator & (1 << group):
+        return f"the file disables group {group}"
+    return ""
+
+
+def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple | None]:
+    """The joint at which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
+    transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
+    gear = float(m.actuator_gear[i, 0])
+    if transmission in OF_A_JOINT:
+        moment = np.zeros(m.nv)
+        moment[m.jnt_dofadr[target]] = gear
+        single = kind_of(m, target) in ("hinge", "slide")
+        return joint_name(m, target), tuple(moment.tolist()) if single else None
+    if transmission == mujoco.mjtTrn.mjTRN_TENDON:
+        moment = tendon_moment(m, target)
+        first = (
+            "" if moment is None else joint_name(m, int(m.dof_jntid[np.flatnonzero(moment)[0]])) if moment.any() else ""
+        )
+        return first, None if moment is None else tuple((gear * moment).tolist())
+    return "", None
+
+
+def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
+    """dl/dq (nv,) of a fixed tendon; None of a spatial one."""
+    moment, start = np.zeros(m.nv), int(m.tendon_adr[i])
+    for k in range(start, start + int(m.tendon_num[i])):
+        if mujoco.mjtWrap(m.wrap_type[k]) != mujoco.mjtWrap.mjWRAP_JOINT:
+            return None
+        moment[m.jnt_dofadr[m.wrap_objid[k]]] += m.wrap_prm[k]
+    return moment
+
+
+def pulls(m: mujoco.MjModel, i: int) -> bool:
+    """Whether a tendon has a spring or a damper in force."""
+    return bool((m.tendon_stiffness[i] and on(m, "SPRING")) or (m.tendon_damping[i] and on(m, "DAMPER")))
+
+
+def tendon(m: mujoco.MjModel, i: int) -> Tendon:
+    """The spring and the damper of a tendon."""
+    moment = tendon_moment(m, i)
+    low, high = map(float, m.tendon_lengthspring[i])
+    return Tendon(
+        own_name(m.tendon(i).name, "tendon", i),
+        None if moment is None else tuple(moment.tolist()),
+        float(m.tendon_stiffness[i]) * on(m, "SPRING"),
+        float(m.tendon_damping[i]) * on(m, "DAMPER"),
+        low,
+        high,
+    )
+
+
+def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
+    """Damping by actuators themselves, times the gear squared, (nv,), where they act at a joint: MuJoCo has it as the joint's."""
+    found = np.zeros(m.nv)
+    for i, damping in enumerate(getattr(m, "actuator_damping", np.zeros(count))):
+        if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and on(m, "DAMPER"):
+            found[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[i, 0] ** 2
+    return tuple(found.tolist())
+
+
+def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
+    """Joints and tendons whose springs or dampers are not linear, by name, and why they are left out."""
+    found = {}
+    for what, fields in (
+        ("joint", ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield")),
+        ("tendon", ("tendon_stiffnesspoly", "tendon_dampingpoly", "tendon_springyield")),
+    ):
+        for name, reason in zip(fields, ("polynomial stiffness", "polynomial damping", "a spring that yields")):
+            values = np.asarray(getattr(m, name, np.zeros(0)))
+            for k in np.flatnonzero(values.reshape(len(values), -1).any(axis=1)) if len(values) else ():
+                k = int(m.dof_jntid[k]) if name.startswith("dof_") else int(k)
+                element = joint_name(m, k) if what == "joint" else own_name(m.tendon(k).name, "tendon", k)
+                found[f"{what} {element}"] = reason
+    return found
+
+
+def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
+    """By the number of a keyframe u of each actuator, None where it states none.
+
+    The compiled model has zeros where a file states none: the file tells. Of a model compiled elsewhere all zeros are none.
+    """
+    keys = None
+    if source is not None:
+        with suppress(ValueError):
+            keys = editable(source).keys
+    found = {}
+    for k in range(m.nkey):
+        control = len(keys[k].ctrl) > 0 if keys and len(keys) == m.nkey else m.key_ctrl[k].any()
+        activation = len(keys[k].act) > 0 if keys and len(keys) == m.nkey else m.key_act[k].any()
+        if m.nu and (control or activation):
+            found[k] = tuple(stated_u(m, k, i, control, activation) for i in range(getattr(m, "nactuator", m.nu)))
+    return found
+
+
+def stated_u(m: mujoco.MjModel, k: int, i: int, control: bool, activation: bool) -> float | None:
+    """u of an actuator in a keyframe, or None: the activation of an integrator; of a filter its control, at which it settles."""
+    place, inputs = control_of(m, i)
+    if kind(mujoco.mjtDyn, m.actuator_dyntype[i]) == "INTEGRATOR":
+        return float(m.key_act[k, m.actuator_actadr[i]]) if activation else None
+    return float(m.key_ctrl[k, place]) if inputs and control else None
+
+
+def kind(enum, value) -> str:
+    """The name of a member without what all of its enumeration have in front."""
+    return enum(int(value)).name.partition("_")[2]
+
+
+def numbers(values, count: int) -> tuple:
+    """The first numbers of a law, filled up with zeros to three."""
+    return (*map(float, values[:count]), *[0.0] * (3 - count))
+
+
+def between(limits) -> tuple[float, float]:
+    return float(limits[0]), float(limits[1])
