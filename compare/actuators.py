@@ -10,8 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-DYNAMICS = ("none", "integrator", "filter", "filterexact")  # of an activation; of "none" u is the control
-
 
 @dataclass(frozen=True)
 class Actuator:
@@ -26,7 +24,7 @@ class Actuator:
     moment: tuple | None
     gain: tuple = (0.0, 0.0, 0.0)  # g0, g1, g2
     bias: tuple = (0.0, 0.0, 0.0)  # b0, b1, b2
-    dynamics: str = "none"  # of DYNAMICS
+    dynamics: str = "none"  # or integrator, filter, filterexact: then u is the activation, else the control
     time_constant: float = 0.0  # s, of a filter
     control_range: tuple | None = None  # (low, high)
     activation_range: tuple | None = None
@@ -77,6 +75,7 @@ class Tendon(NamedTuple):
     """A tendon that pulls by itself: a spring that is without force from `low` to `high`, and a damper."""
 
     name: str
+    number: int  # in the model
     moment: tuple | None  # (nv,), as an Actuator's
     stiffness: float  # N/m, or as its length is measured
     damping: float
@@ -95,9 +94,9 @@ class Tendon(NamedTuple):
 class Drive:
     """All that drives a robot, see Actuator and Tendon.
 
-    controls: by the name of a posture what its keyframe states: u of each actuator, or None. compensation: of each body of the Tree, what part of
-    its weight is taken away. damping: of each speed, by the actuators themselves. cut: speeds at which the sum of the actuators'
-    forces has a range, (low, high) by number. unknown: what else acts and is left out, and why, by name.
+    controls: by the name of a posture what its keyframe states: u of each actuator, or None. compensation: of each body of the
+    Tree, what part of its weight is taken away. damping: of each speed, by the actuators themselves. cut: speeds at which the
+    sum of the actuators' forces has a range, (low, high) by number. unknown: what else acts and is left out, and why, by name.
     """
 
     actuators: tuple[Actuator, ...] = ()
@@ -107,6 +106,7 @@ class Drive:
     controls: Mapping[str, tuple] = field(default_factory=dict)
     cut: Mapping[int, tuple] = field(default_factory=dict)
     unknown: Mapping[str, str] = field(default_factory=dict)
+    explicit_damping: bool = False  # the file switches off that Euler has the damping of joints implicit
 
     @property
     def refused(self) -> dict[str, str]:

@@ -36,6 +36,7 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
             for j in np.flatnonzero(model.jnt_actfrclimited)
         },
         unknown=unknown_springs(model),
+        explicit_damping=not on(model, "EULERDAMP"),
     )
 
 
@@ -147,6 +148,7 @@ def tendon(m: mujoco.MjModel, i: int) -> Tendon:
     low, high = map(float, m.tendon_lengthspring[i])
     return Tendon(
         own_name(m.tendon(i).name, "tendon", i),
+        i,
         None if moment is None else tuple(moment.tolist()),
         float(m.tendon_stiffness[i]) * on(m, "SPRING"),
         float(m.tendon_damping[i]) * on(m, "DAMPER"),

@@ -1,0 +1,116 @@
+"""A file's model in MuJoCo with its actuators: what they are along, what a step does, and runs from near a posture at rest."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from ...actuators import Drive
+from .actuators import control_of
+from .flags import INTEGRATORS, bit
+from .inventory import NOT_HAD_FIELDS
+
+NUDGE = 1e-6  # rad, m and their rates: of derivatives of a step
+# beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
+DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
+LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn
+
+
+class Acting:
+    """A compiled model whose actuators act by their laws alone: no force range, no limit, contact, equality, friction or medium.
+
+    cut: forces of those actuators that their range cuts at the posture, by number: they stay what they are there. locked: speeds
+    that do not move. weightless: without gravity. integrator by MuJoCo's name, dt in s.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        drive: Drive,
+        cut: dict[int, float] | None = None,
+        locked: Sequence[int] = (),
+        weightless: bool = False,
+    ):
+        self.model, self.drive = mujoco.MjModel.__copy__(model), drive
+        m = self.model
+        for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
+            m.opt.disableflags |= bit((flag,))
+        m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
+        for name in set(NOT_HAD_FIELDS) - set(DRIVES):
+            if hasattr(m, name):
+                getattr(m, name)[:] = 0
+        for name in (
+            "actuator_forcelimited",
+            "actuator_ctrllimited",
+            "actuator_actlimited",
+            "jnt_actfrclimited",
+            "tendon_actfrclimited",
+        ):
+            getattr(m, name)[:] = 0
+        for i, one in enumerate(drive.actuators):
+            if not one.acts or i in (cut or {}):
+                m.actuator_gaintype[i], m.actuator_biastype[i] = (
+                    mujoco.mjtGain.mjGAIN_FIXED,
+                    mujoco.mjtBias.mjBIAS_AFFINE,
+                )
+                m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
+                m.actuator_biasprm[i, 0] = (cut or {}).get(i, 0.0)
+                m.actuator_plugin[i] = -1
+        if weightless:
+            m.opt.gravity[:] = 0.0
+        self.data = mujoco.MjData(m)
+        if len(locked):
+            m.dof_armature[list(locked)] += LOCKING * max(1.0, self.mass_matrix(m.qpos0).max())
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """M, (nv, nv)."""
+        full = np.zeros((self.model.nv, self.model.nv))
+        self.data.qpos[:] = q
+        mujoco.mj_forward(self.model, self.data)
+        mujoco.mj_fullM(self.model, self.data, full)
+        return full
+
+    def along(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lengths (k,) and moments (k, nv) of all actuators and then of the tendons that pull, at a posture."""
+        m, d = self.model, self.data
+        d.qpos[:] = q
+        mujoco.mj_fwdPosition(m, d)
+        count = len(self.drive.actuators)
+        moments = np.zeros((count, m.nv))
+        mujoco.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
+        numbers = [tendon.number for tendon in self.drive.tendons]
+        jacobian = np.zeros((m.ntendon, m.nv))
+        if m.ntendon:
+            rows = (m.ten_J_rownnz, m.ten_J_rowadr, m.ten_J_colind) if hasattr(m, "ten_J_rownnz") else None
+            mujoco.mju_sparse2dense(
+                jacobian, d.ten_J.reshape(-1), *(rows or (d.ten_J_rownnz, d.ten_J_rowadr, d.ten_J_colind.reshape(-1)))
+            )
+        lengths = np.concatenate([d.actuator_length[:count], d.ten_length[numbers]])
+        return lengths, np.concatenate([moments, jacobian[numbers]])
+
+    def at(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """Model and data at rest at a posture, under u of each actuator, whose activations, if any, stay as they are."""
+        model = mujoco.MjModel.__copy__(self.model)
+        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+        data = mujoco.MjData(model)
+        data.qpos[:] = q
+        self.drive_by(data, u)
+        return model, data
+
+    def drive_by(self, data: mujoco.MjData, u: np.ndarray) -> None:
+        """Set controls, and activations that stay as they are."""
+        m = self.model
+        for i, one in enumerate(self.drive.actuators):
+            place, inputs = control_of(m, i)
+            if inputs == 1:
+                data.ctrl[place] = 0.0 if one.dynamics == "integrator" else u[i]
+            if one.dynamics != "none" and one.acts:
+                data.act[m.actuator_actadr[i]] = u[i]
+
+    def transition(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> np.ndarray:
+        """d(movement, qd, act)+/d(movement, qd, act) of one step at rest, by central differences of MuJoCo's own; not for RK4."""
+        model, data = self.at(q, u, dt, integrator)
+        size = 2 * model.nv + model.na
+        A = np.zeros((size, size))
+        mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
+        return A
