@@ -112,7 +112,7 @@ class Posture:
             D=D,
             damping=speeds,
             springs=springs,
-            on_path=on_path(tree),
+            on_path=on_one_path(tree),
             poles=tuple((one.name, one.time_constant) for one in acts),
         )
 
@@ -125,7 +125,7 @@ class Posture:
         return self.whole.locked(sorted({*self.lone, *(self.base if base == "locked" else ())}))
 
 
-def on_path(tree: tmt.Tree) -> np.ndarray:
+def on_one_path(tree: tmt.Tree) -> np.ndarray:
     """Whether two speeds are of joints on one path to the root, (nv, nv)."""
     n = len(tree.parent)
     before = np.eye(n, dtype=bool)

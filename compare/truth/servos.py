@@ -13,11 +13,11 @@ from ..actuators import Drive
 from ..case import Coordinates
 from .derivative import stiffness
 
-NUDGE = 1e-6  # rad or m, of central differences where a moment turns with the posture
-NEGLIGIBLE = 1e-9  # of the largest stiffness, or damping: less is none
-SYMMETRIC = 1e-9  # of the largest stiffness: what its two halves may differ by
-MOST_TRIED, BALANCED = 60, 1e-9  # steps of Newton's method; of the largest single force: what may be left at rest
-FARTHEST = 0.3  # rad or m, of one step of it
+TURNED_BY = 1e-6  # rad or m, of central differences where a moment turns with the posture
+SINGULAR = 1e-9  # of the largest stiffness, or damping: less is none
+REST_STEPS = 60  # at most
+REST_FORCE = 1e-9  # of the largest single force: what may be left at rest
+REST_REACH = 0.3  # rad or m, of one step of it
 
 
 class Along(NamedTuple):
@@ -76,9 +76,9 @@ class Driven:
         if turning and self.ask:
             asked_lengths, asked = self.ask(q)
             lengths[turning], moments[turning] = asked_lengths[turning], asked[turning]
-            for j, step in enumerate(NUDGE * np.eye(n)):
+            for j, step in enumerate(TURNED_BY * np.eye(n)):
                 ahead, behind = (self.ask(self.coordinates.move(q, sign * step))[1][turning] for sign in (1.0, -1.0))
-                turns[turning, :, j] = (ahead - behind) / (2.0 * NUDGE)
+                turns[turning, :, j] = (ahead - behind) / (2.0 * TURNED_BY)
         return Along(lengths, moments, turns)
 
     @property
@@ -137,14 +137,14 @@ class Driven:
     def at_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The nearest posture at rest, by Newton's method from q, and the size of the force that is left there; 0.0: none."""
         best, left, scale = q, np.inf, 0.0
-        for _ in range(MOST_TRIED):
+        for _ in range(REST_STEPS):
             force, largest = self.forces(q, u)
             size, scale = float(np.abs(force).max()), max(scale, largest)
             if size < left:
                 best, left = q, size
-            if size <= 1e-4 * BALANCED * scale:
+            if size <= 1e-4 * REST_FORCE * scale:
                 break
             K = self.stiffness_and_damping(q, u)[0]
-            step = np.linalg.lstsq(K, force, rcond=NEGLIGIBLE)[0]
-            q = self.coordinates.move(q, step * min(1.0, FARTHEST / max(np.abs(step).max(), 1e-300)))
-        return best, 0.0 if left <= BALANCED * scale else left
+            step = np.linalg.lstsq(K, force, rcond=SINGULAR)[0]
+            q = self.coordinates.move(q, step * min(1.0, REST_REACH / max(np.abs(step).max(), 1e-300)))
+        return best, 0.0 if left <= REST_FORCE * scale else left

@@ -9,8 +9,8 @@ from ...actuators import Drive
 from .actuators import control_of
 from .flags import INTEGRATORS, bit
 from .inventory import NOT_HAD_FIELDS
+from .linear import NUDGE
 
-NUDGE = 1e-6  # rad, m and their rates: of derivatives of a step
 # beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
 DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
 LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn

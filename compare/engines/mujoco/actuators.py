@@ -57,8 +57,8 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
         name=own_name(m.actuator(i).name, "actuator", i),
         joint=joint,
         moment=moment,
-        gain=numbers(m.actuator_gainprm[i], GAINS.get(gain, 0)),
-        bias=numbers(m.actuator_biasprm[i], BIASES.get(bias, 0)),
+        gain=law(m.actuator_gainprm[i], GAINS.get(gain, 0)),
+        bias=law(m.actuator_biasprm[i], BIASES.get(bias, 0)),
         dynamics=DYNAMICS.get(dynamics, "none"),
         time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
         control_range=between(m.actuator_ctrlrange[place]) if inputs and m.actuator_ctrllimited[place] else None,
@@ -213,7 +213,7 @@ def kind(enum, value) -> str:
     return enum(int(value)).name.partition("_")[2]
 
 
-def numbers(values, count: int) -> tuple:
+def law(values, count: int) -> tuple:
     """The first numbers of a law, filled up with zeros to three."""
     return (*map(float, values[:count]), *[0.0] * (3 - count))
 
