@@ -12,7 +12,7 @@ from ....engines.mujoco.flags import INTEGRATORS
 from ....robots import Robot
 from ....truth.driven import Posture
 from ....truth.linear import NEUTRAL
-from ....truth.step_limits import POLES, Limit, Small
+from ....truth.step_limits import LIMIT_UP_TO, Limit, Small
 
 NEAR = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
 ASIDE = 1e-2  # of a limit: where a step of MuJoCo is asked
@@ -37,6 +37,11 @@ class Predicted(NamedTuple):
     def is_finite(self) -> bool:
         """Whether it has a limit that counts."""
         return any(limit.limit == "finite" for (base, _), limit in self.limits.items() if base == self.at.bases[0])
+
+    def is_stable(self, base: str, integrator: str, dt: float) -> bool | None:
+        """Whether a step is within the limit; None: none can be said."""
+        limit = self.limits[base, integrator]
+        return dt <= (limit.dt or LIMIT_UP_TO) if limit.limit in ("finite", "none") else None
 
     @property
     def pairs(self) -> Iterator[tuple[str, str]]:
@@ -71,7 +76,6 @@ def limit_rows(found: Sequence[Predicted], dt: float, integrator: str) -> list[d
         for base in one.at.bases:
             for name in INTEGRATORS:
                 limit = one.limits.get((base, name), Limit("not_at_rest", None, "", None, ""))
-                is_known = limit.limit in ("finite", "none")
                 rows.append(
                     {
                         "posture": one.name,
@@ -82,7 +86,7 @@ def limit_rows(found: Sequence[Predicted], dt: float, integrator: str) -> list[d
                         "observed_dt_s": None,
                         "file_dt_s": dt,
                         "file_integrator": integrator,
-                        "stable_at_file_dt": one.small[base].is_stable(name, dt) if is_known else None,
+                        "stable_at_file_dt": one.is_stable(base, name, dt) if one.rests else None,
                         "limiting_joint": limit.joint if limit.limit == "finite" else None,
                         "mode_per_s": limit.rate,
                         "mode_kind": limit.kind or None,
