@@ -52,8 +52,8 @@ def grows(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = 
 def sizes(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[float]:
     """The largest deviation in each part of a run over that at its start.
 
-    Its square is dx' M dx, to which joints add alike at the start, by chance, and so do activations of filters. With M the energy of
-    a swing bounds it. A free base moves with the joints so that there is no momentum, and is not measured.
+    Its square is dx' M dx, of which no swing makes more than it was. Joints have alike of it at the start, by chance, and so have
+    activations of filters. A free base moves with the joints so that there is no momentum, and is not measured.
     """
     rng, kept = np.random.default_rng(SEED), counted(acting, at)
     M = acting.mass_matrix(at.q)

@@ -1,7 +1,5 @@
 """How far MuJoCo's response to a step of all servo targets is from the exact one, at a step size."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.linalg import expm
 
