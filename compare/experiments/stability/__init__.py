@@ -12,7 +12,7 @@ from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import held
-from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs
+from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs, servos
 from .choice import dampings_of
 from .claims_judged import check_claims
 from .equilibria import check_equilibria, planes
@@ -116,6 +116,7 @@ def begin(setup: Setup) -> None:
     tongues = about(every and seen.swinging, of(edges, (), edges))
     setup.background["stability"] = {
         "subjects": seen,
+        "servos": servos.begin(setup),
         "limits": ask(limits.limits_and_growths, [held(robot, *point) for point in points], methods=methods, steps=steps,
                       growth_dts=tuple(dict.fromkeys((*FINE_DEPARTURES[::-1], coarse)))),
         "departure": ask(departure.departures, about(seen.saddle, leaving_dts), at=seen.saddle, methods=leaving),
@@ -152,6 +153,8 @@ def rows(setup: Setup) -> Result:
     robot = seen.robot
     result.curves["looked at"] = seen.names
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
+    if work["servos"]:
+        servos.add(result, setup, work["servos"])
     check_equilibria(result, setup)
     limits.check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]

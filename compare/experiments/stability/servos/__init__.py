@@ -11,7 +11,7 @@ from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
-from .remarks import asked_in_words, remarks
+from .remarks import asked_in_words, lifts_in_words, remarks
 from .sentences import DEFAULT, at_the_top, known
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first
@@ -38,6 +38,7 @@ def begin(setup: Setup) -> dict | None:
     tried = [(one, *pair) for one in looked_at for pair in one.pairs if not setup.is_quick or pair[1] in own]
     tried = [(one, base, name) for one, base, name in tried if not setup.is_quick or base == one.at.bases[0]]
     drawn = [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs] if shown and not setup.is_quick else []
+    unstable = [(one, name) for name in dict.fromkeys(own) if (one := least_at(resting, name, reading.dt))]
 
     def ask(function, items):
         return setup.map(partial(function, reading=reading), *(zip(*items) if items else [()]))
@@ -49,9 +50,16 @@ def begin(setup: Setup) -> dict | None:
         "observed": ask(observed_limit_at, tried),
         "steps": ask(steps_at, [(one,) for one in resting]),
         "errors": ask(errors_at, [(one,) for one in resting]),
+        "lifts": (unstable, ask(lifts_at, unstable)),
         "full": ask(full_at, [(one,) for one in resting]),
         "curves": (drawn, ask(curve_at, [(shown, name) for name in drawn])),
     }
+
+
+def least_at(resting: Sequence[Predicted], integrator: str, dt: float) -> Predicted | None:
+    """The posture with the least limit of an integrator, if a step is not stable there; else None."""
+    bad = [one for one in resting if one.is_stable(one.at.bases[0], integrator, dt) is False]
+    return min(bad, key=lambda one: one.limits[one.at.bases[0], integrator].dt, default=None)
 
 
 # in a further process
@@ -76,6 +84,12 @@ def curve_at(one: Predicted, integrator: str, reading: Reading) -> list[tuple[fl
     return response.curve(
         acting_at(reading, one.at, base), one.at, base, integrator, reading.dt, one.limits[base, integrator].dt
     )
+
+
+def lifts_at(one: Predicted, integrator: str, reading: Reading) -> list[lifting.Lift]:
+    """What would make the file's step stable with an integrator, each tried."""
+    base = one.at.bases[0]
+    return lifting.lifts(acting_at(reading, one.at, base), one.at, base, integrator, reading.dt)
 
 
 def full_at(one: Predicted, reading: Reading) -> list[dict]:
@@ -109,7 +123,8 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     result.top = at_the_top(rows, full)
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
-    result.notes += [*result.top, *remarks(found, rows, full)]
+    lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]
+    result.notes += [*result.top, *lifts_in_words(lifted, reading.dt), *remarks(found, rows, full)]
     drawn, curves = work["curves"]
     if drawn:
         result.curves["step response"] = {

@@ -41,7 +41,7 @@ class Predicted(NamedTuple):
     def is_stable(self, base: str, integrator: str, dt: float) -> bool | None:
         """Whether a step is within the limit; None: none can be said."""
         limit = self.limits[base, integrator]
-        return dt <= (limit.dt or LIMIT_UP_TO) if limit.limit in ("finite", "none") else None
+        return bool(dt <= (limit.dt or LIMIT_UP_TO)) if limit.limit in ("finite", "none") else None
 
     @property
     def pairs(self) -> Iterator[tuple[str, str]]:
@@ -82,7 +82,7 @@ def limit_rows(found: Sequence[Predicted], dt: float, integrator: str) -> list[d
                         "base": base,
                         "integrator": name,
                         "limit": limit.limit,
-                        "predicted_dt_s": limit.dt,
+                        "predicted_dt_s": limit.dt and float(limit.dt),
                         "observed_dt_s": None,
                         "file_dt_s": dt,
                         "file_integrator": integrator,

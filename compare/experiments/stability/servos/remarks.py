@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from ....engines.mujoco import Reading
 from ....robots import Robot
 from . import response
+from .lifting import Lift
 from .predicted import Predicted, acting_at
 from .sentences import in_seconds, kinds_in_words, known, silence, some_of
 
@@ -40,6 +41,40 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
 def percent(ratio: float) -> str:
     """A ratio in %."""
     return f"{100.0 * ratio:.2g} %"
+
+
+INERTIAS = {"rad": "kg m2", "m": "kg"}
+
+
+def lifts_in_words(lifted: Sequence[tuple[Predicted, str, list[Lift]]], dt: float) -> Iterator[str]:
+    """What would make the file's step stable with an integrator that it is not stable with; of each only what held in a run."""
+    for one, integrator, lifts in lifted:
+        held = [lift for lift in lifts if lift.tried]
+        others = [
+            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{lift.factor:.2g} times the step'}"
+            for lift in held
+            if lift.kind == "integrator"
+        ]
+        units = dict(zip(one.at.robot.coordinates.speeds, one.at.robot.coordinates.units))
+        changes = []
+        for lift in held:
+            if lift.kind == "kv":
+                changes.append(f"kv at most {some_of(each_value(lift, [''] * len(lift.names)))}")
+            elif lift.kind == "armature":
+                kinds = [INERTIAS[units[name]] for name in lift.names]
+                changes.append(f"armature of at least {some_of(each_value(lift, kinds))}")
+        texts = [f"with another integrator: {'; '.join(others)}"] * bool(others)
+        texts += [f"with {integrator} {', or '.join(changes)}"] * bool(changes)
+        where = f"{in_seconds(dt)} at {one.name}"
+        if texts:
+            yield f"What would make {where} stable, each tried in a run of MuJoCo: {'. Or '.join(texts)}."
+        else:
+            yield f"Nothing was found that makes {where} stable with {integrator}: no other integrator, kv or armature."
+
+
+def each_value(lift: Lift, units: Sequence[str]) -> list[str]:
+    """0.21 (joint7), for all that a change takes."""
+    return [f"{value:g} {unit}".rstrip() + f" ({name})" for name, value, unit in zip(lift.names, lift.values, units)]
 
 
 def remarks(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence[dict]) -> list[str]:
@@ -79,7 +114,8 @@ def costs_in_words(rows: Sequence[dict]) -> Iterator[str]:
     for integrator in dict.fromkeys(row["integrator"] for row in rows):
         errors = [row["step_response_error"] for row in known(rows, integrator)]
         errors = [error for error in errors if error is not None]
-        texts += [f"{integrator} {percent(max(errors))}"] * bool(errors)
+        if errors:
+            texts.append(f"{integrator} {percent(max(errors))}")
     if texts:
         dt = in_seconds(rows[0]["file_dt_s"])
         yield (
