@@ -66,7 +66,9 @@ def step_in_seconds(text: str) -> float:
     except ValueError:
         dt = 0.0
     if not 0.0 < dt <= LONGEST_STEP:
-        raise argparse.ArgumentTypeError(f"{text!r} is no step; seconds above 0 and at most {LONGEST_STEP:g} are expected")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no step; seconds above 0 and at most {LONGEST_STEP:g} are expected"
+        )
     return dt
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from .case import SEED
 from .engines import Engine
 from .engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
-from .engines.own import Own, OwnEquations, OwnError
 from .engines.mujoco.flags import integrator_by_name
+from .engines.own import Own, OwnEquations, OwnError
 from .joint_map import JointsError, joint_map
 from .own_file import OwnFileError, aside, own_object
 from .process.streams import in_one_line
@@ -63,7 +63,10 @@ class Compared(NamedTuple):
     reading: Reading | None  # None: the robot's numbers are stated
 
     def asked_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
-        """A step, s, and an integrator that are asked about, the file's where one is None; None: both are. ModelError: no answer."""
+        """A step, s, and an integrator that are asked about, the file's where one is None; None: both are.
+
+        ModelError, in one line: there is no such integrator, or no servo to ask about.
+        """
         if dt is None and integrator is None:
             return None
         if self.reading is None or not self.robot.drive.actuators:

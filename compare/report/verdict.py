@@ -54,7 +54,11 @@ def failures(sections: Sequence[Section]) -> tuple[list, list, list]:
 def unstable_in_words(unstable: Sequence[Check]) -> str:
     """What step is not stable, at which postures."""
     worst = min(unstable, key=lambda check: check.tolerance)
-    more = f" and {len(unstable) - 1} more postures" if len(unstable) > 2 else " and one more posture" * (len(unstable) > 1)
+    more = (
+        f" and {len(unstable) - 1} more postures"
+        if len(unstable) > 2
+        else " and one more posture" * (len(unstable) > 1)
+    )
     step, limit = (f"{1e3 * number:.4g} ms" for number in (worst.value, worst.tolerance))
     return f"not stable at its own step of {step}, limit {limit} {worst.note}, at {worst.scene}{more}"
 

@@ -30,7 +30,7 @@ def bit(members: Sequence[str]) -> int:
 
 
 def integrator_by_name(name: str) -> str:
-    """An integrator of the installed MuJoCo by its name. ValueError, in one line, for another name: which are known, and a near one."""
+    """An integrator of the installed MuJoCo by its name. ValueError, in one line, for another name: which are expected."""
     if name in INTEGRATORS:
         return name
     if name in NAMES:

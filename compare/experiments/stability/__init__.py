@@ -32,6 +32,7 @@ def claim(robot: Robot) -> str:
         "amplification, gives its limit of dt, its growth per step and the time at which an unstable posture is left. "
         "Runs of both engines do as predicted"
         + (", and the assignment's observations follow from the same numbers." if robot.claims else ".")
+        + servos.claim_of_servos(robot)
     )
 
 
@@ -55,7 +56,7 @@ def tolerance(robot: Robot) -> str:
         "within one step or 0.03 s"
         + (", and what forces that are not linear may add," if robot.is_read else "")
         + " of the first crossing of the method's linear map, whose angles are rounded to doubles at each step; where the map "
-        "stays, the run stays."
+        "stays, the run stays." + servos.tolerance_of_servos(robot)
     )
 
 
@@ -183,11 +184,13 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Limits, the map of growth, regions, the nonlinear edge; departures; the claims; silent failure; a minute."""
     # matplotlib is for the process that draws
     from . import figures_claims, figures_departure, figures_failure, figures_limits
+    from .servos import figures_step
 
     tables, curves, looked_at = result.tables, result.curves, result.curves["looked at"]
     falls = [row for row in tables.get("departure", ()) if row["scene"] == looked_at["marginal"]]
     left = any(row["scene"] == looked_at["saddle"] for row in tables.get("departure", ()))
     drawn = {
+        figures_step.draw_step_response: any(curves.get("step response", {"lines": {}})["lines"].values()),
         figures_limits.draw_limits: bool(looked_at["centres"]),
         figures_limits.draw_regions: bool(curves["points"]),
         figures_departure.draw_departure: left,

@@ -6,18 +6,41 @@ from functools import partial
 from ....engines.mujoco import Reading
 from ....engines.mujoco.flags import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, Result
+from ....robots import Robot
 from ....setup import Setup
 from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
 from .remarks import asked_in_words, lifts_in_words, remarks
-from .sentences import DEFAULT, at_the_top, known
+from .sentences import DEFAULT, at_the_top, feeds_back, known
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first
 OBSERVED_WITHIN = 0.01  # relative
 FORMS_WITHIN = 1e-6  # relative, of the closed form and the eigenvalues of a step
 RADII_WITHIN = 1e-4  # of the spectral radius, of which MuJoCo's is by differences
+
+
+def claim_of_servos(robot: Robot) -> str:
+    """What is examined of a robot with actuators."""
+    if not robot.drive.actuators:
+        return ""
+    return (
+        " Under its own servos, as the file states them, the limit of the step of each integrator of MuJoCo at each posture at "
+        "rest follows from M, K = -d force/dq and D = -d force/dqd in closed form, and runs show the same. Whether the file's "
+        "own step is stable is a check of the robot, not of the two models."
+    )
+
+
+def tolerance_of_servos(robot: Robot) -> str:
+    """How far apart what is compared of a robot with actuators may be."""
+    if not robot.drive.actuators:
+        return ""
+    return (
+        f" Under its own servos: a limit that is found by bisection in runs of MuJoCo, ranges of forces off, is within "
+        f"{100 * OBSERVED_WITHIN:g} % of the predicted one; the closed form within {FORMS_WITHIN:g} of the step at which the "
+        f"spectral radius passes 1; that radius near the limit within {RADII_WITHIN:g} of MuJoCo's own (mjd_transitionFD)."
+    )
 
 
 def begin(setup: Setup) -> dict | None:
@@ -37,7 +60,11 @@ def begin(setup: Setup) -> dict | None:
     own = (reading.integrator, DEFAULT)
     tried = [(one, *pair) for one in looked_at for pair in one.pairs if not setup.is_quick or pair[1] in own]
     tried = [(one, base, name) for one, base, name in tried if not setup.is_quick or base == one.at.bases[0]]
-    drawn = [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs] if shown and not setup.is_quick else []
+    drawn = (
+        [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs]
+        if shown and not setup.is_quick
+        else []
+    )
     unstable = [(one, name) for name in dict.fromkeys(own) if (one := least_at(resting, name, reading.dt))]
 
     def ask(function, items):
@@ -117,10 +144,11 @@ def add(result: Result, setup: Setup, work: dict) -> None:
         row = by_place[one.name, base, name]
         row["observed_dt_s"] = dt
         check_observed(result, row, kind, len(one.at.bases) > 1)
-    check_own_step(result, rows)
+    if feeds_back(setup.robot.drive):
+        check_own_step(result, rows)
     full = [row for part in work["full"] for row in part]
     result.tables |= {"step_limits": rows, "full_model": full}
-    result.top = at_the_top(rows, full)
+    result.top = [at_the_top(rows, full, feeds_back(setup.robot.drive))]
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
     lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]
@@ -167,5 +195,7 @@ def check_own_step(result: Result, rows: Sequence[dict]) -> None:
     """Whether the file's own step is stable under its own integrator, wherever that can be said."""
     for row in known(rows, rows[0]["file_integrator"]):
         limit = row["predicted_dt_s"] or LIMIT_UP_TO
-        note = f"under {row['file_integrator']}" + (f": {row['limiting_joint']} limits" if row["limiting_joint"] else "")
+        note = f"under {row['file_integrator']}" + (
+            f": {row['limiting_joint']} limits" if row["limiting_joint"] else ""
+        )
         result.check(row["posture"], AT_OWN_STEP, row["file_dt_s"], limit, "s", note)

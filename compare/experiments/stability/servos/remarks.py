@@ -1,4 +1,4 @@
-"""Notes on the limits of the step: what limits, where each posture rests, what is left out; and the answer for a step that is asked."""
+"""Notes on the limits of the step: what limits, where each posture rests, what is left out; and the answer to --dt."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,7 +7,7 @@ from ....robots import Robot
 from . import response
 from .lifting import Lift
 from .predicted import Predicted, acting_at
-from .sentences import in_seconds, kinds_in_words, known, silence, some_of
+from .sentences import in_seconds, known, short, some_of
 
 AT_REST = 1e-6  # rad or m: a rest so near is the posture
 FORCES = {"rad": "N m", "m": "N"}
@@ -40,7 +40,7 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
 
 def percent(ratio: float) -> str:
     """A ratio in %."""
-    return f"{100.0 * ratio:.2g} %"
+    return f"{short(100.0 * ratio)} %"
 
 
 INERTIAS = {"rad": "kg m2", "m": "kg"}
@@ -51,7 +51,7 @@ def lifts_in_words(lifted: Sequence[tuple[Predicted, str, list[Lift]]], dt: floa
     for one, integrator, lifts in lifted:
         held = [lift for lift in lifts if lift.tried]
         others = [
-            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{lift.factor:.2g} times the step'}"
+            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{short(lift.factor)} times the step'}"
             for lift in held
             if lift.kind == "integrator"
         ]
@@ -98,14 +98,14 @@ def limits_in_words(rows: Sequence[dict]) -> Iterator[str]:
         of = known(rows, integrator)
         if of and of[0]["limit"] == "finite":
             row = of[0]
-            mode = f"a {row['mode_kind']} mode of {row['mode_per_s']:.3g} per second"
+            mode = f"a {row['mode_kind']} mode of {short(row['mode_per_s'], 3)} per second"
             texts.append(
                 f"{integrator} {in_seconds(row['predicted_dt_s'])} at {row['posture']} ({row['limiting_joint']}, {mode})"
             )
         elif of:
             texts.append(f"{integrator} none up to 5 s")
     if texts:
-        yield f"Under its own servos the least limit of the step of any posture: {'; '.join(texts)}."
+        yield f"With its actuators as the file states them, the least limit of the step of any posture: {'; '.join(texts)}."
 
 
 def costs_in_words(rows: Sequence[dict]) -> Iterator[str]:
