@@ -154,8 +154,7 @@ def rows(setup: Setup) -> Result:
     robot = seen.robot
     result.curves["looked at"] = seen.names
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
-    if work["servos"]:
-        servos.add(result, setup, work["servos"])
+    said = servos.add(result, setup, work["servos"]) if work["servos"] else []
     check_equilibria(result, setup)
     limits.check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
@@ -175,7 +174,7 @@ def rows(setup: Setup) -> Result:
     if seen.centre:
         long_runs.check_newton(result, seen.centre.name, list(work["newton"]))
     result.tables = {name: table for name, table in result.tables.items() if table}
-    result.notes += [*work["not led"], *seen.left_out]
+    result.notes = [*said, *result.notes, *work["not led"], *seen.left_out]
     planes(result, robot, seen, tuple(dict.fromkeys(method.scheme for method in methods)))
     return result
 

@@ -12,7 +12,7 @@ from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
-from .remarks import asked_in_words, lifts_in_words, remarks
+from .remarks import asked_in_words, lifts_in_words, remarks, response_error
 from .sentences import DEFAULT, at_the_top, feeds_back, known
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first
@@ -99,10 +99,7 @@ def observed_limit_at(one: Predicted, base: str, integrator: str, reading: Readi
 
 def errors_at(one: Predicted, reading: Reading) -> dict[tuple[str, str], float | None]:
     """The error of the step response at the file's step, by base and integrator."""
-    return {
-        (base, name): response.error(acting_at(reading, one.at, base), one.at, base, name, reading.dt)
-        for base, name in one.pairs
-    }
+    return {(base, name): response_error(one, base, name, reading.dt, reading) for base, name in one.pairs}
 
 
 def curve_at(one: Predicted, integrator: str, reading: Reading) -> list[tuple[float, float]]:
@@ -129,8 +126,8 @@ def full_at(one: Predicted, reading: Reading) -> list[dict]:
 # in the main process
 
 
-def add(result: Result, setup: Setup, work: dict) -> None:
-    """Rows, checks, sentences and curves of what `begin` has set going."""
+def add(result: Result, setup: Setup, work: dict) -> list[str]:
+    """Rows, checks, curves and the sentence at the top, of what `begin` has set going; returns the notes."""
     found, shown, reading = work["found"], work["shown"], setup.reading
     rows = limit_rows(found, reading.dt, reading.integrator)
     by_place = {(row["posture"], row["base"], row["integrator"]): row for row in rows}
@@ -152,7 +149,7 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
     lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]
-    result.notes += [*result.top, *lifts_in_words(lifted, reading.dt), *remarks(found, rows, full)]
+    said = [*result.top, *lifts_in_words(lifted, reading.dt), *remarks(found, rows, full)]
     drawn, curves = work["curves"]
     if drawn:
         result.curves["step response"] = {
@@ -160,6 +157,7 @@ def add(result: Result, setup: Setup, work: dict) -> None:
             "rows": [row for row in rows if (row["posture"], row["base"]) == (shown.name, shown.at.bases[0])],
             "lines": dict(zip(drawn, curves)),
         }
+    return said
 
 
 def named_place(row: dict, several: bool) -> str:
@@ -195,7 +193,5 @@ def check_own_step(result: Result, rows: Sequence[dict]) -> None:
     """Whether the file's own step is stable under its own integrator, wherever that can be said."""
     for row in known(rows, rows[0]["file_integrator"]):
         limit = row["predicted_dt_s"] or LIMIT_UP_TO
-        note = f"under {row['file_integrator']}" + (
-            f": {row['limiting_joint']} limits" if row["limiting_joint"] else ""
-        )
+        note = ", ".join(filter(None, (f"under {row['file_integrator']}", row["limiting_joint"])))
         result.check(row["posture"], AT_OWN_STEP, row["file_dt_s"], limit, "s", note)

@@ -7,7 +7,7 @@ from ....robots import Robot
 from . import response
 from .lifting import Lift
 from .predicted import Predicted, acting_at
-from .sentences import in_seconds, known, short, some_of
+from .sentences import feeds_back, in_seconds, known, short, some_of
 
 AT_REST = 1e-6  # rad or m: a rest so near is the posture
 FORCES = {"rad": "N m", "m": "N"}
@@ -17,6 +17,8 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
     """Whether a step with an integrator is stable at each posture, what limits it, and the error of the step response."""
     resting = [one for one in found if one.rests and (one.at.bases[0], integrator) in one.pairs]
     step = f"{in_seconds(dt)} under {integrator}"
+    if not feeds_back(found[0].at.robot.drive):
+        return f"Asked: {step}: no actuator feeds back, so that there is no servo that it could make unstable."
     if not resting:
         return f"Asked: {step}: that cannot be said; no posture is a stable rest under the servos."
     good = [one.name for one in resting if one.is_stable(one.at.bases[0], integrator, dt)]
@@ -29,13 +31,17 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
         text += " (no limit up to 5 s)"
     else:
         text += f" (limit {in_seconds(limit.dt, dt)}, {limit.joint}" + f", at {least.name}" * (len(found) > 1) + ")"
-    errors = [
-        response.error(acting_at(reading, one.at, one.at.bases[0]), one.at, one.at.bases[0], integrator, dt)
-        for one in resting
-        if one.name in good
-    ]
+    errors = [response_error(one, one.at.bases[0], integrator, dt, reading) for one in resting if one.name in good]
     errors = [error for error in errors if error is not None]
-    return text + (f"; the step response is at most {percent(max(errors))} off" if errors else "") + "."
+    where = "where it is stable " * bool(bad)
+    return text + (f"; {where}the step response is at most {percent(max(errors))} off" if errors else "") + "."
+
+
+def response_error(one: Predicted, base: str, integrator: str, dt: float, reading: Reading) -> float | None:
+    """The error of the step response, see response.error; None also for a step that is too fine to be run."""
+    if response.LASTS / dt > response.MOST_STEPS:
+        return None
+    return response.error(acting_at(reading, one.at, base), one.at, base, integrator, dt)
 
 
 def percent(ratio: float) -> str:
@@ -147,7 +153,7 @@ def bases_in_words(rows: Sequence[dict]) -> Iterator[str]:
         if base == "free" and dt and limits[posture, integrator, "locked"]
     ]
     if ratios:
-        low, high = (f"{ratio:.3g}" for ratio in (min(ratios), max(ratios)))
+        low, high = (f"{ratio:.3f}" for ratio in (min(ratios), max(ratios)))
         span = f"{low} times" if low == high else f"{low} to {high} times"
         yield (
             "The robot floats: its limits are without gravity, with the base free to give way. Those with the base locked are "
@@ -186,12 +192,12 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
     for one in found:
         if not one.rests:
             left, forces = one.at.rest[1], " or ".join(dict.fromkeys(FORCES[u] for u in one.at.robot.coordinates.units))
-            yield f"{one.name} is not at rest under its servos, and no rest was found near it: {left:.3g} {forces} are left."
+            yield f"{one.name} is not at rest under its actuators, and no rest was found near it: {left:.3g} {forces} are left."
         else:
             limit = one.limits[one.at.bases[0], next(iter(one.limits))[1]]
             if limit.limit == "saddle":
                 yield (
-                    f"{one.name} is a saddle under its servos: whatever the step, it is left at {limit.rate:.3g} per second, "
+                    f"{one.name} is a saddle under its actuators: whatever the step, it is left at {limit.rate:.3g} per second, "
                     f"{limit.joint} first."
                 )
             elif limit.limit == "drifts":
