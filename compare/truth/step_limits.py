@@ -52,6 +52,7 @@ class Small:
     D: np.ndarray
     damping: np.ndarray  # of D what Euler has implicit, (nv,): of joints; zeros where the file switches eulerdamp off
     springs: np.ndarray  # of K what `discrete` has implicit
+    brakes: np.ndarray  # of D what it has implicit; implicitfast and implicit: of that what is on one path
     on_path: np.ndarray  # whether two speeds are on one path to the root
     poles: tuple[tuple[str, float], ...] = ()  # of filters: the actuator's name, and its time constant, s
 
@@ -70,7 +71,9 @@ class Small:
     def locked(self, base: list[int]) -> "Small":
         """With these speeds locked."""
         rest = [k for k in range(len(self.M)) if k not in base]
-        square = {name: getattr(self, name)[np.ix_(rest, rest)] for name in ("M", "K", "D", "springs", "on_path")}
+        square = {
+            name: getattr(self, name)[np.ix_(rest, rest)] for name in ("M", "K", "D", "springs", "brakes", "on_path")
+        }
         return Small(tuple(self.names[k] for k in rest), damping=self.damping[rest], poles=self.poles, **square)
 
     # in the units of M, where it is the identity
@@ -96,9 +99,9 @@ class Small:
     @cached_property
     def implicit(self) -> dict[str, np.ndarray]:
         """Of D what each integrator has implicit, in the units of M."""
-        on_path = self.scaled(np.where(self.on_path, self.D, 0.0))
+        on_path = self.scaled(np.where(self.on_path, self.brakes, 0.0))
         of_joints = self.scaled(np.diag(self.damping))
-        return {"Euler": of_joints, "implicitfast": on_path, "implicit": on_path, "discrete": self.damped}
+        return {"Euler": of_joints, "implicitfast": on_path, "implicit": on_path, "discrete": self.scaled(self.brakes)}
 
     @cached_property
     def is_symmetric(self) -> bool:
