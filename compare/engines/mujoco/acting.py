@@ -68,7 +68,7 @@ class Acting:
             m.opt.gravity[:] = 0.0
         self.data = mujoco.MjData(m)
         if len(locked):
-            m.dof_armature[list(locked)] += LOCKING * max(1.0, self.mass_matrix(m.qpos0).max())
+            add_armature(m, list(locked), LOCKING * max(1.0, self.mass_matrix(m.qpos0).max()))
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """M, (nv, nv)."""
@@ -122,3 +122,12 @@ class Acting:
         A = np.zeros((size, size))
         mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
         return A
+
+
+def add_armature(model: mujoco.MjModel, speeds: Sequence[int], more: float | np.ndarray) -> None:
+    """More armature at some speeds of a compiled model, kg m2 or kg.
+
+    Of bodies whose inertia never changes the compiler keeps it ready: there dof_armature alone does nothing.
+    """
+    model.dof_armature[speeds] += more
+    model.dof_M0[speeds] += more
