@@ -126,7 +126,7 @@ class Small(Deviations):
 
     def scanned(self, integrator: str) -> float | None:
         """The limit by the eigenvalues of steps, s: the first that grows; None: none up to 5 s."""
-        first = min(LIMIT_FROM / max(np.abs(self.modes[0]).max(), 1e-300), 0.1 * LIMIT_UP_TO)
+        first = min(LIMIT_FROM / max(np.abs(self.modes[0]).max(initial=0.0), 1e-300), 0.1 * LIMIT_UP_TO)
         steps = np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1)
         low = 0.0
         for dt in steps:
