@@ -10,6 +10,7 @@ from ...actuators import Drive
 from .actuators import control_of
 from .flags import INTEGRATORS, bit
 from .inventory import NOT_HAD_FIELDS
+from .joints import kind_of
 
 NUDGE = 1e-6  # rad, m and their rates: of derivatives of a step
 # beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
@@ -155,16 +156,17 @@ class Acting:
         """From q to positions near it, (..., nq) -> (..., nv)."""
         m = self.model
         found = np.zeros((*positions.shape[:-1], m.nv))
-        for kind, a, v in zip(m.jnt_type, m.jnt_qposadr, m.jnt_dofadr):
-            turning = kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL)
-            single = {mujoco.mjtJoint.mjJNT_FREE: 3, mujoco.mjtJoint.mjJNT_BALL: 0}.get(int(kind), 1)
+        for j, (a, v) in enumerate(zip(m.jnt_qposadr, m.jnt_dofadr)):
+            kind = kind_of(m, j)
+            single = {"free": 3, "ball": 0}.get(kind, 1)
             found[..., v : v + single] = positions[..., a : a + single] - q[a : a + single]
-            if turning:
+            if kind in ("free", "ball"):
+                # twice the vector of the quaternion from the one to the other: it is near the identity
                 a, v = a + single, v + single
                 w, x = q[a], q[a + 1 : a + 4]
                 w1, x1 = positions[..., a, None], positions[..., a + 1 : a + 4]
-                turned = w * x1 - w1 * x - np.cross(x, x1)
-                found[..., v : v + 3] = 2.0 * turned * np.sign(w * w1 + (x1 @ x)[..., None])
+                turn = w * x1 - w1 * x - np.cross(x, x1)
+                found[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 @ x)[..., None])
         return found
 
     def changed(
