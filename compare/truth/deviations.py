@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 SYMMETRIC = 1e-7  # of the largest entry: what a matrix and its transpose may differ by, and what is nothing beside it
 VANISHING = 1e-10  # of the largest stiffness or damping, in the units of M: nothing
@@ -52,12 +51,16 @@ class Deviations:
     @cached_property
     def root(self) -> np.ndarray:
         """L of M = L L'."""
-        return cholesky(self.M, lower=True)
+        return np.linalg.cholesky(self.M)
+
+    @cached_property
+    def unrooted(self) -> np.ndarray:
+        """L^-1, once for all: for matrices so small SciPy's solution waits for its threads, for ms where cores are busy."""
+        return np.linalg.inv(self.root)
 
     def scaled(self, matrix: np.ndarray) -> np.ndarray:
         """L^-1 matrix L'^-1."""
-        half = solve_triangular(self.root, matrix, lower=True)
-        return solve_triangular(self.root, half.T, lower=True).T
+        return self.unrooted @ matrix @ self.unrooted.T
 
     @cached_property
     def stiff(self) -> np.ndarray:
@@ -119,5 +122,5 @@ class Deviations:
 
     def joint_of(self, shape: np.ndarray) -> str:
         """The speed that has most of the kinetic energy of a movement."""
-        x = solve_triangular(self.root.T, shape, lower=False)
+        x = self.unrooted.T @ shape
         return self.names[int(np.argmax(np.abs(x.conj() * (self.M @ x))))]

@@ -43,12 +43,18 @@ class Limit(NamedTuple):
 class Small(Deviations):
     """Small deviations, and what steps make of them."""
 
+    def braking(self, integrator: str) -> np.ndarray:
+        """What of D an integrator has implicit, (nv, nv)."""
+        if integrator == "Euler":
+            return np.diag(self.damping)
+        if integrator in ("implicitfast", "implicit"):
+            return np.where(self.on_path, self.uncut, 0.0)
+        return self.brakes if integrator == "discrete" else np.zeros_like(self.D)
+
     @cached_property
     def implicit(self) -> dict[str, np.ndarray]:
-        """Of D what each integrator has implicit, in the units of M."""
-        on_path = self.scaled(np.where(self.on_path, self.uncut, 0.0))
-        of_joints = self.scaled(np.diag(self.damping))
-        return {"Euler": of_joints, "implicitfast": on_path, "implicit": on_path, "discrete": self.scaled(self.brakes)}
+        """The same by the integrator's name, in the units of M."""
+        return {name: self.scaled(self.braking(name)) for name in ("Euler", "implicitfast", "implicit", "discrete")}
 
     def step(self, integrator: str, dt: float) -> np.ndarray:
         """What a step makes of a small deviation (x, v), in the units of M, (2nv, 2nv)."""
