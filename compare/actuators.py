@@ -43,6 +43,11 @@ class Actuator:
         """Whether its force depends on the length: it has a target."""
         return self.acts and bool(self.bias[1] or self.gain[1])
 
+    @property
+    def holds_speed(self) -> bool:
+        """Whether its control is a speed that it holds: one number is its gain of both."""
+        return self.gain[0] == -self.bias[2] != 0.0 and not any((*self.gain[1:], *self.bias[:2]))
+
     def target(self, length: float) -> float:
         """The u at which a servo is without force at a length, in its range; of any other actuator 0, in its range."""
         gain = self.gain[0] + self.gain[1] * length

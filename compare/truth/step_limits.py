@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 from tmt import METHODS
 
@@ -81,12 +80,16 @@ class Small:
     @cached_property
     def root(self) -> np.ndarray:
         """L of M = L L'."""
-        return cholesky(self.M, lower=True)
+        return np.linalg.cholesky(self.M)
+
+    @cached_property
+    def unrooted(self) -> np.ndarray:
+        """L^-1, once for all: for matrices so small SciPy's solution waits for its threads, for ms where cores are busy."""
+        return np.linalg.inv(self.root)
 
     def scaled(self, matrix: np.ndarray) -> np.ndarray:
         """L^-1 matrix L'^-1."""
-        half = solve_triangular(self.root, matrix, lower=True)
-        return solve_triangular(self.root, half.T, lower=True).T
+        return self.unrooted @ matrix @ self.unrooted.T
 
     @cached_property
     def stiff(self) -> np.ndarray:
@@ -237,7 +240,7 @@ class Small:
 
     def joint_of(self, shape: np.ndarray) -> str:
         """The speed that has most of the kinetic energy of a movement."""
-        x = solve_triangular(self.root.T, shape, lower=False)
+        x = self.unrooted.T @ shape
         return self.names[int(np.argmax(np.abs(x.conj() * (self.M @ x))))]
 
 

@@ -1,9 +1,10 @@
 """A file's model in MuJoCo with its actuators: what they are along, what a step does, and runs from near a posture at rest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import mujoco
 import numpy as np
+from mujoco.rollout import rollout
 
 from ...actuators import UNCUT, Cut, Drive
 from .actuators import OF_A_JOINT, control_of
@@ -66,7 +67,7 @@ class Acting:
             m.jnt_actfrclimited[m.dof_jntid[speed]], m.jnt_actfrcrange[m.dof_jntid[speed]] = True, force
         if weightless:
             m.opt.gravity[:] = 0.0
-        self.data = mujoco.MjData(m)
+        self.data, self.locked = mujoco.MjData(m), tuple(locked)
         if len(locked):
             m.dof_armature[list(locked)] += LOCKING * max(1.0, self.mass_matrix(m.qpos0).max())
 
@@ -114,6 +115,83 @@ class Acting:
                 data.ctrl[place] = 0.0 if one.dynamics == "integrator" else u[i]
             if one.dynamics != "none" and one.acts:
                 data.act[m.actuator_actadr[i]] = u[i]
+
+    @property
+    def filters(self) -> list[int]:
+        """Where the activations of filters stand that act: they decay by themselves."""
+        return [
+            int(self.model.actuator_actadr[i])
+            for i, one in enumerate(self.drive.actuators)
+            if one.acts and one.dynamics.startswith("filter")
+        ]
+
+    def deviations(
+        self,
+        q: np.ndarray,
+        u: np.ndarray,
+        dt: float,
+        integrator: str,
+        steps: Sequence[int],
+        movement: np.ndarray | float = 0.0,
+        speed: np.ndarray | float = 0.0,
+        activation: float = 0.0,
+        jump: np.ndarray | float = 0.0,
+    ) -> Iterator[np.ndarray]:
+        """A run in parts of so many steps each: how far it is from q after each step, then the activations of filters from u.
+
+        (steps, nv + filters): rad or m, a ball's turn in its own axes. It starts at rest at q, moved by a small movement (nv,),
+        with a speed (nv,) and activations of filters that are off by so much; jump: of u, (k,), once for all. What has left all
+        bounds stays where MuJoCo stopped it.
+        """
+        model, data = self.at(q, np.add(u, jump), dt, integrator)
+        mujoco.mj_integratePos(model, data.qpos, np.broadcast_to(movement, model.nv).astype(float), 1.0)
+        data.qvel[:] = speed
+        rest, filters, controls = data.act.copy(), self.filters, data.ctrl.copy()
+        data.act[filters] += activation
+        spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        state = np.zeros(mujoco.mj_stateSize(model, spec))
+        mujoco.mj_getState(model, data, state, spec)
+        for count in steps:
+            # rollout sets controls anew, and leaves out the initial state
+            states, _ = rollout(model, data, state, np.tile(controls, (1, count, 1)), nstep=count)
+            state = states[0, -1]
+            at = 1 + model.nq + model.nv
+            activations = states[0, :, at : at + model.na] - rest
+            yield np.hstack([self.movements(states[0, :, 1 : 1 + model.nq], q), activations[:, filters]])
+
+    def movements(self, positions: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """From q to positions near it, (..., nq) -> (..., nv)."""
+        m = self.model
+        found = np.zeros((*positions.shape[:-1], m.nv))
+        for kind, a, v in zip(m.jnt_type, m.jnt_qposadr, m.jnt_dofadr):
+            turning = kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL)
+            single = {mujoco.mjtJoint.mjJNT_FREE: 3, mujoco.mjtJoint.mjJNT_BALL: 0}.get(int(kind), 1)
+            found[..., v : v + single] = positions[..., a : a + single] - q[a : a + single]
+            if turning:
+                a, v = a + single, v + single
+                w, x = q[a], q[a + 1 : a + 4]
+                w1, x1 = positions[..., a, None], positions[..., a + 1 : a + 4]
+                turned = w * x1 - w1 * x - np.cross(x, x1)
+                found[..., v : v + 3] = 2.0 * turned * np.sign(w * w1 + (x1 @ x)[..., None])
+        return found
+
+    def changed(
+        self, damping: Mapping[int, float] | None = None, armature: Mapping[int, float] | None = None
+    ) -> "Acting":
+        """The same with other gains of speed, kv, of actuators by number, and more armature of speeds, kg m2 or kg.
+
+        An actuator that holds a speed has the same gain of its control.
+        """
+        other = object.__new__(Acting)
+        other.__dict__.update(self.__dict__ | {"model": mujoco.MjModel.__copy__(self.model)})
+        for i, kv in (damping or {}).items():
+            if self.drive.actuators[i].holds_speed:
+                other.model.actuator_gainprm[i, 0] = kv
+            other.model.actuator_biasprm[i, 2] = -kv
+        for k, more in (armature or {}).items():
+            other.model.dof_armature[k] += more
+        other.data = mujoco.MjData(other.model)
+        return other
 
     def transition(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> np.ndarray:
         """d(movement, qd, act)+/d(movement, qd, act) of one step at rest, by central differences of MuJoCo's own; not for RK4."""

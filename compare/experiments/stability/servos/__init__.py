@@ -1,0 +1,1 @@
+"""Which step is stable under a robot's own servos, predicted and observed."""
