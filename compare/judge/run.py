@@ -83,11 +83,14 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
 
 
 def work(case: Case, q: np.ndarray) -> np.ndarray:
-    """The work of the constant torque along a run, J, (times,).
+    """The work of the constant torque along a run, and of what a controller takes off by the positions, J, (times,).
 
     At hinges and slides it is that of the way from the start. A ball's torque is constant in axes that turn with it, and its work
     no function of the position: it is added up over the movements from state to state.
     """
+    if case.tree.position_gain:
+        mean = case.tau - (fed_back_at(case.tree, q) + fed_back_at(case.tree, q[0])) / 2.0  # as it is linear
+        return np.sum(case.coordinates.difference(q, q[0]) * mean, axis=1)
     if not case.coordinates.has_balls:
         return (q - q[0]) @ case.tau
     if not case.tau.any():
@@ -95,11 +98,17 @@ def work(case: Case, q: np.ndarray) -> np.ndarray:
     return np.append(0.0, np.cumsum(case.coordinates.difference(q[1:], q[:-1]) @ case.tau))
 
 
+def fed_back_at(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
+    """What a controller takes off the torque at positions q (..., nq), N m or N, (..., nv)."""
+    at = [at.start for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]
+    return q[..., at] @ np.array(tree.position_gain).T
+
+
 def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """The energy that the motion of a case can have exchanged up to each state of a run, J, (times,).
 
     It starts with a kinetic energy and with that of its springs, and can gain the whole potential range of the stated robot,
-    twice the sum of m g reach. No reach bounds what slides and a torque do: where that is more, it is the most work of the
+    twice the sum of m g reach, and with servos what these have stored. No reach bounds what slides and a torque do: where that is more, it is the most work of the
     torque, `done`, and the weight times the way along the slides. Rounding may add 64 eps of 1 J for each inertia and stiffness
     of 1.
     """
@@ -110,6 +119,12 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
         + tmt.energy(q[0], case.v, tree)
         - tmt.potential_energy(q[0], tree)
     )
+    if tree.position_gain:
+        # and its servos what they give back until they are without force; what they cannot is the work of a motor
+        gain = np.array(tree.position_gain)
+        pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
+        has = has + pull @ give @ pull / 2.0
+        done = coordinates.difference(q, q[0]) @ (case.tau - gain @ give @ case.tau)
     if tree.has_springs:
         has = has + tmt.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
