@@ -15,7 +15,7 @@ import tmt
 from tmt.lock import CLOSE_TO_ONE
 from tmt.tree import GAINS
 
-from .controller import Controller, controller, takes_part
+from .controller import Controller, controller
 from .coordinates import Coordinates
 from .coordinates import fastest_rates as fastest_rates
 from .coordinates import rates_at as rates_at
@@ -28,7 +28,10 @@ TORQUES = ("free", "hold", "servos")
 
 @dataclass(frozen=True)
 class Scene:
-    """A motion under constant torque, or under constant controls of the robot's own actuators. Raises ValueError, in one line, for what cannot be a scene of any robot."""
+    """A motion under constant torque, or under constant controls of the robot's own actuators.
+
+    Raises ValueError, in one line, for what cannot be a scene of any robot.
+    """
 
     name: str
     # a posture's name, or an angle in deg for each joint (m, a quaternion); (): the reference
@@ -69,7 +72,9 @@ class Scene:
         self.refuse("damping", wrong, "at least 0 N m s/rad")
         object.__setattr__(self, "damping", tuple(float(v) for v in self.damping) if each else float(self.damping))
         each = are_numbers(self.targets) and len(self.targets) > 0
-        self.refuse("targets", not (each or is_number(self.targets)), "a distance in rad or m, for all joints or for each")
+        self.refuse(
+            "targets", not (each or is_number(self.targets)), "a distance in rad or m, for all joints or for each"
+        )
         object.__setattr__(self, "targets", tuple(float(v) for v in self.targets) if each else float(self.targets))
         self.refuse("targets", np.any(self.targets) and self.torque != "servos", 'torque = "servos"')
         self.refuse("gravity", not isinstance(self.gravity, bool | np.bool_), "True, the model's own, or False, none")
@@ -131,8 +136,8 @@ class Case:
         known = not isinstance(scene.targets, tuple) or len(scene.targets) == whole.nv
         scene.refuse("targets", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
         if scene.torque == "servos":
-            driven = any(takes_part(one) for one in self.robot.drive.actuators)
-            scene.refuse("torque", not driven, "free, hold or numbers, as no actuator of this robot takes part,")
+            idle = all(u is None for u in self.controller.controls)
+            scene.refuse("torque", idle, "free, hold or numbers, as no actuator of this robot takes part,")
             scene.refuse("locked", scene.locked, "no locked joint where servos act")
         unknown = [name for name in scene.locked if name not in names]
         most = f"a tuple of at most {len(names) - 1} of {some(names)}"

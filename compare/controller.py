@@ -17,28 +17,23 @@ class Controller(NamedTuple):
     """What acts: torque - position_gain @ q - speed_gain @ qd, q and qd of nv speeds each."""
 
     controls: tuple  # u of each of the robot's actuators; None: it is left out
+    left_out: dict  # why, by name
     torque: np.ndarray  # (nv,) N m or N
     position_gain: np.ndarray  # (nv, nv) N m/rad
     speed_gain: np.ndarray  # (nv, nv) N m s/rad
 
 
-def takes_part(actuator: Actuator) -> bool:
-    """Whether an actuator exerts a force that is linear in q and qd: its law is known, and its moment the same everywhere."""
-    return actuator.acts and actuator.moment is not None and any(actuator.moment)
+def reason(actuator: Actuator, u: float) -> str:
+    """Why an actuator takes no part under a control; "" if it does.
 
-
-def feeds_back(actuator: Actuator) -> bool:
-    """Whether it takes part and pulls towards its target."""
-    return takes_part(actuator) and actuator.is_servo
-
-
-def left_out(drive: Drive) -> dict[str, str]:
-    """Of the actuators that take no part their names, and why."""
-    return {
-        one.name: one.off or one.refused or ("it moves nothing" if one.moment else "its lever turns with the posture")
-        for one in drive.actuators
-        if not takes_part(one)
-    }
+    One that pushes away from its target is left out, as MuJoCo's `discrete` then has another scheme.
+    """
+    known = actuator.off or actuator.refused
+    if not known and actuator.moment is None:
+        return "its lever turns with the posture"
+    if not known and not any(actuator.moment):
+        return "it moves nothing"
+    return known or ("it pushes away from its target" if actuator.stiffness(u) < 0.0 else "")
 
 
 def controller(drive: Drive, posture: object, q: np.ndarray, targets: float | Sequence[float] = 0.0) -> Controller:
@@ -48,19 +43,20 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: float | Se
     much each servo's target is moved, for all speeds or for each, (nv,): its length by the sum of |J| times that.
     """
     moved, n = np.broadcast_to(targets, len(q)), len(q)
-    moments = [np.array(one.moment) if takes_part(one) else np.zeros(n) for one in drive.actuators]
+    moments = [np.zeros(n) if one.moment is None else np.array(one.moment) for one in drive.actuators]
     stated = drive.control(posture if isinstance(posture, str) else "", [moment @ q for moment in moments])
-    torque, position_gain, speed_gain, controls = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), []
+    torque, position_gain, speed_gain, found = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), {}
     for one, moment, u in zip(drive.actuators, moments, stated):
-        if not takes_part(one):
-            controls.append(None)
+        found[one.name] = None, reason(one, u)
+        if found[one.name][1]:
             continue
         u = moved_target(one, float(u), float(np.abs(moment) @ moved))
-        controls.append(u)
+        found[one.name] = u, ""
         torque += moment * one.force(u, 0.0)
         position_gain += np.outer(moment, moment) * one.stiffness(u)
         speed_gain += np.outer(moment, moment) * one.damping(u)
-    return Controller(tuple(controls), torque, position_gain, speed_gain)
+    controls, left_out = tuple(u for u, _ in found.values()), {name: why for name, (_, why) in found.items() if why}
+    return Controller(controls, left_out, torque, position_gain, speed_gain)
 
 
 def moved_target(one: Actuator, u: float, by: float) -> float:

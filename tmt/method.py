@@ -12,11 +12,11 @@ Mbar qdd = Qbar with
     Qbar = tau - D qd - k (q - rest) - P q - S qd - h
     h    = sum_b T_b' (m_b v_conv - f_b) + B_b' (I_b w_conv + omega_b x I_b omega_b),  f_b = m_b gravity
 
-(assignment, part e; its h_b and g_b are v_conv and w_conv here). h is MuJoCo's qfrc_bias, D the joint
-damping, k the stiffness of springs at the joints, P and S the gains of a linear controller (position_gain and speed_gain of
-a Tree); armature is added to Mbar's diagonal. The arm has neither springs nor armature nor gains. Scalars may be floats, NumPy arrays (one element per state), complex numbers, mpmath numbers,
-traced or symbolic expressions; q is a sequence of nq of them, qd and tau of nv. Vectors are in the
-inertial frame unless they are said to be in body axes.
+(assignment, part e; its h_b and g_b are v_conv and w_conv here). h is MuJoCo's qfrc_bias, D the joint damping, k the
+stiffness of springs at the joints, P and S the gains of a linear controller (position_gain and speed_gain of a Tree);
+armature is added to Mbar's diagonal. The arm has neither springs nor armature nor gains. Scalars may be floats, NumPy
+arrays (one element per state), complex numbers, mpmath numbers, traced or symbolic expressions; q is a sequence of nq
+of them, qd and tau of nv. Vectors are in the inertial frame unless they are said to be in body axes.
 """
 
 from typing import NamedTuple

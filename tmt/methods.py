@@ -181,7 +181,9 @@ class SemiImplicitEuler(Method):
         left = [x + d * y for x, d, y in zip(left_over(M, a, force), held, a)]
         position_gain, speed_gain = self.gains_held(tree)
         if position_gain:
-            left = [x + weighted(row, [dt * (v + dt * y) for v, y in zip(qd, a)]) for x, row in zip(left, position_gain)]
+            left = [
+                x + weighted(row, [dt * (v + dt * y) for v, y in zip(qd, a)]) for x, row in zip(left, position_gain)
+            ]
         if speed_gain:
             left = [x + weighted(row, [dt * y for y in a]) for x, row in zip(left, speed_gain)]
         if own := set(range(len(qd))) if self.implicit_bias else lone_speeds(tree) if self.lone_bodies else ():

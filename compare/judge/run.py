@@ -108,9 +108,9 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """The energy that the motion of a case can have exchanged up to each state of a run, J, (times,).
 
     It starts with a kinetic energy and with that of its springs, and can gain the whole potential range of the stated robot,
-    twice the sum of m g reach, and with servos what these have stored. No reach bounds what slides and a torque do: where that is more, it is the most work of the
-    torque, `done`, and the weight times the way along the slides. Rounding may add 64 eps of 1 J for each inertia and stiffness
-    of 1.
+    twice the sum of m g reach, and with servos what these have stored. No reach bounds what slides and a torque do: where that
+    is more, it is the most work of the torque, `done`, and the weight times the way along the slides. Rounding may add 64 eps
+    of 1 J for each inertia and stiffness of 1.
     """
     tree, coordinates = case.tree, case.coordinates
     # what slides have moved at the start belongs to the reach; what they move from there is the way that they have gone
@@ -157,9 +157,9 @@ def leaves_no_digits(robot: object) -> str | None:
     A force that moves a joint at the rate r is rounded by 64 eps of itself, and a step multiplies what is off by (r dt)^2, where
     that is far more than 1: after two of them it is 64 eps (r dt)^4 of 1 rad or 1 m.
     """
-    if not robot.is_read or not robot.scenes:
+    if not (robot.is_read and robot.cases_of_torque):
         return None
-    case = min(robot.cases, key=lambda case: case.scene.dt)
+    case = min(robot.cases_of_torque, key=lambda case: case.scene.dt)
     rate, dt = max(rates_at(case.tree, case.q)), case.scene.dt
     if not FACTOR * EPS * (rate * dt) ** 4 > NARROW:
         return None

@@ -199,7 +199,13 @@ class MujocoDynamics:
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
         states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
-        options = {"control_spec": int(applied), "nstep": steps, "state": states, "sensordata": sensors, "skip_checks": True}
+        options = {
+            "control_spec": int(applied),
+            "nstep": steps,
+            "state": states,
+            "sensordata": sensors,
+            "skip_checks": True,
+        }
 
         def run():
             rollout([model] * runs, [data], starts, torques, **options)
