@@ -120,7 +120,7 @@ def estimated(method: Method, tree: Tree) -> float:
     if method.engine != "tmt":
         return IN_LOOPS * n**1.5
     stepping = method_named(method.name)
-    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages
+    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages and not tree.has_gains
     evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
     if method.adaptive:
         return evaluation
