@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 import tmt
+from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 from tmt.methods import lone_speeds
 
 from ..actuators import Cut
@@ -110,7 +111,7 @@ class Posture:
         filters = [one for one in drive.actuators if one.acts and one.dynamics in ("filter", "filterexact")]
         return Small(
             names=self.robot.coordinates.speeds,
-            M=np.array(tmt.mass_matrix(self.q, tree)),
+            M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
             K=slopes.K,
             D=slopes.D,
             damping=speeds,

@@ -3,7 +3,9 @@
 Of the equations M x'' + D x' + K x = 0, D = D_impl + D_expl, a step of Euler, implicitfast or implicit is
 (M + dt D_impl) (v+ - v) = -dt (K x + D v), x+ = x + dt v+. With z = (1 + s) / (1 - s) for its eigenvalues it is
 P s^2 + 2 dt D s + dt^2 K = 0, P = 4 M + 2 dt (D_impl - D_expl) - dt^2 K: where M, D and K are symmetric and D and K not
-negative it is stable if and only if P is positive definite. Elsewhere the eigenvalues of the step decide.
+negative it is stable if and only if P is positive definite. A step of discrete, which has all of D and the springs S of joints
+and actuators implicit, gives P = 4 M + 2 dt D + dt^2 (2 S - K) and D + dt S in the place of D: the same holds where S is not
+negative. Elsewhere the eigenvalues of the step decide.
 """
 
 from functools import cached_property
@@ -52,6 +54,11 @@ class Small(Deviations):
         return self.brakes if integrator == "discrete" else np.zeros_like(self.D)
 
     @cached_property
+    def held(self) -> dict[str, np.ndarray]:
+        """Of K what each integrator has implicit, in the units of M."""
+        return dict.fromkeys(self.implicit, np.zeros_like(self.M)) | {"discrete": self.scaled(self.springs)}
+
+    @cached_property
     def implicit(self) -> dict[str, np.ndarray]:
         """The same by the integrator's name, in the units of M."""
         return {name: self.scaled(self.braking(name)) for name in ("Euler", "implicitfast", "implicit", "discrete")}
@@ -63,7 +70,7 @@ class Small(Deviations):
         if integrator == "RK4":
             Z = dt * np.block([[none, unit], [-self.stiff, -self.damped]])
             return np.eye(2 * n) + Z @ (np.eye(2 * n) + Z @ (np.eye(2 * n) / 2 + Z @ (np.eye(2 * n) / 6 + Z / 24)))
-        held = dt * self.scaled(self.springs) if integrator == "discrete" else none
+        held = dt * self.held[integrator]
         matrix = unit + dt * (self.implicit[integrator] + held)
         speeds = np.hstack([none, unit]) - dt * np.linalg.solve(matrix, np.hstack([self.stiff, self.damped + held]))
         return np.vstack([np.hstack([unit, none]) + dt * speeds, speeds])
@@ -89,11 +96,11 @@ class Small(Deviations):
         return [(POLE * constant, name) for name, constant, is_exact in self.poles if not is_exact]
 
     def P(self, integrator: str, dt: float) -> np.ndarray:
-        """4 M + 2 dt (D_impl - D_expl) - dt^2 K, in the units of M."""
+        """4 M + 2 dt (D_impl - D_expl) - dt^2 K, of discrete with 2 S dt^2, in the units of M."""
         found = (
             4.0 * np.eye(len(self.M))
             + 2.0 * dt * (2.0 * self.implicit[integrator] - self.damped)
-            - dt * dt * self.stiff
+            - dt * dt * (self.stiff - 2.0 * self.held[integrator])
         )
         return 0.5 * (found + found.T)
 
@@ -122,10 +129,17 @@ class Small(Deviations):
         return Limit("finite", dt, self.joint_of(shape), rate, kind, shape)
 
     def has_closed_form(self, integrator: str) -> bool:
-        return integrator in ("Euler", "implicitfast", "implicit") and self.is_symmetric
+        return self.is_symmetric and integrator in self.implicit and (integrator != "discrete" or self.pulls_back)
+
+    @cached_property
+    def pulls_back(self) -> bool:
+        """Whether the springs that discrete has implicit are symmetric, and none pushes away."""
+        S = self.held["discrete"]
+        size = max(np.abs(S).max(), np.abs(self.stiff).max())
+        return np.abs(S - S.T).max() <= SYMMETRIC * size and np.linalg.eigvalsh(S).min() >= -VANISHING * size
 
     def closed_form(self, integrator: str) -> float | None:
-        """The limit by P, s: as P is concave in dt it is positive definite up to one step; None: up to 5 s."""
+        """The limit by P, s; None: up to 5 s. Along any movement P is a quadratic of dt that comes to zero once at most."""
         if self.holds(integrator, LIMIT_UP_TO):
             return None
         return bisected(lambda dt: self.holds(integrator, dt), 0.0, LIMIT_UP_TO)
