@@ -15,7 +15,7 @@ import numpy as np
 
 from tmt import METHODS
 
-from .deviations import Deviations
+from .deviations import SYMMETRIC, VANISHING, Deviations
 from .linear import NEUTRAL
 from .steps import growth_of
 
@@ -135,8 +135,8 @@ class Small(Deviations):
     def pulls_back(self) -> bool:
         """Whether the springs that discrete has implicit are symmetric, and none pushes away."""
         S = self.held["discrete"]
-        size = max(np.abs(S).max(), np.abs(self.stiff).max())
-        return np.abs(S - S.T).max() <= SYMMETRIC * size and np.linalg.eigvalsh(S).min() >= -VANISHING * size
+        size = max(np.abs(S).max(initial=0.0), np.abs(self.stiff).max(initial=0.0))
+        return np.abs(S - S.T).max() <= SYMMETRIC * size and np.linalg.eigvalsh(S).min(initial=0.0) >= -VANISHING * size
 
     def closed_form(self, integrator: str) -> float | None:
         """The limit by P, s; None: up to 5 s. Along any movement P is a quadratic of dt that comes to zero once at most."""
