@@ -1,0 +1,83 @@
+"""The largest stable step under a robot's own servos as MuJoCo's runs show it, found without the prediction."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ....engines.mujoco.acting import Acting
+from ....truth.driven import Posture
+
+SEED = 14
+DEVIATION, LEAST, MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
+SHORTEST, LONGEST = 1e-7, 5.0  # s: between which the limit is sought
+COARSE = 4.0  # from one step to the next, upwards, until one fails
+COARSE_STEPS, STEPS = 400, 4000  # of a run: upwards, and where the limit is narrowed
+PARTS = 8  # of a run: after each it ends if the deviation has grown far
+FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
+STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+REFINED = 1e-3  # relative, between a step that holds and one that does not
+
+
+def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | None]:
+    """The largest dt, s, at which no small deviation grows in MuJoCo: ("finite", dt); ("none", None): none grows up to 5 s.
+
+    Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
+    acting: MuJoCo at the posture, with the base that is asked for.
+    """
+    count = int(np.log(LONGEST / SHORTEST) / np.log(COARSE)) + 1
+    tried = LONGEST / COARSE ** np.arange(count)[::-1]
+    failed = next((k for k, dt in enumerate(tried) if grows(acting, at, integrator, dt, COARSE_STEPS)), count)
+    # a short run may not show what hardly grows: the longest step that held is tried once more
+    while failed and grows(acting, at, integrator, tried[failed - 1]):
+        failed -= 1
+    if failed in (0, count):
+        return ("none" if failed else "always"), None
+    low, high = tried[failed - 1], tried[failed]
+    while high / low > 1.0 + REFINED:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if grows(acting, at, integrator, middle) else (middle, high)
+    return "finite", float(np.sqrt(low * high))
+
+
+def grows(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = STEPS) -> bool:
+    """Whether a small random deviation from rest grows in a run of so many steps."""
+    found = []
+    for size in sizes(acting, at, integrator, dt, steps):
+        if not size <= FAR:  # or no number
+            return True
+        found.append(size)
+    return max(found[3 * PARTS // 4 :]) > STILL * max(1.0, *found[: PARTS // 2])
+
+
+def sizes(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[float]:
+    """The largest deviation in each part of a run over that at its start.
+
+    Its square is dx' M dx, of which no swing makes more than it was. Joints have alike of it at the start, by chance, and so have
+    activations of filters. A free base moves with the joints so that there is no momentum, and is not measured.
+    """
+    rng, kept = np.random.default_rng(SEED), counted(acting, at)
+    M = acting.mass_matrix(at.q)
+    inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
+    root = np.linalg.cholesky(0.5 * (inner + inner.T))
+    inertia = np.diag(inner)
+    each = np.clip(DEVIATION * np.sqrt(np.median(inertia) / inertia), LEAST, MOST)
+    movement, speed = np.zeros((2, len(M)))
+    movement[kept] = each * rng.uniform(-1.0, 1.0, len(kept))
+    # what nothing pulls back drifts no farther in the run than it was moved
+    speed[kept] = each * rng.uniform(-1.0, 1.0, len(kept)) / (steps * dt)
+    base = np.setdiff1d(np.arange(len(M)), kept)
+    speed[base] = -np.linalg.solve(M[np.ix_(base, base)], M[np.ix_(base, kept)] @ speed[kept])
+    start = np.linalg.norm(movement[kept] @ root)
+    parts = [steps // PARTS] * PARTS
+    for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, DEVIATION):
+        filters = off[:, len(M) :]
+        with np.errstate(over="ignore", invalid="ignore"):
+            filters = filters * start / (DEVIATION * np.sqrt(max(1, filters.shape[1])))
+            yield float(np.linalg.norm(np.hstack([off[:, kept] @ root, filters]), axis=1).max() / start)
+
+
+def counted(acting: Acting, at: Posture) -> list[int]:
+    """The speeds that are measured: with a free base, those that do not follow from the others."""
+    base = "locked" if acting.locked else at.bases[0]
+    names = set(at.small(base).names)
+    return [k for k, name in enumerate(at.robot.coordinates.speeds) if name in names]

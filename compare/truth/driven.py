@@ -1,0 +1,134 @@
+"""A robot under its own servos at a posture: where it comes to rest, and the equations of small deviations there."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+import tmt
+from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
+from tmt.methods import lone_speeds
+
+from ..actuators import Cut
+from .servos import Driven
+from .step_limits import Small
+
+BASES = {
+    "fixed": "the robot stands on the world",
+    "free": "the robot floats, without gravity",
+    "locked": "its free base is held",
+}
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A posture of a robot under u of each actuator: at its name's position, then where it rests.
+
+    ask: see Driven. A robot that floats is without gravity: it has no rest with it.
+    """
+
+    robot: object  # a robots.Robot
+    name: str
+    ask: Callable | None = None
+
+    @cached_property
+    def driven(self) -> Driven:
+        """The tree with its drive. A free body that stands alone neither holds nor moves the rest: it is without weight."""
+        tree, drive = self.robot.tree, self.robot.drive
+        if self.lone:
+            parts = list(drive.compensation or (0.0,) * len(tree.mass))
+            for body, hinge in enumerate(tree.body_hinge):
+                if hinge >= 0 and tree.coordinates.joints[hinge].qd.start in self.lone:
+                    parts[body] = 1.0
+            drive = replace(drive, compensation=tuple(parts))
+        return Driven(tree, drive, self.ask, weightless=bool(self.base))
+
+    @property
+    def start(self) -> np.ndarray:
+        """The posture itself, (nq,)."""
+        return self.robot.posture(self.name)
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        """Of each actuator, see Drive.control."""
+        return self.robot.drive.control(self.name, self.driven.along(self.start).lengths)
+
+    @cached_property
+    def rest(self) -> tuple[np.ndarray, float]:
+        """Where it rests, (nq,), found from the posture, and the size of the force that is left, N m or N; 0.0: it rests."""
+        return self.driven.at_rest(self.start, self.u)
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.rest[0]
+
+    @property
+    def moved(self) -> float:
+        """How far the rest is from the posture, the largest movement of a joint, rad or m."""
+        return float(np.abs(self.robot.coordinates.difference(self.q, self.start)).max())
+
+    @cached_property
+    def lone(self) -> list[int]:
+        """The speeds of free bodies that stand alone and that no actuator drives."""
+        driven = {k for one in self.robot.drive.actuators for k in np.flatnonzero(one.moment or ())}
+        return sorted(lone_speeds(self.robot.tree) - driven)
+
+    @cached_property
+    def base(self) -> list[int]:
+        """The speeds of free joints that carry the robot, or parts of it."""
+        tree, found = self.robot.tree, []
+        for i in range(3, len(tree.kind)):
+            chain = [i - 3, i - 2, i - 1, i]
+            free = tuple(tree.kind[j] for j in chain) == ("slide",) * 3 + ("ball",)
+            if free and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
+                found += range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop)
+        return [k for k in found if k not in self.lone]
+
+    @property
+    def bases(self) -> tuple[str, ...]:
+        """With what base limits are asked: of BASES."""
+        return ("free", "locked") if self.base else ("fixed",)
+
+    @cached_property
+    def cut(self) -> Cut:
+        """What ranges cut at rest."""
+        return self.driven.cut(self.q, self.u)
+
+    @cached_property
+    def whole(self) -> Small:
+        """Small deviations of all speeds."""
+        tree, drive = self.robot.tree, self.robot.drive
+        slopes = self.driven.slopes(self.q, self.u)
+        speeds = np.add(tree.damping, drive.damping or 0.0) * (not drive.explicit_damping)
+        acts = [one for one in drive.actuators if one.acts and one.dynamics == "filter"]
+        return Small(
+            names=self.robot.coordinates.speeds,
+            M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
+            K=slopes.K,
+            D=slopes.D,
+            damping=speeds,
+            springs=slopes.springs,
+            brakes=slopes.brakes,
+            on_path=on_one_path(tree),
+            poles=tuple((one.name, one.time_constant) for one in acts),
+        )
+
+    def small(self, base: str) -> Small:
+        """Small deviations with a base of BASES; free bodies that stand alone are left out."""
+        if base == "free":
+            names = [self.whole.names[k] for k in self.base]
+            kept = self.whole.locked(self.lone)
+            return kept.without([k for k, name in enumerate(kept.names) if name in names])
+        return self.whole.locked(sorted({*self.lone, *(self.base if base == "locked" else ())}))
+
+
+def on_one_path(tree: tmt.Tree) -> np.ndarray:
+    """Whether two speeds are of joints on one path to the root, (nv, nv)."""
+    n = len(tree.parent)
+    before = np.eye(n, dtype=bool)
+    for i, parent in enumerate(tree.parent):
+        if parent >= 0:
+            before[i] |= before[parent]
+    joints = [i for i, (_, _, by) in enumerate(tree.coordinates.joints) for _ in range(by.start, by.stop)]
+    return (before | before.T)[np.ix_(joints, joints)]
