@@ -6,10 +6,11 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-from ...actuators import Drive
-from .actuators import control_of
+from ...actuators import UNCUT, Cut, Drive
+from .actuators import OF_A_JOINT, control_of
 from .flags import INTEGRATORS, bit
 from .inventory import NOT_HAD_FIELDS
+from .joints import kind_of
 from .linear import NUDGE
 
 # beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
@@ -20,15 +21,15 @@ LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn
 class Acting:
     """A compiled model whose actuators act by their laws alone: no force range, no limit, contact, equality, friction or medium.
 
-    cut: forces of those actuators that their range cuts at the posture, by number: they stay what they are there. locked: speeds
-    that do not move. weightless: without gravity. integrator by MuJoCo's name, dt in s.
+    cut: what ranges cut at the posture: it stays what it is there. locked: speeds that do not move. weightless: without gravity.
+    integrator by MuJoCo's name, dt in s.
     """
 
     def __init__(
         self,
         model: mujoco.MjModel,
         drive: Drive,
-        cut: dict[int, float] | None = None,
+        cut: Cut = UNCUT,
         locked: Sequence[int] = (),
         weightless: bool = False,
     ):
@@ -49,19 +50,27 @@ class Acting:
         ):
             getattr(m, name)[:] = 0
         for i, one in enumerate(drive.actuators):
-            if not one.acts or i in (cut or {}):
+            if not one.acts or i in cut.forces:
                 m.actuator_gaintype[i], m.actuator_biastype[i] = (
                     mujoco.mjtGain.mjGAIN_FIXED,
                     mujoco.mjtBias.mjBIAS_AFFINE,
                 )
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
-                m.actuator_biasprm[i, 0] = (cut or {}).get(i, 0.0)
+                m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
                 m.actuator_plugin[i] = -1
+            if (
+                one.refused
+                and hasattr(m, "actuator_damping")
+                and mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT
+            ):
+                m.actuator_damping[i] = 0.0
+        for speed, force in cut.sums.items():
+            m.jnt_actfrclimited[m.dof_jntid[speed]], m.jnt_actfrcrange[m.dof_jntid[speed]] = True, force
         if weightless:
             m.opt.gravity[:] = 0.0
         self.data, self.locked = mujoco.MjData(m), tuple(locked)
         if len(locked):
-            m.dof_armature[list(locked)] += LOCKING * max(1.0, self.mass_matrix(m.qpos0).max())
+            add_armature(m, list(locked), LOCKING * max(1.0, self.mass_matrix(m.qpos0).max()))
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """M, (nv, nv)."""
@@ -79,7 +88,7 @@ class Acting:
         count = len(self.drive.actuators)
         moments = np.zeros((count, m.nv))
         mujoco.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
-        numbers = [tendon.number for tendon in self.drive.tendons]
+        numbers = np.array([tendon.number for tendon in self.drive.tendons], int)
         jacobian = np.zeros((m.ntendon, m.nv))
         if m.ntendon:
             rows = (m.ten_J_rownnz, m.ten_J_rowadr, m.ten_J_colind) if hasattr(m, "ten_J_rownnz") else None
@@ -155,16 +164,17 @@ class Acting:
         """From q to positions near it, (..., nq) -> (..., nv)."""
         m = self.model
         found = np.zeros((*positions.shape[:-1], m.nv))
-        for kind, a, v in zip(m.jnt_type, m.jnt_qposadr, m.jnt_dofadr):
-            turning = kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL)
-            single = {mujoco.mjtJoint.mjJNT_FREE: 3, mujoco.mjtJoint.mjJNT_BALL: 0}.get(int(kind), 1)
+        for j, (a, v) in enumerate(zip(m.jnt_qposadr, m.jnt_dofadr)):
+            kind = kind_of(m, j)
+            single = {"free": 3, "ball": 0}.get(kind, 1)
             found[..., v : v + single] = positions[..., a : a + single] - q[a : a + single]
-            if turning:
+            if kind in ("free", "ball"):
+                # twice the vector of the quaternion from the one to the other: it is near the identity
                 a, v = a + single, v + single
                 w, x = q[a], q[a + 1 : a + 4]
                 w1, x1 = positions[..., a, None], positions[..., a + 1 : a + 4]
-                turned = w * x1 - w1 * x - np.cross(x, x1)
-                found[..., v : v + 3] = 2.0 * turned * np.sign(w * w1 + (x1 @ x)[..., None])
+                turn = w * x1 - w1 * x - np.cross(x, x1)
+                found[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 @ x)[..., None])
         return found
 
     def changed(
@@ -181,7 +191,7 @@ class Acting:
                 other.model.actuator_gainprm[i, 0] = kv
             other.model.actuator_biasprm[i, 2] = -kv
         for k, more in (armature or {}).items():
-            other.model.dof_armature[k] += more
+            add_armature(other.model, [k], more)
         other.data = mujoco.MjData(other.model)
         return other
 
@@ -192,3 +202,12 @@ class Acting:
         A = np.zeros((size, size))
         mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
         return A
+
+
+def add_armature(model: mujoco.MjModel, speeds: Sequence[int], more: float | np.ndarray) -> None:
+    """More armature at some speeds of a compiled model, kg m2 or kg.
+
+    Of bodies whose inertia never changes the compiler keeps it ready: there dof_armature alone does nothing.
+    """
+    model.dof_armature[speeds] += more
+    model.dof_M0[speeds] += more

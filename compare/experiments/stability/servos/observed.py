@@ -15,6 +15,9 @@ COARSE_STEPS, STEPS = 400, 4000  # of a run: upwards, and where the limit is nar
 PARTS = 8  # of a run: after each it ends if the deviation has grown far
 FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+# of what changes its sign with every step: it grows if it does so from part to part of the second half, by so much in all, fold;
+# less of it, of the deviation at the start, may be rounding
+STEADY, LEFT = 1.003, 1e-2
 REFINED = 1e-3  # relative, between a step that holds and one that does not
 
 
@@ -42,18 +45,35 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
 def grows(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = STEPS) -> bool:
     """Whether a small random deviation from rest grows in a run of so many steps."""
     found = []
-    for size in sizes(acting, at, integrator, dt, steps):
-        if not size <= FAR:  # or no number
-            return True
-        found.append(size)
-    return max(found[3 * PARTS // 4 :]) > STILL * max(1.0, *found[: PARTS // 2])
+    with np.errstate(over="ignore", invalid="ignore"):
+        for off in deviations(acting, at, integrator, dt, steps):
+            size = np.linalg.norm(off, axis=1).max()
+            if not size <= FAR:  # or no number
+                return True
+            found.append((size, alternating(off)))
+    largest, turning = np.array(found).T
+    late = 3 * PARTS // 4
+    if largest[late:].max() > STILL * max(1.0, largest[: PARTS // 2].max()):
+        return True
+    last = turning[PARTS // 2 :]
+    return bool(steps >= STEPS and last[-1] > LEFT and last[-1] > STEADY * last[0] and (np.diff(last) > 0.0).all())
 
 
-def sizes(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[float]:
-    """The largest deviation in each part of a run over that at its start.
+def alternating(off: np.ndarray) -> float:
+    """The part of deviations (steps, n) that changes its sign with every step, in the mean, so that swings cancel.
 
-    Its square is dx' M dx, of which no swing makes more than it was. Joints have alike of it at the start, by chance, and so have
-    activations of filters. A free base moves with the joints so that there is no momentum, and is not measured.
+    So grows, and hardly, what is damped by explicit and implicit damping almost alike.
+    """
+    changes = np.diff(off, n=4, axis=0) / 16.0
+    weight = np.hanning(len(changes) + 2)[1:-1]
+    return float(np.sqrt(weight @ (changes**2).sum(axis=1) / weight.sum()))
+
+
+def deviations(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
+    """Deviations in each part of a run, (steps, n), in units of that at its start.
+
+    The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
+    by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
     """
     rng, kept = np.random.default_rng(SEED), counted(acting, at)
     M = acting.mass_matrix(at.q)
@@ -70,10 +90,8 @@ def sizes(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -
     start = np.linalg.norm(movement[kept] @ root)
     parts = [steps // PARTS] * PARTS
     for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, DEVIATION):
-        filters = off[:, len(M) :]
-        with np.errstate(over="ignore", invalid="ignore"):
-            filters = filters * start / (DEVIATION * np.sqrt(max(1, filters.shape[1])))
-            yield float(np.linalg.norm(np.hstack([off[:, kept] @ root, filters]), axis=1).max() / start)
+        filters = off[:, len(M) :] / (DEVIATION * np.sqrt(max(1, off.shape[1] - len(M))))
+        yield np.hstack([off[:, kept] @ (root / start), filters])
 
 
 def counted(acting: Acting, at: Posture) -> list[int]:
