@@ -15,9 +15,9 @@ COARSE_STEPS, STEPS = 400, 4000  # of a run: upwards, and where the limit is nar
 PARTS = 8  # of a run: after each it ends if the deviation has grown far
 FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
-# of what changes its sign with every step: it grows if it does so from part to part of the second half, by so much in all, fold;
-# less of it, of the deviation at the start, may be rounding
-STEADY, LEFT = 1.003, 1e-2
+# what changes its sign with every step grows if it does so from part to part after the first two, by so much in all, fold, and
+# at its slowest by so much of its fastest; less of it, of the deviation at the start, is rounding
+STEADY, REGULAR, LEFT = 1.003, 0.5, 1e-5
 REFINED = 1e-3  # relative, between a step that holds and one that does not
 
 
@@ -55,8 +55,11 @@ def grows(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = 
     late = 3 * PARTS // 4
     if largest[late:].max() > STILL * max(1.0, largest[: PARTS // 2].max()):
         return True
-    last = turning[PARTS // 2 :]
-    return bool(steps >= STEPS and last[-1] > LEFT and last[-1] > STEADY * last[0] and (np.diff(last) > 0.0).all())
+    last = turning[2:]
+    if steps < STEPS or last.min() < LEFT:
+        return False
+    growth = np.diff(np.log(last))
+    return bool(growth.sum() > np.log(STEADY) and growth.min() > REGULAR * growth.max())
 
 
 def alternating(off: np.ndarray) -> float:
