@@ -15,8 +15,8 @@ import numpy as np
 class Actuator:
     """One actuator, at a joint, a tendon, or whatever MuJoCo knows the length of.
 
-    moment: dl/dq, (nv,), where it is the same at every posture (a joint of one number, a fixed tendon), else None: then it is
-    asked of MuJoCo. Forces are N or N m, times the gear.
+    moment: what its force is multiplied with, (nv,), where that is dl/dq and the same at every posture (a joint of one number, a
+    fixed tendon), else None: then both are asked of MuJoCo. Forces are N or N m, times the gear.
     """
 
     name: str
@@ -29,6 +29,7 @@ class Actuator:
     control_range: tuple | None = None  # (low, high)
     activation_range: tuple | None = None
     force_range: tuple | None = None  # N or N m
+    tendon: int = -1  # along which it pulls, by its number in the model; -1: none
     off: str = ""  # why it exerts nothing; "": it does
     refused: str = ""  # why its law is not known here; "": it is
 
@@ -76,6 +77,16 @@ class Actuator:
         return self.force_range is not None and not self.force_range[0] < force < self.force_range[1]
 
 
+class Cut(NamedTuple):
+    """What ranges cut at a posture: it stays what it is there, N or N m."""
+
+    forces: Mapping[int, float]  # of actuators by number
+    sums: Mapping[int, float]  # of all actuators at a speed, by its number
+
+
+UNCUT = Cut({}, {})
+
+
 class Tendon(NamedTuple):
     """A tendon that pulls by itself: a spring that is without force from `low` to `high`, and a damper."""
 
@@ -100,8 +111,9 @@ class Drive:
     """All that drives a robot, see Actuator and Tendon.
 
     controls: by the name of a posture what its keyframe states: u of each actuator, or None. compensation: of each body of the
-    Tree, what part of its weight is taken away. damping: of each speed, by the actuators themselves. cut: speeds at which the
-    sum of the actuators' forces has a range, (low, high) by number. unknown: what else acts and is left out, and why, by name.
+    Tree, what part of its weight is taken away; lifted: the speeds at which that is an actuator's force, unlifted: at which it is
+    left out. damping: of each speed, by the actuators themselves. ranges: of the sum of the actuators' forces at a speed, and
+    tendon_ranges: along a tendon, (low, high) by number. unknown: what else acts and is left out, and why, by name.
     """
 
     actuators: tuple[Actuator, ...] = ()
@@ -109,7 +121,10 @@ class Drive:
     compensation: tuple[float, ...] = ()
     damping: tuple[float, ...] = ()
     controls: Mapping[str, tuple] = field(default_factory=dict)
-    cut: Mapping[int, tuple] = field(default_factory=dict)
+    ranges: Mapping[int, tuple] = field(default_factory=dict)
+    tendon_ranges: Mapping[int, tuple] = field(default_factory=dict)
+    lifted: tuple[int, ...] = ()
+    unlifted: tuple[int, ...] = ()
     unknown: Mapping[str, str] = field(default_factory=dict)
     explicit_damping: bool = False  # the file switches off that Euler has the damping of joints implicit
 

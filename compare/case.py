@@ -13,7 +13,9 @@ import numpy as np
 
 import tmt
 from tmt.lock import CLOSE_TO_ONE
+from tmt.tree import GAINS
 
+from .controller import Controller, controller
 from .coordinates import Coordinates
 from .coordinates import fastest_rates as fastest_rates
 from .coordinates import rates_at as rates_at
@@ -21,19 +23,24 @@ from .given import WrongField, are_numbers, is_number, some
 
 SEED = 10  # of every random number in a report
 MOST_STEPS = 10_000_000  # of a run
-TORQUES = ("free", "hold")
+TORQUES = ("free", "hold", "servos")
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A motion under constant torque. Raises ValueError, in one line, for what cannot be a scene of any robot."""
+    """A motion under constant torque, or under constant controls of the robot's own actuators.
+
+    Raises ValueError, in one line, for what cannot be a scene of any robot.
+    """
 
     name: str
     # a posture's name, or an angle in deg for each joint (m, a quaternion); (): the reference
     posture: str | tuple = ()
-    torque: str | tuple = "free"  # "free": none; "hold": what balances gravity and springs at the start, by TMT; or N m
+    # "free": none; "hold": what balances gravity and springs at the start, by TMT; "servos": the robot's own actuators; or N m
+    torque: str | tuple = "free"
     speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
     damping: float | tuple = 0.0  # N m s/rad (N s/m), added to that of every joint; or a number for each speed
+    targets: float | tuple = 0.0  # rad or m, by how much the servos' targets are moved; or a number for each speed
     gravity: bool = True  # the robot's own, or none
     locked: tuple = ()  # names of the joints that stay at the start
     duration: float = 5.0  # s
@@ -46,7 +53,7 @@ class Scene:
         self.refuse("name", not named, "a text that is not empty, in one line")
         choices = {
             "posture": "the name of a posture, or an angle in deg for each joint",
-            "torque": "free, hold, or a torque in N m for each joint",
+            "torque": "free, hold, servos, or a torque in N m for each joint",
             "speed": "a speed in deg/s for each joint",
         }
         for name, accepted in choices.items():
@@ -64,6 +71,12 @@ class Scene:
         wrong = not (each or is_number(self.damping)) or np.min(self.damping) < 0.0
         self.refuse("damping", wrong, "at least 0 N m s/rad")
         object.__setattr__(self, "damping", tuple(float(v) for v in self.damping) if each else float(self.damping))
+        each = are_numbers(self.targets) and len(self.targets) > 0
+        self.refuse(
+            "targets", not (each or is_number(self.targets)), "a distance in rad or m, for all joints or for each"
+        )
+        object.__setattr__(self, "targets", tuple(float(v) for v in self.targets) if each else float(self.targets))
+        self.refuse("targets", np.any(self.targets) and self.torque != "servos", 'torque = "servos"')
         self.refuse("gravity", not isinstance(self.gravity, bool | np.bool_), "True, the model's own, or False, none")
         object.__setattr__(self, "gravity", bool(self.gravity))
         steps = f"a step that divides {self.duration:g} s"
@@ -120,6 +133,12 @@ class Case:
                 scene.refuse("posture", wrong, "a quaternion w, x, y, z of length 1 for each ball")
         known = not isinstance(scene.damping, tuple) or len(scene.damping) == whole.nv
         scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
+        known = not isinstance(scene.targets, tuple) or len(scene.targets) == whole.nv
+        scene.refuse("targets", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
+        if scene.torque == "servos":
+            idle = all(u is None for u in self.controller.controls)
+            scene.refuse("torque", idle, "free, hold or numbers, as no actuator of this robot takes part,")
+            scene.refuse("locked", scene.locked, "no locked joint where servos act")
         unknown = [name for name in scene.locked if name not in names]
         most = f"a tuple of at most {len(names) - 1} of {some(names)}"
         scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)
@@ -166,11 +185,24 @@ class Case:
         return Coordinates(self.joints, kinds)
 
     @cached_property
+    def controller(self) -> Controller | None:
+        """What the robot's own actuators do, if they act."""
+        if self.scene.torque != "servos":
+            return None
+        places = self.robot.coordinates.places.places
+        q = np.array([self.posture[at.start] for at, by in places for _ in range(by.start, by.stop)])
+        return controller(self.robot.drive, self.scene.posture, q, self.scene.targets)
+
+    @cached_property
     def whole(self) -> tmt.Tree:
-        """The robot's Tree with the scene's damping added, and without gravity if the scene has none; no joint locked."""
+        """The robot's Tree with the scene's damping added, its actuators, and without gravity if the scene has none.
+
+        No joint is locked.
+        """
         tree, scene = self.robot.tree, self.scene
         gravity = tree.gravity if scene.gravity else (0.0, 0.0, 0.0)
-        return dataclasses.replace(tree, damping=np.add(tree.damping, scene.damping), gravity=gravity)
+        gains = {name: getattr(self.controller, name) for name in GAINS} if self.controller else {}
+        return dataclasses.replace(tree, damping=np.add(tree.damping, scene.damping), gravity=gravity, **gains)
 
     @property
     def locked(self) -> Mapping[str, float | tuple]:
@@ -216,6 +248,8 @@ class Case:
             torque = tmt.gravity_balance(self.posture, self.whole)
             if self.whole.has_springs:
                 torque = torque + tmt.spring_torque(self.posture, self.whole)
+        elif self.controller:
+            torque = self.controller.torque
         elif torque == "free":
             torque = (0.0,) * self.robot.coordinates.nv
         return np.array(torque)[self._free("qd")]

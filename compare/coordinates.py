@@ -116,6 +116,11 @@ def fastest_rates(tree: Tree, inverse: np.ndarray, added: tuple = ()) -> tuple[f
 
     inverse: of Mbar, (nv, nv).
     """
-    decay = np.abs(np.linalg.eigvals(inverse @ np.diag(np.add(tree.damping, added or 0.0)))).max()
     of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
-    return float(decay), float(np.sqrt(np.abs(np.linalg.eigvals(inverse @ np.diag(of_speeds))).max()))
+    damped, stiff = np.diag(np.add(tree.damping, added or 0.0)), np.diag(of_speeds)
+    if tree.has_gains:
+        damped, stiff = (
+            part + (gain or 0.0) for part, gain in ((damped, tree.speed_gain), (stiff, tree.position_gain))
+        )
+    decay, square = (np.abs(np.linalg.eigvals(inverse @ part)).max() for part in (damped, stiff))
+    return float(decay), float(np.sqrt(square))

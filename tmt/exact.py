@@ -6,7 +6,10 @@ from types import SimpleNamespace
 from .space import Vector, sqrt
 from .tree import Tree
 
-NUMBERS = ("offset", "damping", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference")
+NUMBERS = (
+    "offset", "damping", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference",
+    "position_gain", "speed_gain",
+)  # fmt: skip
 
 
 def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
@@ -36,6 +39,7 @@ def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
         coordinates=tree.coordinates,
         moves=tree.moves,
         has_springs=tree.has_springs,
+        has_gains=tree.has_gains,
     )
 
 

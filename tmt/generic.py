@@ -34,6 +34,8 @@ class Arrays(NamedTuple):
     rest: np.ndarray  # (nq,)
     reference: np.ndarray  # (n,)
     gravity: np.ndarray  # (3,)
+    position_gain: np.ndarray  # (nv, nv), or (0, 0) where there is none
+    speed_gain: np.ndarray
 
 
 @lru_cache(maxsize=64)
@@ -58,7 +60,13 @@ def arrays(tree) -> Arrays:
             np.array(getattr(tree, name))
             for name in ("damping", "armature", "stiffness", "rest", "reference", "gravity")
         ),
+        *(matrix(gain) for gain in (tree.position_gain, tree.speed_gain)),
     )
+
+
+def matrix(rows) -> np.ndarray:
+    """Rows as an array of two dimensions, whatever their number."""
+    return np.array(rows, dtype=float).reshape(len(rows), len(rows))
 
 
 def compiled():

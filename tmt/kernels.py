@@ -47,8 +47,11 @@ def stepper(tree: Tree, method_name: str) -> Callable:
 
 
 def is_traced(tree: Tree, stepping) -> bool:
-    """Whether a method follows a tree in straight-line code: that of moderate length."""
-    return _cost(tree, stepping) <= LONGEST
+    """Whether a method follows a tree in straight-line code: that of moderate length.
+
+    Gains belong to one controller of a robot that may have many: where there is a loop nothing is compiled for each.
+    """
+    return not (tree.has_gains and stepping.loop) and _cost(tree, stepping) <= LONGEST
 
 
 @lru_cache(maxsize=256)

@@ -38,6 +38,7 @@ def locked(tree, angles: Mapping):
             shift, turned = _placed(tree, i, held[name])
             frames.append((carrier, _moved(origin, turn, shift), turn if turned is None else turn @ turned))
 
+    _refuse_fed_back(tree, held, free)
     before = {i: frame(tree.parent[i]) for i in free}
     carried = [frame(joint) for joint in tree.body_hinge]
     at = [k for i in free for k in range(*joints[i].q.indices(len(tree.rest)))]
@@ -57,7 +58,27 @@ def locked(tree, angles: Mapping):
         stiffness=[tree.stiffness[i] for i in free],
         rest=[tree.rest[k] for k in at],
         reference=[tree.reference[i] for i in free],
+        position_gain=_gains_of_free(tree.position_gain, by),
+        speed_gain=_gains_of_free(tree.speed_gain, by),
     )
+
+
+def _gains_of_free(gain, by) -> list:
+    """The rows and columns of a controller's gain at the speeds of the free joints."""
+    return [[gain[k][l] for _, l in by] for _, k in by] if gain else []
+
+
+def _refuse_fed_back(tree, held, free):
+    """Raise ValueError if the position of a locked joint makes a torque at a free one: a Tree has no place for it."""
+    names, joints = tree.hinge_names, tree.coordinates.joints
+    for name, position in held.items() if tree.position_gain else ():
+        l = joints[names.index(name)].qd.start
+        for i in free:
+            if position and any(tree.position_gain[k][l] for k in range(*joints[i].qd.indices(len(tree.axis)))):
+                raise ValueError(
+                    f"{name!r} cannot be locked at {shown(position)}: its position makes a torque at {names[i]!r} "
+                    "(position_gain); a joint that is fed back to itself alone, or 0, is expected"
+                )
 
 
 def _placed(tree, i, position):

@@ -123,8 +123,11 @@ def estimate(tree, errors, tolerance, h, rates, changes, q, qd, new, new_qd):
 
 
 @compiled
-def run_semi_implicit(tree, own, springs, q, qd, tau, dt, ended):
-    """The same by the semi-implicit Euler method; own (nv,): whose bias is implicit too; springs: whether they are."""
+def run_semi_implicit(tree, own, springs, position_gain, speed_gain, q, qd, tau, dt, ended):
+    """The same by the semi-implicit Euler method.
+
+    own (nv,): whose bias is implicit too; springs: whether they are; position_gain, speed_gain: their implicit entries.
+    """
     check(tree, q, qd, tau, ended)
     evaluations, n = 0, len(tree.before)
     M, h, force, u = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n)
@@ -145,6 +148,13 @@ def run_semi_implicit(tree, own, springs, q, qd, tau, dt, ended):
                 if springs:
                     force[v] -= (held[v] - dt * tree.damping[v]) / dt * speeds[v]
                 M[v, v] += held[v]
+            for v in range(len(speed_gain)):
+                for w in range(n):
+                    M[v, w] += dt * speed_gain[v, w]
+            for v in range(len(position_gain)):
+                for w in range(n):
+                    M[v, w] += dt * dt * position_gain[v, w]
+                    force[v] -= dt * position_gain[v, w] * speeds[w]
             if own.any():
                 add_bias_rates(tree, own, place, speeds, dt, M)
             solve(M, force)

@@ -191,11 +191,24 @@ def take_springs(tree, q, force):
 
 
 @compiled
+def take_fed_back(tree, q, qd, force):
+    """force (nv,) less P q + S qd, the torque of a linear controller."""
+    for i in range(len(tree.parent) if len(tree.position_gain) else 0):
+        if tree.kind[i] != BALL:
+            for v in range(len(force)):
+                force[v] -= tree.position_gain[v, tree.by[i]] * q[tree.at[i]]
+    for w in range(len(tree.speed_gain)):
+        for v in range(len(force)):
+            force[v] -= tree.speed_gain[v, w] * qd[w]
+
+
+@compiled
 def reduced_force(tree, h, q, qd, tau, force):
-    """Qbar = tau - D qd - k (q - rest) - h, (nv,)."""
+    """Qbar = tau - D qd - k (q - rest) - P q - S qd - h, (nv,)."""
     for v in range(len(force)):
         force[v] = tau[v] - tree.damping[v] * qd[v] - h[v]
     take_springs(tree, q, force)
+    take_fed_back(tree, q, qd, force)
 
 
 @compiled

@@ -9,14 +9,14 @@ in body axes). With xdd_b = T_b qdd + v_conv and omegad_b = B_b qdd + w_conv, vi
 Mbar qdd = Qbar with
 
     Mbar = sum_b T_b' m_b T_b + B_b' I_b B_b
-    Qbar = tau - D qd - k (q - rest) - h
+    Qbar = tau - D qd - k (q - rest) - P q - S qd - h
     h    = sum_b T_b' (m_b v_conv - f_b) + B_b' (I_b w_conv + omega_b x I_b omega_b),  f_b = m_b gravity
 
-(assignment, part e; its h_b and g_b are v_conv and w_conv here). h is MuJoCo's qfrc_bias, D the joint
-damping, k the stiffness of springs at the joints; armature is added to Mbar's diagonal. The arm has neither
-springs nor armature. Scalars may be floats, NumPy arrays (one element per state), complex numbers, mpmath numbers,
-traced or symbolic expressions; q is a sequence of nq of them, qd and tau of nv. Vectors are in the
-inertial frame unless they are said to be in body axes.
+(assignment, part e; its h_b and g_b are v_conv and w_conv here). h is MuJoCo's qfrc_bias, D the joint damping, k the
+stiffness of springs at the joints, P and S the gains of a linear controller (position_gain and speed_gain of a Tree);
+armature is added to Mbar's diagonal. The arm has neither springs nor armature nor gains. Scalars may be floats, NumPy
+arrays (one element per state), complex numbers, mpmath numbers, traced or symbolic expressions; q is a sequence of nq
+of them, qd and tau of nv. Vectors are in the inertial frame unless they are said to be in body axes.
 """
 
 from typing import NamedTuple
@@ -152,10 +152,22 @@ def spring_torque(tree, q) -> list:
     return [k * x for k, (_, by) in zip(tree.stiffness, tree.coordinates.places) for x in off[by]]
 
 
+def fed_back(tree, q, qd) -> list:
+    """P q + S qd (nv, N m or N), which a linear controller takes off the force; no entry of P is that of a ball."""
+    positions = [q[at.start] for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]
+    terms = [[] for _ in qd]
+    for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):
+        for own, row in zip(terms, gain):
+            own += [g * x for g, x in zip(row, values) if g]
+    return [total(own) for own in terms]
+
+
 def reduced_force(tree, h, q, qd, tau) -> list:
-    """Qbar = tau - D qd - k (q - rest) - h (nv, N m)."""
+    """Qbar = tau - D qd - k (q - rest) - P q - S qd - h (nv, N m)."""
     Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
-    return [Q - s for Q, s in zip(Qbar, spring_torque(tree, q))] if tree.has_springs else Qbar
+    if tree.has_springs:
+        Qbar = [Q - s for Q, s in zip(Qbar, spring_torque(tree, q))]
+    return [Q - f for Q, f in zip(Qbar, fed_back(tree, q, qd))] if tree.has_gains else Qbar
 
 
 def acceleration(tree, q, qd, tau, terms=mass_matrix_and_bias) -> list:

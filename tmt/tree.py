@@ -12,6 +12,7 @@ from .lock import CLOSE_TO_ONE, locked
 from .values import names, numbers_of, shown
 
 OPTIONAL = ("reference", "armature", "stiffness", "rest")  # fields that may be left out
+GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,9 @@ class Tree:
     stiffness: tuple = ()  # (n,) N m/rad or N/m, of a spring at each joint; (): none
     rest: tuple = ()  # (nq,) rad, m and quaternions: where the springs are without force; (): at the reference
     reference: tuple = ()  # (n,) rad or m, where the joint leaves frames parallel; 0 for a ball; (): all 0
+    # of a linear controller of hinges and slides: torque = tau - position_gain @ q - speed_gain @ qd; (): none
+    position_gain: tuple = ()  # (nv, nv) N m/rad or N/m, q in rad and m as it stands
+    speed_gain: tuple = ()  # (nv, nv) N m s/rad or N s/m
 
     def __new__(cls, *values, **named):
         known = [field.name for field in fields(cls)]
@@ -64,6 +68,8 @@ class Tree:
             if name in OPTIONAL and isinstance(value, tuple | list) and not value:
                 value = self.zero if name == "rest" else (0.0,) * shape[0]
             object.__setattr__(self, name, numbers_of(name, value, shape))
+        for name in GAINS:
+            object.__setattr__(self, name, _gain(name, getattr(self, name), self.coordinates))
         if n == 0 or m == 0:
             raise ValueError("a Tree needs at least one joint and one body")
         for name, hinges, before in (("parent", self.parent, range(n)), ("body_hinge", self.body_hinge, [n] * m)):
@@ -95,7 +101,7 @@ class Tree:
         """The fields, without those that may be left out and say nothing."""
         n, nv = len(self.parent), len(self.axis)
         nothing, plain = (0.0,) * n, {"kind": ("hinge",) * n, "armature": (0.0,) * nv, "rest": self.zero}
-        plain |= {"stiffness": nothing, "reference": nothing}
+        plain |= {"stiffness": nothing, "reference": nothing} | dict.fromkeys(GAINS, ())
         said = {field.name: getattr(self, field.name) for field in fields(self)}
         return f"Tree({', '.join(f'{name}={value}' for name, value in said.items() if value != plain.get(name))})"
 
@@ -107,6 +113,10 @@ class Tree:
     @property
     def has_springs(self) -> bool:
         return any(self.stiffness)
+
+    @property
+    def has_gains(self) -> bool:
+        return bool(self.position_gain or self.speed_gain)
 
     @property
     def zero(self) -> tuple:
@@ -128,7 +138,7 @@ class Tree:
         A position is in rad, of a slide in m, of a ball a quaternion. What hangs on a locked joint is carried by the joint
         before it, its vectors turned so that all frames are again parallel to the inertial frame where the free joints are at
         their reference. A joint locked there rounds nothing. Raises ValueError for an unknown joint, a position that is none,
-        or if no joint is left.
+        if no joint is left, or if a controller takes the position of a locked joint for the torque at a free one.
         """
         return locked(self, angles)
 
@@ -151,6 +161,20 @@ def _kinds(values, n) -> tuple:
     if len(kinds) != n or not all(isinstance(kind, str) and kind in KINDS for kind in kinds):
         raise ValueError(f"Tree.kind is {shown(values)}; {n} of {', '.join(KINDS)} are expected")
     return tuple(map(str, kinds))
+
+
+def _gain(name, values, coordinates) -> tuple:
+    """The rows of a gain, (nv, nv); () where nothing is fed back."""
+    if isinstance(values, tuple | list) and not values:
+        return ()
+    rows = numbers_of(name, values, (coordinates.nv, coordinates.nv))
+    fed = np.array(rows) != 0.0
+    for i, (kind, _, by) in enumerate(coordinates.joints):
+        if kind == "ball" and (fed[by].any() or fed[:, by].any()):
+            raise ValueError(
+                f"Tree.{name} has an entry of joint {i}, a ball; of hinges and slides alone is it accepted"
+            )
+    return rows if fed.any() else ()
 
 
 def _check_ball(i, axes, reference, rest):

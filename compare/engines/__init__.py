@@ -113,6 +113,11 @@ def compared(engines: Mapping[str, Engine], case: Case) -> dict[str, Dynamics]:
     return {name: engines[name].of(case) for name in case.robot.compared}
 
 
+def methods_in(engine: Engine, case: Case) -> Mapping[str, Method]:
+    """An engine's methods in a case: where a robot's own actuators act, others may be the same scheme."""
+    return engine.methods_in(case) if hasattr(engine, "methods_in") else engine.methods
+
+
 def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[np.ndarray]]:
     """The batch shape that values (..., n) have together, and each of them as rows, (states, n), contiguous.
 

@@ -36,6 +36,10 @@ class Tmt:
             if name not in self.left_out
         }
 
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        """Its methods in a case: where actuators act every scheme of MuJoCo's is another."""
+        return Tmt({*FOR_SOME[1:], *self.methods}).methods if case.controller else self.methods
+
     def unavailable(self) -> str | None:
         return None
 

@@ -6,7 +6,7 @@ from tmt import Tree
 from tmt.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
 from tmt.stepping import Method, stepped
 
-from .scale import EPS, FACTOR, bias_scale, spring_scale
+from .scale import EPS, FACTOR, bias_scale, gain_scale, spring_scale
 
 SAMPLED = 16  # states of a block at which the bound of a step is taken
 NARROW = 1e-3  # rad, m: while the band of the positions is below, a run is judged
@@ -35,6 +35,8 @@ def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, 
     force = bias_scale(tree, q, qd) + np.abs(tau).max() + np.max(tree.damping) * np.abs(qd).max(axis=1)
     if tree.has_springs:
         force = force + spring_scale(tree, q).max(axis=1)
+    if tree.has_gains:
+        force = force + gain_scale(tree, q, qd).max(axis=1)
     return a, size, FACTOR * EPS * (values[:, 0] * size + force) / values[:, -1]
 
 

@@ -83,11 +83,14 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
 
 
 def work(case: Case, q: np.ndarray) -> np.ndarray:
-    """The work of the constant torque along a run, J, (times,).
+    """The work of the constant torque along a run, and of what a controller takes off by the positions, J, (times,).
 
     At hinges and slides it is that of the way from the start. A ball's torque is constant in axes that turn with it, and its work
     no function of the position: it is added up over the movements from state to state.
     """
+    if case.tree.position_gain:
+        mean = case.tau - (fed_back_at(case.tree, q) + fed_back_at(case.tree, q[0])) / 2.0  # as it is linear
+        return np.sum(case.coordinates.difference(q, q[0]) * mean, axis=1)
     if not case.coordinates.has_balls:
         return (q - q[0]) @ case.tau
     if not case.tau.any():
@@ -95,13 +98,19 @@ def work(case: Case, q: np.ndarray) -> np.ndarray:
     return np.append(0.0, np.cumsum(case.coordinates.difference(q[1:], q[:-1]) @ case.tau))
 
 
+def fed_back_at(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
+    """What a controller takes off the torque at positions q (..., nq), N m or N, (..., nv)."""
+    at = [at.start for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]
+    return q[..., at] @ np.array(tree.position_gain).T
+
+
 def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """The energy that the motion of a case can have exchanged up to each state of a run, J, (times,).
 
     It starts with a kinetic energy and with that of its springs, and can gain the whole potential range of the stated robot,
-    twice the sum of m g reach. No reach bounds what slides and a torque do: where that is more, it is the most work of the
-    torque, `done`, and the weight times the way along the slides. Rounding may add 64 eps of 1 J for each inertia and stiffness
-    of 1.
+    twice the sum of m g reach, and with servos what these have stored. No reach bounds what slides and a torque do: where that
+    is more, it is the most work of the torque, `done`, and the weight times the way along the slides. Rounding may add 64 eps
+    of 1 J for each inertia and stiffness of 1.
     """
     tree, coordinates = case.tree, case.coordinates
     # what slides have moved at the start belongs to the reach; what they move from there is the way that they have gone
@@ -110,6 +119,12 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
         + tmt.energy(q[0], case.v, tree)
         - tmt.potential_energy(q[0], tree)
     )
+    if tree.position_gain:
+        # and its servos what they give back until they are without force; what they cannot is the work of a motor
+        gain = np.array(tree.position_gain)
+        pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
+        has = has + pull @ give @ pull / 2.0
+        done = coordinates.difference(q, q[0]) @ (case.tau - gain @ give @ case.tau)
     if tree.has_springs:
         has = has + tmt.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
@@ -142,9 +157,9 @@ def leaves_no_digits(robot: object) -> str | None:
     A force that moves a joint at the rate r is rounded by 64 eps of itself, and a step multiplies what is off by (r dt)^2, where
     that is far more than 1: after two of them it is 64 eps (r dt)^4 of 1 rad or 1 m.
     """
-    if not robot.is_read or not robot.scenes:
+    if not (robot.is_read and robot.cases_of_torque):
         return None
-    case = min(robot.cases, key=lambda case: case.scene.dt)
+    case = min(robot.cases_of_torque, key=lambda case: case.scene.dt)
     rate, dt = max(rates_at(case.tree, case.q)), case.scene.dt
     if not FACTOR * EPS * (rate * dt) ** 4 > NARROW:
         return None

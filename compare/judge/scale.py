@@ -70,6 +70,13 @@ def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: Ar
     return (eigenvalues[:, -1] * size + force) / eigenvalues[:, 0]
 
 
+def gain_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """|P| |q| + |S| |qd| of a controller's gains, N m or N, (..., nv)."""
+    positions = np.abs(q)[..., [at.start for at, by in tree.coordinates.places for _ in range(by.start, by.stop)]]
+    gains = zip((tree.position_gain, tree.speed_gain), (positions, np.abs(qd)))
+    return sum((values @ np.abs(gain).T for gain, values in gains if gain), np.zeros(np.shape(qd)))
+
+
 def spring_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """k (|q| + |rest|) of the springs, N m or N, (..., nv): of a ball, whose turn is at most half a one, k times pi."""
     scale = np.zeros((*q.shape[:-1], tree.coordinates.nv))

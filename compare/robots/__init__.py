@@ -144,6 +144,11 @@ class Robot:
         """Its scenes."""
         return tuple(Case(self, scene) for scene in self.scenes)
 
+    @property
+    def cases_of_torque(self) -> tuple[Case, ...]:
+        """Those under constant torque, in which its own actuators do not act."""
+        return tuple(case for case in self.cases if not case.controller)
+
     def with_scenes(self, scenes: tuple[Scene, ...]) -> "Robot":
         """The same robot with more scenes."""
         return replace(self, scenes=self.scenes + scenes)

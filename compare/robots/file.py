@@ -9,15 +9,19 @@ import numpy as np
 
 import tmt
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
+from tmt.tree import GAINS
 
 from ..actuators import Drive
 from ..case import Coordinates, Scene, fastest_rates
+from ..controller import controller
 from . import Robot
 
 DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
 LEAST_STEPS, MOST_STEPS_OF_A_FILE = 64, 8192  # of a scene, by its coarsest step
 COARSER = 4  # than the file's own step
 OWN_POSTURES = "qpos0", "middle"  # their names
+SERVOS_ACT = 0.25  # s: a servo has answered then, and its fast modes ask for short steps
+MOVED_TARGETS = {"hinge": 0.1, "slide": 0.02, "ball": 0.0}  # rad or m, in a step response
 STILL = 1e-6  # rad/s2 or m/s2: what accelerates less where it is let go stays
 THROWN_UP, TUMBLING = 2.0, (120.0, 60.0, -90.0)  # m/s, and deg/s about a free body's own axes
 SET_GOING = {"hinge": 60.0, "slide": 0.2, "ball": 60.0}  # deg/s or m/s
@@ -42,6 +46,7 @@ def robot_of(reading: Reading, shown: str) -> Robot:
     keys = names_of_keys(reading)
     found = named_positions(reading, keys)
     start = next(name for name in found if name != "qpos0" or len(found) == 1)
+    drive = replace(reading.drive, controls={keys[name]: u for name, u in reading.drive.controls.items()})
     return Robot(
         name=reading.name or Path(shown).stem or shown,
         mjcf=reading.source if isinstance(reading.source, Path) else Path(shown),
@@ -49,10 +54,10 @@ def robot_of(reading: Reading, shown: str) -> Robot:
         postures={},
         positions=found,
         ranges=tuple(reading.ranges),
-        scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt),
+        scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt, drive),
         described=Path(shown).name or shown,
         features=tuple(reading.features),
-        drive=replace(reading.drive, controls={keys[name]: u for name, u in reading.drive.controls.items()}),
+        drive=drive,
     )
 
 
@@ -84,12 +89,14 @@ def named_positions(reading: Reading, names: Mapping[str, str]) -> dict[str, tup
     return found
 
 
-def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[Scene, ...]:
+def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive | None = None) -> tuple[Scene, ...]:
     """The scenes: held at a posture by what balances gravity and springs, a free body thrown, let go, let go with damping.
+
+    And, if it has servos, held by these, and their step response.
 
     Of each nothing is expected but agreement, for as long as rounding allows. What rests where it is let go is set going. A free
     body that is let go may only fall, and none of its joints moves: it is thrown where errors are to be seen.
-    start, q: the posture, its name and position (nq,); dt: s, of the file.
+    start, q: the posture, its name and position (nq,); dt: s, of the file; drive: its actuators.
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
@@ -111,7 +118,32 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float) -> tuple[S
         Scene(f"{start}, {how}", start, tags=tags, **speed, **timing),
         Scene(f"{start}, {how}, damped", start, damping=added, tags=("own", "full only"), **speed, **damped),
     ]
-    return tuple(made)
+    return (*made, *servo_scenes(tree, start, q, dt, drive or Drive(), inverse))
+
+
+def servo_scenes(
+    tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive, inverse: np.ndarray
+) -> list[Scene]:
+    """The scenes in which a robot's own actuators act, if some of these are servos: held, and their targets moved.
+
+    A robot with a free body has no rest under gravity, and none here. A robot whose servos are too fast for the finest of the
+    coarsest steps of a file is not followed by every method.
+    """
+    joints = tree.coordinates.joints
+    positions = np.array([q[at.start] for _, at, by in joints for _ in range(by.start, by.stop)])
+    acting = controller(drive, start, positions)
+    if not acting.position_gain.any():
+        return []
+    driven = replace(tree, **{name: getattr(acting, name) for name in GAINS})
+    count, least = coarsest(driven, inverse, dt, duration=SERVOS_ACT), SERVOS_ACT * max(fastest_rates(driven, inverse))
+    free = bool(free_bodies(Coordinates(tree.hinge_names, tree.kind)))
+    given = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
+    moved = tuple(MOVED_TARGETS[kind] for kind, _, by in joints for _ in range(by.start, by.stop))
+    followed = ("speed",) if least <= count else ()
+    return [
+        Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **given),
+        Scene(f"{start}, step of the servos", start, "servos", moved, tags=("own", "servos", *followed), **given),
+    ]
 
 
 def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]:
@@ -124,13 +156,13 @@ def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float
     return tuple(float(rate / ease) for ease in np.diag(inverse))
 
 
-def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = ()) -> int:
+def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = (), duration: float = DURATION) -> int:
     """Into how many steps a scene is divided: 64, 128 ... 8192, of four times the file's own dt, s, as finer runs divide them.
 
-    No step is longer than 1 over the fastest rate, 1/s, of the joints' own damping, what is added, and the springs.
-    inverse: of Mbar, (nv, nv).
+    No step is longer than 1 over the fastest rate, 1/s, of the joints' own damping, what is added, springs and servos.
+    inverse: of Mbar, (nv, nv); duration: s, of the scene.
     """
-    least = DURATION * max(1.0 / (COARSER * dt), *fastest_rates(tree, inverse, added))
+    least = duration * max(1.0 / (COARSER * dt), *fastest_rates(tree, inverse, added))
     count = LEAST_STEPS
     while count < min(0.999 * least, MOST_STEPS_OF_A_FILE):
         count *= 2

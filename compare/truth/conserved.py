@@ -75,9 +75,15 @@ class Conserved(NamedTuple):
 
 
 def conserved(tree: tmt.Tree) -> tuple[Conserved, ...]:
-    """The momenta that a tree conserves; no angular one where a ball's rotors differ between its axes: they do not turn."""
+    """The momenta that a tree conserves; no angular one where a ball's rotors differ between its axes: they do not turn.
+
+    None where a controller acts at the joint that carries it.
+    """
     free = tree.kind[:4] == FREE and tree.parent[:4] == (-1, 0, 1, 2)
     name = tree.hinge_names[0]
+    carrying = slice(0, tree.coordinates.joints[3 if free else 0].qd.stop)
+    if any(np.any(gain[carrying]) for gain in (tree.position_gain, tree.speed_gain)):
+        return ()
     if not free and tree.kind[0] != "ball":
         return (Conserved(tree, f"p_{name}", "row", "N" if tree.kind[0] == "slide" else "N m"),)
     rotors = tree.armature[3:6] if free else tree.armature[:3]

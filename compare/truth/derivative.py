@@ -8,11 +8,11 @@ from tmt.dual import seeded
 
 
 def stiffness(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """d(torque that holds)/dq at q, of gravity and springs, N m/rad, (nv, nv), by movements: exact.
+    """d(torque that holds)/dq at q, of gravity, springs and a controller, N m/rad, (nv, nv), by movements: exact.
 
     Of hinges without springs V is a + b cos q_i + c sin q_i in each angle; else by dual numbers.
     """
-    if set(tree.kind) == {"hinge"} and not tree.has_springs:
+    if set(tree.kind) == {"hinge"} and not (tree.has_springs or tree.has_gains):
         quarter = np.pi / 2 * np.eye(len(q))
         return (tmt.gravity_balance(q + quarter, tree) - tmt.gravity_balance(q - quarter, tree)) / 2
     moved = moving(tree, q, np.eye(tree.coordinates.nv))
@@ -26,9 +26,11 @@ def moving(tree: tmt.Tree, q, directions) -> list:
 
 
 def holding(tree: tmt.Tree, q) -> list:
-    """The torque that holds a posture against gravity and springs, N m, (nv,), over any scalar."""
+    """The torque that holds a posture against gravity, springs and a controller, N m, (nv,), over any scalar."""
     torque = method.bias(method.bodies(tree, q), tree.gravity)
-    return [a + b for a, b in zip(torque, method.spring_torque(tree, q))] if tree.has_springs else torque
+    if tree.has_springs:
+        torque = [a + b for a, b in zip(torque, method.spring_torque(tree, q))]
+    return [a + b for a, b in zip(torque, method.fed_back(tree, q, [0.0] * len(torque)))] if tree.has_gains else torque
 
 
 def slopes(seeds, values) -> list:

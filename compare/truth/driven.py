@@ -7,8 +7,10 @@ from functools import cached_property
 import numpy as np
 
 import tmt
+from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 from tmt.methods import lone_speeds
 
+from ..actuators import Cut
 from .servos import Driven
 from .step_limits import Small
 
@@ -89,30 +91,26 @@ class Posture:
         return ("free", "locked") if self.base else ("fixed",)
 
     @cached_property
-    def cut(self) -> dict[int, float]:
-        """The forces of actuators that their range cuts at rest, by number."""
-        lengths = self.driven.along(self.q).lengths
-        found = {}
-        for i, (one, u, length) in enumerate(zip(self.robot.drive.actuators, self.u, lengths)):
-            if one.acts and one.is_cut(force := one.force(u, length)):
-                found[i] = float(np.clip(force, *one.force_range))
-        return found
+    def cut(self) -> Cut:
+        """What ranges cut at rest."""
+        return self.driven.cut(self.q, self.u)
 
     @cached_property
     def whole(self) -> Small:
         """Small deviations of all speeds."""
         tree, drive = self.robot.tree, self.robot.drive
-        K, D, springs = self.driven.stiffness_and_damping(self.q, self.u)
+        slopes = self.driven.slopes(self.q, self.u)
         speeds = np.add(tree.damping, drive.damping or 0.0) * (not drive.explicit_damping)
         acts = [one for one in drive.actuators if one.acts and one.dynamics == "filter"]
         return Small(
             names=self.robot.coordinates.speeds,
-            M=np.array(tmt.mass_matrix(self.q, tree)),
-            K=K,
-            D=D,
+            M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
+            K=slopes.K,
+            D=slopes.D,
             damping=speeds,
-            springs=springs,
-            on_path=on_path(tree),
+            springs=slopes.springs,
+            brakes=slopes.brakes,
+            on_path=on_one_path(tree),
             poles=tuple((one.name, one.time_constant) for one in acts),
         )
 
@@ -125,7 +123,7 @@ class Posture:
         return self.whole.locked(sorted({*self.lone, *(self.base if base == "locked" else ())}))
 
 
-def on_path(tree: tmt.Tree) -> np.ndarray:
+def on_one_path(tree: tmt.Tree) -> np.ndarray:
     """Whether two speeds are of joints on one path to the root, (nv, nv)."""
     n = len(tree.parent)
     before = np.eye(n, dtype=bool)

@@ -124,7 +124,7 @@ def in_doubles(case: Case) -> Reference:
 
 def has_no_reference(robot: object) -> str | None:
     """Why a run in doubles cannot follow a file's robot: with its finest steps too the fastest mode diverges; or None."""
-    for case in robot.cases if robot.is_read else ():
+    for case in robot.cases_of_torque if robot.is_read else ():
         count = -(-case.steps // RECORDS) * RECORDS << MOST_DOUBLINGS
         decay, swing = rates_at(case.tree, case.q)
         grown = np.abs(growth_of(METHODS[DOUBLES], np.array([-decay, 1j * swing]) * case.duration / count)).max()

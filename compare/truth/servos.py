@@ -1,6 +1,6 @@
 """The equations of motion at rest under a robot's own servos: M x'' + D x' + K x = 0 for small deviations x."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -9,23 +9,51 @@ import numpy as np
 
 import tmt
 
-from ..actuators import Drive
+from ..actuators import Cut, Drive
 from ..case import Coordinates
 from .derivative import stiffness
 
-NUDGE = 1e-6  # rad or m, of central differences where a moment turns with the posture
-NEGLIGIBLE = 1e-9  # of the largest stiffness, or damping: less is none
-SYMMETRIC = 1e-9  # of the largest stiffness: what its two halves may differ by
-MOST_TRIED, BALANCED = 60, 1e-9  # steps of Newton's method; of the largest single force: what may be left at rest
-FARTHEST = 0.3  # rad or m, of one step of it
+TURNED_BY = 1e-6  # rad or m, of central differences where a moment turns with the posture
+SINGULAR = 1e-9  # of the largest stiffness, or damping: less is none
+REST_STEPS = 60  # at most
+REST_FORCE = 1e-9  # of the largest single force: what may be left at rest
+REST_REACH = 0.3  # rad or m, of one step of it
 
 
 class Along(NamedTuple):
-    """Lengths of transmissions and tendons at a posture (k,), dl/dq (k, nv), and how that turns with q (k, nv, nv)."""
+    """Transmissions and tendons at a posture: k of them.
+
+    lengths (k,); slopes: dl/dq (k, nv); moments (k, nv), which multiply forces and with which ldot = moment qd; turns: how the
+    moments change with q (k, nv, nv). MuJoCo's length of a site without a reference is 0, of a ball the vector of its turn: there
+    slopes are not moments.
+    """
 
     lengths: np.ndarray
+    slopes: np.ndarray
     moments: np.ndarray
     turns: np.ndarray
+
+
+class Pulls(NamedTuple):
+    """What actuators, then tendons do at rest, (k,) each: force, -d force/dl and -d force/dldot; 0 of those that are cut."""
+
+    forces: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    cut: np.ndarray  # whether a range cuts it
+
+
+class Slopes(NamedTuple):
+    """Derivatives of the forces at rest, (nv, nv) each: K = -d force/dq, D = -d force/dqd.
+
+    springs and brakes: of K what the springs of joints and the actuators do, and of D all, as the implicit integrators have it:
+    before the range of a speed's sum cuts it.
+    """
+
+    K: np.ndarray
+    D: np.ndarray
+    springs: np.ndarray
+    brakes: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -72,14 +100,15 @@ class Driven:
         every = (*self.drive.actuators, *self.drive.tendons)
         n, turning = places.nv, [i for i, one in enumerate(every) if one.moment is None]
         moments = np.array([one.moment or (0.0,) * n for one in every]).reshape(-1, n)
-        lengths, turns = moments @ single, np.zeros((len(every), n, n))
+        lengths, slopes, turns = moments @ single, moments.copy(), np.zeros((len(every), n, n))
         if turning and self.ask:
-            asked_lengths, asked = self.ask(q)
-            lengths[turning], moments[turning] = asked_lengths[turning], asked[turning]
-            for j, step in enumerate(NUDGE * np.eye(n)):
-                ahead, behind = (self.ask(self.coordinates.move(q, sign * step))[1][turning] for sign in (1.0, -1.0))
-                turns[turning, :, j] = (ahead - behind) / (2.0 * NUDGE)
-        return Along(lengths, moments, turns)
+            lengths[turning], moments[turning] = (found[turning] for found in self.ask(q))
+            for j, step in enumerate(TURNED_BY * np.eye(n)):
+                ahead, behind = (self.ask(self.coordinates.move(q, sign * step)) for sign in (1.0, -1.0))
+                slopes[turning, j], turns[turning, :, j] = (
+                    (one[turning] - other[turning]) / (2.0 * TURNED_BY) for one, other in zip(ahead, behind)
+                )
+        return Along(lengths, slopes, moments, turns)
 
     @property
     def differenced(self) -> tuple[str, ...]:
@@ -87,64 +116,108 @@ class Driven:
         every = [one for one in self.drive.actuators if one.acts] + list(self.drive.tendons)
         return tuple(one.name for one in every if one.moment is None)
 
-    def pulls(self, along: Along, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each actuator and tendon force, -d force/dl and -d force/dldot at rest, (k,) each; nothing where a range cuts it."""
-        forces, stiff, damped = [], [], []
+    def pulls(self, along: Along, u: np.ndarray) -> Pulls:
+        """What each actuator and tendon does at rest at a posture, under u of each actuator."""
+        forces, stiff, damped, cut = [], [], [], []
         for one, control, length in zip(self.drive.actuators, u, along.lengths):
             force = one.force(control, length) if one.acts else 0.0
-            is_free = one.acts and not one.is_cut(force)
-            forces.append(force if is_free or not one.acts else float(np.clip(force, *one.force_range)))
-            stiff.append(one.stiffness(control) * is_free)
-            damped.append(one.damping(control) * is_free)
+            cut.append(one.acts and one.is_cut(force))
+            forces.append(float(np.clip(force, *one.force_range)) if cut[-1] else force)
+            stiff.append(one.stiffness(control) * one.acts)
+            damped.append(one.damping(control) * one.acts)
+        for number, (low, high) in self.drive.tendon_ranges.items():
+            pulling = [i for i, one in enumerate(self.drive.actuators) if one.tendon == number and one.acts]
+            total = sum(forces[i] for i in pulling)
+            if not low < total < high:
+                for i in pulling:
+                    forces[i], cut[i] = forces[i] * np.clip(total, low, high) / total if total else 0.0, True
         for tendon, length in zip(self.drive.tendons, along.lengths[len(forces) :]):
             forces.append(tendon.force(length))
             stiff.append(tendon.stiffness * tendon.pulls(length))
             damped.append(tendon.damping)
-        return np.array(forces), np.array(stiff), np.array(damped)
+            cut.append(False)
+        cut = np.array(cut, bool)
+        return Pulls(np.array(forces), np.where(cut, 0.0, stiff), np.where(cut, 0.0, damped), cut)
+
+    def actuated(self, q: np.ndarray, along: Along, pulls: Pulls) -> np.ndarray:
+        """The sum of the actuators' forces at each speed, (nv,), before its range cuts it."""
+        count = len(self.drive.actuators)
+        total, lifted = pulls.forces[:count] @ along.moments[:count], list(self.drive.lifted)
+        if self.compensated and lifted:
+            total[lifted] += tmt.gravity_balance(q, self.compensated)[lifted]
+        return total
+
+    def sums(self, total: np.ndarray) -> dict[int, float]:
+        """By the number of a speed what its range leaves of the actuators' sum, (nv,), where it cuts it."""
+        return {
+            speed: float(np.clip(total[speed], low, high))
+            for speed, (low, high) in self.drive.ranges.items()
+            if not low < total[speed] < high
+        }
+
+    def cut(self, q: np.ndarray, u: np.ndarray) -> Cut:
+        """What ranges cut at a posture. An actuator that acts only where the sum is cut has nothing to say: it is cut too."""
+        along = self.along(q)
+        pulls = self.pulls(along, u)
+        sums, count = self.sums(self.actuated(q, along, pulls)), len(self.drive.actuators)
+        cut = pulls.cut | self.silenced(along, sums)
+        return Cut({int(i): float(pulls.forces[i]) for i in np.flatnonzero(cut[:count])}, sums)
+
+    def silenced(self, along: Along, sums: Mapping[int, float]) -> np.ndarray:
+        """Which of the actuators and tendons act only at speeds whose sum is cut, (k,)."""
+        elsewhere = np.delete(along.moments, list(sums), axis=1).any(axis=1)
+        is_actuator = np.arange(len(elsewhere)) < len(self.drive.actuators)
+        return is_actuator & along.moments.any(axis=1) & ~elsewhere
 
     def forces(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The sum of all forces at rest, (nv,) N m or N, and the size of the largest single one."""
-        along = self.along(q)
-        by_drive = along.moments * self.pulls(along, u)[0][:, None]
-        actuated = by_drive[: len(self.drive.actuators)].sum(axis=0)
-        for speed, (low, high) in self.drive.cut.items():
-            actuated[speed] = np.clip(actuated[speed], low, high)
-        own = [-tmt.gravity_balance(q, self.weight), -tmt.spring_torque(q, self.tree)]
+        along, count = self.along(q), len(self.drive.actuators)
+        pulls = self.pulls(along, u)
+        actuated = self.actuated(q, along, pulls)
+        for speed, left in self.sums(actuated).items():
+            actuated[speed] = left
+        each = along.moments * pulls.forces[:, None]
+        parts = [actuated, each[count:].sum(axis=0)]
+        parts += [-tmt.gravity_balance(q, self.weight), -tmt.spring_torque(q, self.tree)]
         if self.compensated:
-            own.append(tmt.gravity_balance(q, self.compensated))
-        parts = [actuated, by_drive[len(self.drive.actuators) :].sum(axis=0), *own]
-        return sum(parts), float(max([np.abs(by_drive).max(initial=0.0), *(np.abs(part).max() for part in parts)]))
+            parts.append(tmt.gravity_balance(q, self.compensated))
+            parts[-1][[*self.drive.lifted, *self.drive.unlifted]] = 0.0
+        return sum(parts), float(max([np.abs(each).max(initial=0.0), *(np.abs(part).max() for part in parts)]))
 
-    def stiffness_and_damping(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """K = -d force/dq and D = -d force/dqd at rest, (nv, nv), and of K what actuators and joints' springs do (nv, nv)."""
-        along = self.along(q)
-        forces, stiff, damped = self.pulls(along, u)
-        count, J = len(self.drive.actuators), along.moments
-        each = np.einsum("ki,k,kj->kij", J, stiff, J) - np.einsum("k,kij->kij", forces, along.turns)
-        lost = np.einsum("ki,k,kj->kij", J, damped, J)
-        acting, damping = each[:count].sum(axis=0), lost[:count].sum(axis=0)
-        total = (J[:count] * forces[:count, None]).sum(axis=0)
-        for speed, (low, high) in self.drive.cut.items():
-            if not low < total[speed] < high:
-                acting[speed], damping[speed] = 0.0, 0.0
-        damping = damping + lost[count:].sum(axis=0) + np.diag(np.add(self.tree.damping, self.drive.damping or 0.0))
+    def slopes(self, q: np.ndarray, u: np.ndarray) -> Slopes:
+        """Derivatives of the forces at rest at a posture, under u of each actuator."""
+        along, count = self.along(q), len(self.drive.actuators)
+        pulls, J = self.pulls(along, u), along.moments
+        sums = self.sums(self.actuated(q, along, pulls))
+        heard = ~self.silenced(along, sums)
+        each = np.einsum("ki,k,kj->kij", J, pulls.stiffness, along.slopes)
+        each -= np.einsum("k,kij->kij", pulls.forces, along.turns)
+        each[~heard] = 0.0
+        lost = np.einsum("ki,k,kj->kij", J, pulls.damping * heard, J)
+        always = lost[count:].sum(axis=0) + np.diag(np.add(self.tree.damping, self.drive.damping or 0.0))
+        of_actuators, braked = each[:count].sum(axis=0), lost[:count].sum(axis=0)
         K = stiffness(self.weight, q)  # with the springs of the joints
         springs = K - stiffness(replace(self.weight, stiffness=()), q) if self.tree.has_springs else 0.0 * K
+        brakes, springs, acting = always + braked, springs + of_actuators, of_actuators.copy()
         if self.compensated:
-            K = K - stiffness(self.compensated, q)
-        return K + acting + each[count:].sum(axis=0), damping, acting + springs
+            lifted = -stiffness(self.compensated, q)
+            lifted[list(self.drive.unlifted)] = 0.0
+            by_actuators = np.isin(np.arange(len(K)), self.drive.lifted)[:, None]
+            K, acting = K + np.where(by_actuators, 0.0, lifted), acting + np.where(by_actuators, lifted, 0.0)
+        acting[list(sums)], braked[list(sums)] = 0.0, 0.0
+        return Slopes(K + acting + each[count:].sum(axis=0), always + braked, springs, brakes)
 
     def at_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The nearest posture at rest, by Newton's method from q, and the size of the force that is left there; 0.0: none."""
         best, left, scale = q, np.inf, 0.0
-        for _ in range(MOST_TRIED):
+        for _ in range(REST_STEPS):
             force, largest = self.forces(q, u)
             size, scale = float(np.abs(force).max()), max(scale, largest)
             if size < left:
                 best, left = q, size
-            if size <= 1e-4 * BALANCED * scale:
+            if size <= 1e-4 * REST_FORCE * scale:
                 break
-            K = self.stiffness_and_damping(q, u)[0]
-            step = np.linalg.lstsq(K, force, rcond=NEGLIGIBLE)[0]
-            q = self.coordinates.move(q, step * min(1.0, FARTHEST / max(np.abs(step).max(), 1e-300)))
-        return best, 0.0 if left <= BALANCED * scale else left
+            K = self.slopes(q, u).K
+            step = np.linalg.lstsq(K, force, rcond=SINGULAR)[0]
+            q = self.coordinates.move(q, step * min(1.0, REST_REACH / max(np.abs(step).max(), 1e-300)))
+        return best, 0.0 if left <= REST_FORCE * scale else left

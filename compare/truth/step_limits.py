@@ -3,7 +3,9 @@
 Of the equations M x'' + D x' + K x = 0, D = D_impl + D_expl, a step of Euler, implicitfast or implicit is
 (M + dt D_impl) (v+ - v) = -dt (K x + D v), x+ = x + dt v+. With z = (1 + s) / (1 - s) for its eigenvalues it is
 P s^2 + 2 dt D s + dt^2 K = 0, P = 4 M + 2 dt (D_impl - D_expl) - dt^2 K: where M, D and K are symmetric and D and K not
-negative it is stable if and only if P is positive definite. Elsewhere the eigenvalues of the step decide.
+negative it is stable if and only if P is positive definite. A step of discrete, which has all of D and the springs S of joints
+and actuators implicit, gives P = 4 M + 2 dt D + dt^2 (2 S - K) and D + dt S in the place of D: the same holds where S is not
+negative. Elsewhere the eigenvalues of the step decide.
 """
 
 from dataclasses import dataclass
@@ -14,15 +16,16 @@ import numpy as np
 
 from tmt import METHODS
 
+from .linear import NEUTRAL
 from .steps import growth_of
 
-LONGEST = 5.0  # s: what is stable up to it has no limit here
-SHORTEST = 0.01  # of the time of the fastest mode: stable if anything is
-SCANNED = 12  # steps for each power of ten, where no closed form tells the limit
+LIMIT_UP_TO = 5.0  # s: what is stable up to it has no limit here
+LIMIT_FROM = 0.01  # of the time of the fastest mode: stable if anything is
+STEPS_A_DECADE = 12  # steps for each power of ten, where no closed form tells the limit
 REFINED = 1e-10  # of a limit
-NEUTRAL = 1e-9  # growth in a step that rounding can pretend
-ROUNDED = 1e-11  # of the largest stiffness or damping, in the units of M: zero
-ALIKE = 0.9  # of the largest overlap: modes of one shape
+SYMMETRIC = 1e-9  # of the largest entry: what a matrix and its transpose may differ by, and what is nothing beside it
+VANISHING = 1e-11  # of the largest stiffness or damping, in the units of M: zero
+SAME_SHAPE = 0.9  # of the largest overlap: modes of one shape
 POLES = {"RK4": 2.7852935634052816}  # dt over the time constant of a filter, up to which it is stable; of others 2
 
 
@@ -50,6 +53,7 @@ class Small:
     D: np.ndarray
     damping: np.ndarray  # of D what Euler has implicit, (nv,): of joints; zeros where the file switches eulerdamp off
     springs: np.ndarray  # of K what `discrete` has implicit
+    brakes: np.ndarray  # of D what it has implicit; implicitfast and implicit: of that what is on one path
     on_path: np.ndarray  # whether two speeds are on one path to the root
     poles: tuple[tuple[str, float], ...] = ()  # of filters: the actuator's name, and its time constant, s
 
@@ -57,7 +61,7 @@ class Small:
         """Without the speeds of free bodies that nothing holds: they move so that momentum stays zero. Locked: `locked`."""
         held = max(np.abs(self.K[base]).max(initial=0.0), np.abs(self.K[:, base]).max(initial=0.0))
         lost = max(np.abs(self.D[base]).max(initial=0.0), np.abs(self.D[:, base]).max(initial=0.0))
-        if not base or held > NEUTRAL * np.abs(self.K).max() or lost > NEUTRAL * np.abs(self.D).max():
+        if not base or held > SYMMETRIC * np.abs(self.K).max() or lost > SYMMETRIC * np.abs(self.D).max():
             return self
         rest = [k for k in range(len(self.M)) if k not in base]
         across = np.linalg.solve(self.M[np.ix_(base, base)], self.M[np.ix_(base, rest)])
@@ -68,7 +72,9 @@ class Small:
     def locked(self, base: list[int]) -> "Small":
         """With these speeds locked."""
         rest = [k for k in range(len(self.M)) if k not in base]
-        square = {name: getattr(self, name)[np.ix_(rest, rest)] for name in ("M", "K", "D", "springs", "on_path")}
+        square = {
+            name: getattr(self, name)[np.ix_(rest, rest)] for name in ("M", "K", "D", "springs", "brakes", "on_path")
+        }
         return Small(tuple(self.names[k] for k in rest), damping=self.damping[rest], poles=self.poles, **square)
 
     # in the units of M, where it is the identity
@@ -96,18 +102,23 @@ class Small:
         return self.scaled(self.D)
 
     @cached_property
+    def held(self) -> dict[str, np.ndarray]:
+        """Of K what each integrator has implicit, in the units of M."""
+        return dict.fromkeys(self.implicit, np.zeros_like(self.M)) | {"discrete": self.scaled(self.springs)}
+
+    @cached_property
     def implicit(self) -> dict[str, np.ndarray]:
         """Of D what each integrator has implicit, in the units of M."""
-        on_path = self.scaled(np.where(self.on_path, self.D, 0.0))
+        on_path = self.scaled(np.where(self.on_path, self.brakes, 0.0))
         of_joints = self.scaled(np.diag(self.damping))
-        return {"Euler": of_joints, "implicitfast": on_path, "implicit": on_path, "discrete": self.damped}
+        return {"Euler": of_joints, "implicitfast": on_path, "implicit": on_path, "discrete": self.scaled(self.brakes)}
 
     @cached_property
     def is_symmetric(self) -> bool:
         """Whether the closed form holds: K and D are symmetric, and D takes energy away. K may have any sign: see `drifts`."""
-        halves = [np.abs(matrix - matrix.T).max() <= NEUTRAL * np.abs(matrix).max() for matrix in (self.K, self.D)]
+        halves = [np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in (self.K, self.D)]
         lowest = np.linalg.eigvalsh(self.damped).min(initial=0.0)
-        return all(halves) and lowest >= -ROUNDED * np.abs(self.damped).max()
+        return all(halves) and lowest >= -VANISHING * np.abs(self.damped).max()
 
     @cached_property
     def modes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -121,7 +132,7 @@ class Small:
     def drifts(self) -> bool:
         """Whether a movement meets neither stiffness nor damping."""
         both = [matrix / max(np.abs(matrix).max(), 1e-300) for matrix in (self.stiff, self.damped)]
-        return bool(np.linalg.svd(np.vstack(both), compute_uv=False).min() <= ROUNDED)
+        return bool(np.linalg.svd(np.vstack(both), compute_uv=False).min() <= VANISHING)
 
     @property
     def growing(self) -> tuple[float, np.ndarray] | None:
@@ -129,7 +140,7 @@ class Small:
         values, moves = self.modes
         if self.is_symmetric:
             lowest, shapes = np.linalg.eigh(0.5 * (self.stiff + self.stiff.T))
-            if lowest[0] >= -ROUNDED * np.abs(lowest).max():
+            if lowest[0] >= -VANISHING * np.abs(lowest).max():
                 return None
             fastest = max(values.real.max(), 0.0)
             return float(fastest), moves[:, np.argmax(values.real)] if fastest else shapes[:, 0]
@@ -146,7 +157,7 @@ class Small:
         if integrator == "RK4":
             Z = dt * np.block([[none, unit], [-self.stiff, -self.damped]])
             return np.eye(2 * n) + Z @ (np.eye(2 * n) + Z @ (np.eye(2 * n) / 2 + Z @ (np.eye(2 * n) / 6 + Z / 24)))
-        held = dt * self.scaled(self.springs) if integrator == "discrete" else none
+        held = dt * self.held[integrator]
         matrix = unit + dt * (self.implicit[integrator] + held)
         speeds = np.hstack([none, unit]) - dt * np.linalg.solve(matrix, np.hstack([self.stiff, self.damped + held]))
         return np.vstack([np.hstack([unit, none]) + dt * speeds, speeds])
@@ -163,11 +174,11 @@ class Small:
         return poles and self.growth(integrator, dt) <= 1.0 + NEUTRAL
 
     def P(self, integrator: str, dt: float) -> np.ndarray:
-        """4 M + 2 dt (D_impl - D_expl) - dt^2 K, in the units of M."""
+        """4 M + 2 dt (D_impl - D_expl) - dt^2 K, of discrete with 2 S dt^2, in the units of M."""
         found = (
             4.0 * np.eye(len(self.M))
             + 2.0 * dt * (2.0 * self.implicit[integrator] - self.damped)
-            - dt * dt * self.stiff
+            - dt * dt * (self.stiff - 2.0 * self.held[integrator])
         )
         return 0.5 * (found + found.T)
 
@@ -187,7 +198,7 @@ class Small:
         dt = self.closed_form(integrator) if self.has_closed_form(integrator) else self.scanned(integrator)
         poles = [(POLES.get(integrator, 2.0) * constant, name) for name, constant in self.poles]
         slowest, name = min(poles, default=(np.inf, ""))
-        if slowest < min(dt or np.inf, LONGEST):
+        if slowest < min(dt or np.inf, LIMIT_UP_TO):
             return Limit("finite", slowest, name, POLES.get(integrator, 2.0) / slowest, "real")
         if dt is None:
             return Limit("none", None, "", None, "")
@@ -196,18 +207,25 @@ class Small:
         return Limit("finite", dt, self.joint_of(shape), rate, kind, shape)
 
     def has_closed_form(self, integrator: str) -> bool:
-        return integrator in ("Euler", "implicitfast", "implicit") and self.is_symmetric
+        return self.is_symmetric and integrator in self.implicit and (integrator != "discrete" or self.pulls_back)
+
+    @cached_property
+    def pulls_back(self) -> bool:
+        """Whether the springs that discrete has implicit are symmetric, and none pushes away."""
+        S = self.held["discrete"]
+        size = max(np.abs(S).max(), np.abs(self.stiff).max())
+        return np.abs(S - S.T).max() <= SYMMETRIC * size and np.linalg.eigvalsh(S).min() >= -VANISHING * size
 
     def closed_form(self, integrator: str) -> float | None:
-        """The limit by P, s: as P is concave in dt it is positive definite up to one step; None: up to 5 s."""
-        if self.holds(integrator, LONGEST):
+        """The limit by P, s; None: up to 5 s. Along any movement P is a quadratic of dt that comes to zero once at most."""
+        if self.holds(integrator, LIMIT_UP_TO):
             return None
-        return bisected(lambda dt: self.holds(integrator, dt), 0.0, LONGEST)
+        return bisected(lambda dt: self.holds(integrator, dt), 0.0, LIMIT_UP_TO)
 
     def scanned(self, integrator: str) -> float | None:
         """The limit by the eigenvalues of steps, s: the first that grows; None: none up to 5 s."""
-        first = min(SHORTEST / max(np.abs(self.modes[0]).max(), 1e-300), 0.1 * LONGEST)
-        steps = np.geomspace(first, LONGEST, int(np.ceil(SCANNED * np.log10(LONGEST / first))) + 1)
+        first = min(LIMIT_FROM / max(np.abs(self.modes[0]).max(), 1e-300), 0.1 * LIMIT_UP_TO)
+        steps = np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1)
         low = 0.0
         for dt in steps:
             if self.growth(integrator, dt) > 1.0 + NEUTRAL:
@@ -230,7 +248,7 @@ class Small:
         """Rate, 1/s, and kind, swing or real, of the mode whose movement is nearest, the fastest of several."""
         values, moves = self.modes
         overlap = np.abs(moves.conj().T @ shape)
-        near = np.flatnonzero(overlap >= ALIKE * overlap.max())
+        near = np.flatnonzero(overlap >= SAME_SHAPE * overlap.max())
         found = values[near[np.argmax(np.abs(values[near]))]]
         return float(np.abs(found)), "swing" if abs(found.imag) > 1e-6 * abs(found) else "real"
 

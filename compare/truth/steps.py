@@ -19,7 +19,11 @@ def linear_step(at, stepping, dt: np.ndarray) -> np.ndarray:
     if type(stepping) is SemiImplicitEuler:
         # at rest the bias has no derivative by the speeds, so it does not matter whether it is implicit
         stiff = np.diag(by_speed(at.tree, at.tree.stiffness)) * stepping.implicit_springs
-        matrix = at.mass_matrix + each * np.diag(at.tree.damping) + each**2 * stiff
+        damped = np.diag(at.tree.damping)
+        if at.tree.has_gains:
+            position_gain, speed_gain = stepping.gains_held(at.tree)
+            stiff, damped = stiff + (position_gain or 0.0), damped + (speed_gain or 0.0)
+        matrix = at.mass_matrix + each * damped + each**2 * stiff
         force = at.mass_matrix @ at.matrix[n:] - each * np.hstack([0.0 * stiff, stiff])
         speeds = unit[n:] + each * np.linalg.solve(matrix, force)
         return np.concatenate([unit[:n] + each * speeds, speeds], axis=1)

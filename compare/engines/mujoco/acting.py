@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-from ...actuators import Drive
-from .actuators import control_of
+from ...actuators import UNCUT, Cut, Drive
+from .actuators import OF_A_JOINT, control_of
 from .flags import INTEGRATORS, bit
 from .inventory import NOT_HAD_FIELDS
 from .joints import kind_of
+from .linear import NUDGE
 
-NUDGE = 1e-6  # rad, m and their rates: of derivatives of a step
 # beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
 DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
 LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn
@@ -21,15 +21,15 @@ LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn
 class Acting:
     """A compiled model whose actuators act by their laws alone: no force range, no limit, contact, equality, friction or medium.
 
-    cut: forces of those actuators that their range cuts at the posture, by number: they stay what they are there. locked: speeds
-    that do not move. weightless: without gravity. integrator by MuJoCo's name, dt in s.
+    cut: what ranges cut at the posture: it stays what it is there. locked: speeds that do not move. weightless: without gravity.
+    integrator by MuJoCo's name, dt in s.
     """
 
     def __init__(
         self,
         model: mujoco.MjModel,
         drive: Drive,
-        cut: dict[int, float] | None = None,
+        cut: Cut = UNCUT,
         locked: Sequence[int] = (),
         weightless: bool = False,
     ):
@@ -50,14 +50,22 @@ class Acting:
         ):
             getattr(m, name)[:] = 0
         for i, one in enumerate(drive.actuators):
-            if not one.acts or i in (cut or {}):
+            if not one.acts or i in cut.forces:
                 m.actuator_gaintype[i], m.actuator_biastype[i] = (
                     mujoco.mjtGain.mjGAIN_FIXED,
                     mujoco.mjtBias.mjBIAS_AFFINE,
                 )
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
-                m.actuator_biasprm[i, 0] = (cut or {}).get(i, 0.0)
+                m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
                 m.actuator_plugin[i] = -1
+            if (
+                one.refused
+                and hasattr(m, "actuator_damping")
+                and mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT
+            ):
+                m.actuator_damping[i] = 0.0
+        for speed, force in cut.sums.items():
+            m.jnt_actfrclimited[m.dof_jntid[speed]], m.jnt_actfrcrange[m.dof_jntid[speed]] = True, force
         if weightless:
             m.opt.gravity[:] = 0.0
         self.data, self.locked = mujoco.MjData(m), tuple(locked)
@@ -80,7 +88,7 @@ class Acting:
         count = len(self.drive.actuators)
         moments = np.zeros((count, m.nv))
         mujoco.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
-        numbers = [tendon.number for tendon in self.drive.tendons]
+        numbers = np.array([tendon.number for tendon in self.drive.tendons], int)
         jacobian = np.zeros((m.ntendon, m.nv))
         if m.ntendon:
             rows = (m.ten_J_rownnz, m.ten_J_rowadr, m.ten_J_colind) if hasattr(m, "ten_J_rownnz") else None

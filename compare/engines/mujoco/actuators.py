@@ -25,16 +25,21 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
     source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of the keyframes.
     """
     count = getattr(model, "nactuator", model.nu)
+    passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
+    by_actuators = np.flatnonzero(model.jnt_actgravcomp[model.dof_jntid]).tolist()
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(count)),
         tendons=tuple(tendon(model, i) for i in range(model.ntendon) if pulls(model, i)),
-        compensation=tuple(map(float, model.body_gravcomp[list(bodies)])),
+        compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
         damping=own_damping(model, count),
         controls={keys[k]: u for k, u in stated_controls(model, source).items()},
-        cut={
-            int(model.jnt_dofadr[j]): tuple(map(float, model.jnt_actfrcrange[j]))
-            for j in np.flatnonzero(model.jnt_actfrclimited)
+        ranges={
+            int(model.jnt_dofadr[j]): between(model.jnt_actfrcrange[j]) for j in np.flatnonzero(model.jnt_actfrclimited)
         },
+        tendon_ranges={
+            int(i): between(model.tendon_actfrcrange[i]) for i in np.flatnonzero(model.tendon_actfrclimited)
+        },
+        **{"lifted" if on(model, "ACTUATION") else "unlifted": tuple(by_actuators)},
         unknown=unknown_springs(model),
         explicit_damping=not on(model, "EULERDAMP"),
     )
@@ -53,17 +58,20 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     place, inputs = control_of(m, i)
     joint, moment = moment_of(m, i)
     filters = dynamics in ("FILTER", "FILTEREXACT")
+    clamped = inputs and on(m, "CLAMPCTRL") and m.actuator_ctrllimited[place]
+    along_tendon = mujoco.mjtTrn(m.actuator_trntype[i]) == mujoco.mjtTrn.mjTRN_TENDON
     return Actuator(
         name=own_name(m.actuator(i).name, "actuator", i),
         joint=joint,
         moment=moment,
-        gain=numbers(m.actuator_gainprm[i], GAINS.get(gain, 0)),
-        bias=numbers(m.actuator_biasprm[i], BIASES.get(bias, 0)),
+        gain=law(m.actuator_gainprm[i], GAINS.get(gain, 0)),
+        bias=law(m.actuator_biasprm[i], BIASES.get(bias, 0)),
         dynamics=DYNAMICS.get(dynamics, "none"),
         time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
-        control_range=between(m.actuator_ctrlrange[place]) if inputs and m.actuator_ctrllimited[place] else None,
+        control_range=between(m.actuator_ctrlrange[place]) if clamped else None,
         activation_range=between(m.actuator_actrange[i]) if m.actuator_actlimited[i] else None,
         force_range=between(m.actuator_forcerange[i]) if m.actuator_forcelimited[i] else None,
+        tendon=int(m.actuator_trnid[i, 0]) if along_tendon else -1,
         off=off(m, i),
         refused=refused(m, i, gain, bias, dynamics, inputs),
     )
@@ -213,7 +221,7 @@ def kind(enum, value) -> str:
     return enum(int(value)).name.partition("_")[2]
 
 
-def numbers(values, count: int) -> tuple:
+def law(values, count: int) -> tuple:
     """The first numbers of a law, filled up with zeros to three."""
     return (*map(float, values[:count]), *[0.0] * (3 - count))
 

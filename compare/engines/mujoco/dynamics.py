@@ -28,14 +28,18 @@ class MujocoDynamics:
 
     Columns follow the names of the coordinates, whatever the order in the file; a free joint of the model is four of them.
     bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero, (nq,).
-    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move.
+    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move. driven: the controls
+    and activations under which its actuators act, and the constant part of their torque, see servos.py: of a torque that is
+    given only what goes beyond that part is applied.
     """
 
-    def __init__(self, model, coordinates, bodies, zero, bare=False):
+    def __init__(self, model, coordinates, bodies, zero, bare=False, driven=None):
         # where states are evaluated the file's integrator must not matter, as `discrete` does
         model.opt.integrator = INTEGRATORS["RK4"]
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
-        self.model, self.data = model, mujoco.MjData(model)
+        self.model, self.data, self.driven = model, mujoco.MjData(model), driven
+        if driven:
+            self.data.ctrl[:], self.data.act[:] = driven.ctrl, driven.act
         self.coordinates, self.bodies, self.bare = coordinates, list(bodies), bare
         known = joint_places(model)
         joints = [known[name] for name in coordinates.names]
@@ -104,7 +108,7 @@ class MujocoDynamics:
 
     def acceleration(self, q, v, tau) -> np.ndarray:
         """a, rad/s2, (..., nv): qacc."""
-        return self._each(lambda d: d.qacc[self.dofs], q, v, tau)
+        return self._each(lambda d: d.qacc[self.dofs], q, v, self.applied(tau))
 
     def inverse(self, q, v, a) -> np.ndarray:
         """The torque for which a is the acceleration, N m, (..., nv): mj_inverse."""
@@ -181,18 +185,27 @@ class MujocoDynamics:
         """
         model, data = self.own_copy(dt, method)
         model.opt.disableflags |= int(FLAGS["autoreset"])  # a reset would hide the divergence
-        given, spec = rows_of_states(q, v, tau)[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
+        given, spec = rows_of_states(q, v, self.applied(tau))[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
         runs = len(given[0])
         starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
-        torques = np.zeros((runs, steps, model.nv))
+        applied, controls = mujoco.mjtState.mjSTATE_QFRC_APPLIED, model.nu if self.driven else 0
+        if self.driven:  # controls come first
+            applied |= mujoco.mjtState.mjSTATE_CTRL
+        torques = np.zeros((runs, steps, controls + model.nv))
+        torques[:, :, :controls] = data.ctrl[:controls]
         for start, torque, *state in zip(starts, torques, *given):
-            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, self.dofs] = state
+            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, controls + self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
         states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
-        applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-        options = {"control_spec": applied, "nstep": steps, "state": states, "sensordata": sensors, "skip_checks": True}
+        options = {
+            "control_spec": int(applied),
+            "nstep": steps,
+            "state": states,
+            "sensordata": sensors,
+            "skip_checks": True,
+        }
 
         def run():
             rollout([model] * runs, [data], starts, torques, **options)
@@ -204,8 +217,14 @@ class MujocoDynamics:
         """A copy of the model with this step and integrator, and data at one state, for whoever steps on their own."""
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
-        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, tau
+        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, self.applied(tau)
+        if self.driven:
+            data.ctrl[:], data.act[:] = self.driven.ctrl, self.driven.act
         return model, data
+
+    def applied(self, tau):
+        """What of the torques of a case is applied to the joints: not what its actuators exert themselves."""
+        return tau - self.driven.torque if self.driven else tau
 
     # how the fields are read
 

@@ -14,6 +14,7 @@ from .dynamics import MujocoDynamics
 from .flags import INTEGRATORS
 from .inventory import switch_off
 from .lock import locked_model
+from .servos import engaged
 
 SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
     "Euler": "semi_implicit_euler",
@@ -30,14 +31,15 @@ def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
 
     Measured, step by step: a free body that stands alone has its bias implicit in implicitfast and discrete; discrete has
     springs implicit too; and up to 3.17 RK4 turns a ball by the mean of its speeds. There implicitfast takes a midpoint rule
-    for a free body alone, which tmt has not: it is left out.
+    for a free body alone, which tmt has not: it is left out. The speed gain of actuators is implicit in implicitfast and implicit
+    where two joints lie on one path to the world, in discrete everywhere, and there the position gain too; Euler has neither.
     """
     schemes, order = dict(SCHEMES), 4
     if tree is not None:
         lone = bool(lone_speeds(tree))
-        if lone:
+        if lone or tree.has_gains:
             schemes["implicitfast"] = schemes["discrete"] = "implicitfast"
-        if tree.has_springs:
+        if tree.has_springs or tree.has_gains:
             schemes["discrete"] = "discrete"
         if tree.coordinates.balls and not FROM_4:
             schemes["RK4"], order = "rk4_mean_speed", 2
@@ -86,12 +88,17 @@ class Mujoco:
     def unavailable(self) -> str | None:
         return None
 
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        """Its integrators in a case: where actuators act some are other schemes."""
+        return methods_for(case.tree) if case.controller else self.methods
+
     def of(self, case: Case) -> MujocoDynamics:
         """The file's own numbers with what the case changes: they stay what they are, and nothing of the file is hidden.
 
         A model with locked joints is compiled from the source again, without them. ModelError if that is not possible.
         """
         changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints
+        changes += (case.controller.controls,) if case.controller else ()
         dynamics = self.known.pop(changes, None) or self.dynamics(case)
         self.known[changes] = dynamics
         if len(self.known) > MODELS:
@@ -100,7 +107,9 @@ class Mujoco:
 
     def dynamics(self, case: Case) -> MujocoDynamics:
         """The dynamics of a case, made anew."""
-        dynamics = MujocoDynamics(self.changed(case), case.coordinates, self.bodies, case.tree.zero, self.bare)
+        model = self.changed(case)
+        driven = engaged(model, case.controller) if case.controller else None
+        dynamics = MujocoDynamics(model, case.coordinates, self.bodies, case.tree.zero, self.bare, driven)
         dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
         return dynamics
 

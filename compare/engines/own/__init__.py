@@ -32,6 +32,10 @@ class Own:
             name: Method(self.name, name, tmt.METHODS[name].order, name) for name in RK4_SCHEMES if name in self.schemes
         }
 
+    def methods_in(self, case: Case) -> Mapping[str, Method]:
+        """None where a robot's own actuators act: the equations do not have them."""
+        return {} if case.controller else self.methods
+
     def unavailable(self) -> str | None:
         return None
 

@@ -37,7 +37,7 @@ def steps_of_integrators(setup: Setup, q: np.ndarray, qd: np.ndarray, tau: np.nd
     if setup.robot.coordinates.nv > MOST_SPEEDS_STEPPED:
         return found
     dynamics = setup.engines["mujoco"].of(case)
-    dt = min(LONGEST_DT, *(one.scene.dt for one in setup.robot.cases))
+    dt = min(LONGEST_DT, *(one.scene.dt for one in setup.robot.cases_of_torque))
     for name, method in setup.engines["mujoco"].methods.items():
         motion = dynamics.run(q, qd, tau, dt, 1, name)
         steps = Steps(q, qd, tau, dt, motion.q[..., 1, :], motion.v[..., 1, :])

@@ -27,7 +27,7 @@ def claim(robot: Robot) -> str:
     one, joints = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint", robot.coordinates
     runs = not robot.is_read or joints.nv <= MOST_IN_A_BAND
     held = any(case.is_held for case in robot.cases)
-    swings = [case for case in exact_motion.pendulums(robot.cases) if exact_motion.is_compared(case)]
+    swings = [case for case in exact_motion.pendulums(robot.cases_of_torque) if exact_motion.is_compared(case)]
     return (
         f"A {one} may be locked if, with it at its start value and at rest, its acceleration vanishes for all values of the "
         f"other {one}s. The program finds these {one}s on the expressions of the traced method, which fold to the number 0, and "
@@ -61,7 +61,7 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
     solutions, in a few tenths of a second: enough to see a wrong model.
     """
     result = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}})
-    cases = cases or [case for case in setup.robot.cases if timed or "fewer joints" in case.scene.tags]
+    cases = cases or [case for case in setup.robot.cases_of_torque if timed or "fewer joints" in case.scene.tags]
     try:
         fill(result, setup, cases, timed)
     except ModelError as error:  # a model with something that cannot be taken out with its joint

@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ...case import Case
-from ...engines import COMPARED, GRID, Engine, Method, Setting
+from ...engines import COMPARED, GRID, Engine, Method, Setting, methods_in
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.run import diverged_at, leaves_no_digits, movement_unit
@@ -112,8 +112,11 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "doubles": setup.robot.is_read}
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
-    taking = methods(setup.engines, setup.size, which, setup.robot)
-    taking = [method for method in taking if whole or method.engine in COMPARED]
+    taking = {}
+    for case in cases:
+        of_case = methods(setup.engines, setup.size, which, setup.robot, case)
+        taking = {(method.engine, method.name): method for method in of_case} | taking
+    taking = [method for method in taking.values() if whole or method.engine in COMPARED]
     fixed = [method for method in taking if not method.adaptive]
     falling = names if whole else [regular.name]
     # the steps of a robot of many joints may be too few for that
@@ -121,7 +124,10 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete)
     if timed and setup.robot.coordinates.has_balls:
         result.tables["speed_orders"] += tumbling.orders_on_a_body(result, setup.engines)
-    schemes = {method.name: method.scheme for method in setup.engines["mujoco"].methods.values()}
+    schemes = {
+        case.name: {method.name: method.scheme for method in methods_in(setup.engines["mujoco"], case).values()}
+        for case in cases
+    }
     accuracy.check_same_schemes(result, floors, schemes, unit)
     accuracy.check_smallest_errors(result, floors, unit)
     steps = {case.name: coarsest_steps(case) for case in cases}
@@ -151,6 +157,8 @@ def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Seq
         spread += fill_in(of_scene, take_times(of_scene, setup))
     floors = result.curves["floors"]
     result.tables["what_should_i_use"] = advice.advice(result.rows, list(floors), floors)
+    driven = [case.name for case in setup.robot.cases if case.controller]
+    result.notes += advice.step_response_in_words(result.tables["what_should_i_use"], driven)
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
     result.notes += [*sentences, *spread_in_words(spread), PARTS]
@@ -168,7 +176,7 @@ def rows_of_scene(
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
     found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
-    taking, energy = methods(engines, size, which, case.robot), true_energy(case, reference)
+    taking, energy = methods(engines, size, which, case.robot, case), true_energy(case, reference)
     for method in taking:
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):

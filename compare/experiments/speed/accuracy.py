@@ -18,15 +18,18 @@ ANOTHER_MOTION = 0.1  # rad: a run that is farther off is another motion
 ALIKE = 0.01  # of an error: two that differ by less are the same in a sentence
 
 
-def check_same_schemes(result: Result, floors: Floors, schemes: Mapping[str, str], unit: str = "rad") -> None:
+def check_same_schemes(
+    result: Result, floors: Floors, schemes: Mapping[str, Mapping[str, str]], unit: str = "rad"
+) -> None:
     """MuJoCo's integrators and the same schemes in tmt make the same error, but for rounding.
 
     Judged where either error is below 0.1 rad: one that is not, or a run that has diverged, beside one that is, fails.
-    schemes: {integrator of MuJoCo: the method of tmt}.
+    schemes: of each scene {integrator of MuJoCo: the method of tmt}.
     """
     by_place = {(row["scene"], row["engine"], row["method"], row["dt_s"]): row for row in result.rows}
     for (scene, engine, method, dt), row in by_place.items():
-        ours = by_place.get((scene, "tmt", schemes.get(method), dt)) if engine == "mujoco" and scene in floors else None
+        known = schemes[scene].get(method) if engine == "mujoco" and scene in floors else None
+        ours = by_place.get((scene, "tmt", known, dt)) if known else None
         if ours and min(error(row), error(ours)) < SMALL_DEVIATION:
             difference = abs(error(row) - error(ours))
             where = f"{scene}, {method}, dt = {dt:.3g} s"

@@ -10,6 +10,7 @@ from ...judge.run import ORDER_MARGIN
 from .accuracy import NEAR_ROUNDING, Floors
 
 TARGETS = (1e-2, 1e-3, 1e-6, 1e-9, 1e-12)  # rad, worst on the way
+ASKED = 1e-3  # rad: the one of these for which a sentence says what to use
 EARLY = 1.0  # s: up to here chaos has not yet grown, and errors fall regularly
 REGULAR, CLEAR = 3e-2, 2e-12  # rad, in that time: an error in between falls with its order, and rounding is far below
 LEAST_ORDER = {8: 7.0}  # of order 8 only the least, as rounding comes before it has settled
@@ -56,6 +57,36 @@ def advice(rows: list[dict], scenes: Sequence[str], floors: Floors) -> list[dict
             line["why_not"] = why_not(of_scene, theirs, ours, floors[scene])
             table.append(line)
     return table
+
+
+def step_response_in_words(table: Sequence[dict], driven: Sequence[str]) -> list[str]:
+    """Which integrator and step come to 1e-3 rad where servos act, beside the other scenes; [] if they act in none.
+
+    table: what `advice` gives; driven: the names of the scenes in which they act.
+    """
+    lines = [line for line in table if line["target_rad"] == ASKED]
+
+    def answers(wanted):
+        return "; ".join(answer_in_words(line) for line in lines if (line["scene"] in driven) == wanted)
+
+    if not (answers(True) and answers(False)):
+        return []
+    return [
+        f"Which integrator and step for {ASKED:g} rad? Where the robot's own servos act: {answers(True)}. Where they do not: "
+        f"{answers(False)}."
+    ]
+
+
+def answer_in_words(line: dict) -> str:
+    """The cheapest setting of MuJoCo and of tmt in one line of `advice`."""
+    found = [
+        f"{line[who]} (dt = {line[f'{who}_dt_s']:.3g} s), {line[f'{who}_ms']:.3g} ms"
+        if line[f"{who}_dt_s"]
+        else f"{line[who]}, {line[f'{who}_ms']:.3g} ms"
+        for who in ("mujoco", "tmt")
+        if line[who]
+    ]
+    return f"{line['scene']}: {' or '.join(found) if found else 'none comes so near'}"
 
 
 def setting_in_words(row: dict) -> str:

@@ -6,7 +6,7 @@ from tmt import Tree, kernels
 from tmt.methods import method_named
 
 from ...case import Case
-from ...engines import COMPARED, GRID, LABELS, Engine, Method, Setting, one_of_each_scheme
+from ...engines import COMPARED, GRID, LABELS, Engine, Method, Setting, methods_in, one_of_each_scheme
 from ...robots import Robot
 from ...setup import Setup
 
@@ -63,8 +63,17 @@ def taking_part(engines: Mapping[str, Engine], size: str) -> dict[str, Engine]:
     return {name: engine for name, engine in engines.items() if size != "quick" or name in COMPARED}
 
 
-def methods(engines: Mapping[str, Engine], size: str, which: str = "all", robot: Robot | None = None) -> list[Method]:
-    """The methods of all engines that are there; "same schemes": one of MuJoCo for each scheme, and the same in tmt."""
+def methods(
+    engines: Mapping[str, Engine],
+    size: str,
+    which: str = "all",
+    robot: Robot | None = None,
+    case: Case | None = None,
+) -> list[Method]:
+    """The methods of all engines that are there; "same schemes": one of MuJoCo for each scheme, and the same in tmt.
+
+    case: of the robot, if its own actuators may act there: then some are other schemes.
+    """
     if which == "same schemes":
         theirs = one_of_each_scheme(engines["mujoco"])
         schemes = {method.scheme for method in theirs}
@@ -73,7 +82,7 @@ def methods(engines: Mapping[str, Engine], size: str, which: str = "all", robot:
     return [
         method
         for engine in taking_part(engines, size).values()
-        for method in engine.methods.values()
+        for method in (methods_in(engine, case) if case else engine.methods).values()
         if (engine.name, method.name) not in out
     ]
 
@@ -111,7 +120,7 @@ def estimated(method: Method, tree: Tree) -> float:
     if method.engine != "tmt":
         return IN_LOOPS * n**1.5
     stepping = method_named(method.name)
-    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages
+    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages and not tree.has_gains
     evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
     if method.adaptive:
         return evaluation

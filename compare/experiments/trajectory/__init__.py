@@ -99,6 +99,7 @@ def begin(setup: Setup) -> None:
     schemes = [method.scheme for method in one_of_each_scheme(setup.engines["mujoco"])]
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = [] if setup.robot.own else setup.of(cases, [], cases)
+    grown = [case for case in grown if not case.controller]
     duration, steps = horizon.growth_run(setup.robot, grown, setup.size == "small")
     of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {

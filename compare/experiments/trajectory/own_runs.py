@@ -17,10 +17,15 @@ def within_time(setup: Setup, cases: Sequence[Case], entries: int) -> tuple[list
 
     entries: of the Jacobians of a run, see `counts`.
     """
-    said, able = [], [case for case in cases if case.scene.gravity]
-    if len(able) < len(cases):
-        names = "; ".join(case.name for case in cases if case not in able)
-        said.append(f"Your equations have gravity in them; scenes without it are left out: {names}.")
+    said, able = [], cases
+    for left, why in (
+        ([case for case in cases if case.controller], "Your equations have no actuators; scenes in which these act"),
+        ([case for case in cases if not case.scene.gravity], "Your equations have gravity in them; scenes without it"),
+    ):
+        names = "; ".join(case.name for case in left if case in able)
+        able = [case for case in able if case not in left]
+        if names:
+            said.append(f"{why} are left out: {names}.")
     seconds, equations = SECONDS_OF_RUNS[setup.size], setup.engines["own"].equations
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
     each = BESIDE_THEM + sum(equations.times[part][0] for part in parts)

@@ -8,7 +8,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...case import Case, Coordinates
-from ...engines import LABELS, Dynamics, Engine, Method, compared
+from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
 from ...judge.check import Result
 from ...judge.rounding import NARROW, band, slope_rounding, step_rounding
 from ...judge.run import (
@@ -90,8 +90,8 @@ def follow(
     result, known = Result("trajectory", label=LABELS[ours]), {} if known is None else known
     if case not in known:  # what joints a scene of a robot from a file needs is not asked here
         known[case] = None if case.robot.is_read else reduced(case)
-    schemes, here = {}, {method.scheme for method in engines[ours].methods.values()}
-    for method in engines[theirs].methods.values():
+    schemes, here = {}, {method.scheme for method in methods_in(engines[ours], case).values()}
+    for method in methods_in(engines[theirs], case).values():
         if method.scheme in here:
             schemes.setdefault(method.scheme, []).append(method)
     runs = [(case, steps, *item) for steps in counts(case, finer, entries) for item in schemes.items()]

@@ -46,7 +46,7 @@ def lifts(acting: Acting, at: Posture, base: str, integrator: str, dt: float) ->
         changed = small.limit(other)
         if (changed.dt or np.inf) > max(now.dt, dt) and other != integrator:
             found.append(Lift("integrator", (other,), (), *gain(now, changed), holds(acting, at, other, dt)))
-    if now.dt < dt:
+    if now.dt < dt and now.shape is not None:  # no filter's
         found += [
             *less_damping(acting, at, small, now, integrator, dt),
             *heavier(acting, at, small, now, integrator, dt),
@@ -61,7 +61,7 @@ def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrat
     ease = np.einsum("ki,ik->k", moments, np.linalg.solve(small.M, moments.T))  # 1 over the inertia along each length
     now_kv = np.zeros(len(at.u))
     for i, (one, u) in enumerate(zip(at.robot.drive.actuators, at.u)):
-        if one.acts and i not in at.cut and not one.gain[2]:
+        if one.acts and i not in at.cut.forces and not one.gain[2]:
             now_kv[i] = max(one.damping(u), 0.0)
     able = np.flatnonzero((now_kv > 0.0) & (ease > 0.0))
     if not len(able):
@@ -73,7 +73,8 @@ def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrat
         return kv
 
     def with_kv(kv: np.ndarray) -> Small:
-        return replace(small, D=small.D - moments.T @ ((now_kv - kv)[:, None] * moments))
+        less = moments.T @ ((now_kv - kv)[:, None] * moments)
+        return replace(small, D=small.D - less, brakes=small.brakes - less)
 
     def is_stable(share: float, chosen) -> bool:
         return stable(with_kv(capped(share, chosen)), integrator, SPARE * dt)
@@ -93,9 +94,8 @@ def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrat
 def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: str, dt: float) -> list[Lift]:
     """The least armature on as few joints as it takes; []: none is large enough."""
     kept, coordinates = observed.counted(acting, at), at.robot.coordinates
-    explicit = small.D - explicitless(small, integrator)
     # what a joint needs that is alone, and what it has
-    needed = (dt * dt * np.abs(np.diag(small.K)) + 2.0 * dt * np.abs(np.diag(explicit))) / 4.0
+    needed = (dt * dt * np.abs(np.diag(small.K)) + 2.0 * dt * np.abs(explicit_damping(small, integrator))) / 4.0
     has = 1.0 / np.diag(np.linalg.inv(small.M))
     able = np.flatnonzero([name in coordinates.names for name in small.names] & (needed > 0.0))
 
@@ -141,17 +141,16 @@ def fewest(is_stable: Callable, able: np.ndarray, most: float) -> tuple[np.ndarr
 
 
 def stable(small: Small, integrator: str, dt: float) -> bool:
-    """Whether a step is stable, in closed form where there is one."""
-    if not small.has_closed_form(integrator):
-        return small.is_stable(integrator, dt)
-    return small.holds(integrator, dt) and all(dt < 2.0 * constant for _, constant in small.poles)
+    """Whether a step is stable, in closed form where there is one; filters are not asked."""
+    if small.has_closed_form(integrator):
+        return small.holds(integrator, dt)
+    return replace(small, poles=()).is_stable(integrator, dt)
 
 
-def explicitless(small: Small, integrator: str) -> np.ndarray:
-    """What of D an integrator has implicit, (nv, nv)."""
-    if integrator == "RK4":
-        return np.zeros_like(small.D)
-    return {"Euler": np.diag(small.damping), "discrete": small.D}.get(integrator, np.where(small.on_path, small.D, 0.0))
+def explicit_damping(small: Small, integrator: str) -> np.ndarray:
+    """The part of the damping of each speed that an integrator does not have implicit, (n,)."""
+    implicit = small.implicit.get(integrator)
+    return np.diag(small.D) - (0.0 if implicit is None else np.diag(small.root @ implicit @ small.root.T))
 
 
 def gain(now: Limit, changed: Limit) -> tuple[Limit, float | None]:

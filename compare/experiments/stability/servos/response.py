@@ -62,7 +62,7 @@ def jump_of(at: Posture) -> np.ndarray:
     jump = np.zeros(len(at.u))
     for i, (one, u, length) in enumerate(zip(at.robot.drive.actuators, at.u, lengths)):
         gain = one.gain[0] + one.gain[1] * length
-        if one.is_servo and gain and i not in at.cut:
+        if one.is_servo and gain and i not in at.cut.forces:
             jump[i] = one.stiffness(u) / gain
     return jump
 
