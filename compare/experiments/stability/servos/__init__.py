@@ -37,11 +37,7 @@ def begin(setup: Setup) -> dict | None:
     own = (reading.integrator, DEFAULT)
     tried = [(one, *pair) for one in looked_at for pair in one.pairs if not setup.is_quick or pair[1] in own]
     tried = [(one, base, name) for one, base, name in tried if not setup.is_quick or base == one.at.bases[0]]
-    drawn = (
-        [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs]
-        if shown and not setup.is_quick
-        else []
-    )
+    drawn = [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs] if shown and not setup.is_quick else []
 
     def ask(function, items):
         return setup.map(partial(function, reading=reading), *(zip(*items) if items else [()]))
@@ -156,7 +152,5 @@ def check_own_step(result: Result, rows: Sequence[dict]) -> None:
     """Whether the file's own step is stable under its own integrator, wherever that can be said."""
     for row in known(rows, rows[0]["file_integrator"]):
         limit = row["predicted_dt_s"] or LIMIT_UP_TO
-        note = f"under {row['file_integrator']}" + (
-            f": {row['limiting_joint']} limits" if row["limiting_joint"] else ""
-        )
+        note = f"under {row['file_integrator']}" + (f": {row['limiting_joint']} limits" if row["limiting_joint"] else "")
         result.check(row["posture"], AT_OWN_STEP, row["file_dt_s"], limit, "s", note)

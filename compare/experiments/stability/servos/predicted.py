@@ -65,11 +65,7 @@ def predicted_at(robot: Robot, name: str, reading: Reading) -> Predicted:
     return Predicted(
         at,
         small,
-        {
-            (base, name): small[base].limit(name) if small[base].names else nothing
-            for base in small
-            for name in INTEGRATORS
-        },
+        {(base, name): small[base].limit(name) if small[base].names else nothing for base in small for name in INTEGRATORS},
     )
 
 
@@ -105,12 +101,8 @@ class Steps(NamedTuple):
 
     base: str
     integrator: str
-    apart: (
-        float | None
-    )  # of the limit: how far the one by the closed form is from that by eigenvalues; None: no closed form
-    beside: (
-        float | None
-    )  # the largest difference of the spectral radius from that of MuJoCo's own derivative; None: RK4
+    apart: float | None  # of the limit: how far the one by the closed form is from that by eigenvalues; None: no closed form
+    beside: float | None  # the largest difference of the spectral radius from that of MuJoCo's own derivative; None: RK4
 
 
 def steps_at(one: Predicted, reading: Reading) -> list[Steps]:

@@ -51,9 +51,7 @@ def at_the_top(rows: Sequence[dict], full: Sequence[dict]) -> list[str]:
     dt, integrator = rows[0]["file_dt_s"], rows[0]["file_integrator"]
     own = known(rows, integrator)
     if not own:
-        return [
-            f"Whether its own {in_seconds(dt)} under {integrator} is stable cannot be said: {kinds_in_words(rows)}."
-        ]
+        return [f"Whether its own {in_seconds(dt)} under {integrator} is stable cannot be said: {kinds_in_words(rows)}."]
     words = [own_in_words(rows, own, full)]
     if integrator != DEFAULT:
         words.append(default_in_words(rows, own, full))
