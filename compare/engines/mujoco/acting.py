@@ -193,6 +193,7 @@ class Acting:
         for k, more in (armature or {}).items():
             other.model.dof_armature[k] += more
         other.data = mujoco.MjData(other.model)
+        mujoco.mj_setConst(other.model, other.data)  # of a body that stands alone M is a constant
         return other
 
     def transition(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> np.ndarray:

@@ -12,10 +12,10 @@ from ....truth.driven import Posture
 from ....truth.step_limits import Limit, Small
 from . import observed
 
-SPARE = 1.01  # of the step: so far above it a change must hold by the prediction
-BISECTED = 1e-3  # of the range of a change
-MOST_HEAVIER = 100.0  # fold, of the armature that a joint would need if it were alone
-DIGITS = 2  # of the numbers that are proposed
+CHANGE_SPARE = 1.01  # of the step: so far above it a change must hold by the prediction
+CHANGE_BISECTED = 1e-3  # of the range of a change
+CHANGE_HEAVIER = 100.0  # fold, of the armature that a joint would need if it were alone
+CHANGE_DIGITS = 2  # of the numbers that are proposed
 
 
 class Lift(NamedTuple):
@@ -77,7 +77,7 @@ def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrat
         return replace(small, D=small.D - less, brakes=small.brakes - less)
 
     def is_stable(share: float, chosen) -> bool:
-        return stable(with_kv(capped(share, chosen)), integrator, SPARE * dt)
+        return stable(with_kv(capped(share, chosen)), integrator, CHANGE_SPARE * dt)
 
     most = 1.01 * float((now_kv * ease)[able].max() * dt)
     if (found := fewest(lambda left, chosen: is_stable(most - left, chosen), able, most)) is None:
@@ -105,9 +105,9 @@ def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: s
         return more
 
     def is_stable(share: float, chosen) -> bool:
-        return stable(replace(small, M=small.M + np.diag(added(share, chosen))), integrator, SPARE * dt)
+        return stable(replace(small, M=small.M + np.diag(added(share, chosen))), integrator, CHANGE_SPARE * dt)
 
-    if (found := fewest(is_stable, able, MOST_HEAVIER)) is None:
+    if (found := fewest(is_stable, able, CHANGE_HEAVIER)) is None:
         return []
     chosen, share = found
     own = acting.model.dof_armature[kept]
@@ -125,7 +125,7 @@ def fewest(is_stable: Callable, able: np.ndarray, most: float) -> tuple[np.ndarr
 
     def least(chosen) -> float:
         low, high = 0.0, most
-        while high - low > BISECTED * high:
+        while high - low > CHANGE_BISECTED * high:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if is_stable(middle, chosen) else (middle, high)
         return high
@@ -167,5 +167,5 @@ def rounded(value: float, way: Callable) -> float:
     """To a few digits, upwards or downwards."""
     if not value:
         return 0.0
-    power = 10.0 ** (np.floor(np.log10(abs(value))) - DIGITS + 1)
-    return float(f"{way(value / power) * power:.{DIGITS}g}")
+    power = 10.0 ** (np.floor(np.log10(abs(value))) - CHANGE_DIGITS + 1)
+    return float(f"{way(value / power) * power:.{CHANGE_DIGITS}g}")
