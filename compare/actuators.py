@@ -77,7 +77,8 @@ class Actuator:
         return self.force_range is not None and not self.force_range[0] < force < self.force_range[1]
 
 
-class Cut(NamedTuple):
+@dataclass(frozen=True)
+class Cut:
     """What ranges cut at a posture: it stays what it is there, N or N m."""
 
     forces: Mapping[int, float]  # of actuators by number

@@ -40,7 +40,7 @@ class Scene:
     torque: str | tuple = "free"
     speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
     damping: float | tuple = 0.0  # N m s/rad (N s/m), added to that of every joint; or a number for each speed
-    targets: float | tuple = 0.0  # rad or m, by how much the servos' targets are moved; or a number for each speed
+    targets: float | tuple = 0.0  # deg (m), by how much the servos' targets are moved; or a number for each speed
     gravity: bool = True  # the robot's own, or none
     locked: tuple = ()  # names of the joints that stay at the start
     duration: float = 5.0  # s
@@ -73,7 +73,7 @@ class Scene:
         object.__setattr__(self, "damping", tuple(float(v) for v in self.damping) if each else float(self.damping))
         each = are_numbers(self.targets) and len(self.targets) > 0
         self.refuse(
-            "targets", not (each or is_number(self.targets)), "a distance in rad or m, for all joints or for each"
+            "targets", not (each or is_number(self.targets)), "a movement in deg (m), for all joints or for each"
         )
         object.__setattr__(self, "targets", tuple(float(v) for v in self.targets) if each else float(self.targets))
         self.refuse("targets", np.any(self.targets) and self.torque != "servos", 'torque = "servos"')
@@ -133,8 +133,9 @@ class Case:
                 scene.refuse("posture", wrong, "a quaternion w, x, y, z of length 1 for each ball")
         known = not isinstance(scene.damping, tuple) or len(scene.damping) == whole.nv
         scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
-        known = not isinstance(scene.targets, tuple) or len(scene.targets) == whole.nv
-        scene.refuse("targets", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
+        one, kinds = not isinstance(scene.targets, tuple), {*whole.all_kinds} - {"ball"}
+        known = scene.targets == 0.0 or len(kinds) < 2 if one else len(scene.targets) == whole.nv
+        scene.refuse("targets", not known, f"{whole.nv} numbers, one per joint ({some(whole.speeds)}), in {units},")
         if scene.torque == "servos":
             idle = all(u is None for u in self.controller.controls)
             scene.refuse("torque", idle, "free, hold or numbers, as no actuator of this robot takes part,")
@@ -189,9 +190,10 @@ class Case:
         """What the robot's own actuators do, if they act."""
         if self.scene.torque != "servos":
             return None
-        places = self.robot.coordinates.places.places
-        q = np.array([self.posture[at.start] for at, by in places for _ in range(by.start, by.stop)])
-        return controller(self.robot.drive, self.scene.posture, q, self.scene.targets)
+        whole = self.robot.coordinates
+        q = np.array([self.posture[at.start] for at, by in whole.places.places for _ in range(by.start, by.stop)])
+        targets = whole.from_degrees(np.broadcast_to(self.scene.targets, whole.nv), positions=False)
+        return controller(self.robot.drive, self.scene.posture, q, targets)
 
     @cached_property
     def whole(self) -> tmt.Tree:

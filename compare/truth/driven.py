@@ -70,25 +70,32 @@ class Posture:
 
     @cached_property
     def lone(self) -> list[int]:
-        """The speeds of free bodies that stand alone and that no actuator drives."""
-        driven = {k for one in self.robot.drive.actuators for k in np.flatnonzero(one.moment or ())}
-        return sorted(lone_speeds(self.robot.tree) - driven)
+        """The speeds of free bodies that stand alone, and that no actuator or tendon moves."""
+        alone, pulled = lone_speeds(self.robot.tree), self.pulled
+        return [
+            k for body in floating(self.robot.tree) if alone.issuperset(body) and not pulled & {*body} for k in body
+        ]
+
+    @cached_property
+    def pulled(self) -> set[int]:
+        """The speeds at which an actuator or a tendon acts at the posture."""
+        moments = Driven(self.robot.tree, self.robot.drive, self.ask).along(self.start).moments
+        return set(np.flatnonzero(moments.any(axis=0)).tolist())
 
     @cached_property
     def base(self) -> list[int]:
-        """The speeds of free joints that carry the robot, or parts of it."""
-        tree, found = self.robot.tree, []
-        for i in range(3, len(tree.kind)):
-            chain = [i - 3, i - 2, i - 1, i]
-            free = tuple(tree.kind[j] for j in chain) == ("slide",) * 3 + ("ball",)
-            if free and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
-                found += range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop)
-        return [k for k in found if k not in self.lone]
+        """The speeds of free joints that carry the robot, or parts of it, and that no servo or spring of their own holds."""
+        tree, drive = self.robot.tree, self.robot.drive
+        held = np.any([one.moment for one in drive.servos if one.moment] or [[False] * len(tree.axis)], axis=0)
+        held = held | np.repeat(np.array(tree.stiffness or [0.0] * len(tree.kind)) != 0.0, widths(tree))
+        return [k for body in floating(tree) if not held[body].any() for k in body if k not in self.lone]
 
     @property
     def bases(self) -> tuple[str, ...]:
         """With what base limits are asked: of BASES."""
-        return ("free", "locked") if self.base else ("fixed",)
+        if not self.base:
+            return ("fixed",)
+        return ("free", "locked") if len(self.base) + len(self.lone) < len(self.robot.tree.axis) else ("free",)
 
     @cached_property
     def cut(self) -> Cut:
@@ -101,17 +108,18 @@ class Posture:
         tree, drive = self.robot.tree, self.robot.drive
         slopes = self.driven.slopes(self.q, self.u)
         speeds = np.add(tree.damping, drive.damping or 0.0) * (not drive.explicit_damping)
-        acts = [one for one in drive.actuators if one.acts and one.dynamics == "filter"]
+        filters = [one for one in drive.actuators if one.acts and one.dynamics in ("filter", "filterexact")]
         return Small(
             names=self.robot.coordinates.speeds,
             M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
             K=slopes.K,
             D=slopes.D,
             damping=speeds,
+            uncut=slopes.uncut,
             springs=slopes.springs,
             brakes=slopes.brakes,
             on_path=on_one_path(tree),
-            poles=tuple((one.name, one.time_constant) for one in acts),
+            poles=tuple((one.name, one.time_constant, one.dynamics == "filterexact") for one in filters),
         )
 
     def small(self, base: str) -> Small:
@@ -119,8 +127,25 @@ class Posture:
         if base == "free":
             names = [self.whole.names[k] for k in self.base]
             kept = self.whole.locked(self.lone)
-            return kept.without([k for k, name in enumerate(kept.names) if name in names])
+            return kept.free([k for k, name in enumerate(kept.names) if name in names])
         return self.whole.locked(sorted({*self.lone, *(self.base if base == "locked" else ())}))
+
+
+def floating(tree: tmt.Tree) -> list[list[int]]:
+    """The six speeds of each free joint: three slides that carry nothing else, and a ball, from the world."""
+    found = []
+    for i in range(3, len(tree.kind)):
+        chain = [i - 3, i - 2, i - 1, i]
+        free = tuple(tree.kind[j] for j in chain) == ("slide",) * 3 + ("ball",)
+        if free and [tree.parent[j] for j in chain] == [-1, *chain[:3]] and not {*chain[:3]} & {*tree.body_hinge}:
+            joints = tree.coordinates.joints
+            found.append(list(range(joints[i - 3].qd.start, joints[i].qd.stop)))
+    return found
+
+
+def widths(tree: tmt.Tree) -> list[int]:
+    """How many speeds each joint has."""
+    return [by.stop - by.start for _, _, by in tree.coordinates.joints]
 
 
 def on_one_path(tree: tmt.Tree) -> np.ndarray:
@@ -130,5 +155,5 @@ def on_one_path(tree: tmt.Tree) -> np.ndarray:
     for i, parent in enumerate(tree.parent):
         if parent >= 0:
             before[i] |= before[parent]
-    joints = [i for i, (_, _, by) in enumerate(tree.coordinates.joints) for _ in range(by.start, by.stop)]
+    joints = np.repeat(np.arange(n), widths(tree))
     return (before | before.T)[np.ix_(joints, joints)]

@@ -46,12 +46,13 @@ class Pulls(NamedTuple):
 class Slopes(NamedTuple):
     """Derivatives of the forces at rest, (nv, nv) each: K = -d force/dq, D = -d force/dqd.
 
-    springs and brakes: of K what the springs of joints and the actuators do, and of D all, as the implicit integrators have it:
-    before the range of a speed's sum cuts it.
+    uncut: D before the range of a speed's sum cuts it: that is what implicitfast and implicit know of. springs and brakes: what
+    `discrete` has implicit: symmetric, without how moments turn, and without what pushes away or speeds up.
     """
 
     K: np.ndarray
     D: np.ndarray
+    uncut: np.ndarray
     springs: np.ndarray
     brakes: np.ndarray
 
@@ -195,17 +196,19 @@ class Driven:
         each[~heard] = 0.0
         lost = np.einsum("ki,k,kj->kij", J, pulls.damping * heard, J)
         always = lost[count:].sum(axis=0) + np.diag(np.add(self.tree.damping, self.drive.damping or 0.0))
-        of_actuators, braked = each[:count].sum(axis=0), lost[:count].sum(axis=0)
+        acting, braked = each[:count].sum(axis=0), lost[:count].sum(axis=0)
         K = stiffness(self.weight, q)  # with the springs of the joints
         springs = K - stiffness(replace(self.weight, stiffness=()), q) if self.tree.has_springs else 0.0 * K
-        brakes, springs, acting = always + braked, springs + of_actuators, of_actuators.copy()
+        springs = 0.5 * (springs + springs.T) + (J.T * np.maximum(pulls.stiffness * heard, 0.0)) @ J
+        speeding = lost[pulls.damping < 0.0].sum(axis=0)
+        uncut = always + braked
         if self.compensated:
             lifted = -stiffness(self.compensated, q)
             lifted[list(self.drive.unlifted)] = 0.0
             by_actuators = np.isin(np.arange(len(K)), self.drive.lifted)[:, None]
             K, acting = K + np.where(by_actuators, 0.0, lifted), acting + np.where(by_actuators, lifted, 0.0)
         acting[list(sums)], braked[list(sums)] = 0.0, 0.0
-        return Slopes(K + acting + each[count:].sum(axis=0), always + braked, springs, brakes)
+        return Slopes(K + acting + each[count:].sum(axis=0), always + braked, uncut, springs, uncut - speeding)
 
     def at_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
         """The nearest posture at rest, by Newton's method from q, and the size of the force that is left there; 0.0: none."""

@@ -70,7 +70,7 @@ class Acting:
             m.opt.gravity[:] = 0.0
         self.data, self.locked = mujoco.MjData(m), tuple(locked)
         if len(locked):
-            m.dof_armature[list(locked)] += LOCKING * max(1.0, self.mass_matrix(m.qpos0).max())
+            add_armature(m, list(locked), LOCKING * max(1.0, self.mass_matrix(m.qpos0).max()))
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """M, (nv, nv)."""
@@ -191,9 +191,8 @@ class Acting:
                 other.model.actuator_gainprm[i, 0] = kv
             other.model.actuator_biasprm[i, 2] = -kv
         for k, more in (armature or {}).items():
-            other.model.dof_armature[k] += more
+            add_armature(other.model, [k], more)
         other.data = mujoco.MjData(other.model)
-        mujoco.mj_setConst(other.model, other.data)  # of a body that stands alone M is a constant
         return other
 
     def transition(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> np.ndarray:
@@ -203,3 +202,12 @@ class Acting:
         A = np.zeros((size, size))
         mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
         return A
+
+
+def add_armature(model: mujoco.MjModel, speeds: Sequence[int], more: float | np.ndarray) -> None:
+    """More armature at some speeds of a compiled model, kg m2 or kg.
+
+    Of bodies whose inertia never changes the compiler keeps it ready: there dof_armature alone does nothing.
+    """
+    model.dof_armature[speeds] += more
+    model.dof_M0[speeds] += more

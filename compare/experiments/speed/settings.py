@@ -120,7 +120,7 @@ def estimated(method: Method, tree: Tree) -> float:
     if method.engine != "tmt":
         return IN_LOOPS * n**1.5
     stepping = method_named(method.name)
-    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages and not tree.has_gains
+    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages
     evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
     if method.adaptive:
         return evaluation
@@ -149,8 +149,11 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
 
 
 def coarsest_steps(case: Case) -> int:
-    """The least multiple of 64 that is no less than the scene's own number of steps."""
-    return -(-case.steps // GRID) * GRID
+    """The least multiple of 64 that is no less than the scene's own number of steps; 64 where servos act.
+
+    There a scene's own steps are short for the sake of methods that are explicit in the speeds, as others need not be.
+    """
+    return GRID if case.controller else -(-case.steps // GRID) * GRID
 
 
 def finest_steps(method: Method) -> int:

@@ -46,7 +46,7 @@ def lifts(acting: Acting, at: Posture, base: str, integrator: str, dt: float) ->
         changed = small.limit(other)
         if (changed.dt or np.inf) > max(now.dt, dt) and other != integrator:
             found.append(Lift("integrator", (other,), (), *gain(now, changed), holds(acting, at, other, dt)))
-    if now.dt < dt and now.shape is not None:  # no filter's
+    if now.dt < dt:
         found += [
             *less_damping(acting, at, small, now, integrator, dt),
             *heavier(acting, at, small, now, integrator, dt),
@@ -74,7 +74,7 @@ def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrat
 
     def with_kv(kv: np.ndarray) -> Small:
         less = moments.T @ ((now_kv - kv)[:, None] * moments)
-        return replace(small, D=small.D - less, brakes=small.brakes - less)
+        return replace(small, D=small.D - less, uncut=small.uncut - less, brakes=small.brakes - less)
 
     def is_stable(share: float, chosen) -> bool:
         return stable(with_kv(capped(share, chosen)), integrator, CHANGE_SPARE * dt)
@@ -94,8 +94,9 @@ def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrat
 def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: str, dt: float) -> list[Lift]:
     """The least armature on as few joints as it takes; []: none is large enough."""
     kept, coordinates = observed.counted(acting, at), at.robot.coordinates
+    explicit = small.D - small.braking(integrator)
     # what a joint needs that is alone, and what it has
-    needed = (dt * dt * np.abs(np.diag(small.K)) + 2.0 * dt * np.abs(explicit_damping(small, integrator))) / 4.0
+    needed = (dt * dt * np.abs(np.diag(small.K)) + 2.0 * dt * np.abs(np.diag(explicit))) / 4.0
     has = 1.0 / np.diag(np.linalg.inv(small.M))
     able = np.flatnonzero([name in coordinates.names for name in small.names] & (needed > 0.0))
 
@@ -141,16 +142,10 @@ def fewest(is_stable: Callable, able: np.ndarray, most: float) -> tuple[np.ndarr
 
 
 def stable(small: Small, integrator: str, dt: float) -> bool:
-    """Whether a step is stable, in closed form where there is one; filters are not asked."""
-    if small.has_closed_form(integrator):
-        return small.holds(integrator, dt)
-    return replace(small, poles=()).is_stable(integrator, dt)
-
-
-def explicit_damping(small: Small, integrator: str) -> np.ndarray:
-    """The part of the damping of each speed that an integrator does not have implicit, (n,)."""
-    implicit = small.implicit.get(integrator)
-    return np.diag(small.D) - (0.0 if implicit is None else np.diag(small.root @ implicit @ small.root.T))
+    """Whether a step is stable, in closed form where there is one."""
+    if not small.has_closed_form(integrator):
+        return small.is_stable(integrator, dt)
+    return small.holds(integrator, dt) and all(dt < most for most, _ in small.pole_limits(integrator))
 
 
 def gain(now: Limit, changed: Limit) -> tuple[Limit, float | None]:

@@ -142,7 +142,7 @@ def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt:
     found = []
     for step in (dt * (1.0 - ASIDE), dt * (1.0 + ASIDE)):
         A = acting.transition(at.q, at.u, step, integrator)[np.ix_(kept, kept)]
-        poles = [abs(1.0 - step / constant) for _, constant in small.poles]
+        poles = [np.exp(-step / constant) if exact else abs(1.0 - step / constant) for _, constant, exact in small.poles]
         stays = 1.0 if at.base or acting.model.na > len(small.poles) else 0.0
         own = max(small.growth(integrator, step), *poles, stays, 0.0)
         found.append(abs(float(np.abs(np.linalg.eigvals(A)).max()) - own))
