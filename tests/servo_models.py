@@ -27,7 +27,8 @@ FLOATING = """<mujoco><option timestep="0.002"/><worldbody><body name="trunk"><f
   <geom type="box" size="0.1 0.03 0.05" pos="0.1 0 0" mass="1"/>
   <body pos="0.2 0 0"><joint name="jaw" axis="0 1 0"/><geom type="capsule" size="0.02" fromto="0 0 0 0.2 0 0.1" mass="0.4"/>
   </body></body></body></worldbody><actuator><position name="jaw" joint="jaw" kp="20" kv="1"/></actuator></mujoco>"""
-FILTERED = '<general name="servo" joint="turn" dyntype="{kind}" dynprm="{constant}" gainprm="20" biastype="affine" biasprm="0 -20 -2"/>'
+FILTERED = """<general name="servo" joint="turn" dyntype="{kind}" dynprm="{constant}" gainprm="20" biastype="affine"
+  biasprm="0 -20 -2"/>"""
 
 
 def hinge(kp: float = 20.0, kv: float = 0.0, joint: str = "", option: str = "", actuator: str = "") -> str:
