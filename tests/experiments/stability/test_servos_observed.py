@@ -6,7 +6,7 @@ from models import PATHS
 from servo_models import FILTERED, FLOATING, FORK, INERTIA, acting_of, hinge, posture_of
 
 from compare.experiments.stability.servos import observed
-from compare.experiments.stability.servos.observed import alternating, counted, deviations, grows
+from compare.experiments.stability.servos.observed import alternating, grows_in_runs, measured_speeds, run_parts
 
 
 def limit_of(source, integrator, base=None):
@@ -24,7 +24,7 @@ def of_euler(kp, explicit, implicit=0.0):
     (20.0, 0.0, 0.0),  # it swings and nothing damps it
     (20.0, 0.4, 0.0), (20.0, 50.0, 0.0),  # far too large
     (20.0, 1.0, 2.0),
-    (20.0, 40.0, 39.0),  # explicit and implicit damping nearly cancel: above the limit it hardly grows
+    (20.0, 40.0, 39.0),  # explicit and implicit damping nearly cancel: above the limit it hardly grows_in_runs
 ])  # fmt: skip
 def test_the_limit_of_one_hinge_is_that_of_the_formula(kp, kv, damping):
     source = hinge(kp, kv, joint=f'damping="{damping}"')
@@ -68,17 +68,17 @@ def test_runs_show_the_predicted_limit(source, base, integrator):
     acting = acting_of(at, reading, base)
     predicted = at.small(base or at.bases[0]).limit(integrator)
     assert predicted.limit == "finite"
-    assert not grows(acting, at, integrator, 0.997 * predicted.dt)
-    assert grows(acting, at, integrator, 1.003 * predicted.dt)
+    assert not grows_in_runs(acting, at, integrator, 0.997 * predicted.dt)
+    assert grows_in_runs(acting, at, integrator, 1.003 * predicted.dt)
 
 
 def test_a_base_that_drifts_is_no_growth():
     at, reading = posture_of(FLOATING)
     acting = acting_of(at, reading)
-    assert not set(counted(acting, at)) & set(at.base) and counted(acting, at)
-    start = next(deviations(acting, at, "implicitfast", 1e-3, 400))
+    assert not set(measured_speeds(acting, at)) & set(at.base) and measured_speeds(acting, at)
+    start = next(run_parts(acting, at, "implicitfast", 1e-3, 400))
     assert 0.1 < np.linalg.norm(start, axis=1).max() < 3.0
-    assert not grows(acting, at, "implicitfast", 1e-3)
+    assert not grows_in_runs(acting, at, "implicitfast", 1e-3)
 
 
 def test_what_changes_its_sign_is_told_from_swings():

@@ -13,7 +13,7 @@ from compare.experiments.stability.servos import response
 def errors(source, integrator, dts, base=None):
     at, reading = posture_of(source)
     acting = acting_of(at, reading, base)
-    return [response.error(acting, at, base or at.bases[0], integrator, dt) for dt in dts]
+    return [response.response_error(acting, at, base or at.bases[0], integrator, dt) for dt in dts]
 
 
 @pytest.mark.parametrize("source, base", [
@@ -40,10 +40,10 @@ def test_the_exact_response_of_one_hinge_is_the_known_one():
 def test_a_wrong_stiffness_is_an_error_that_no_step_removes():
     at, reading = posture_of(hinge(20.0, 1.0))
     acting = acting_of(at, reading)
-    right = response.error(acting, at, "fixed", "RK4", 1e-4)
+    right = response.response_error(acting, at, "fixed", "RK4", 1e-4)
     whole = at.whole
     object.__setattr__(at, "__dict__", at.__dict__ | {"whole": replace(whole, K=1.02 * whole.K)})
-    assert right < 1e-7 < 1e-3 < response.error(acting, at, "fixed", "RK4", 1e-4)
+    assert right < 1e-7 < 1e-3 < response.response_error(acting, at, "fixed", "RK4", 1e-4)
 
 
 def test_without_a_servo_or_without_numbers_there_is_no_error():

@@ -30,24 +30,24 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
     """
     count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 1
     tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]
-    failed = next((k for k, dt in enumerate(tried) if grows(acting, at, integrator, dt, SOUGHT_STEPS)), count)
+    failed = next((k for k, dt in enumerate(tried) if grows_in_runs(acting, at, integrator, dt, SOUGHT_STEPS)), count)
     # a short run may not show what hardly grows: the longest step that held is tried once more
-    while failed and grows(acting, at, integrator, tried[failed - 1]):
+    while failed and grows_in_runs(acting, at, integrator, tried[failed - 1]):
         failed -= 1
     if failed in (0, count):
         return ("none" if failed else "always"), None
     low, high = tried[failed - 1], tried[failed]
     while high / low > 1.0 + NARROWED:
         middle = np.sqrt(low * high)
-        low, high = (low, middle) if grows(acting, at, integrator, middle) else (middle, high)
+        low, high = (low, middle) if grows_in_runs(acting, at, integrator, middle) else (middle, high)
     return "finite", float(np.sqrt(low * high))
 
 
-def grows(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
+def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
     """Whether a small random deviation from rest grows in a run of so many steps."""
     found = []
     with np.errstate(over="ignore", invalid="ignore"):
-        for off in deviations(acting, at, integrator, dt, steps):
+        for off in run_parts(acting, at, integrator, dt, steps):
             size = np.linalg.norm(off, axis=1).max()
             if not size <= GROWN_FAR:  # or no number
                 return True
@@ -73,13 +73,13 @@ def alternating(off: np.ndarray) -> float:
     return float(np.sqrt(weight @ (changes**2).sum(axis=1) / weight.sum()))
 
 
-def deviations(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
+def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
     """Deviations in each part of a run, (steps, n), in units of that at its start.
 
     The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
     by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
     """
-    rng, kept = np.random.default_rng(SEED), counted(acting, at)
+    rng, kept = np.random.default_rng(SEED), measured_speeds(acting, at)
     M = acting.mass_matrix(at.q)
     inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
     root = np.linalg.cholesky(0.5 * (inner + inner.T))
@@ -98,7 +98,7 @@ def deviations(acting: Acting, at: Posture, integrator: str, dt: float, steps: i
         yield np.hstack([off[:, kept] @ (root / start), filters])
 
 
-def counted(acting: Acting, at: Posture) -> list[int]:
+def measured_speeds(acting: Acting, at: Posture) -> list[int]:
     """The speeds that are measured: with a free base, those that do not follow from the others."""
     base = "locked" if acting.locked else at.bases[0]
     names = set(at.small(base).names)

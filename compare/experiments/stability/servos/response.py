@@ -5,7 +5,7 @@ from scipy.linalg import expm
 
 from ....engines.mujoco.acting import Acting
 from ....truth.driven import Posture
-from .observed import counted
+from .observed import measured_speeds
 
 LASTS = 0.2  # s, of a response; at least one step
 RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, may move
@@ -14,10 +14,10 @@ RESPONSE_LEAST = (
 )
 RESPONSE_MOST = 100.0  # fold, of the largest response
 CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
-CURVE_STEPS = 50_000  # of a run of a curve
+CURVE_MOST = 50_000  # of a run of a curve
 
 
-def error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
+def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
     """The largest difference from the exact response over the largest response, in 0.2 s, a ratio.
 
     Of rad and of m each by themselves, the worse of both; None: no servo, or it diverged. The targets of all servos jump by the
@@ -28,7 +28,7 @@ def error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) ->
     if not jump.any():
         return None
     steps = max(1, round(LASTS / dt))
-    kept = counted(acting, at)
+    kept = measured_speeds(acting, at)
     exact = exact_response(at, base, jump, dt, steps)
     size = RESPONSE_SIZE / max(np.abs(exact).max(), 1e-300)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -53,9 +53,11 @@ def curve(
 ) -> list[tuple[float, float]]:
     """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response."""
     end = min(limit or LASTS, LASTS)
-    first = max(min(file_dt, end) / CURVE_FROM, LASTS / CURVE_STEPS)
+    first = max(min(file_dt, end) / CURVE_FROM, LASTS / CURVE_MOST)
     count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
-    found = [(float(dt), error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))]
+    found = [
+        (float(dt), response_error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))
+    ]
     return [(dt, off) for dt, off in found if off is not None]
 
 
