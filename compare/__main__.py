@@ -22,7 +22,7 @@ from .process.streams import in_one_line
 
 PROGRAM = "python -m compare"
 ANSWERING_STEPS = "stability"  # the experiment of --dt and --integrator
-LONGEST_STEP = 5.0  # s, that can be asked about
+LONGEST_ASKED = 5.0  # s, that can be asked about
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
@@ -65,9 +65,9 @@ def step_in_seconds(text: str) -> float:
         dt = float(text)
     except ValueError:
         dt = 0.0
-    if not 0.0 < dt <= LONGEST_STEP:
+    if not 0.0 < dt <= LONGEST_ASKED:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no step; seconds above 0 and at most {LONGEST_STEP:g} are expected"
+            f"{text!r} is no step; seconds above 0 and at most {LONGEST_ASKED:g} are expected"
         )
     return dt
 

@@ -12,8 +12,8 @@ from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
-from .remarks import asked_in_words, lifts_in_words, remarks, response_error
-from .sentences import DEFAULT, at_the_top, feeds_back, known
+from .remarks import asked_in_words, lifts_in_words, servo_notes, response_error_at
+from .sentences import DEFAULT_INTEGRATOR, at_the_top, feeds_back, known
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first
 OBSERVED_WITHIN = 0.01  # relative
@@ -57,7 +57,7 @@ def begin(setup: Setup) -> dict | None:
     resting = [one for one in found if one.rests]
     shown = next((one for one in resting if one.is_finite), None)
     looked_at = resting if setup.alone and not setup.is_quick else [shown] * bool(shown)
-    own = (reading.integrator, DEFAULT)
+    own = (reading.integrator, DEFAULT_INTEGRATOR)
     tried = [(one, *pair) for one in looked_at for pair in one.pairs if not setup.is_quick or pair[1] in own]
     tried = [(one, base, name) for one, base, name in tried if not setup.is_quick or base == one.at.bases[0]]
     drawn = (
@@ -99,7 +99,7 @@ def observed_limit_at(one: Predicted, base: str, integrator: str, reading: Readi
 
 def errors_at(one: Predicted, reading: Reading) -> dict[tuple[str, str], float | None]:
     """The error of the step response at the file's step, by base and integrator."""
-    return {(base, name): response_error(one, base, name, reading.dt, reading) for base, name in one.pairs}
+    return {(base, name): response_error_at(one, base, name, reading.dt, reading) for base, name in one.pairs}
 
 
 def curve_at(one: Predicted, integrator: str, reading: Reading) -> list[tuple[float, float]]:
@@ -149,7 +149,7 @@ def add(result: Result, setup: Setup, work: dict) -> list[str]:
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
     lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]
-    said = [*result.top, *lifts_in_words(lifted, reading.dt), *remarks(found, rows, full)]
+    said = [*result.top, *lifts_in_words(lifted, reading.dt), *servo_notes(found, rows, full)]
     drawn, curves = work["curves"]
     if drawn:
         result.curves["step response"] = {

@@ -6,7 +6,7 @@ from ....judge.check import Result
 from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH, plain
 from ....robots import Robot
 from .response import LASTS
-from .sentences import in_seconds, short
+from .sentences import in_digits, in_seconds
 
 STEP_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn over each other, the wider one below
     "Euler": (BLUE, "-", "o", 1.3),
@@ -52,13 +52,13 @@ def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     )
     if own and own["step_response_error"]:
         caption += (
-            f"The file's own {dt} under {own['file_integrator']} is {short(100 * own['step_response_error'])} % off"
+            f"The file's own {dt} under {own['file_integrator']} is {in_digits(100 * own['step_response_error'])} % off"
         )
         caption += (
-            f"; least at that step is {best} with {short(100 * errors[best])} %."
+            f"; least at that step is {best} with {in_digits(100 * errors[best])} %."
             if best != own["integrator"]
             else ", the least of all integrators at that step."
         )
     elif best:
-        caption += f"At the file's own {dt} the least error is that of {best}, {short(100 * errors[best])} %."
+        caption += f"At the file's own {dt} the least error is that of {best}, {in_digits(100 * errors[best])} %."
     return "stability_step_response", fig, caption

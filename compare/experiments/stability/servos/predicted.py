@@ -14,8 +14,8 @@ from ....truth.driven import Posture
 from ....truth.linear import NEUTRAL
 from ....truth.step_limits import LIMIT_UP_TO, Limit, Small
 
-NEAR = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
-ASIDE = 1e-2  # of a limit: where a step of MuJoCo is asked
+NEAR_LIMIT = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
+ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is asked
 
 
 class Predicted(NamedTuple):
@@ -132,7 +132,7 @@ def forms_apart(small: Small, integrator: str, limit: Limit) -> float | None:
     def excess(dt):
         return small.growth(integrator, dt) - 1.0 - NEUTRAL
 
-    low, high = limit.dt * (1.0 - NEAR), limit.dt * (1.0 + NEAR)
+    low, high = limit.dt * (1.0 - NEAR_LIMIT), limit.dt * (1.0 + NEAR_LIMIT)
     if excess(low) <= 0.0 < excess(high):
         by_radius = brentq(excess, low, high, xtol=1e-9 * limit.dt)
     else:
@@ -148,9 +148,11 @@ def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt:
     nv = acting.model.nv
     kept = [k for k in range(2 * nv + acting.model.na) if k % nv not in at.lone or k >= 2 * nv]
     found = []
-    for step in (dt * (1.0 - ASIDE), dt * (1.0 + ASIDE)):
+    for step in (dt * (1.0 - ASIDE_OF_LIMIT), dt * (1.0 + ASIDE_OF_LIMIT)):
         A = acting.transition(at.q, at.u, step, integrator)[np.ix_(kept, kept)]
-        poles = [np.exp(-step / constant) if exact else abs(1.0 - step / constant) for _, constant, exact in small.poles]
+        poles = [
+            np.exp(-step / constant) if exact else abs(1.0 - step / constant) for _, constant, exact in small.poles
+        ]
         stays = 1.0 if at.base or acting.model.na > len(small.poles) else 0.0
         own = max(small.growth(integrator, step), *poles, stays, 0.0)
         found.append(abs(float(np.abs(np.linalg.eigvals(A)).max()) - own))

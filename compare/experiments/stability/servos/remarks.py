@@ -7,9 +7,9 @@ from ....robots import Robot
 from . import response
 from .lifting import Lift
 from .predicted import Predicted, acting_at
-from .sentences import feeds_back, in_seconds, known, short, some_of
+from .sentences import feeds_back, in_digits, in_seconds, known, some_of
 
-AT_REST = 1e-6  # rad or m: a rest so near is the posture
+RESTS_WITHIN = 1e-6  # rad or m: a rest so near is the posture
 FORCES = {"rad": "N m", "m": "N"}
 
 
@@ -31,22 +31,22 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
         text += " (no limit up to 5 s)"
     else:
         text += f" (limit {in_seconds(limit.dt, dt)}, {limit.joint}" + f", at {least.name}" * (len(found) > 1) + ")"
-    errors = [response_error(one, one.at.bases[0], integrator, dt, reading) for one in resting if one.name in good]
+    errors = [response_error_at(one, one.at.bases[0], integrator, dt, reading) for one in resting if one.name in good]
     errors = [error for error in errors if error is not None]
     where = "where it is stable " * bool(bad)
     return text + (f"; {where}the step response is at most {percent(max(errors))} off" if errors else "") + "."
 
 
-def response_error(one: Predicted, base: str, integrator: str, dt: float, reading: Reading) -> float | None:
-    """The error of the step response, see response.error; None also for a step that is too fine to be run."""
-    if response.LASTS / dt > response.MOST_STEPS:
+def response_error_at(one: Predicted, base: str, integrator: str, dt: float, reading: Reading) -> float | None:
+    """The error of the step response, see response.response_error; None also for a step that is too fine to be run."""
+    if response.LASTS / dt > response.CURVE_MOST:
         return None
-    return response.error(acting_at(reading, one.at, base), one.at, base, integrator, dt)
+    return response.response_error(acting_at(reading, one.at, base), one.at, base, integrator, dt)
 
 
 def percent(ratio: float) -> str:
     """A ratio in %."""
-    return f"{short(100.0 * ratio)} %"
+    return f"{in_digits(100.0 * ratio)} %"
 
 
 INERTIAS = {"rad": "kg m2", "m": "kg"}
@@ -57,7 +57,7 @@ def lifts_in_words(lifted: Sequence[tuple[Predicted, str, list[Lift]]], dt: floa
     for one, integrator, lifts in lifted:
         held = [lift for lift in lifts if lift.tried]
         others = [
-            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{short(lift.factor)} times the step'}"
+            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{in_digits(lift.factor)} times the step'}"
             for lift in held
             if lift.kind == "integrator"
         ]
@@ -83,12 +83,12 @@ def each_value(lift: Lift, units: Sequence[str]) -> list[str]:
     return [f"{value:g} {unit}".rstrip() + f" ({name})" for name, value, unit in zip(lift.names, lift.values, units)]
 
 
-def remarks(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence[dict]) -> list[str]:
+def servo_notes(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence[dict]) -> list[str]:
     """All other sentences, in the order in which they are of use."""
     robot = found[0].at.robot
     return [
-        *limits_in_words(rows),
-        *costs_in_words(rows),
+        *least_limits_in_words(rows),
+        *step_costs_in_words(rows),
         *seen_in_words(rows),
         *bases_in_words(rows),
         *differences_in_words(full),
@@ -97,14 +97,14 @@ def remarks(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence[dic
     ]
 
 
-def limits_in_words(rows: Sequence[dict]) -> Iterator[str]:
+def least_limits_in_words(rows: Sequence[dict]) -> Iterator[str]:
     """Of each integrator the least limit, and the joint and the mode that set it."""
     texts = []
     for integrator in dict.fromkeys(row["integrator"] for row in rows):
         of = known(rows, integrator)
         if of and of[0]["limit"] == "finite":
             row = of[0]
-            mode = f"a {row['mode_kind']} mode of {short(row['mode_per_s'], 3)} per second"
+            mode = f"a {row['mode_kind']} mode of {in_digits(row['mode_per_s'], 3)} per second"
             texts.append(
                 f"{integrator} {in_seconds(row['predicted_dt_s'])} at {row['posture']} ({row['limiting_joint']}, {mode})"
             )
@@ -114,7 +114,7 @@ def limits_in_words(rows: Sequence[dict]) -> Iterator[str]:
         yield f"With its actuators as the file states them, the least limit of the step of any posture: {'; '.join(texts)}."
 
 
-def costs_in_words(rows: Sequence[dict]) -> Iterator[str]:
+def step_costs_in_words(rows: Sequence[dict]) -> Iterator[str]:
     """The error of the step response at the file's step, by integrator."""
     texts = []
     for integrator in dict.fromkeys(row["integrator"] for row in rows):
@@ -183,7 +183,7 @@ def differences_in_words(full: Sequence[dict]) -> Iterator[str]:
 def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator[str]:
     """Where the postures rest, and which have none."""
     unit = "/".join(dict.fromkeys(found[0].at.robot.coordinates.units))
-    moved = [f"{one.name} {one.at.moved:.2g}" for one in found if one.rests and one.at.moved > AT_REST]
+    moved = [f"{one.name} {one.at.moved:.2g}" for one in found if one.rests and one.at.moved > RESTS_WITHIN]
     if moved:
         yield (
             f"Under their servos postures sink to a rest near them, which is what is looked at; from the stated one it is, in "

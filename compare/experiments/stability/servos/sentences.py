@@ -5,28 +5,28 @@ from collections.abc import Sequence
 from ....actuators import Drive
 from ....judge.words import listed
 
-DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
+DEFAULT_INTEGRATOR = "Euler"  # MuJoCo's integrator where a file states none
 HIDDEN = "In the full model that cannot be told, which moves under stable integrators too"
 SHAKES = 10.0  # fold, of the speed under an integrator that is stable: then it is the step that shakes it
-MOST_LISTED = 6  # postures or actuators in a sentence
+MOST_IN_A_SENTENCE = 6  # postures or actuators in a sentence
 
 
 def in_seconds(dt: float, beside: float | None = None) -> str:
     """A time in words, 2 ms or 0.15 s; with more digits where another one is near."""
     digits = 4 if beside and abs(dt / beside - 1.0) < 0.1 and dt != beside else 2
     number, unit = (1e3 * dt, "ms") if dt < 0.1 else (dt, "s")
-    return f"{short(number, digits)} {unit}"
+    return f"{in_digits(number, digits)} {unit}"
 
 
-def short(number: float, digits: int = 2) -> str:
+def in_digits(number: float, digits: int = 2) -> str:
     """A number in a sentence, 130 and not 1.3e+02."""
     return f"{float(f'{number:.{digits}g}'):g}"
 
 
 def some_of(words: Sequence[str]) -> str:
     """The first of many words as a list."""
-    more = len(words) - MOST_LISTED
-    return f"{', '.join(words[:MOST_LISTED])} and {more} more" if more > 0 else listed(words)
+    more = len(words) - MOST_IN_A_SENTENCE
+    return f"{', '.join(words[:MOST_IN_A_SENTENCE])} and {more} more" if more > 0 else listed(words)
 
 
 def known(rows: Sequence[dict], integrator: str) -> list[dict]:
@@ -66,13 +66,13 @@ def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = Tr
     if not own:
         return f"Whether its own {in_seconds(dt)} under {integrator} is stable cannot be said: {kinds_in_words(rows)}."
     words = own_in_words(rows, own, full)
-    return words if integrator == DEFAULT else f"{words} {default_in_words(rows, own, full)}"
+    return words if integrator == DEFAULT_INTEGRATOR else f"{words} {default_in_words(rows, own, full)}"
 
 
 def own_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict]) -> str:
     """Whether the file's own step is stable under its own integrator."""
     dt, integrator = own[0]["file_dt_s"], own[0]["file_integrator"]
-    name = integrator if integrator != DEFAULT else f"{DEFAULT}, MuJoCo's default"
+    name = integrator if integrator != DEFAULT_INTEGRATOR else f"{DEFAULT_INTEGRATOR}, MuJoCo's default"
     step = f"table at its own {in_seconds(dt)} under {name}"
     postures = {row["posture"] for row in rows}
     bad = [row for row in own if not row["stable_at_file_dt"]]
@@ -97,13 +97,13 @@ def own_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict]
 
 def default_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict]) -> str:
     """Whether the same step is stable under the integrator that a scene has which states none."""
-    of_default, dt = known(rows, DEFAULT), own[0]["file_dt_s"]
+    of_default, dt = known(rows, DEFAULT_INTEGRATOR), own[0]["file_dt_s"]
     attached = "attached to a scene whose `<option>` states no integrator"
     too = all(row["stable_at_file_dt"] for row in own)
     bad = [row for row in of_default if not row["stable_at_file_dt"]]
     limit = limit_in_words(of_default[0], len({row["posture"] for row in rows}) > 1, dt)
     if not bad:
-        return f"Under MuJoCo's default {DEFAULT} it is{' too' if too else ''} ({limit}), {attached}."
+        return f"Under MuJoCo's default {DEFAULT_INTEGRATOR} it is{' too' if too else ''} ({limit}), {attached}."
     kind, silent = shaking(full, bad)
     shakes = {
         "": "it can shake",
@@ -111,9 +111,7 @@ def default_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[d
         "calm": "it can shake, though the full model stays calm for two seconds",
         "both": f"it can shake. {HIDDEN}",
     }
-    return (
-        f"Under MuJoCo's default {DEFAULT} it is {'not' if too else 'neither'} ({limit}): {attached}, {shakes[kind]}."
-    )
+    return f"Under MuJoCo's default {DEFAULT_INTEGRATOR} it is {'not' if too else 'neither'} ({limit}): {attached}, {shakes[kind]}."
 
 
 def shaking(full: Sequence[dict], bad: Sequence[dict]) -> tuple[str, str]:
@@ -143,7 +141,7 @@ def least_speed(full: Sequence[dict], posture: str) -> float:
     return min((speed for speed in speeds if speed is not None), default=0.0)
 
 
-KINDS = {
+WITHOUT_LIMIT = {
     "saddle": "a saddle, which is left by itself",
     "drifts": "nothing holds or brakes a movement",
     "not_at_rest": "it does not rest",
@@ -153,7 +151,7 @@ KINDS = {
 def kinds_in_words(rows: Sequence[dict]) -> str:
     """At which postures there is no limit to be said, and why."""
     texts = []
-    for kind, why in KINDS.items():
+    for kind, why in WITHOUT_LIMIT.items():
         names = list(dict.fromkeys(row["posture"] for row in rows if row["limit"] == kind and row["base"] != "locked"))
         texts += [f"{some_of(names)}: {why}"] * bool(names)
     return "; ".join(texts)
