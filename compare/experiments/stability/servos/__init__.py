@@ -12,7 +12,7 @@ from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
-from .remarks import asked_in_words, lifts_in_words, servo_notes, response_error_at
+from .remarks import asked_in_words, lifts_in_words, response_error_at, servo_notes
 from .sentences import DEFAULT_INTEGRATOR, at_the_top, feeds_back, known
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first

@@ -216,9 +216,7 @@ def drive_in_words(robot: Robot, found: Sequence[Predicted]) -> Iterator[str]:
     for one in found:
         if one.rests and (one.at.cut.forces or one.at.cut.sums):
             cut = [f"{drive.actuators[i].name} at {force:.3g}" for i, force in one.at.cut.forces.items()]
-            cut += [
-                f"the sum at {robot.coordinates.speeds[k]} at {force:.3g}" for k, force in one.at.cut.sums.items()
-            ]
+            cut += [f"the sum at {robot.coordinates.speeds[k]} at {force:.3g}" for k, force in one.at.cut.sums.items()]
             yield f"At {one.name} the range of their force cuts {some_of(cut)}: there they have neither stiffness nor damping."
     if by_differences := found[0].at.driven.differenced:
         yield (

@@ -111,7 +111,8 @@ def default_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[d
         "calm": "it can shake, though the full model stays calm for two seconds",
         "both": f"it can shake. {HIDDEN}",
     }
-    return f"Under MuJoCo's default {DEFAULT_INTEGRATOR} it is {'not' if too else 'neither'} ({limit}): {attached}, {shakes[kind]}."
+    text = f"Under MuJoCo's default {DEFAULT_INTEGRATOR} it is {'not' if too else 'neither'} ({limit})"
+    return f"{text}: {attached}, {shakes[kind]}."
 
 
 def shaking(full: Sequence[dict], bad: Sequence[dict]) -> tuple[str, str]:
