@@ -14,22 +14,11 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import Setup, engines
 
-LIMITS = [
-    "posture",
-    "base",
-    "integrator",
-    "limit",
-    "predicted_dt_s",
-    "observed_dt_s",
-    "file_dt_s",
-    "file_integrator",
-    "stable_at_file_dt",
-    "limiting_joint",
-    "mode_per_s",
-    "mode_kind",
-    "step_response_error",
-]
-FULL = ["posture", "integrator", "dt_s", "rms_speed", "warnings", "resets", "predicted_stable", "calm"]
+LIMITS = (
+    "posture", "base", "integrator", "limit", "predicted_dt_s", "observed_dt_s", "file_dt_s", "file_integrator",
+    "stable_at_file_dt", "limiting_joint", "mode_per_s", "mode_kind", "step_response_error",
+)  # fmt: skip
+FULL = ("posture", "integrator", "dt_s", "rms_speed", "warnings", "resets", "predicted_stable", "calm")
 SWING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="swing" axis="0 1 0" damping="0.01"/>
   <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody>
   <actuator><position name="servo" joint="swing" kp="50" kv="{kv}"/></actuator></mujoco>"""
@@ -54,7 +43,7 @@ def gripper():
 
 def test_tables_have_their_columns_and_a_row_for_each_posture_base_and_integrator(gripper):
     rows, full = gripper[1].tables["step_limits"], gripper[1].tables["full_model"]
-    assert all(list(row) == LIMITS for row in rows) and all(list(row) == FULL for row in full)
+    assert all(tuple(row) == LIMITS for row in rows) and all(tuple(row) == FULL for row in full)
     places = [(row["posture"], row["base"], row["integrator"]) for row in rows]
     assert places == [(p, "fixed", i) for p in ("open", "closed", "qpos0", "middle") for i in INTEGRATORS]
     assert len(full) == len(rows) and all(row["predicted_stable"] and row["calm"] for row in full)
@@ -95,7 +84,7 @@ def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_that_compares_n
 
 
 def test_a_figure_has_the_files_own_point_and_says_its_number():
-    said, result = done(read(SWING.format(dt=0.002, kv=4), Setup.small))
+    _, result = done(read(SWING.format(dt=0.002, kv=4), Setup.small))
     name, fig, caption = figures_step.draw_step_response(result, None)
     ax = fig.axes[0]
     (own,) = (line for line in ax.lines if line.get_marker() == "*")
