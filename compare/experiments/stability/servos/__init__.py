@@ -65,7 +65,7 @@ def observed_limit_at(one: Predicted, base: str, integrator: str, reading: Readi
 def errors_at(one: Predicted, reading: Reading) -> dict[tuple[str, str], float | None]:
     """The error of the step response at the file's step, by base and integrator."""
     return {
-        (base, name): response.error(acting_at(reading, one.at, base), one.at, base, name, reading.dt)
+        (base, name): response.response_error(acting_at(reading, one.at, base), one.at, base, name, reading.dt)
         for base, name in one.pairs
     }
 

@@ -29,7 +29,7 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
     else:
         text += f" (limit {in_seconds(limit.dt, dt)}, {limit.joint}" + f", at {least.name}" * (len(found) > 1) + ")"
     errors = [
-        response.error(acting_at(reading, one.at, one.at.bases[0]), one.at, one.at.bases[0], integrator, dt)
+        response.response_error(acting_at(reading, one.at, one.at.bases[0]), one.at, one.at.bases[0], integrator, dt)
         for one in resting
         if one.name in good
     ]
