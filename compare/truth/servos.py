@@ -200,8 +200,7 @@ class Driven:
         acting, braked = each[:count].sum(axis=0), lost[:count].sum(axis=0)
         K = stiffness(self.weight, q)  # with the springs of the joints
         springs = (
-            np.diag(by_speed(self.tree, self.tree.stiffness))
-            + (J.T * np.maximum(pulls.stiffness * heard, 0.0)) @ J
+            np.diag(by_speed(self.tree, self.tree.stiffness)) + (J.T * np.maximum(pulls.stiffness * heard, 0.0)) @ J
         )
         speeding = lost[pulls.damping < 0.0].sum(axis=0)
         uncut = always + braked
