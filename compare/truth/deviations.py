@@ -85,7 +85,7 @@ class Deviations:
         moves = vectors[:n].astype(complex)
         return values.astype(complex), moves / np.maximum(np.linalg.norm(moves, axis=0), 1e-300)
 
-    @property
+    @cached_property
     def drifts(self) -> bool:
         """Whether a movement, other than of a free base, meets neither stiffness nor damping."""
         both = np.vstack([self.stiff / self.largest(self.stiff), self.damped / self.largest(self.damped)])
@@ -101,7 +101,7 @@ class Deviations:
         """The largest entry, beside which what is below VANISHING is nothing; a matrix of nothing but rounding is nothing."""
         return max(np.abs(matrix).max(initial=0.0), SLOW / VANISHING)
 
-    @property
+    @cached_property
     def growing(self) -> tuple[float, np.ndarray] | None:
         """The rate, 1/s, and the movement of the mode that grows fastest by itself, or None."""
         if not self.names:

@@ -221,6 +221,7 @@ def test_no_file_of_gymnasium_is_called_stable_or_unstable_without_a_rest(path):
         if posture.rest[1]:
             continue
         force, size = posture.driven.forces(posture.q, posture.u)
+        assert size > 0.0 or not force.any()
         assert np.abs(force).max() <= 1e-9 * size
         for base in posture.bases:
             small = posture.small(base)
