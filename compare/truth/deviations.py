@@ -7,7 +7,7 @@ import numpy as np
 
 SYMMETRIC = 1e-7  # of the largest entry: what a matrix and its transpose may differ by, and what is nothing beside it
 VANISHING = 1e-10  # of the largest stiffness or damping, in the units of M: nothing
-SLOW = 1e-8  # 1/s2 and 1/s: and so is less than this
+CREEPING = 1e-8  # 1/s2 and 1/s: and so is less than this
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Deviations:
     @staticmethod
     def largest(matrix: np.ndarray) -> float:
         """The largest entry, beside which what is below VANISHING is nothing; a matrix of nothing but rounding is nothing."""
-        return max(np.abs(matrix).max(initial=0.0), SLOW / VANISHING)
+        return max(np.abs(matrix).max(initial=0.0), CREEPING / VANISHING)
 
     @cached_property
     def growing(self) -> tuple[float, np.ndarray] | None:
