@@ -33,7 +33,7 @@ def whole_run(
 ) -> WholeRun:
     """A run of so many seconds from q, by default at rest, under u of each actuator, which stays; judged in its last seconds.
 
-    u stands in controls, and in activations. It is given anew at every step: MuJoCo takes it away when it resets.
+    u stands in controls, and in activations. Where MuJoCo resets, the controls and the speed are given anew.
     """
     m = mujoco.MjModel.__copy__(model)
     m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
@@ -48,12 +48,11 @@ def whole_run(
     steps, squares, warnings, resets, seen = max(1, round(lasts / dt)), [], 0, 0, 0
     judged = steps - max(1, round(last / dt))
     for step in range(steps):
-        before = data.time
-        data.ctrl[:] = controls
+        before, data.ctrl[:] = data.time, controls
         mujoco.mj_step(m, data)
         number = int(data.warning.number.sum())
         if data.time <= before:  # it begins to count anew
-            resets, seen = resets + 1, 0
+            resets, seen, data.qvel[:] = resets + 1, 0, speed
         warnings, seen = warnings + number - seen, number
         if step >= judged:
             squares.append(data.qvel @ data.qvel / m.nv)
