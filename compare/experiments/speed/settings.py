@@ -87,6 +87,21 @@ def methods(
     ]
 
 
+def methods_of(setup: Setup, cases: Sequence[Case], which: str) -> list[Method]:
+    """The methods that follow any of the cases, each once."""
+    found = {}
+    for case in cases:
+        of_case = methods(setup.engines, setup.size, which, setup.robot, case)
+        found = {(method.engine, method.name): method for method in of_case} | found
+    return list(found.values())
+
+
+def schemes_in(setup: Setup, cases: Sequence[Case]) -> dict[str, dict[str, str]]:
+    """Of each case by its name {integrator of MuJoCo: the method of tmt that is the same scheme}."""
+    mujoco = setup.engines["mujoco"]
+    return {case.name: {method.name: method.scheme for method in methods_in(mujoco, case).values()} for case in cases}
+
+
 def left_out(engines: Mapping[str, Engine], size: str, robot: Robot | None) -> dict[tuple[str, str], str]:
     """{(engine, method): why it takes no part}: an engine is not there, or what it makes of this robot would take too long."""
     out = {}
