@@ -48,11 +48,13 @@ def whole_run(
     steps, squares, warnings, resets, seen = max(1, round(lasts / dt)), [], 0, 0, 0
     judged = steps - max(1, round(last / dt))
     for step in range(steps):
-        before, data.ctrl[:] = data.time, controls
+        before = data.time
+        data.ctrl[:] = controls
         mujoco.mj_step(m, data)
         number = int(data.warning.number.sum())
         if data.time <= before:  # it begins to count anew
-            resets, seen, data.qvel[:] = resets + 1, 0, speed
+            resets, seen = resets + 1, 0
+            data.qvel[:] = speed
         warnings, seen = warnings + number - seen, number
         if step >= judged:
             squares.append(data.qvel @ data.qvel / m.nv)
