@@ -13,6 +13,7 @@ assignment's part e in another order.
 """
 
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 from .space import IDENTITY, ZERO, Matrix, Vector, rotation, total_vector, turn_of
@@ -113,6 +114,17 @@ def carried_by_joint(tree) -> list[Distribution]:
     return own
 
 
+@lru_cache(maxsize=4)
+def carried_exactly(tree) -> tuple[list, list, list]:
+    """carried_by_joint, and of it what is uneven about a hinge and what is even; once for a tree: fractions take long."""
+    exact = carried_by_joint(tree)
+    even = [
+        d.even_about(Vector(*map(Fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
+        for d, (kind, _, by) in zip(exact, tree.coordinates.joints)
+    ]
+    return exact, [d.less(e) for d, e in zip(exact, even)], even
+
+
 def mass_matrix_and_bias(tree, q, qd, number=float) -> tuple[list, list]:
     """Mbar (nv rows of nv, kg m2) and h (nv, N m), as in method.py; over any scalar.
 
@@ -122,14 +134,7 @@ def mass_matrix_and_bias(tree, q, qd, number=float) -> tuple[list, list]:
     n, joints = len(tree.axis), tree.coordinates.joints
     axes = [Vector(*v) for v in tree.axis]
     offsets, turns = zip(*(placed(tree, i, q) for i in range(len(joints))))
-    exact = carried_by_joint(tree)
-    even = [
-        d.even_about(Vector(*map(Fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
-        for d, (kind, _, by) in zip(exact, joints)
-    ]
-    own, uneven, even = (
-        [d.rounded(number) for d in ds] for ds in (exact, [d.less(e) for d, e in zip(exact, even)], even)
-    )
+    own, uneven, even = ([d.rounded(number) for d in ds] for ds in carried_exactly(tree))
 
     # outward: each frame's motion at qdd = 0, in its own axes
     motions = []
