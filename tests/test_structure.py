@@ -36,7 +36,6 @@ DIRECTIONS = {
     "report": {"judge", "process"},
     "setup": {"tmt", "case", "states", "robots", "engines"},
     "experiments": {
-        "actuators",
         "diagnosis",
         "joint_map",
         "tmt",

@@ -39,9 +39,11 @@ class Predicted(NamedTuple):
         return any(limit.limit == "finite" for (base, _), limit in self.limits.items() if base == self.at.bases[0])
 
     def is_stable(self, base: str, integrator: str, dt: float) -> bool | None:
-        """Whether a step is within the limit; None: none can be said."""
+        """Whether a step is within the limit; None: there is none, or no servo whose step it is."""
         limit = self.limits[base, integrator]
-        return bool(dt <= (limit.dt or LIMIT_UP_TO)) if limit.limit in ("finite", "none") else None
+        if limit.limit not in ("finite", "none") or not self.at.robot.drive.feeds_back:
+            return None
+        return bool(dt <= (limit.dt or LIMIT_UP_TO))
 
     @property
     def pairs(self) -> Iterator[tuple[str, str]]:
