@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import pytest
 from models import PATHS
 
+from compare.actuators import Actuator
 from compare.case import Scene
 from compare.engines.mujoco import engine, read
 from compare.engines.own import Own
-from compare.experiments.trajectory import own_runs
+from compare.experiments.trajectory import own_runs, sentences
 from compare.experiments.trajectory.runs import follow
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
@@ -56,6 +57,21 @@ def test_every_integrator_is_its_scheme_held_and_in_a_step(gripper):
         dataclasses.replace(SHORT, gravity=False),
     ):
         assert failing(robot, known, scene) == set()
+
+
+def test_a_sentence_names_scenes_schemes_and_what_is_left_out(gripper):
+    robot, known = gripper
+    drive = dataclasses.replace(
+        robot.drive, actuators=(*robot.drive.actuators, Actuator("pull", "", None)), controls={}
+    )
+    for changed, left in (
+        (robot, ""),
+        (dataclasses.replace(robot, drive=drive), "pull, its lever turns with the posture"),
+    ):
+        (said,) = sentences.of_servos(changed.cases, known["mujoco"])
+        assert "in: open, held by servos; open, step of the servos. " in said and "implicitfast: implicitfast" in said
+        assert said.partition("Left out in both: ")[2].rstrip(".") == left
+    assert sentences.of_servos(robot.cases_of_torque, known["mujoco"]) == []
 
 
 def test_velocity_gains_implicit_under_euler_leave_the_band(gripper, altered):
