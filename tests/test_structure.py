@@ -36,6 +36,7 @@ DIRECTIONS = {
     "report": {"judge", "process"},
     "setup": {"tmt", "case", "states", "robots", "engines"},
     "experiments": {
+        "actuators",
         "diagnosis",
         "joint_map",
         "tmt",

@@ -73,12 +73,9 @@ class Deviations:
     @cached_property
     def is_symmetric(self) -> bool:
         """Whether the closed form holds: K and D are symmetric, and D takes energy away. K may have any sign: see `drifts`."""
-        halves = [
-            np.abs(matrix - matrix.T).max(initial=0.0) <= SYMMETRIC * np.abs(matrix).max(initial=0.0)
-            for matrix in (self.K, self.D)
-        ]
-        lowest = np.linalg.eigvalsh(self.damped).min(initial=0.0)
-        return all(halves) and lowest >= -VANISHING * np.abs(self.damped).max(initial=0.0)
+        halves = [np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in (self.K, self.D)]
+        lowest = np.linalg.eigvalsh(self.damped).min()
+        return all(halves) and lowest >= -VANISHING * np.abs(self.damped).max()
 
     @cached_property
     def modes(self) -> tuple[np.ndarray, np.ndarray]:

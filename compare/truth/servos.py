@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt.methods import by_speed
 
 from ..actuators import Cut, Drive
 from ..case import Coordinates
@@ -47,7 +48,7 @@ class Slopes(NamedTuple):
     """Derivatives of the forces at rest, (nv, nv) each: K = -d force/dq, D = -d force/dqd.
 
     uncut: D before the range of a speed's sum cuts it: that is what implicitfast and implicit know of. springs and brakes: what
-    `discrete` has implicit: symmetric, without how moments turn, and without what pushes away or speeds up.
+    `discrete` has implicit: without how moments turn, of balls the same about each axis, and nothing that pushes or speeds up.
     """
 
     K: np.ndarray
@@ -198,8 +199,9 @@ class Driven:
         always = lost[count:].sum(axis=0) + np.diag(np.add(self.tree.damping, self.drive.damping or 0.0))
         acting, braked = each[:count].sum(axis=0), lost[:count].sum(axis=0)
         K = stiffness(self.weight, q)  # with the springs of the joints
-        springs = K - stiffness(replace(self.weight, stiffness=()), q) if self.tree.has_springs else 0.0 * K
-        springs = 0.5 * (springs + springs.T) + (J.T * np.maximum(pulls.stiffness * heard, 0.0)) @ J
+        springs = (
+            np.diag(by_speed(self.tree, self.tree.stiffness)) + (J.T * np.maximum(pulls.stiffness * heard, 0.0)) @ J
+        )
         speeding = lost[pulls.damping < 0.0].sum(axis=0)
         uncut = always + braked
         if self.compensated:

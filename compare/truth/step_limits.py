@@ -106,7 +106,7 @@ class Small(Deviations):
 
     def holds(self, integrator: str, dt: float) -> bool:
         """Whether P is positive definite."""
-        return bool(np.linalg.eigvalsh(self.P(integrator, dt)).min(initial=1.0) > 0.0)
+        return bool(np.linalg.eigvalsh(self.P(integrator, dt))[0] > 0.0)
 
     # limits
 
@@ -117,7 +117,9 @@ class Small(Deviations):
             return Limit("saddle", None, self.joint_of(shape), rate, "real", shape)
         if self.drifts:
             return Limit("drifts", None, "", None, "")
-        dt = self.closed_form(integrator) if self.has_closed_form(integrator) else self.scanned(integrator)
+        dt = None
+        if self.names:
+            dt = self.closed_form(integrator) if self.has_closed_form(integrator) else self.scanned(integrator)
         slowest, name = min(self.pole_limits(integrator), default=(np.inf, ""))
         if slowest < min(dt or np.inf, LIMIT_UP_TO):
             constant = next(constant for actuator, constant, _ in self.poles if actuator == name)
@@ -135,8 +137,8 @@ class Small(Deviations):
     def pulls_back(self) -> bool:
         """Whether the springs that discrete has implicit are symmetric, and none pushes away."""
         S = self.held["discrete"]
-        size = max(np.abs(S).max(initial=0.0), np.abs(self.stiff).max(initial=0.0))
-        return np.abs(S - S.T).max() <= SYMMETRIC * size and np.linalg.eigvalsh(S).min(initial=0.0) >= -VANISHING * size
+        size = max(np.abs(S).max(), np.abs(self.stiff).max())
+        return np.abs(S - S.T).max() <= SYMMETRIC * size and np.linalg.eigvalsh(S).min() >= -VANISHING * size
 
     def closed_form(self, integrator: str) -> float | None:
         """The limit by P, s; None: up to 5 s. Along any movement P is a quadratic of dt that comes to zero once at most."""
@@ -146,7 +148,7 @@ class Small(Deviations):
 
     def scanned(self, integrator: str) -> float | None:
         """The limit by the eigenvalues of steps, s: the first that grows; None: none up to 5 s."""
-        first = min(LIMIT_FROM / max(np.abs(self.modes[0]).max(initial=0.0), 1e-300), 0.1 * LIMIT_UP_TO)
+        first = min(LIMIT_FROM / max(np.abs(self.modes[0]).max(), 1e-300), 0.1 * LIMIT_UP_TO)
         steps = np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1)
         low = 0.0
         for dt in steps:

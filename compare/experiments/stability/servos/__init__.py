@@ -6,18 +6,41 @@ from functools import partial
 from ....engines.mujoco import Reading
 from ....engines.mujoco.flags import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, Result
+from ....robots import Robot
 from ....setup import Setup
 from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
-from .remarks import asked_in_words, remarks
-from .sentences import DEFAULT, at_the_top, known
+from .remarks import asked_in_words, lifts_in_words, response_error_at, servo_notes
+from .sentences import DEFAULT_INTEGRATOR, at_the_top, feeds_back, known
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first
 OBSERVED_WITHIN = 0.01  # relative
 FORMS_WITHIN = 1e-6  # relative, of the closed form and the eigenvalues of a step
 RADII_WITHIN = 1e-4  # of the spectral radius, of which MuJoCo's is by differences
+
+
+def claim_of_servos(robot: Robot) -> str:
+    """What is examined of a robot with actuators."""
+    if not robot.drive.actuators:
+        return ""
+    return (
+        " Under its own servos, as the file states them, the limit of the step of each integrator of MuJoCo at each posture at "
+        "rest follows from M, K = -d force/dq and D = -d force/dqd in closed form, and runs show the same. Whether the file's "
+        "own step is stable is a check of the robot, not of the two models."
+    )
+
+
+def tolerance_of_servos(robot: Robot) -> str:
+    """How far apart what is compared of a robot with actuators may be."""
+    if not robot.drive.actuators:
+        return ""
+    return (
+        f" Under its own servos: a limit that is found by bisection in runs of MuJoCo, ranges of forces off, is within "
+        f"{100 * OBSERVED_WITHIN:g} % of the predicted one; the closed form within {FORMS_WITHIN:g} of the step at which the "
+        f"spectral radius passes 1; that radius near the limit within {RADII_WITHIN:g} of MuJoCo's own (mjd_transitionFD)."
+    )
 
 
 def begin(setup: Setup) -> dict | None:
@@ -34,10 +57,15 @@ def begin(setup: Setup) -> dict | None:
     resting = [one for one in found if one.rests]
     shown = next((one for one in resting if one.is_finite), None)
     looked_at = resting if setup.alone and not setup.is_quick else [shown] * bool(shown)
-    own = (reading.integrator, DEFAULT)
+    own = (reading.integrator, DEFAULT_INTEGRATOR)
     tried = [(one, *pair) for one in looked_at for pair in one.pairs if not setup.is_quick or pair[1] in own]
     tried = [(one, base, name) for one, base, name in tried if not setup.is_quick or base == one.at.bases[0]]
-    drawn = [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs] if shown and not setup.is_quick else []
+    drawn = (
+        [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs]
+        if shown and not setup.is_quick
+        else []
+    )
+    unstable = [(one, name) for name in dict.fromkeys(own) if (one := least_at(resting, name, reading.dt))]
 
     def ask(function, items):
         return setup.map(partial(function, reading=reading), *(zip(*items) if items else [()]))
@@ -49,9 +77,16 @@ def begin(setup: Setup) -> dict | None:
         "observed": ask(observed_limit_at, tried),
         "steps": ask(steps_at, [(one,) for one in resting]),
         "errors": ask(errors_at, [(one,) for one in resting]),
+        "lifts": (unstable, ask(lifts_at, unstable)),
         "full": ask(full_at, [(one,) for one in resting]),
         "curves": (drawn, ask(curve_at, [(shown, name) for name in drawn])),
     }
+
+
+def least_at(resting: Sequence[Predicted], integrator: str, dt: float) -> Predicted | None:
+    """The posture with the least limit of an integrator, if a step is not stable there; else None."""
+    bad = [one for one in resting if one.is_stable(one.at.bases[0], integrator, dt) is False]
+    return min(bad, key=lambda one: one.limits[one.at.bases[0], integrator].dt, default=None)
 
 
 # in a further process
@@ -64,10 +99,7 @@ def observed_limit_at(one: Predicted, base: str, integrator: str, reading: Readi
 
 def errors_at(one: Predicted, reading: Reading) -> dict[tuple[str, str], float | None]:
     """The error of the step response at the file's step, by base and integrator."""
-    return {
-        (base, name): response.error(acting_at(reading, one.at, base), one.at, base, name, reading.dt)
-        for base, name in one.pairs
-    }
+    return {(base, name): response_error_at(one, base, name, reading.dt, reading) for base, name in one.pairs}
 
 
 def curve_at(one: Predicted, integrator: str, reading: Reading) -> list[tuple[float, float]]:
@@ -76,6 +108,12 @@ def curve_at(one: Predicted, integrator: str, reading: Reading) -> list[tuple[fl
     return response.curve(
         acting_at(reading, one.at, base), one.at, base, integrator, reading.dt, one.limits[base, integrator].dt
     )
+
+
+def lifts_at(one: Predicted, integrator: str, reading: Reading) -> list[lifting.Lift]:
+    """What would make the file's step stable with an integrator, each tried."""
+    base = one.at.bases[0]
+    return lifting.lifts(acting_at(reading, one.at, base), one.at, base, integrator, reading.dt)
 
 
 def full_at(one: Predicted, reading: Reading) -> list[dict]:
@@ -88,8 +126,8 @@ def full_at(one: Predicted, reading: Reading) -> list[dict]:
 # in the main process
 
 
-def add(result: Result, setup: Setup, work: dict) -> None:
-    """Rows, checks, sentences and curves of what `begin` has set going."""
+def add(result: Result, setup: Setup, work: dict) -> list[str]:
+    """Rows, checks, curves and the sentence at the top, of what `begin` has set going; returns the notes."""
     found, shown, reading = work["found"], work["shown"], setup.reading
     rows = limit_rows(found, reading.dt, reading.integrator)
     by_place = {(row["posture"], row["base"], row["integrator"]): row for row in rows}
@@ -103,13 +141,15 @@ def add(result: Result, setup: Setup, work: dict) -> None:
         row = by_place[one.name, base, name]
         row["observed_dt_s"] = dt
         check_observed(result, row, kind, len(one.at.bases) > 1)
-    check_own_step(result, rows)
+    if feeds_back(setup.robot.drive):
+        check_own_step(result, rows)
     full = [row for part in work["full"] for row in part]
     result.tables |= {"step_limits": rows, "full_model": full}
-    result.top = at_the_top(rows, full)
+    result.top = [at_the_top(rows, full, feeds_back(setup.robot.drive))]
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
-    result.notes += [*result.top, *remarks(found, rows, full)]
+    lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]
+    said = [*result.top, *lifts_in_words(lifted, reading.dt), *servo_notes(found, rows, full)]
     drawn, curves = work["curves"]
     if drawn:
         result.curves["step response"] = {
@@ -117,6 +157,7 @@ def add(result: Result, setup: Setup, work: dict) -> None:
             "rows": [row for row in rows if (row["posture"], row["base"]) == (shown.name, shown.at.bases[0])],
             "lines": dict(zip(drawn, curves)),
         }
+    return said
 
 
 def named_place(row: dict, several: bool) -> str:
@@ -152,5 +193,5 @@ def check_own_step(result: Result, rows: Sequence[dict]) -> None:
     """Whether the file's own step is stable under its own integrator, wherever that can be said."""
     for row in known(rows, rows[0]["file_integrator"]):
         limit = row["predicted_dt_s"] or LIMIT_UP_TO
-        note = f"under {row['file_integrator']}" + (f": {row['limiting_joint']} limits" if row["limiting_joint"] else "")
+        note = ", ".join(filter(None, (f"under {row['file_integrator']}", row["limiting_joint"])))
         result.check(row["posture"], AT_OWN_STEP, row["file_dt_s"], limit, "s", note)

@@ -7,7 +7,7 @@ import numpy as np
 from ....engines.mujoco.whole import whole_run
 from ....truth.driven import Posture
 
-LASTS, LAST = 2.0, 0.5  # s: of a run, and of its part whose speeds are looked at
+FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run, and of its part whose speeds are looked at
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 
 
@@ -19,7 +19,7 @@ def rows(model, at: Posture, dt: float, predicted: Mapping[str, bool | None]) ->
     found = []
     for integrator, is_stable in predicted.items():
         with np.errstate(over="ignore", invalid="ignore"):
-            run = whole_run(model, at.robot.drive, at.start, at.u, dt, integrator, LASTS, LAST)
+            run = whole_run(model, at.robot.drive, at.start, at.u, dt, integrator, FULL_TIME, FULL_LAST)
         found.append({
             "posture": at.name, "integrator": integrator, "dt_s": dt,
             "rms_speed": run.rms_speed if np.isfinite(run.rms_speed) else None,

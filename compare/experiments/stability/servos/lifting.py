@@ -12,10 +12,10 @@ from ....truth.driven import Posture
 from ....truth.step_limits import Limit, Small
 from . import observed
 
-SPARE = 1.01  # of the step: so far above it a change must hold by the prediction
-BISECTED = 1e-3  # of the range of a change
-MOST_HEAVIER = 100.0  # fold, of the armature that a joint would need if it were alone
-DIGITS = 2  # of the numbers that are proposed
+CHANGE_SPARE = 1.01  # of the step: so far above it a change must hold by the prediction
+CHANGE_BISECTED = 1e-3  # of the range of a change
+CHANGE_HEAVIER = 100.0  # fold, of the armature that a joint would need if it were alone
+CHANGE_DIGITS = 2  # of the numbers that are proposed
 
 
 class Lift(NamedTuple):
@@ -45,7 +45,7 @@ def lifts(acting: Acting, at: Posture, base: str, integrator: str, dt: float) ->
     for other in INTEGRATORS:
         changed = small.limit(other)
         if (changed.dt or np.inf) > max(now.dt, dt) and other != integrator:
-            found.append(Lift("integrator", (other,), (), *gain(now, changed), holds(acting, at, other, dt)))
+            found.append(Lift("integrator", (other,), (), *lifted(now, changed), holds(acting, at, other, dt)))
     if now.dt < dt:
         found += [
             *less_damping(acting, at, small, now, integrator, dt),
@@ -56,7 +56,7 @@ def lifts(acting: Acting, at: Posture, base: str, integrator: str, dt: float) ->
 
 def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrator: str, dt: float) -> list[Lift]:
     """The largest kv of as few actuators as it takes; []: none is small enough."""
-    along, kept = at.driven.along(at.q), observed.counted(acting, at)
+    along, kept = at.driven.along(at.q), observed.measured_speeds(acting, at)
     moments = along.moments[: len(at.u), kept]
     ease = np.einsum("ki,ik->k", moments, np.linalg.solve(small.M, moments.T))  # 1 over the inertia along each length
     now_kv = np.zeros(len(at.u))
@@ -77,23 +77,23 @@ def less_damping(acting: Acting, at: Posture, small: Small, now: Limit, integrat
         return replace(small, D=small.D - less, uncut=small.uncut - less, brakes=small.brakes - less)
 
     def is_stable(share: float, chosen) -> bool:
-        return stable(with_kv(capped(share, chosen)), integrator, SPARE * dt)
+        return stable(with_kv(capped(share, chosen)), integrator, CHANGE_SPARE * dt)
 
     most = 1.01 * float((now_kv * ease)[able].max() * dt)
-    if (found := fewest(lambda left, chosen: is_stable(most - left, chosen), able, most)) is None:
+    if (found := needed_changes(lambda left, chosen: is_stable(most - left, chosen), able, most)) is None:
         return []
     chosen, left = found
     kv = capped(most - left, chosen)
     kv[chosen] = [rounded(value, np.floor) for value in kv[chosen]]
     tried = acting.changed(damping={int(i): kv[i] for i in chosen})
     names = tuple(at.robot.drive.actuators[i].name for i in chosen)
-    return [Lift("kv", names, tuple(map(float, kv[chosen])), *gain(now, with_kv(kv).limit(integrator)),
+    return [Lift("kv", names, tuple(map(float, kv[chosen])), *lifted(now, with_kv(kv).limit(integrator)),
                  holds(tried, at, integrator, dt))]  # fmt: skip
 
 
 def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: str, dt: float) -> list[Lift]:
     """The least armature on as few joints as it takes; []: none is large enough."""
-    kept, coordinates = observed.counted(acting, at), at.robot.coordinates
+    kept, coordinates = observed.measured_speeds(acting, at), at.robot.coordinates
     explicit = small.D - small.braking(integrator)
     # what a joint needs that is alone, and what it has
     needed = (dt * dt * np.abs(np.diag(small.K)) + 2.0 * dt * np.abs(np.diag(explicit))) / 4.0
@@ -106,9 +106,9 @@ def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: s
         return more
 
     def is_stable(share: float, chosen) -> bool:
-        return stable(replace(small, M=small.M + np.diag(added(share, chosen))), integrator, SPARE * dt)
+        return stable(replace(small, M=small.M + np.diag(added(share, chosen))), integrator, CHANGE_SPARE * dt)
 
-    if (found := fewest(is_stable, able, MOST_HEAVIER)) is None:
+    if (found := needed_changes(is_stable, able, CHANGE_HEAVIER)) is None:
         return []
     chosen, share = found
     own = acting.model.dof_armature[kept]
@@ -117,16 +117,16 @@ def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: s
     tried = acting.changed(armature={kept[k]: float(a) for k, a in zip(chosen, more)})
     changed = replace(small, M=small.M + np.diag(np.bincount(chosen, more, len(has))))
     names = tuple(small.names[k] for k in chosen)
-    return [Lift("armature", names, tuple(map(float, total)), *gain(now, changed.limit(integrator)),
+    return [Lift("armature", names, tuple(map(float, total)), *lifted(now, changed.limit(integrator)),
                  holds(tried, at, integrator, dt))]  # fmt: skip
 
 
-def fewest(is_stable: Callable, able: np.ndarray, most: float) -> tuple[np.ndarray, float] | None:
+def needed_changes(is_stable: Callable, able: np.ndarray, most: float) -> tuple[np.ndarray, float] | None:
     """Which of those that can be changed must be, and by the least share that does it, up to `most`; None: none does."""
 
     def least(chosen) -> float:
         low, high = 0.0, most
-        while high - low > BISECTED * high:
+        while high - low > CHANGE_BISECTED * high:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if is_stable(middle, chosen) else (middle, high)
         return high
@@ -148,19 +148,19 @@ def stable(small: Small, integrator: str, dt: float) -> bool:
     return small.holds(integrator, dt) and all(dt < most for most, _ in small.pole_limits(integrator))
 
 
-def gain(now: Limit, changed: Limit) -> tuple[Limit, float | None]:
+def lifted(now: Limit, changed: Limit) -> tuple[Limit, float | None]:
     """The limit with a change, and how much longer a step it allows."""
     return changed, changed.dt / now.dt if changed.dt else None
 
 
 def holds(acting: Acting, at: Posture, integrator: str, dt: float) -> bool:
     """Whether nothing grows in a run."""
-    return not observed.grows(acting, at, integrator, dt)
+    return not observed.grows_in_runs(acting, at, integrator, dt)
 
 
 def rounded(value: float, way: Callable) -> float:
     """To a few digits, upwards or downwards."""
     if not value:
         return 0.0
-    power = 10.0 ** (np.floor(np.log10(abs(value))) - DIGITS + 1)
-    return float(f"{way(value / power) * power:.{DIGITS}g}")
+    power = 10.0 ** (np.floor(np.log10(abs(value))) - CHANGE_DIGITS + 1)
+    return float(f"{way(value / power) * power:.{CHANGE_DIGITS}g}")

@@ -4,21 +4,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ....case import SEED
 from ....engines.mujoco.acting import Acting
 from ....truth.driven import Posture
+from ....truth.step_limits import LIMIT_UP_TO
 
-SEED = 14
-DEVIATION, LEAST, MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
-SHORTEST, LONGEST = 1e-7, 5.0  # s: between which the limit is sought
-COARSE = 4.0  # from one step to the next, upwards, until one fails
-COARSE_STEPS, STEPS = 400, 4000  # of a run: upwards, and where the limit is narrowed
-PARTS = 8  # of a run: after each it ends if the deviation has grown far
-FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
-STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
-# of what changes its sign with every step: it grows if it does so from part to part of the second half, by so much in all, fold;
-# less of it, of the deviation at the start, may be rounding
-STEADY, LEFT = 1.003, 1e-2
-REFINED = 1e-3  # relative, between a step that holds and one that does not
+MOVED_BY, MOVED_LEAST, MOVED_MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
+SOUGHT_FROM = 1e-7  # s: from which the limit is sought
+SOUGHT_BY = 4.0  # from one step to the next, upwards, until one fails
+SOUGHT_STEPS, NARROWED_STEPS = 400, 4000  # of a run: upwards, and where the limit is narrowed
+RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
+GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
+GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+# what changes its sign with every step grows if it does so from part to part after the first two, by so much in all, fold, and
+# at its slowest by so much of its fastest; less of it, of the deviation at the start, is rounding
+GROWN_SLOWLY, GROWN_EVENLY, GROWN_FROM = 1.003, 0.5, 1e-5
+NARROWED = 1e-3  # relative, between a step that holds and one that does not
 
 
 def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | None]:
@@ -27,36 +28,39 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
     Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
     acting: MuJoCo at the posture, with the base that is asked for.
     """
-    count = int(np.log(LONGEST / SHORTEST) / np.log(COARSE)) + 1
-    tried = LONGEST / COARSE ** np.arange(count)[::-1]
-    failed = next((k for k, dt in enumerate(tried) if grows(acting, at, integrator, dt, COARSE_STEPS)), count)
+    count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 1
+    tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]
+    failed = next((k for k, dt in enumerate(tried) if grows_in_runs(acting, at, integrator, dt, SOUGHT_STEPS)), count)
     # a short run may not show what hardly grows: the longest step that held is tried once more
-    while failed and grows(acting, at, integrator, tried[failed - 1]):
+    while failed and grows_in_runs(acting, at, integrator, tried[failed - 1]):
         failed -= 1
     if failed in (0, count):
         return ("none" if failed else "always"), None
     low, high = tried[failed - 1], tried[failed]
-    while high / low > 1.0 + REFINED:
+    while high / low > 1.0 + NARROWED:
         middle = np.sqrt(low * high)
-        low, high = (low, middle) if grows(acting, at, integrator, middle) else (middle, high)
+        low, high = (low, middle) if grows_in_runs(acting, at, integrator, middle) else (middle, high)
     return "finite", float(np.sqrt(low * high))
 
 
-def grows(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = STEPS) -> bool:
+def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
     """Whether a small random deviation from rest grows in a run of so many steps."""
     found = []
     with np.errstate(over="ignore", invalid="ignore"):
-        for off in deviations(acting, at, integrator, dt, steps):
+        for off in run_parts(acting, at, integrator, dt, steps):
             size = np.linalg.norm(off, axis=1).max()
-            if not size <= FAR:  # or no number
+            if not size <= GROWN_FAR:  # or no number
                 return True
             found.append((size, alternating(off)))
     largest, turning = np.array(found).T
-    late = 3 * PARTS // 4
-    if largest[late:].max() > STILL * max(1.0, largest[: PARTS // 2].max()):
+    late = 3 * RUN_PARTS // 4
+    if largest[late:].max() > GROWN_STILL * max(1.0, largest[: RUN_PARTS // 2].max()):
         return True
-    last = turning[PARTS // 2 :]
-    return bool(steps >= STEPS and last[-1] > LEFT and last[-1] > STEADY * last[0] and (np.diff(last) > 0.0).all())
+    last = turning[2:]
+    if steps < NARROWED_STEPS or last.min() < GROWN_FROM:
+        return False
+    growth = np.diff(np.log(last))
+    return bool(growth.sum() > np.log(GROWN_SLOWLY) and growth.min() > GROWN_EVENLY * growth.max())
 
 
 def alternating(off: np.ndarray) -> float:
@@ -69,18 +73,18 @@ def alternating(off: np.ndarray) -> float:
     return float(np.sqrt(weight @ (changes**2).sum(axis=1) / weight.sum()))
 
 
-def deviations(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
+def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
     """Deviations in each part of a run, (steps, n), in units of that at its start.
 
     The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
     by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
     """
-    rng, kept = np.random.default_rng(SEED), counted(acting, at)
+    rng, kept = np.random.default_rng(SEED), measured_speeds(acting, at)
     M = acting.mass_matrix(at.q)
     inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
     root = np.linalg.cholesky(0.5 * (inner + inner.T))
     inertia = np.diag(inner)
-    each = np.clip(DEVIATION * np.sqrt(np.median(inertia) / inertia), LEAST, MOST)
+    each = np.clip(MOVED_BY * np.sqrt(np.median(inertia) / inertia), MOVED_LEAST, MOVED_MOST)
     movement, speed = np.zeros((2, len(M)))
     movement[kept] = each * rng.uniform(-1.0, 1.0, len(kept))
     # what nothing pulls back drifts no farther in the run than it was moved
@@ -88,13 +92,13 @@ def deviations(acting: Acting, at: Posture, integrator: str, dt: float, steps: i
     base = np.setdiff1d(np.arange(len(M)), kept)
     speed[base] = -np.linalg.solve(M[np.ix_(base, base)], M[np.ix_(base, kept)] @ speed[kept])
     start = np.linalg.norm(movement[kept] @ root)
-    parts = [steps // PARTS] * PARTS
-    for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, DEVIATION):
-        filters = off[:, len(M) :] / (DEVIATION * np.sqrt(max(1, off.shape[1] - len(M))))
+    parts = [steps // RUN_PARTS] * RUN_PARTS
+    for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, MOVED_BY):
+        filters = off[:, len(M) :] / (MOVED_BY * np.sqrt(max(1, off.shape[1] - len(M))))
         yield np.hstack([off[:, kept] @ (root / start), filters])
 
 
-def counted(acting: Acting, at: Posture) -> list[int]:
+def measured_speeds(acting: Acting, at: Posture) -> list[int]:
     """The speeds that are measured: with a free base, those that do not follow from the others."""
     base = "locked" if acting.locked else at.bases[0]
     names = set(at.small(base).names)

@@ -14,8 +14,8 @@ from ....truth.driven import Posture
 from ....truth.linear import NEUTRAL
 from ....truth.step_limits import LIMIT_UP_TO, Limit, Small
 
-NEAR = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
-ASIDE = 1e-2  # of a limit: where a step of MuJoCo is asked
+NEAR_LIMIT = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
+ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is asked
 
 
 class Predicted(NamedTuple):
@@ -41,7 +41,7 @@ class Predicted(NamedTuple):
     def is_stable(self, base: str, integrator: str, dt: float) -> bool | None:
         """Whether a step is within the limit; None: none can be said."""
         limit = self.limits[base, integrator]
-        return dt <= (limit.dt or LIMIT_UP_TO) if limit.limit in ("finite", "none") else None
+        return bool(dt <= (limit.dt or LIMIT_UP_TO)) if limit.limit in ("finite", "none") else None
 
     @property
     def pairs(self) -> Iterator[tuple[str, str]]:
@@ -65,7 +65,11 @@ def predicted_at(robot: Robot, name: str, reading: Reading) -> Predicted:
     return Predicted(
         at,
         small,
-        {(base, name): small[base].limit(name) if small[base].names else nothing for base in small for name in INTEGRATORS},
+        {
+            (base, name): small[base].limit(name) if small[base].names else nothing
+            for base in small
+            for name in INTEGRATORS
+        },
     )
 
 
@@ -82,7 +86,7 @@ def limit_rows(found: Sequence[Predicted], dt: float, integrator: str) -> list[d
                         "base": base,
                         "integrator": name,
                         "limit": limit.limit,
-                        "predicted_dt_s": limit.dt,
+                        "predicted_dt_s": limit.dt and float(limit.dt),
                         "observed_dt_s": None,
                         "file_dt_s": dt,
                         "file_integrator": integrator,
@@ -101,8 +105,12 @@ class Steps(NamedTuple):
 
     base: str
     integrator: str
-    apart: float | None  # of the limit: how far the one by the closed form is from that by eigenvalues; None: no closed form
-    beside: float | None  # the largest difference of the spectral radius from that of MuJoCo's own derivative; None: RK4
+    apart: (
+        float | None
+    )  # of the limit: how far the one by the closed form is from that by eigenvalues; None: no closed form
+    beside: (
+        float | None
+    )  # the largest difference of the spectral radius from that of MuJoCo's own derivative; None: RK4
 
 
 def steps_at(one: Predicted, reading: Reading) -> list[Steps]:
@@ -124,7 +132,7 @@ def forms_apart(small: Small, integrator: str, limit: Limit) -> float | None:
     def excess(dt):
         return small.growth(integrator, dt) - 1.0 - NEUTRAL
 
-    low, high = limit.dt * (1.0 - NEAR), limit.dt * (1.0 + NEAR)
+    low, high = limit.dt * (1.0 - NEAR_LIMIT), limit.dt * (1.0 + NEAR_LIMIT)
     if excess(low) <= 0.0 < excess(high):
         by_radius = brentq(excess, low, high, xtol=1e-9 * limit.dt)
     else:
@@ -140,9 +148,11 @@ def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt:
     nv = acting.model.nv
     kept = [k for k in range(2 * nv + acting.model.na) if k % nv not in at.lone or k >= 2 * nv]
     found = []
-    for step in (dt * (1.0 - ASIDE), dt * (1.0 + ASIDE)):
+    for step in (dt * (1.0 - ASIDE_OF_LIMIT), dt * (1.0 + ASIDE_OF_LIMIT)):
         A = acting.transition(at.q, at.u, step, integrator)[np.ix_(kept, kept)]
-        poles = [np.exp(-step / constant) if exact else abs(1.0 - step / constant) for _, constant, exact in small.poles]
+        poles = [
+            np.exp(-step / constant) if exact else abs(1.0 - step / constant) for _, constant, exact in small.poles
+        ]
         stays = 1.0 if at.base or acting.model.na > len(small.poles) else 0.0
         own = max(small.growth(integrator, step), *poles, stays, 0.0)
         found.append(abs(float(np.abs(np.linalg.eigvals(A)).max()) - own))

@@ -1,14 +1,15 @@
-"""Notes on the limits of the step: what limits, where each posture rests, what is left out; and the answer for a step that is asked."""
+"""Notes on the limits of the step: what limits, where each posture rests, what is left out; and the answer to --dt."""
 
 from collections.abc import Iterator, Sequence
 
 from ....engines.mujoco import Reading
 from ....robots import Robot
 from . import response
+from .lifting import Lift
 from .predicted import Predicted, acting_at
-from .sentences import in_seconds, kinds_in_words, known, silence, some_of
+from .sentences import feeds_back, in_digits, in_seconds, known, some_of
 
-AT_REST = 1e-6  # rad or m: a rest so near is the posture
+RESTS_WITHIN = 1e-6  # rad or m: a rest so near is the posture
 FORCES = {"rad": "N m", "m": "N"}
 
 
@@ -16,6 +17,8 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
     """Whether a step with an integrator is stable at each posture, what limits it, and the error of the step response."""
     resting = [one for one in found if one.rests and (one.at.bases[0], integrator) in one.pairs]
     step = f"{in_seconds(dt)} under {integrator}"
+    if not feeds_back(found[0].at.robot.drive):
+        return f"Asked: {step}: no actuator feeds back, so that there is no servo that it could make unstable."
     if not resting:
         return f"Asked: {step}: that cannot be said; no posture is a stable rest under the servos."
     good = [one.name for one in resting if one.is_stable(one.at.bases[0], integrator, dt)]
@@ -28,26 +31,64 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
         text += " (no limit up to 5 s)"
     else:
         text += f" (limit {in_seconds(limit.dt, dt)}, {limit.joint}" + f", at {least.name}" * (len(found) > 1) + ")"
-    errors = [
-        response.error(acting_at(reading, one.at, one.at.bases[0]), one.at, one.at.bases[0], integrator, dt)
-        for one in resting
-        if one.name in good
-    ]
+    errors = [response_error_at(one, one.at.bases[0], integrator, dt, reading) for one in resting if one.name in good]
     errors = [error for error in errors if error is not None]
-    return text + (f"; the step response is at most {percent(max(errors))} off" if errors else "") + "."
+    where = "where it is stable " * bool(bad)
+    return text + (f"; {where}the step response is at most {percent(max(errors))} off" if errors else "") + "."
+
+
+def response_error_at(one: Predicted, base: str, integrator: str, dt: float, reading: Reading) -> float | None:
+    """The error of the step response, see response.response_error; None also for a step that is too fine to be run."""
+    if response.LASTS / dt > response.CURVE_MOST:
+        return None
+    return response.response_error(acting_at(reading, one.at, base), one.at, base, integrator, dt)
 
 
 def percent(ratio: float) -> str:
     """A ratio in %."""
-    return f"{100.0 * ratio:.2g} %"
+    return f"{in_digits(100.0 * ratio)} %"
 
 
-def remarks(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence[dict]) -> list[str]:
+INERTIAS = {"rad": "kg m2", "m": "kg"}
+
+
+def lifts_in_words(lifted: Sequence[tuple[Predicted, str, list[Lift]]], dt: float) -> Iterator[str]:
+    """What would make the file's step stable with an integrator that it is not stable with; of each only what held in a run."""
+    for one, integrator, lifts in lifted:
+        held = [lift for lift in lifts if lift.tried]
+        others = [
+            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{in_digits(lift.factor)} times the step'}"
+            for lift in held
+            if lift.kind == "integrator"
+        ]
+        units = dict(zip(one.at.robot.coordinates.speeds, one.at.robot.coordinates.units))
+        changes = []
+        for lift in held:
+            if lift.kind == "kv":
+                changes.append(f"kv at most {some_of(each_value(lift, [''] * len(lift.names)))}")
+            elif lift.kind == "armature":
+                kinds = [INERTIAS[units[name]] for name in lift.names]
+                changes.append(f"armature of at least {some_of(each_value(lift, kinds))}")
+        texts = [f"with another integrator: {'; '.join(others)}"] * bool(others)
+        texts += [f"with {integrator} {', or '.join(changes)}"] * bool(changes)
+        where = f"{in_seconds(dt)} at {one.name}"
+        if texts:
+            yield f"What would make {where} stable, each tried in a run of MuJoCo: {'. Or '.join(texts)}."
+        else:
+            yield f"Nothing was found that makes {where} stable with {integrator}: no other integrator, kv or armature."
+
+
+def each_value(lift: Lift, units: Sequence[str]) -> list[str]:
+    """0.21 (joint7), for all that a change takes."""
+    return [f"{value:g} {unit}".rstrip() + f" ({name})" for name, value, unit in zip(lift.names, lift.values, units)]
+
+
+def servo_notes(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence[dict]) -> list[str]:
     """All other sentences, in the order in which they are of use."""
     robot = found[0].at.robot
     return [
-        *limits_in_words(rows),
-        *costs_in_words(rows),
+        *least_limits_in_words(rows),
+        *step_costs_in_words(rows),
         *seen_in_words(rows),
         *bases_in_words(rows),
         *differences_in_words(full),
@@ -56,30 +97,31 @@ def remarks(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence[dic
     ]
 
 
-def limits_in_words(rows: Sequence[dict]) -> Iterator[str]:
+def least_limits_in_words(rows: Sequence[dict]) -> Iterator[str]:
     """Of each integrator the least limit, and the joint and the mode that set it."""
     texts = []
     for integrator in dict.fromkeys(row["integrator"] for row in rows):
         of = known(rows, integrator)
         if of and of[0]["limit"] == "finite":
             row = of[0]
-            mode = f"a {row['mode_kind']} mode of {row['mode_per_s']:.3g} per second"
+            mode = f"a {row['mode_kind']} mode of {in_digits(row['mode_per_s'], 3)} per second"
             texts.append(
                 f"{integrator} {in_seconds(row['predicted_dt_s'])} at {row['posture']} ({row['limiting_joint']}, {mode})"
             )
         elif of:
             texts.append(f"{integrator} none up to 5 s")
     if texts:
-        yield f"Under its own servos the least limit of the step of any posture: {'; '.join(texts)}."
+        yield f"With its actuators as the file states them, the least limit of the step of any posture: {'; '.join(texts)}."
 
 
-def costs_in_words(rows: Sequence[dict]) -> Iterator[str]:
+def step_costs_in_words(rows: Sequence[dict]) -> Iterator[str]:
     """The error of the step response at the file's step, by integrator."""
     texts = []
     for integrator in dict.fromkeys(row["integrator"] for row in rows):
         errors = [row["step_response_error"] for row in known(rows, integrator)]
         errors = [error for error in errors if error is not None]
-        texts += [f"{integrator} {percent(max(errors))}"] * bool(errors)
+        if errors:
+            texts.append(f"{integrator} {percent(max(errors))}")
     if texts:
         dt = in_seconds(rows[0]["file_dt_s"])
         yield (
@@ -111,7 +153,7 @@ def bases_in_words(rows: Sequence[dict]) -> Iterator[str]:
         if base == "free" and dt and limits[posture, integrator, "locked"]
     ]
     if ratios:
-        low, high = (f"{ratio:.3g}" for ratio in (min(ratios), max(ratios)))
+        low, high = (f"{ratio:.3f}" for ratio in (min(ratios), max(ratios)))
         span = f"{low} times" if low == high else f"{low} to {high} times"
         yield (
             "The robot floats: its limits are without gravity, with the base free to give way. Those with the base locked are "
@@ -141,7 +183,7 @@ def differences_in_words(full: Sequence[dict]) -> Iterator[str]:
 def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator[str]:
     """Where the postures rest, and which have none."""
     unit = "/".join(dict.fromkeys(found[0].at.robot.coordinates.units))
-    moved = [f"{one.name} {one.at.moved:.2g}" for one in found if one.rests and one.at.moved > AT_REST]
+    moved = [f"{one.name} {one.at.moved:.2g}" for one in found if one.rests and one.at.moved > RESTS_WITHIN]
     if moved:
         yield (
             f"Under their servos postures sink to a rest near them, which is what is looked at; from the stated one it is, in "
@@ -150,12 +192,12 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
     for one in found:
         if not one.rests:
             left, forces = one.at.rest[1], " or ".join(dict.fromkeys(FORCES[u] for u in one.at.robot.coordinates.units))
-            yield f"{one.name} is not at rest under its servos, and no rest was found near it: {left:.3g} {forces} are left."
+            yield f"{one.name} is not at rest under its actuators, and no rest was found near it: {left:.3g} {forces} are left."
         else:
             limit = one.limits[one.at.bases[0], next(iter(one.limits))[1]]
             if limit.limit == "saddle":
                 yield (
-                    f"{one.name} is a saddle under its servos: whatever the step, it is left at {limit.rate:.3g} per second, "
+                    f"{one.name} is a saddle under its actuators: whatever the step, it is left at {limit.rate:.3g} per second, "
                     f"{limit.joint} first."
                 )
             elif limit.limit == "drifts":
@@ -174,9 +216,7 @@ def drive_in_words(robot: Robot, found: Sequence[Predicted]) -> Iterator[str]:
     for one in found:
         if one.rests and (one.at.cut.forces or one.at.cut.sums):
             cut = [f"{drive.actuators[i].name} at {force:.3g}" for i, force in one.at.cut.forces.items()]
-            cut += [
-                f"the sum at {robot.coordinates.speeds[k]} at {force:.3g}" for k, force in one.at.cut.sums.items()
-            ]
+            cut += [f"the sum at {robot.coordinates.speeds[k]} at {force:.3g}" for k, force in one.at.cut.sums.items()]
             yield f"At {one.name} the range of their force cuts {some_of(cut)}: there they have neither stiffness nor damping."
     if by_differences := found[0].at.driven.differenced:
         yield (

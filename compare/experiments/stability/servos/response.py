@@ -5,17 +5,19 @@ from scipy.linalg import expm
 
 from ....engines.mujoco.acting import Acting
 from ....truth.driven import Posture
-from .observed import counted
+from .observed import measured_speeds
 
 LASTS = 0.2  # s, of a response; at least one step
-FARTHEST = 1e-4  # rad or m: how far a response, and the posture at rest, may move
-FAINT = 1e-3  # of the largest response, rad or m: joints of a kind that answer less count as if they did so much
-DIVERGED = 100.0  # fold, of the largest response
-FINEST, FINER = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
-MOST_STEPS = 50_000  # of a run of a curve
+RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, may move
+RESPONSE_LEAST = (
+    1e-3  # of the largest response, rad or m: joints of a kind that answer less count as if they did so much
+)
+RESPONSE_MOST = 100.0  # fold, of the largest response
+CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
+CURVE_MOST = 50_000  # of a run of a curve
 
 
-def error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
+def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
     """The largest difference from the exact response over the largest response, in 0.2 s, a ratio.
 
     Of rad and of m each by themselves, the worse of both; None: no servo, or it diverged. The targets of all servos jump by the
@@ -26,21 +28,22 @@ def error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) ->
     if not jump.any():
         return None
     steps = max(1, round(LASTS / dt))
-    kept = counted(acting, at)
+    kept = measured_speeds(acting, at)
     exact = exact_response(at, base, jump, dt, steps)
-    size = FARTHEST / max(np.abs(exact).max(), 1e-300)
+    size = RESPONSE_SIZE / max(np.abs(exact).max(), 1e-300)
     with np.errstate(over="ignore", invalid="ignore"):
         there, back = (
             next(acting.deviations(at.q, at.u, dt, integrator, [steps], jump=sign * size * jump))
             for sign in (1.0, -1.0)
         )
         off = np.abs((there - back)[:, kept] / (2.0 * size) - exact[:steps])
-    if not off.max() <= DIVERGED * np.abs(exact).max():  # or no number
+    if not off.max() <= RESPONSE_MOST * np.abs(exact).max():  # or no number
         return None
     units = np.array(at.robot.coordinates.units)[kept]
     largest = np.abs(exact).max()
     ratios = [
-        off[:, units == unit].max() / max(np.abs(exact[:, units == unit]).max(), FAINT * largest) for unit in set(units)
+        off[:, units == unit].max() / max(np.abs(exact[:, units == unit]).max(), RESPONSE_LEAST * largest)
+        for unit in set(units)
     ]
     return float(max(ratios))
 
@@ -50,9 +53,11 @@ def curve(
 ) -> list[tuple[float, float]]:
     """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response."""
     end = min(limit or LASTS, LASTS)
-    first = max(min(file_dt, end) / FINEST, LASTS / MOST_STEPS)
-    count = int(np.ceil(np.log(end / first) / np.log(FINER))) + 1
-    found = [(float(dt), error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))]
+    first = max(min(file_dt, end) / CURVE_FROM, LASTS / CURVE_MOST)
+    count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
+    found = [
+        (float(dt), response_error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))
+    ]
     return [(dt, off) for dt, off in found if off is not None]
 
 
