@@ -86,7 +86,7 @@ def begin(setup: Setup) -> dict | None:
 def least_at(resting: Sequence[Predicted], integrator: str, dt: float) -> Predicted | None:
     """The posture with the least limit of an integrator, if a step is not stable there; else None."""
     bad = [one for one in resting if one.is_stable(one.at.bases[0], integrator, dt) is False]
-    return min(bad, key=lambda one: one.limits[one.at.bases[0], integrator].dt, default=None)
+    return min(bad, key=lambda one: one.limits[one.at.bases[0], integrator].dt or LIMIT_UP_TO, default=None)
 
 
 # in a further process
