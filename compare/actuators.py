@@ -5,7 +5,7 @@ with u its control, or its activation. MuJoCo documentation, computation, actuat
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -146,6 +146,12 @@ class Drive:
     def servos(self) -> tuple[Actuator, ...]:
         """The actuators that have a target."""
         return tuple(one for one in self.actuators if one.is_servo)
+
+    @property
+    def without_ranges(self) -> "Drive":
+        """With forces of any size."""
+        actuators = tuple(replace(one, force_range=None) for one in self.actuators)
+        return replace(self, actuators=actuators, ranges={}, tendon_ranges={})
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture: what its keyframe states, else the targets that are the posture; in their ranges.
