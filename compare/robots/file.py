@@ -142,7 +142,9 @@ def servo_scenes(
     followed = ("speed",) if least <= count else ()
     return [
         Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **given),
-        Scene(f"{start}, step of the servos", start, "servos", moved, tags=("own", "servos", *followed), **given),
+        Scene(
+            f"{start}, step of the servos", start, "servos", targets=moved, tags=("own", "servos", *followed), **given
+        ),
     ]
 
 

@@ -27,7 +27,7 @@ from .settings import (
     coarsest_steps,
     followed,
     methods,
-    methods_of,
+    methods_following,
     regular_of,
     scenes_of,
     schemes_in,
@@ -114,7 +114,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "doubles": setup.robot.is_read}
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
-    taking = [method for method in methods_of(setup, cases, which) if whole or method.engine in COMPARED]
+    taking = [method for method in methods_following(setup, cases, which) if whole or method.engine in COMPARED]
     fixed = [method for method in taking if not method.adaptive]
     falling = names if whole else [regular.name]
     # the steps of a robot of many joints may be too few for that

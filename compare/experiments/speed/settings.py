@@ -87,7 +87,7 @@ def methods(
     ]
 
 
-def methods_of(setup: Setup, cases: Sequence[Case], which: str) -> list[Method]:
+def methods_following(setup: Setup, cases: Sequence[Case], which: str) -> list[Method]:
     """The methods that follow any of the cases, each once."""
     found = {}
     for case in cases:
