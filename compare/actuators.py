@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+ON_EDGE = 1e-9  # m or rad: so near the end of a dead band a tendon is on its edge
+
 
 @dataclass(frozen=True)
 class Actuator:
@@ -111,8 +113,8 @@ class Tendon(NamedTuple):
         return self.stiffness * max(abs(length), abs(self.low), abs(self.high)) if self.pulls(length) else 0.0
 
     def pulls(self, length: float) -> bool:
-        """Whether its spring does something at a length."""
-        return not self.low < length < self.high
+        """Whether its spring does something at a length; on the edge of its dead band it does, to one side."""
+        return not self.low + ON_EDGE < length < self.high - ON_EDGE
 
 
 @dataclass(frozen=True)
