@@ -64,6 +64,10 @@ class Actuator:
         """At rest, before the force range cuts it."""
         return (self.gain[0] + self.gain[1] * length) * u + self.bias[0] + self.bias[1] * length
 
+    def largest(self, u: float, length: float) -> float:
+        """Of what the force is summed from: rounding is relative to it."""
+        return max(abs(self.gain[0] * u), abs(self.gain[1] * length * u), abs(self.bias[0]), abs(self.bias[1] * length))
+
     def stiffness(self, u: float) -> float:
         """-d force/dl."""
         return -(self.gain[1] * u + self.bias[1])
@@ -101,6 +105,10 @@ class Tendon(NamedTuple):
 
     def force(self, length: float) -> float:
         return self.stiffness * (min(self.high - length, 0.0) + max(self.low - length, 0.0))
+
+    def largest(self, length: float) -> float:
+        """Of what the force is summed from."""
+        return self.stiffness * max(abs(length), abs(self.low), abs(self.high)) if self.pulls(length) else 0.0
 
     def pulls(self, length: float) -> bool:
         """Whether its spring does something at a length."""

@@ -60,7 +60,7 @@ def unstable_in_words(unstable: Sequence[Check]) -> str:
         else " and one more posture" * (len(unstable) > 1)
     )
     step, limit = (f"{1e3 * number:.4g} ms" for number in (worst.value, worst.tolerance))
-    return f"not stable at its own step of {step} at {worst.scene}{more}: the limit is {limit} {worst.note}"
+    return f"not stable at its own step of {step} at {worst.scene}{more}: the limit is {limit} {worst.note}".rstrip()
 
 
 def passed(sections: Sequence[Section]) -> bool:

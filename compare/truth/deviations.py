@@ -7,7 +7,7 @@ import numpy as np
 
 SYMMETRIC = 1e-7  # of the largest entry: what a matrix and its transpose may differ by, and what is nothing beside it
 VANISHING = 1e-10  # of the largest stiffness or damping, in the units of M: nothing
-SLOW = 1e-8  # 1/s2 and 1/s: and so is less than this
+CREEPING = 1e-8  # 1/s2 and 1/s: and so is less than this
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Deviations:
         moves = vectors[:n].astype(complex)
         return values.astype(complex), moves / np.maximum(np.linalg.norm(moves, axis=0), 1e-300)
 
-    @property
+    @cached_property
     def drifts(self) -> bool:
         """Whether a movement, other than of a free base, meets neither stiffness nor damping."""
         both = np.vstack([self.stiff / self.largest(self.stiff), self.damped / self.largest(self.damped)])
@@ -99,9 +99,9 @@ class Deviations:
     @staticmethod
     def largest(matrix: np.ndarray) -> float:
         """The largest entry, beside which what is below VANISHING is nothing; a matrix of nothing but rounding is nothing."""
-        return max(np.abs(matrix).max(initial=0.0), SLOW / VANISHING)
+        return max(np.abs(matrix).max(initial=0.0), CREEPING / VANISHING)
 
-    @property
+    @cached_property
     def growing(self) -> tuple[float, np.ndarray] | None:
         """The rate, 1/s, and the movement of the mode that grows fastest by itself, or None."""
         if not self.names:

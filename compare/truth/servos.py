@@ -1,8 +1,7 @@
 """The equations of motion at rest under a robot's own servos: M x'' + D x' + K x = 0 for small deviations x."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from tmt.methods import by_speed
 
 from ..actuators import Cut, Drive
 from ..case import Coordinates
-from .derivative import stiffness
+from .weight import Weight, spring_slope, weight
 
 TURNED_BY = 1e-6  # rad or m, of central differences where a moment turns with the posture
 SINGULAR = 1e-9  # of the largest stiffness, or damping: less is none
@@ -75,25 +74,18 @@ class Driven:
     def coordinates(self) -> Coordinates:
         return Coordinates(self.tree.hinge_names, self.tree.kind)
 
-    @cached_property
-    def weight(self) -> tmt.Tree:
-        """The tree whose bias at rest is what gravity does beside the springs, after compensation; masses may not be below 0."""
-        gravity = (0.0, 0.0, 0.0) if self.weightless else self.tree.gravity
-        return replace(self.tree, gravity=gravity)
+    def weights(self, q: np.ndarray) -> tuple[Weight, Weight]:
+        """What gravity does at a posture, and what of it is taken away."""
+        tree, parts = self.tree, self.drive.compensation or (0.0,) * len(self.tree.mass)
+        gravity = (0.0, 0.0, 0.0) if self.weightless else tree.gravity
+        lighter = [mass * part for mass, part in zip(tree.mass, parts)]
+        return weight(tree, q, tree.mass, gravity), weight(tree, q, lighter, gravity)
 
-    @cached_property
-    def compensated(self) -> tmt.Tree | None:
-        """The tree of what is taken away from the weight; None: nothing."""
-        parts = self.drive.compensation
-        if self.weightless or not any(parts) or not any(self.tree.gravity):
-            return None
-        n, nv = len(self.tree.parent), self.coordinates.nv
-        masses = tuple(mass * part for mass, part in zip(self.tree.mass, parts))
-        # rotors so that nothing is too light to be a tree; at rest they do nothing
-        return replace(self.tree, mass=masses, armature=(1.0,) * nv, stiffness=(0.0,) * n)
+    def along(self, q: np.ndarray, differenced: bool = False) -> Along:
+        """The transmissions of the actuators, then the tendons, at a posture (nq,).
 
-    def along(self, q: np.ndarray) -> Along:
-        """The transmissions of the actuators, then the tendons, at a posture (nq,)."""
+        differenced: with what only differences tell, see Along; else slopes are moments, and turns 0.
+        """
         places = self.coordinates.places
         single = np.zeros(places.nv)
         for kind, at, by in places.joints:
@@ -105,6 +97,7 @@ class Driven:
         lengths, slopes, turns = moments @ single, moments.copy(), np.zeros((len(every), n, n))
         if turning and self.ask:
             lengths[turning], moments[turning] = (found[turning] for found in self.ask(q))
+        if turning and self.ask and differenced:
             for j, step in enumerate(TURNED_BY * np.eye(n)):
                 ahead, behind = (self.ask(self.coordinates.move(q, sign * step)) for sign in (1.0, -1.0))
                 slopes[turning, j], turns[turning, :, j] = (
@@ -145,8 +138,8 @@ class Driven:
         """The sum of the actuators' forces at each speed, (nv,), before its range cuts it."""
         count = len(self.drive.actuators)
         total, lifted = pulls.forces[:count] @ along.moments[:count], list(self.drive.lifted)
-        if self.compensated and lifted:
-            total[lifted] += tmt.gravity_balance(q, self.compensated)[lifted]
+        if lifted:
+            total[lifted] += self.weights(q)[1].torque[lifted]
         return total
 
     def sums(self, total: np.ndarray) -> dict[int, float]:
@@ -172,23 +165,27 @@ class Driven:
         return is_actuator & along.moments.any(axis=1) & ~elsewhere
 
     def forces(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
-        """The sum of all forces at rest, (nv,) N m or N, and the size of the largest single one."""
+        """The sum of all forces at rest, (nv,) N m or N, and the largest of what they are summed from."""
         along, count = self.along(q), len(self.drive.actuators)
         pulls = self.pulls(along, u)
         actuated = self.actuated(q, along, pulls)
         for speed, left in self.sums(actuated).items():
             actuated[speed] = left
-        each = along.moments * pulls.forces[:, None]
-        parts = [actuated, each[count:].sum(axis=0)]
-        parts += [-tmt.gravity_balance(q, self.weight), -tmt.spring_torque(q, self.tree)]
-        if self.compensated:
-            parts.append(tmt.gravity_balance(q, self.compensated))
-            parts[-1][[*self.drive.lifted, *self.drive.unlifted]] = 0.0
-        return sum(parts), float(max([np.abs(each).max(initial=0.0), *(np.abs(part).max() for part in parts)]))
+        of_tendons = pulls.forces[count:] @ along.moments[count:]
+        whole, away = self.weights(q)
+        away.torque[[*self.drive.lifted, *self.drive.unlifted]] = 0.0
+        springs = tmt.spring_torque(q, self.tree)
+        sizes = [one.largest(x, length) for one, x, length in zip(self.drive.actuators, u, along.lengths) if one.acts]
+        sizes += [one.largest(length) for one, length in zip(self.drive.tendons, along.lengths[count:])]
+        levers = np.abs(along.moments[[one.acts for one in self.drive.actuators] + [True] * len(self.drive.tendons)])
+        by_drive = (levers * np.array(sizes).reshape(-1, 1)).max(initial=0.0)
+        by_springs = np.abs(by_speed(self.tree, self.tree.stiffness)).max() * max(1.0, np.abs(q).max())
+        total = actuated + of_tendons - whole.torque + away.torque - springs
+        return total, float(max(by_drive, by_springs, whole.size, away.size))
 
     def slopes(self, q: np.ndarray, u: np.ndarray) -> Slopes:
         """Derivatives of the forces at rest at a posture, under u of each actuator."""
-        along, count = self.along(q), len(self.drive.actuators)
+        along, count = self.along(q, differenced=True), len(self.drive.actuators)
         pulls, J = self.pulls(along, u), along.moments
         sums = self.sums(self.actuated(q, along, pulls))
         heard = ~self.silenced(along, sums)
@@ -198,17 +195,16 @@ class Driven:
         lost = np.einsum("ki,k,kj->kij", J, pulls.damping * heard, J)
         always = lost[count:].sum(axis=0) + np.diag(np.add(self.tree.damping, self.drive.damping or 0.0))
         acting, braked = each[:count].sum(axis=0), lost[:count].sum(axis=0)
-        K = stiffness(self.weight, q)  # with the springs of the joints
         springs = (
             np.diag(by_speed(self.tree, self.tree.stiffness)) + (J.T * np.maximum(pulls.stiffness * heard, 0.0)) @ J
         )
         speeding = lost[pulls.damping < 0.0].sum(axis=0)
         uncut = always + braked
-        if self.compensated:
-            lifted = -stiffness(self.compensated, q)
-            lifted[list(self.drive.unlifted)] = 0.0
-            by_actuators = np.isin(np.arange(len(K)), self.drive.lifted)[:, None]
-            K, acting = K + np.where(by_actuators, 0.0, lifted), acting + np.where(by_actuators, lifted, 0.0)
+        whole, away = self.weights(q)
+        away.slope[list(self.drive.unlifted)] = 0.0
+        acting[list(self.drive.lifted)] -= away.slope[list(self.drive.lifted)]
+        away.slope[list(self.drive.lifted)] = 0.0
+        K = whole.slope - away.slope + spring_slope(self.tree, q)
         acting[list(sums)], braked[list(sums)] = 0.0, 0.0
         return Slopes(K + acting + each[count:].sum(axis=0), always + braked, uncut, springs, uncut - speeding)
 

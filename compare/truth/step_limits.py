@@ -25,7 +25,8 @@ STEPS_A_DECADE = 12  # steps for each power of ten, where no closed form tells t
 REFINED = 1e-10  # of a limit
 SPLIT = 1e-6  # of a factor 1
 SAME_SHAPE = 0.9  # of the largest overlap: modes of one shape
-POLE, POLE_RK4 = 2.0, 2.7852935634052816  # dt over the time constant of a filter, up to which it is stable
+POLE = 2.0  # dt over the time constant of a filter, up to which it is stable
+POLE_RK4 = 2.7852935634052816  # and of RK4
 
 
 class Limit(NamedTuple):

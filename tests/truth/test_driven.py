@@ -53,13 +53,13 @@ def assert_the_same_map(source):
             assert off <= LINEAR.get(integrator, 1e-8) * max(1.0, np.abs(theirs).max()), integrator
 
 
-def assert_limits(source):
+def assert_limits(source, integrators=STEPPED):
     """Below a limit nothing grows in MuJoCo's step, above it something does; how many are finite."""
     posture, _ = at(source)
     finite = 0
     for base in posture.bases:
         small = posture.small(base)
-        for integrator in STEPPED:
+        for integrator in integrators:
             limit = small.limit(integrator)
             if limit.limit == "finite" and limit.shape is not None:
                 finite += 1
@@ -182,7 +182,8 @@ def test_a_free_body_that_stands_alone_is_left_out_and_one_that_is_pulled_is_not
     rope = '<tendon><spatial stiffness="9" springlength="0.5"><site site="r"/><site site="tip"/></spatial></tendon>'
     source = DRONE.format(more=ROD, actuators=servo).replace("<actuator>", rope + "<actuator>")
     assert at(source)[0].bases == ("free", "locked")
-    assert_limits(source)
+    # implicitfast up to MuJoCo 3.10 turns a body without joints on it by the mean of two speeds
+    assert assert_limits(source, ("Euler", "implicit")) == 4
 
 
 def test_a_body_that_flies_alone_has_no_locked_base():
@@ -220,6 +221,7 @@ def test_no_file_of_gymnasium_is_called_stable_or_unstable_without_a_rest(path):
         if posture.rest[1]:
             continue
         force, size = posture.driven.forces(posture.q, posture.u)
+        assert size > 0.0 or not force.any()
         assert np.abs(force).max() <= 1e-9 * size
         for base in posture.bases:
             small = posture.small(base)

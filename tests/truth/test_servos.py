@@ -165,6 +165,20 @@ def test_a_servo_that_is_too_weak_for_its_range_finds_no_rest():
         assert (driven.at_rest(np.zeros(1), np.zeros(1))[1] == 0.0) is rests
 
 
+def test_what_only_rounding_leaves_is_a_rest():
+    """Straight up, at angles that are no numbers in binary; and at the targets of servos whose gains are none."""
+    text = arm("".join(f'<general joint="{name}" gainprm="0.7" biastype="affine" biasprm="0.1 -0.3 0"/>' for name in "ab"),
+               flags='gravity="disable"')  # fmt: skip
+    driven, _ = driven_of(text)
+    q = np.array([0.1, 0.7])
+    u = np.array([one.target(angle) for one, angle in zip(driven.drive.actuators, q)])
+    assert driven.at_rest(q, u)[1] == 0.0
+    rod = '<body euler="0.3 0 0"><joint axis="0 1 0" ref="0.1"/><geom size="0.1" pos="0.1 0 0.7"/></body>'
+    driven, _ = driven_of(f'<mujoco><compiler angle="radian"/><worldbody>{rod}</worldbody></mujoco>')
+    up, left = driven.at_rest(np.array([0.1 - np.arctan(0.1 / 0.7)]), np.zeros(0))
+    assert left == 0.0 and driven.at_rest(up, np.zeros(0))[1] == 0.0
+
+
 def test_a_dead_band_has_no_spring_inside_and_one_outside():
     text = arm('<motor joint="a"/>', tendon='stiffness="50" springlength="0.1 0.4"', flags='gravity="disable"')
     driven, _ = driven_of(text)

@@ -195,14 +195,15 @@ def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
 
     The compiled model has zeros where a file states none: the file tells. Of a model compiled elsewhere all zeros are none.
     """
-    keys = None
+    spec = None  # its keyframes live as long as it does
     if source is not None:
         with suppress(ValueError):
-            keys = editable(source).keys
+            spec = editable(source)
+    keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None
     found = {}
     for k in range(m.nkey):
-        control = len(keys[k].ctrl) > 0 if keys and len(keys) == m.nkey else m.key_ctrl[k].any()
-        activation = len(keys[k].act) > 0 if keys and len(keys) == m.nkey else m.key_act[k].any()
+        control = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
+        activation = len(keys[k].act) > 0 if keys else m.key_act[k].any()
         if m.nu and (control or activation):
             found[k] = tuple(stated_u(m, k, i, control, activation) for i in range(getattr(m, "nactuator", m.nu)))
     return found

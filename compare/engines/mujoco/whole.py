@@ -29,15 +29,16 @@ def whole_run(
     integrator: str,
     lasts: float,
     last: float,
+    speed: np.ndarray | float = 0.0,
 ) -> WholeRun:
-    """A run of so many seconds from rest at q, under u of each actuator, which stays; speeds are those of the last seconds.
+    """A run of so many seconds from q, by default at rest, under u of each actuator, which stays; judged in its last seconds.
 
-    u stands in controls, and in activations. It is given anew at every step: MuJoCo takes it away when it resets.
+    u stands in controls, and in activations. Where MuJoCo resets, the controls and the speed are given anew.
     """
     m = mujoco.MjModel.__copy__(model)
     m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
     data, controls = mujoco.MjData(m), np.zeros(m.nu)
-    data.qpos[:] = q
+    data.qpos[:], data.qvel[:] = q, speed
     for i, (one, value) in enumerate(zip(drive.actuators, u)):
         place, inputs = control_of(m, i)
         if inputs == 1:
@@ -53,6 +54,7 @@ def whole_run(
         number = int(data.warning.number.sum())
         if data.time <= before:  # it begins to count anew
             resets, seen = resets + 1, 0
+            data.qvel[:] = speed
         warnings, seen = warnings + number - seen, number
         if step >= judged:
             squares.append(data.qvel @ data.qvel / m.nv)

@@ -90,3 +90,10 @@ def test_friction_calms_what_is_unstable():
     )
     at, reading = posture_of(stuck)
     assert full_model.rows(reading.model, at, 0.002, {"Euler": False})[0]["calm"]
+
+
+def test_what_is_unstable_and_rests_exactly_does_not_pass_for_calm():
+    at, reading = posture_of(hinge(20.0, 300.0))
+    assert at.moved == 0.0
+    rows = full_model.rows(reading.model, at, 0.002, {"Euler": False, "implicitfast": True})
+    assert [row["calm"] for row in rows] == [False, True]

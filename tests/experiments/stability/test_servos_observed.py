@@ -6,7 +6,14 @@ from models import PATHS
 from servo_models import FILTERED, FLOATING, FORK, INERTIA, acting_of, hinge, posture_of
 
 from compare.experiments.stability.servos import observed
-from compare.experiments.stability.servos.observed import alternating, grows_in_runs, measured_speeds, run_parts
+from compare.experiments.stability.servos.observed import (
+    alternating,
+    grows_in_runs,
+    hardly_grows,
+    measured_speeds,
+    run_parts,
+    sizes_in_a_run,
+)
 
 
 def limit_of(source, integrator, base=None):
@@ -86,3 +93,23 @@ def test_what_changes_its_sign_is_told_from_swings():
     assert alternating(((-1.0) ** n)[:, None]) == pytest.approx(1.0, rel=1e-6)
     assert alternating(np.cos(0.1 * n)[:, None]) < 1e-5
     assert alternating(np.array([(-1.0) ** n, 0.0 * n]).T * 3.0) == pytest.approx(3.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("turning, growing", [
+    (0.1 * 1.001 ** np.arange(8), True),
+    (0.1 * 1.0005 ** np.arange(8), False),  # by too little in all
+    (0.1 * np.array([9.0, 5.0, 1.0, 1.001, 1.002, 1.003, 1.004, 1.005]), True),  # what decays first does not count
+    (0.1 * np.array([1.0, 1.0, 1.0, 1.001, 1.002, 1.0021, 1.003, 1.004]), False),  # not evenly
+    (1.1e-5 * 1.001 ** np.arange(8), True), (0.9e-5 * 1.001 ** np.arange(8), False),
+])  # fmt: skip
+def test_hardly_growing_is_told_by_evenness(turning, growing):
+    assert hardly_grows(turning) is growing
+
+
+def test_rounding_that_seems_to_grow_is_asked_again_with_a_larger_deviation():
+    at, reading = posture_of(hinge(20.0, 40.0, joint='damping="39"'))
+    acting = acting_of(at, reading)
+    dt = 1.005 * of_euler(20.0, 40.0, 39.0)
+    once, again = (sizes_in_a_run(acting, at, "Euler", dt, 4000, times)[1] for times in (1.0, 30.0))
+    assert hardly_grows(once) and hardly_grows(again) and again == pytest.approx(once, rel=1e-3)
+    assert grows_in_runs(acting, at, "Euler", dt)

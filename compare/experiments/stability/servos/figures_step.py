@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from ....judge.check import Result
-from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH, plain
+from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH
 from ....robots import Robot
 from .response import LASTS
 from .sentences import in_digits, in_seconds
@@ -42,13 +42,17 @@ def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     ax.set(xlabel="dt, s", ylabel="error of the step response, ratio")
     ax.axvline(drawn["rows"][0]["file_dt_s"], color="black", linewidth=0.6, linestyle=":")
     fig.legend(loc="outside upper center", ncols=2)
-    errors = {name: row["step_response_error"] for name, row in rows.items() if row["step_response_error"] is not None}
+    errors = {
+        name: row["step_response_error"]
+        for name, row in rows.items()
+        if row["step_response_error"] is not None and row["stable_at_file_dt"]
+    }
     best = min(errors, key=errors.get, default=None)
     dt = in_seconds(drawn["rows"][0]["file_dt_s"])
     caption = (
-        f"What a step costs beside being stable, at {plain(drawn['posture'])}: all targets of servos are moved by a step, and "
+        f"What a step costs beside being stable, at {drawn['posture']}: all targets of servos are moved by a step, and "
         f"MuJoCo's response over {LASTS:g} s is compared with the exact one of the linear equations; largest difference over "
-        "largest response. A line ends with a mark where the next step is not stable. "
+        "largest response. A mark is the last stable step. "
     )
     if own and own["step_response_error"]:
         caption += (

@@ -124,8 +124,8 @@ def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: s
 def needed_changes(is_stable: Callable, able: np.ndarray, most: float) -> tuple[np.ndarray, float] | None:
     """Which of those that can be changed must be, and by the least share that does it, up to `most`; None: none does."""
 
-    def least(chosen) -> float:
-        low, high = 0.0, most
+    def least(chosen, high) -> float:
+        low = 0.0
         while high - low > CHANGE_BISECTED * high:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if is_stable(middle, chosen) else (middle, high)
@@ -133,12 +133,12 @@ def needed_changes(is_stable: Callable, able: np.ndarray, most: float) -> tuple[
 
     if not is_stable(most, able):
         return None
-    share, chosen = least(able), able
+    share, chosen = least(able, most), able
     for one in able:
         fewer = chosen[chosen != one]
         if len(fewer) and is_stable(share, fewer):
             chosen = fewer
-    return chosen, least(chosen)
+    return chosen, least(chosen, share)
 
 
 def stable(small: Small, integrator: str, dt: float) -> bool:

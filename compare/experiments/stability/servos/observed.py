@@ -17,8 +17,9 @@ RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
 # what changes its sign with every step grows if it does so from part to part after the first two, by so much in all, fold, and
-# at its slowest by so much of its fastest; less of it, of the deviation at the start, is rounding
+# at its slowest by so much of its fastest; less of it, of the deviation at the start, is not looked at
 GROWN_SLOWLY, GROWN_EVENLY, GROWN_FROM = 1.003, 0.5, 1e-5
+ASKED_AGAIN = 30.0  # times the deviation, where that decides
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
 
 
@@ -45,22 +46,37 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
 
 def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
     """Whether a small random deviation from rest grows in a run of so many steps."""
+    largest, turning = sizes_in_a_run(acting, at, integrator, dt, steps)
+    late = 3 * RUN_PARTS // 4
+    if len(largest) < RUN_PARTS or largest[late:].max() > GROWN_STILL * max(1.0, largest[: RUN_PARTS // 2].max()):
+        return True
+    if steps < NARROWED_STEPS or not hardly_grows(turning):
+        return False
+    # rounding, which may seem to grow, is less of a larger deviation
+    larger = sizes_in_a_run(acting, at, integrator, dt, steps, ASKED_AGAIN)[1]
+    return len(larger) < RUN_PARTS or (hardly_grows(larger) and larger[-1] > GROWN_EVENLY * turning[-1])
+
+
+def hardly_grows(turning: np.ndarray) -> bool:
+    """Whether what changes its sign with every step, by the parts of a run, grows steadily after the first two."""
+    if turning.min() < GROWN_FROM:
+        return False
+    growth = np.diff(np.log(turning[2:]))
+    return bool(growth.sum() > np.log(GROWN_SLOWLY) and growth.min() > GROWN_EVENLY * growth.max())
+
+
+def sizes_in_a_run(
+    acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """By the parts of a run, up to where it has grown far: the largest deviation, and what of it changes its sign every step."""
     found = []
     with np.errstate(over="ignore", invalid="ignore"):
-        for off in run_parts(acting, at, integrator, dt, steps):
+        for off in run_parts(acting, at, integrator, dt, steps, times):
             size = np.linalg.norm(off, axis=1).max()
             if not size <= GROWN_FAR:  # or no number
-                return True
+                break
             found.append((size, alternating(off)))
-    largest, turning = np.array(found).T
-    late = 3 * RUN_PARTS // 4
-    if largest[late:].max() > GROWN_STILL * max(1.0, largest[: RUN_PARTS // 2].max()):
-        return True
-    last = turning[2:]
-    if steps < NARROWED_STEPS or last.min() < GROWN_FROM:
-        return False
-    growth = np.diff(np.log(last))
-    return bool(growth.sum() > np.log(GROWN_SLOWLY) and growth.min() > GROWN_EVENLY * growth.max())
+    return np.array(found).reshape(-1, 2).T
 
 
 def alternating(off: np.ndarray) -> float:
@@ -73,8 +89,10 @@ def alternating(off: np.ndarray) -> float:
     return float(np.sqrt(weight @ (changes**2).sum(axis=1) / weight.sum()))
 
 
-def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: int) -> Iterator[np.ndarray]:
-    """Deviations in each part of a run, (steps, n), in units of that at its start.
+def run_parts(
+    acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
+) -> Iterator[np.ndarray]:
+    """Deviations in each part of a run, (steps, n), in units of that at its start, which is so many times the usual one.
 
     The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
     by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
@@ -84,7 +102,7 @@ def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: in
     inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
     root = np.linalg.cholesky(0.5 * (inner + inner.T))
     inertia = np.diag(inner)
-    each = np.clip(MOVED_BY * np.sqrt(np.median(inertia) / inertia), MOVED_LEAST, MOVED_MOST)
+    each = times * np.clip(MOVED_BY * np.sqrt(np.median(inertia) / inertia), MOVED_LEAST, MOVED_MOST)
     movement, speed = np.zeros((2, len(M)))
     movement[kept] = each * rng.uniform(-1.0, 1.0, len(kept))
     # what nothing pulls back drifts no farther in the run than it was moved
@@ -93,8 +111,8 @@ def run_parts(acting: Acting, at: Posture, integrator: str, dt: float, steps: in
     speed[base] = -np.linalg.solve(M[np.ix_(base, base)], M[np.ix_(base, kept)] @ speed[kept])
     start = np.linalg.norm(movement[kept] @ root)
     parts = [steps // RUN_PARTS] * RUN_PARTS
-    for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, MOVED_BY):
-        filters = off[:, len(M) :] / (MOVED_BY * np.sqrt(max(1, off.shape[1] - len(M))))
+    for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, times * MOVED_BY):
+        filters = off[:, len(M) :] / (times * MOVED_BY * np.sqrt(max(1, off.shape[1] - len(M))))
         yield np.hstack([off[:, kept] @ (root / start), filters])
 
 

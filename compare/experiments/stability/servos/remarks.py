@@ -118,10 +118,11 @@ def step_costs_in_words(rows: Sequence[dict]) -> Iterator[str]:
     """The error of the step response at the file's step, by integrator."""
     texts = []
     for integrator in dict.fromkeys(row["integrator"] for row in rows):
-        errors = [row["step_response_error"] for row in known(rows, integrator)]
-        errors = [error for error in errors if error is not None]
+        of = known(rows, integrator)
+        errors = [row["step_response_error"] for row in of if row["step_response_error"] is not None]
         if errors:
-            texts.append(f"{integrator} {percent(max(errors))}")
+            unstable = "" if all(row["stable_at_file_dt"] for row in of) else " (not stable everywhere)"
+            texts.append(f"{integrator} {percent(max(errors))}{unstable}")
     if texts:
         dt = in_seconds(rows[0]["file_dt_s"])
         yield (
