@@ -1,5 +1,7 @@
 """What drives a file's robot, read from its compiled model."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -176,3 +178,23 @@ def test_a_speed_that_is_locked_does_not_move():
     data.qfrc_applied[:] = 1.0
     mujoco.mj_step(model, data)
     assert np.abs(data.qvel[:6]).max() < 1e-6 < np.abs(data.qvel[6:]).max()
+
+
+PLUGIN = """<mujoco><extension><plugin plugin="mujoco.pid"><instance name="p"><config key="kp" value="4"/></instance></plugin>
+</extension><worldbody><body><joint name="a"/><geom size="0.1"/></body></worldbody><actuator>
+<plugin name="x" joint="a" plugin="mujoco.pid" instance="p"/><position joint="a" kp="50"/></actuator></mujoco>"""
+
+
+def test_a_plugin_is_refused_and_exerts_nothing():
+    library = next((Path(mujoco.__file__).parent / "plugin").glob("*actuator*"), None)
+    if library is None:
+        pytest.skip("no plugins beside this MuJoCo")
+    try:
+        reading = read(PLUGIN)
+    except ValueError:  # not yet loaded
+        mujoco.mj_loadPluginLibrary(str(library))
+        reading = read(PLUGIN)
+    assert reading.drive.refused == {"x": "a plugin"}
+    model, data = Acting(reading.model, reading.drive).at(np.zeros(1), np.array([1.0, 0.1]), 0.01, "Euler")
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator[0] == pytest.approx(5.0)

@@ -57,7 +57,8 @@ class Acting:
                 )
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
                 m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
-                m.actuator_plugin[i] = -1
+                if m.actuator_plugin[i] >= 0:  # it has its own law, whatever stands here
+                    m.actuator_gear[i] = 0.0
             if (
                 one.refused
                 and hasattr(m, "actuator_damping")
