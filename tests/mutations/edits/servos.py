@@ -37,7 +37,7 @@ EDITS = (
          "a control of zero that a keyframe states is none"),
     Edit("mujoco.actuators", "drive_of", "not on(model, 'EULERDAMP')", "False", "Euler always has damping implicit"),
     Edit("mujoco.actuators", "off", "m.opt.disableactuator & (1 << group)", "False", "no group is disabled"),
-    Edit("mujoco.actuators", "own_damping", "m.actuator_gear[i, 0] ** 2", "m.actuator_gear[i, 0]",
+    Edit("mujoco.actuators", "own_damping", "m.actuator_gear[output_of(m, i), 0] ** 2", "m.actuator_gear[output_of(m, i), 0]",
          "damping of an actuator goes with its gear"),
     Edit("mujoco.acting", "add_armature", "model.dof_M0[speeds] += more", "pass", "a body that never changes stays as it is"),
     Edit("deviations", "Deviations.drifts", "loose(both) > loose(both @ of_base)", "False", "nothing drifts"),
