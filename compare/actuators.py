@@ -145,6 +145,11 @@ class Drive:
         return {one.name: one.refused for one in self.actuators if one.refused} | dict(self.unknown)
 
     @property
+    def feeds_back(self) -> bool:
+        """Whether an actuator's force depends on position or speed; motors alone have no step of their own."""
+        return any(one.acts and any((*one.bias[1:], *one.gain[1:])) for one in self.actuators)
+
+    @property
     def servos(self) -> tuple[Actuator, ...]:
         """The actuators that have a target."""
         return tuple(one for one in self.actuators if one.is_servo)
