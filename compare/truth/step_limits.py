@@ -88,11 +88,7 @@ class Small(Deviations):
     def is_stable(self, integrator: str, dt: float) -> bool:
         """Whether nothing grows in a step; nothing but what grows or drifts by itself is asked."""
         slowest = min(self.pole_limits(integrator), default=(np.inf, ""))[0]
-        return dt < slowest and self.does_not_grow(integrator, dt)
-
-    def does_not_grow(self, integrator: str, dt: float) -> bool:
-        """Whether the eigenvalues of a step are within 1, but for what creeps away by itself, see `growing`."""
-        return self.growth(integrator, dt) <= 1.0 + NEUTRAL + 2.0 * dt * self.creep
+        return dt < slowest and self.growth(integrator, dt) <= 1.0 + NEUTRAL
 
     def pole_limits(self, integrator: str) -> list[tuple[float, str]]:
         """Up to which step, s, each filter is stable, and its actuator. RK4 has a filterexact no more exact than a filter."""
@@ -157,8 +153,8 @@ class Small(Deviations):
         steps = np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1)
         low = 0.0
         for dt in steps:
-            if not self.does_not_grow(integrator, dt):
-                return bisected(lambda dt: self.does_not_grow(integrator, dt), low, dt)
+            if self.growth(integrator, dt) > 1.0 + NEUTRAL:
+                return bisected(lambda dt: self.growth(integrator, dt) <= 1.0 + NEUTRAL, low, dt)
             low = dt
         return None
 
