@@ -132,6 +132,11 @@ class Deviations:
         off = off / np.maximum(along, 1e-300)
         return off[[np.argmin(np.abs(values - value)) for value in self.modes[0]]]
 
+    @cached_property
+    def neutral(self) -> float:
+        """The rate, 1/s, at which something seems to grow by itself, but within `doubts`."""
+        return 0.0 if self.is_symmetric or self.growing else max(float(self.modes[0].real.max(initial=0.0)), 0.0)
+
     def joint_of(self, shape: np.ndarray) -> str:
         """The speed that has most of the kinetic energy of a movement."""
         x = self.unrooted.T @ shape
