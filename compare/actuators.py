@@ -5,10 +5,12 @@ with u its control, or its activation. MuJoCo documentation, computation, actuat
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+
+ON_EDGE = 1e-9  # m or rad: so near the end of a dead band a tendon is on its edge
 
 
 @dataclass(frozen=True)
@@ -111,8 +113,8 @@ class Tendon(NamedTuple):
         return self.stiffness * max(abs(length), abs(self.low), abs(self.high)) if self.pulls(length) else 0.0
 
     def pulls(self, length: float) -> bool:
-        """Whether its spring does something at a length."""
-        return not self.low < length < self.high
+        """Whether its spring does something at a length; on the edge of its dead band it does, to one side."""
+        return not self.low + ON_EDGE < length < self.high - ON_EDGE
 
 
 @dataclass(frozen=True)
@@ -143,9 +145,20 @@ class Drive:
         return {one.name: one.refused for one in self.actuators if one.refused} | dict(self.unknown)
 
     @property
+    def feeds_back(self) -> bool:
+        """Whether an actuator's force depends on position or speed; motors alone have no step of their own."""
+        return any(one.acts and any((*one.bias[1:], *one.gain[1:])) for one in self.actuators)
+
+    @property
     def servos(self) -> tuple[Actuator, ...]:
         """The actuators that have a target."""
         return tuple(one for one in self.actuators if one.is_servo)
+
+    @property
+    def without_ranges(self) -> "Drive":
+        """With forces of any size."""
+        actuators = tuple(replace(one, force_range=None) for one in self.actuators)
+        return replace(self, actuators=actuators, ranges={}, tendon_ranges={})
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture: what its keyframe states, else the targets that are the posture; in their ranges.

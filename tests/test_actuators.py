@@ -42,6 +42,7 @@ def test_the_spring_of_a_tendon_is_without_force_in_its_dead_band():
     tendon = Tendon("t", 0, (1.0,), 10.0, 0.0, 0.2, 0.5)
     assert [tendon.force(x) for x in (0.1, 0.3, 0.7)] == pytest.approx([1.0, 0.0, -2.0])
     assert [tendon.pulls(x) for x in (0.199, 0.201, 0.499, 0.501)] == [True, False, False, True]
+    assert [tendon.pulls(x) for x in (0.2 + 1e-12, 0.5 - 1e-12)] == [True, True]
     assert Tendon("t", 0, (1.0,), 10.0, 0.0, 0.2, 0.2).pulls(0.2)
 
 

@@ -17,11 +17,11 @@ DIRECTIONS = {
     "": {"agreement"},
     "agreement": {
         "tmt",
+        "case",
         "coordinates",
         "diagnosis",
         "engines",
         "given",
-        "case",
         "joint_map",
         "judge",
         "robots",
@@ -47,7 +47,6 @@ DIRECTIONS = {
     "report": {"judge", "process"},
     "setup": {"tmt", "case", "states", "robots", "engines"},
     "experiments": {
-        "actuators",
         "diagnosis",
         "joint_map",
         "tmt",

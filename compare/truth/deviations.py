@@ -114,8 +114,12 @@ class Deviations:
             fastest = max(values.real.max(), 0.0)
             return float(fastest), moves[:, np.argmax(values.real)] if fastest else shapes[:, 0]
         fastest = np.argmax(values.real)
-        small = 1e-7 * np.abs(values).max()  # rounding of eigenvalues where K is not symmetric
-        return (float(values[fastest].real), moves[:, fastest]) if values[fastest].real > small else None
+        return (float(values[fastest].real), moves[:, fastest]) if values[fastest].real > self.neutral else None
+
+    @cached_property
+    def neutral(self) -> float:
+        """The rate, 1/s, below which a mode grows by rounding alone: where K or D is not symmetric."""
+        return 0.0 if self.is_symmetric else SYMMETRIC * float(np.abs(self.modes[0]).max())
 
     def joint_of(self, shape: np.ndarray) -> str:
         """The speed that has most of the kinetic energy of a movement."""

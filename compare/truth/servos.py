@@ -1,7 +1,7 @@
 """The equations of motion at rest under a robot's own servos: M x'' + D x' + K x = 0 for small deviations x."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -209,7 +209,19 @@ class Driven:
         return Slopes(K + acting + each[count:].sum(axis=0), always + braked, uncut, springs, uncut - speeding)
 
     def at_rest(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
-        """The nearest posture at rest, by Newton's method from q, and the size of the force that is left there; 0.0: none."""
+        """The nearest posture at rest, by Newton's method from q, and the size of the force that is left there; 0.0: none.
+
+        A force on its range tells no way back: if there is no rest that way, from where it would rest without ranges.
+        """
+        found = self.descended(q, u)
+        if found[1] and (self.drive.ranges or self.drive.tendon_ranges or self.cut(q, u).forces):
+            unlimited = replace(self, drive=self.drive.without_ranges).descended(q, u)
+            again = found if unlimited[1] else self.descended(unlimited[0], u)
+            return found if again[1] else again
+        return found
+
+    def descended(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
+        """The same by Newton's method from q alone."""
         best, left, scale = q, np.inf, 0.0
         for _ in range(REST_STEPS):
             force, largest = self.forces(q, u)

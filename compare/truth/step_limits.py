@@ -88,7 +88,11 @@ class Small(Deviations):
     def is_stable(self, integrator: str, dt: float) -> bool:
         """Whether nothing grows in a step; nothing but what grows or drifts by itself is asked."""
         slowest = min(self.pole_limits(integrator), default=(np.inf, ""))[0]
-        return dt < slowest and self.growth(integrator, dt) <= 1.0 + NEUTRAL
+        return dt < slowest and self.stays(integrator, dt)
+
+    def stays(self, integrator: str, dt: float) -> bool:
+        """Whether nothing grows in a step but by rounding."""
+        return self.growth(integrator, dt) <= 1.0 + max(NEUTRAL, dt * self.neutral)
 
     def pole_limits(self, integrator: str) -> list[tuple[float, str]]:
         """Up to which step, s, each filter is stable, and its actuator. RK4 has a filterexact no more exact than a filter."""
@@ -153,8 +157,8 @@ class Small(Deviations):
         steps = np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1)
         low = 0.0
         for dt in steps:
-            if self.growth(integrator, dt) > 1.0 + NEUTRAL:
-                return bisected(lambda dt: self.growth(integrator, dt) <= 1.0 + NEUTRAL, low, dt)
+            if not self.stays(integrator, dt):
+                return bisected(lambda dt: self.stays(integrator, dt), low, dt)
             low = dt
         return None
 

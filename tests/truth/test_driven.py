@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 
+import mujoco
 import numpy as np
 import pytest
 from driven_models import with_servos
@@ -94,6 +95,32 @@ def test_a_locked_base_is_more_optimistic():
         free, locked = (posture.small(base) for base in posture.bases)
         for integrator in ("Euler", "implicitfast", "RK4"):
             assert free.limit(integrator).dt < locked.limit(integrator).dt
+
+
+def test_discrete_has_nothing_implicit_that_pushes_away_or_speeds_up():
+    servo = '<position joint="a" kp="100" kv="5"/>'
+    for bias in ("0 20 2", "0 -20 2", "0 20 -2"):
+        assert_the_same_map(one(f'{servo}<general joint="a" biastype="affine" biasprm="{bias}"/>'))
+
+
+def test_a_step_of_rk4_is_that_of_mujoco():
+    source = with_servos(6)
+    posture, model = at(source)
+    dt, n, nudge = posture.whole.limit("RK4").dt, model.nv, 1e-6
+    units, found = np.kron(np.eye(2), posture.whole.root.T), np.zeros((2 * model.nv, 2 * model.nv))
+    coordinates = posture.robot.coordinates
+    for k, aside in enumerate(nudge * np.eye(2 * n)):
+        ends = []
+        for sign in (1.0, -1.0):
+            stepped, data = acting(source).at(posture.q, posture.u, dt, "RK4")
+            data.qpos[:] = coordinates.move(posture.q, sign * aside[:n])
+            data.qvel[:] = sign * aside[n:]
+            mujoco.mj_step(stepped, data)
+            ends.append((data.qpos, data.qvel))
+        found[:n, k] = coordinates.difference(ends[0][0], ends[1][0])
+        found[n:, k] = ends[0][1] - ends[1][1]
+    theirs = units @ (found / (2.0 * nudge)) @ np.linalg.inv(units)
+    assert posture.whole.step("RK4", dt) == pytest.approx(theirs, abs=1e-7 * np.abs(theirs).max())
 
 
 ONE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody><body><joint name="a" {joint}/>

@@ -179,6 +179,17 @@ def test_what_only_rounding_leaves_is_a_rest():
     assert left == 0.0 and driven.at_rest(up, np.zeros(0))[1] == 0.0
 
 
+def test_a_rest_is_found_from_where_a_force_is_on_its_range():
+    """The servo is stiff within 5 mrad of its target only; it rests there from wherever it starts."""
+    text = arm(
+        '<position joint="a" kp="1000" forcerange="-5 5"/><position joint="b" kp="1000"/>', flags='gravity="disable"'
+    )
+    driven, _ = driven_of(text)
+    for start in (0.05, 1.0, -2.0):
+        q, left = driven.at_rest(np.array([start, 0.1]), np.array([0.2, 0.1]))
+        assert left == 0.0 and q == pytest.approx([0.2, 0.1], abs=1e-9)
+
+
 def test_a_dead_band_has_no_spring_inside_and_one_outside():
     text = arm('<motor joint="a"/>', tendon='stiffness="50" springlength="0.1 0.4"', flags='gravity="disable"')
     driven, _ = driven_of(text)

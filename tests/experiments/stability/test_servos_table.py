@@ -109,6 +109,8 @@ def test_motors_alone_are_called_neither_stable_nor_not():
     said, result = done(read(source))
     assert said[0] == "No actuator feeds back: there is no servo that its own 2 ms could make unstable."
     assert not any(check.quantity == AT_OWN_STEP for check in result.checks)
+    assert {row["stable_at_file_dt"] for row in result.tables["step_limits"]} == {None}
+    assert not any("not stable" in text or "What would make" in text for text in said)
 
 
 # tolerances and rules: just inside, just outside

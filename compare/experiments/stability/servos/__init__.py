@@ -13,7 +13,7 @@ from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
 from .remarks import asked_in_words, lifts_in_words, response_error_at, servo_notes
-from .sentences import DEFAULT_INTEGRATOR, at_the_top, feeds_back, known
+from .sentences import DEFAULT_INTEGRATOR, at_the_top, known
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first
 OBSERVED_WITHIN = 0.01  # relative
@@ -86,7 +86,7 @@ def begin(setup: Setup) -> dict | None:
 def least_at(resting: Sequence[Predicted], integrator: str, dt: float) -> Predicted | None:
     """The posture with the least limit of an integrator, if a step is not stable there; else None."""
     bad = [one for one in resting if one.is_stable(one.at.bases[0], integrator, dt) is False]
-    return min(bad, key=lambda one: one.limits[one.at.bases[0], integrator].dt, default=None)
+    return min(bad, key=lambda one: one.limits[one.at.bases[0], integrator].dt or LIMIT_UP_TO, default=None)
 
 
 # in a further process
@@ -141,11 +141,11 @@ def add(result: Result, setup: Setup, work: dict) -> list[str]:
         row = by_place[one.name, base, name]
         row["observed_dt_s"] = dt
         check_observed(result, row, kind, len(one.at.bases) > 1)
-    if feeds_back(setup.robot.drive):
+    if setup.robot.drive.feeds_back:
         check_own_step(result, rows)
     full = [row for part in work["full"] for row in part]
     result.tables |= {"step_limits": rows, "full_model": full}
-    result.top = [at_the_top(rows, full, feeds_back(setup.robot.drive))]
+    result.top = [at_the_top(rows, full, setup.robot.drive.feeds_back)]
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
     lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]

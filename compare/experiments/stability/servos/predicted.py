@@ -39,9 +39,11 @@ class Predicted(NamedTuple):
         return any(limit.limit == "finite" for (base, _), limit in self.limits.items() if base == self.at.bases[0])
 
     def is_stable(self, base: str, integrator: str, dt: float) -> bool | None:
-        """Whether a step is within the limit; None: none can be said."""
+        """Whether a step is within the limit; None: there is none, or no servo whose step it is."""
         limit = self.limits[base, integrator]
-        return bool(dt <= (limit.dt or LIMIT_UP_TO)) if limit.limit in ("finite", "none") else None
+        if limit.limit not in ("finite", "none") or not self.at.robot.drive.feeds_back:
+            return None
+        return bool(dt <= (limit.dt or LIMIT_UP_TO))
 
     @property
     def pairs(self) -> Iterator[tuple[str, str]]:
@@ -143,17 +145,16 @@ def forms_apart(small: Small, integrator: str, limit: Limit) -> float | None:
 def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt: float) -> float:
     """The spectral radius of a step beside that of MuJoCo's own derivative, just below and above a limit: the larger difference.
 
-    What is free to move, or held by a rotor, stays as it is: that has the radius 1.
+    What is free to move, or held by a rotor, stays as it is: that has the radius 1. Of activations only filters can grow.
     """
     nv = acting.model.nv
-    kept = [k for k in range(2 * nv + acting.model.na) if k % nv not in at.lone or k >= 2 * nv]
+    kept = [k for k in range(2 * nv) if k % nv not in at.lone] + [2 * nv + k for k in acting.filters]
+    least = 1.0 if at.base else 0.0
     found = []
     for step in (dt * (1.0 - ASIDE_OF_LIMIT), dt * (1.0 + ASIDE_OF_LIMIT)):
         A = acting.transition(at.q, at.u, step, integrator)[np.ix_(kept, kept)]
-        poles = [
-            np.exp(-step / constant) if exact else abs(1.0 - step / constant) for _, constant, exact in small.poles
-        ]
-        stays = 1.0 if at.base or acting.model.na > len(small.poles) else 0.0
-        own = max(small.growth(integrator, step), *poles, stays, 0.0)
-        found.append(abs(float(np.abs(np.linalg.eigvals(A)).max()) - own))
+        theirs = float(np.abs(np.linalg.eigvals(A)).max())
+        decays = [np.exp(-step / tau) if is_exact else abs(1.0 - step / tau) for _, tau, is_exact in small.poles]
+        own = max(small.growth(integrator, step) if small.names else 0.0, *decays, 0.0)
+        found.append(abs(max(theirs, least) - max(own, least)))
     return max(found)

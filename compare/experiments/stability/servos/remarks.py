@@ -7,7 +7,7 @@ from ....robots import Robot
 from . import response
 from .lifting import Lift
 from .predicted import Predicted, acting_at
-from .sentences import feeds_back, in_digits, in_seconds, known, some_of
+from .sentences import in_digits, in_seconds, known, some_of
 
 RESTS_WITHIN = 1e-6  # rad or m: a rest so near is the posture
 FORCES = {"rad": "N m", "m": "N"}
@@ -17,7 +17,7 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
     """Whether a step with an integrator is stable at each posture, what limits it, and the error of the step response."""
     resting = [one for one in found if one.rests and (one.at.bases[0], integrator) in one.pairs]
     step = f"{in_seconds(dt)} under {integrator}"
-    if not feeds_back(found[0].at.robot.drive):
+    if not found[0].at.robot.drive.feeds_back:
         return f"Asked: {step}: no actuator feeds back, so that there is no servo that it could make unstable."
     if not resting:
         return f"Asked: {step}: that cannot be said; no posture is a stable rest under the servos."

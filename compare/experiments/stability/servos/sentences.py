@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from ....actuators import Drive
 from ....judge.words import listed
 
 DEFAULT_INTEGRATOR = "Euler"  # MuJoCo's integrator where a file states none
@@ -45,11 +44,6 @@ def limit_in_words(row: dict, several: bool, dt: float) -> str:
         return "no limit up to 5 s"
     where = f", at {row['posture']}" if several else ""
     return f"limit {in_seconds(row['predicted_dt_s'], dt)}, {row['limiting_joint']}{where}"
-
-
-def feeds_back(drive: Drive) -> bool:
-    """Whether an actuator's force depends on position or speed: motors alone have no step of their own."""
-    return any(one.acts and any((*one.bias[1:], *one.gain[1:])) for one in drive.actuators)
 
 
 def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = True) -> str:
