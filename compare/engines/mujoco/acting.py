@@ -118,6 +118,15 @@ class Acting:
                 data.act[m.actuator_actadr[i]] = u[i]
 
     @property
+    def activations(self) -> list[int]:
+        """Where the activations of all actuators stand that act."""
+        return [
+            int(self.model.actuator_actadr[i])
+            for i, one in enumerate(self.drive.actuators)
+            if one.acts and one.dynamics != "none"
+        ]
+
+    @property
     def filters(self) -> list[int]:
         """Where the activations of filters stand that act: they decay by themselves."""
         return [

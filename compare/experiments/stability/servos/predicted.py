@@ -143,17 +143,18 @@ def forms_apart(small: Small, integrator: str, limit: Limit) -> float | None:
 def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt: float) -> float:
     """The spectral radius of a step beside that of MuJoCo's own derivative, just below and above a limit: the larger difference.
 
-    What is free to move, or held by a rotor, stays as it is: that has the radius 1.
+    What is free to move, or held by a rotor, stays as it is: that has the radius 1. Activations of actuators that are left out
+    (a muscle's has a pole of its own) are left out here too.
     """
-    nv = acting.model.nv
-    kept = [k for k in range(2 * nv + acting.model.na) if k % nv not in at.lone or k >= 2 * nv]
+    nv, activations = acting.model.nv, acting.activations
+    kept = [k for k in range(2 * nv) if k % nv not in at.lone] + [2 * nv + place for place in activations]
     found = []
     for step in (dt * (1.0 - ASIDE_OF_LIMIT), dt * (1.0 + ASIDE_OF_LIMIT)):
         A = acting.transition(at.q, at.u, step, integrator)[np.ix_(kept, kept)]
         poles = [
             np.exp(-step / constant) if exact else abs(1.0 - step / constant) for _, constant, exact in small.poles
         ]
-        stays = 1.0 if at.base or acting.model.na > len(small.poles) else 0.0
+        stays = 1.0 if at.base or len(activations) > len(small.poles) else 0.0
         own = max(small.growth(integrator, step), *poles, stays, 0.0)
         found.append(abs(float(np.abs(np.linalg.eigvals(A)).max()) - own))
     return max(found)
