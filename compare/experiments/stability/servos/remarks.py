@@ -94,6 +94,7 @@ def servo_notes(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence
         *differences_in_words(full),
         *rests_in_words(found, rows),
         *drive_in_words(robot, found),
+        "All other notes, figures and tables here are of the robot without its actuators, at postures held by a constant torque.",
     ]
 
 
