@@ -59,6 +59,7 @@ CALM = run("implicitfast", 1e-12, True)
     (limits(own=("p", "drifts", "q", "not_at_rest"), euler=()), [],
      "Whether its own 2 ms under implicitfast is stable cannot be said: p: nothing holds or brakes a movement; q: it does "
      "not rest."),
+    (limits(own=("p", "not_at_rest"), euler=(), base="free"), [], "cannot be said: p: without gravity it does not rest."),
 ])  # fmt: skip
 def test_what_is_said_first(rows, full, said):
     if not any(row["integrator"] == "Euler" for row in rows):

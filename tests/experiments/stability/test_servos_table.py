@@ -102,6 +102,18 @@ def test_without_actuators_there_is_nothing_new(engines):
     assert "servos" in stability.claim(read(PATHS["gripper"]).robot)
 
 
+def test_the_activation_of_an_actuator_that_is_left_out_is_not_compared():
+    servo = '<position name="servo" joint="swing" kp="50" kv="4"/>'
+    limits = []
+    for more in ("", '<muscle joint="swing" lengthrange="0.1 1"/>'):
+        setup = read(SWING.format(dt=0.002, kv=4).replace(servo, servo + more))
+        said, result = done(setup)
+        limits.append([row["predicted_dt_s"] for row in result.tables["step_limits"]])
+        growth = [check for check in result.checks if check.quantity.startswith("growth of a step")]
+        assert growth and all(check.passed for check in growth)
+    assert limits[0] == limits[1] and "a law of the kind muscle" in " ".join(said)
+
+
 def test_motors_alone_are_called_neither_stable_nor_not():
     source = SWING.format(dt=0.002, kv=4).replace(
         'position name="servo" joint="swing" kp="50" kv="4"', 'motor joint="swing"'

@@ -57,7 +57,7 @@ def lifts_in_words(lifted: Sequence[tuple[Predicted, str, list[Lift]]], dt: floa
     for one, integrator, lifts in lifted:
         held = [lift for lift in lifts if lift.tried]
         others = [
-            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{in_digits(lift.factor)} times the step'}"
+            f"{lift.names[0]} {'(no limit up to 5 s)' if lift.factor is None else f'({in_digits(lift.factor)} times the limit)'}"
             for lift in held
             if lift.kind == "integrator"
         ]
@@ -94,6 +94,7 @@ def servo_notes(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence
         *differences_in_words(full),
         *rests_in_words(found, rows),
         *drive_in_words(robot, found),
+        "All other notes, figures and tables here are of the robot without its actuators, at postures held by a constant torque.",
     ]
 
 
@@ -174,7 +175,10 @@ def differences_in_words(full: Sequence[dict]) -> Iterator[str]:
         )
     for rows, what in (
         (calm, "stays calm where the limits say that it is not stable: friction, equalities or contacts may hold it"),
-        (shaken, "is not calm where the limits say that it is stable: contacts, limits of joints or a fall move it"),
+        (
+            shaken,
+            "is not calm where the limits say that it is stable: contacts, joint limits, a fall or the way to its rest move it",
+        ),
     ):
         if rows:
             names = [f"{row['posture']} ({row['integrator']})" for row in rows]
@@ -193,7 +197,11 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
     for one in found:
         if not one.rests:
             left, forces = one.at.rest[1], " or ".join(dict.fromkeys(FORCES[u] for u in one.at.robot.coordinates.units))
-            yield f"{one.name} is not at rest under its actuators, and no rest was found near it: {left:.3g} {forces} are left."
+            weightless = ", without gravity, for it floats," * bool(one.at.base)
+            yield (
+                f"{one.name} is not at rest under its actuators{weightless or ','} and no rest was found near it: {left:.3g} "
+                f"{forces} are left."
+            )
         else:
             limit = one.limits[one.at.bases[0], next(iter(one.limits))[1]]
             if limit.limit == "saddle":

@@ -147,6 +147,8 @@ def kinds_in_words(rows: Sequence[dict]) -> str:
     """At which postures there is no limit to be said, and why."""
     texts = []
     for kind, why in WITHOUT_LIMIT.items():
-        names = list(dict.fromkeys(row["posture"] for row in rows if row["limit"] == kind and row["base"] != "locked"))
-        texts += [f"{some_of(names)}: {why}"] * bool(names)
+        of = [row for row in rows if row["limit"] == kind and row["base"] != "locked"]
+        weightless = kind == "not_at_rest" and any(row["base"] == "free" for row in of)
+        where = some_of(list(dict.fromkeys(row["posture"] for row in of)))
+        texts += [f"{where}: {'without gravity ' * weightless}{why}"] * bool(of)
     return "; ".join(texts)
