@@ -7,6 +7,8 @@ import numpy as np
 
 SYMMETRIC = 1e-7  # of the largest entry: what a matrix and its transpose may differ by, and what is nothing beside it
 VANISHING = 1e-10  # of the largest stiffness or damping, in the units of M: nothing
+# what K and D may be off where K is not symmetric: each entry of itself, as it may be a difference, and of the largest one
+DOUBTED, ROUNDED_OFF = 1e-8, 1e-14
 CREEPING = 1e-8  # 1/s2 and 1/s: and so is less than this
 
 
@@ -113,13 +115,27 @@ class Deviations:
                 return None
             fastest = max(values.real.max(), 0.0)
             return float(fastest), moves[:, np.argmax(values.real)] if fastest else shapes[:, 0]
-        fastest = np.argmax(values.real)
-        return (float(values[fastest].real), moves[:, fastest]) if values[fastest].real > self.neutral else None
+        known = np.flatnonzero(values.real > self.doubts)
+        fastest = known[np.argmax(values[known].real)] if len(known) else None
+        return None if fastest is None else (float(values[fastest].real), moves[:, fastest])
+
+    @property
+    def doubts(self) -> np.ndarray:
+        """How far each of the eigenvalues of `modes` may be off, 1/s, (2nv,): much where two are one, as of what is loose."""
+        n, size = len(self.M), max(np.sqrt(np.abs(self.stiff).max(initial=0.0)), 1.0)
+        balanced = np.block([[np.zeros((n, n)), size * np.eye(n)], [-self.stiff / size, -self.damped]])
+        values, right = np.linalg.eig(balanced)
+        others, left = np.linalg.eig(balanced.T)
+        pairs = [np.argmin(np.abs(others - value)) for value in values]
+        left, along = np.abs(left[:, pairs]), np.abs((left[:, pairs] * right).sum(axis=0))
+        off = DOUBTED * (left * (np.abs(balanced) @ np.abs(right))).sum(axis=0) + ROUNDED_OFF * np.linalg.norm(balanced)
+        off = off / np.maximum(along, 1e-300)
+        return off[[np.argmin(np.abs(values - value)) for value in self.modes[0]]]
 
     @cached_property
     def neutral(self) -> float:
-        """The rate, 1/s, below which a mode grows by rounding alone: where K or D is not symmetric."""
-        return 0.0 if self.is_symmetric else SYMMETRIC * float(np.abs(self.modes[0]).max())
+        """The rate, 1/s, at which something seems to grow by itself, but within `doubts`."""
+        return 0.0 if self.is_symmetric or self.growing else max(float(self.modes[0].real.max(initial=0.0)), 0.0)
 
     def joint_of(self, shape: np.ndarray) -> str:
         """The speed that has most of the kinetic energy of a movement."""

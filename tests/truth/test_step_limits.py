@@ -153,6 +153,17 @@ def test_rounding_is_no_saddle():
     assert small(np.eye(2), noise - np.diag([1e-3, 0.0]), np.eye(2)).limit("Euler").limit == "saddle"
 
 
+@pytest.mark.parametrize("name", EVERY)
+def test_what_is_left_slowly_beside_a_stiff_servo_is_a_saddle_and_no_limit(name):
+    """K is not symmetric: the eigenvalues alone say it, and what they are off goes with how well they are told apart."""
+    slow = small(np.eye(2), [[1e10, 5e4], [0.0, -0.02]], np.diag([1e5, 10.0])).limit(name)
+    assert slow.limit == "saddle" and slow.rate == pytest.approx(0.002, rel=1e-3)
+    loose = small(np.eye(2), [[1e10, 0.0], [5e4, -1e-7]], np.diag([1e5, 0.0])).limit(name)
+    assert loose.limit == "drifts"
+    held = small(np.eye(2), [[1e10, 5e4], [0.0, 0.02]], np.diag([1e5, 10.0])).limit(name)
+    assert held.limit in ("finite", "none")
+
+
 @pytest.mark.parametrize("exact", [False, True])
 def test_a_filter_has_a_limit_of_its_own(exact):
     one = small(1.0, 1.0, 1.0, damping=[1.0], poles=(("servo", 0.05, exact),))
