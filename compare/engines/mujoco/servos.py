@@ -29,7 +29,7 @@ def engaged(model: mujoco.MjModel, controller: Controller) -> Driven:
     """Switch on, in a model, the actuators that take part, without any range.
 
     `discrete` has their gains in a system that is solved by iteration where a tendon couples branches: here to rounding, and by
-    Newton's method, as with PGS it is another scheme. An activation is held constant: that of a filter by a control that is the
+    Newton's method, as with PGS it is Euler's scheme. An activation is held constant: that of a filter by a control that is the
     same, that of an integrator by none.
     """
     model.opt.disableflags &= ~bit(("ACTUATION",))
