@@ -164,6 +164,12 @@ def test_what_is_left_slowly_beside_a_stiff_servo_is_a_saddle_and_no_limit(name)
     assert held.limit in ("finite", "none")
 
 
+def test_a_fast_servo_leaves_the_limit_of_a_slow_joint_as_it_is():
+    """K is not symmetric; kv of the one is implicit: 4 + 2 dt - 400 dt^2 = 0 of the other."""
+    K, D = [[1e10, 5e4], [0.0, 400.0]], np.diag([1e9, 1.0])
+    assert small(np.eye(2), K, D).limit("implicitfast").dt == pytest.approx((1.0 + np.sqrt(1601.0)) / 400.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("exact", [False, True])
 def test_a_filter_has_a_limit_of_its_own(exact):
     one = small(1.0, 1.0, 1.0, damping=[1.0], poles=(("servo", 0.05, exact),))

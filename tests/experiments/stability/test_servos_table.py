@@ -52,6 +52,7 @@ def test_tables_have_their_columns_and_a_row_for_each_posture_base_and_integrato
     assert euler["stable_at_file_dt"] is True and euler["observed_dt_s"] == pytest.approx(
         euler["predicted_dt_s"], rel=5e-3
     )
+    assert euler["observed_dt_s"] != euler["predicted_dt_s"]  # found without it
     assert 0.0 < euler["step_response_error"] < 0.1
 
 
@@ -81,6 +82,19 @@ def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_that_compares_n
         "Stable" if stable else "Not stable at its own 2 ms under Euler, MuJoCo's default (limit 1."
     )
     assert stable == ("What would make 2 ms at qpos0 stable" not in " ".join(said))
+    (row,) = (row for row in result.tables["full_model"] if row["integrator"] == "Euler")
+    assert row["predicted_stable"] is stable
+
+
+def test_of_postures_that_are_not_stable_the_one_with_the_least_limit_is_looked_at():
+    setup = read(SWING.format(dt=0.002, kv=800))
+    one = predicted.predicted_at(setup.robot, "qpos0", setup.reading)
+    limit = one.limits["fixed", "Euler"]
+    three = [
+        one._replace(limits=one.limits | {("fixed", "Euler"): limit._replace(dt=dt)}) for dt in (1.9e-3, 1e-3, 1.5e-3)
+    ]
+    assert servos.least_at(three, "Euler", 2e-3) is three[1]
+    assert servos.least_at(three[:1], "Euler", 1.8e-3) is None
 
 
 def test_a_figure_has_the_files_own_point_and_says_its_number():
