@@ -7,6 +7,7 @@ from files import TWO, mjcf
 
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
+from compare.engines.mujoco.lock import ModelError
 from compare.robots.file import robot_of
 
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
@@ -176,3 +177,13 @@ def test_a_speed_that_is_locked_does_not_move():
     data.qfrc_applied[:] = 1.0
     mujoco.mj_step(model, data)
     assert np.abs(data.qvel[:6]).max() < 1e-6 < np.abs(data.qvel[6:]).max()
+
+
+@pytest.mark.parametrize("actuator, what", [
+    ('<position name="s" joint="j" kp="nan"/>', "gain of actuator 's'"),
+    ('<general name="s" joint="j" biastype="affine" biasprm="0 -inf 0"/>', "bias of actuator 's'"),
+    ('<motor name="s" joint="j" gear="nan"/>', "gear of actuator 's'"),
+])  # fmt: skip
+def test_gains_that_are_no_numbers_are_refused_by_name(actuator, what):
+    with pytest.raises(ModelError, match=f"the {what} has a number that is not finite"):
+        drive_of(actuator)

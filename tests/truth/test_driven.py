@@ -3,7 +3,6 @@
 from functools import lru_cache
 
 import mujoco
-import mujoco
 import numpy as np
 import pytest
 from driven_models import with_servos
@@ -172,9 +171,7 @@ def test_a_servo_on_its_range_is_not_stiff():
 def test_where_the_sum_of_a_speed_is_cut_a_tendon_brakes_elsewhere_and_is_implicit_as_it_was():
     arm = '<body pos="0.6 0 0"><joint name="b" axis="0 1 0" damping="0.2"/><geom size="0.1" mass="1" pos="0.2 0 0"/></body>'
     both = '<tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" coef="0.5"/></fixed></tendon>'
-    servos = (
-        '<position joint="a" kp="1000" kv="50"/><position tendon="t" kp="300" kv="20"/><position joint="b" kp="30" kv="2"/>'
-    )
+    servos = '<position joint="a" kp="1000" kv="50"/><position tendon="t" kp="300" kv="20"/><position joint="b" kp="30" kv="2"/>'
     source = one(servos, 'axis="0 1 0" actuatorfrcrange="-1 1" damping="0.3"', gravity=-9.81)
     source = source.replace("</body></worldbody>", f"{arm}</body></worldbody>{both}")
     posture, _ = at(source)

@@ -142,6 +142,13 @@ def test_a_length_that_does_not_change_has_no_stiffness():
     assert slopes.D[0, 0] > 0.0 and abs(slopes.K[0, 0]) < 100 * 0.3**2 / 2
 
 
+def test_what_turns_with_the_posture_is_named():
+    text = arm('<motor name="m" joint="a"/><motor name="at the site" site="s"/>').replace(
+        "<geom", '<site name="s" pos="0.3 0 0"/><geom', 1
+    )
+    assert driven_of(text)[0].differenced == ("at the site",)
+
+
 # rest
 
 
