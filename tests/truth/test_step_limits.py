@@ -212,6 +212,20 @@ def test_the_kind_is_that_of_the_equations_and_the_joint_that_of_the_mode():
     assert (softer.joint, softer.kind) == ("joint1", "swing")
 
 
+@pytest.mark.parametrize("coupling", [0.0, 1.0])
+def test_the_joint_that_limits_is_the_fast_one_wherever_the_fastest_decay_is(coupling):
+    """Of three swings, one of them fast; K is symmetric or not."""
+    K = np.diag([4.0, 900.0, 25.0])
+    K[0, 2] = coupling
+    for name in EVERY:
+        one = small(np.eye(3), K, 1e-3 * np.eye(3), springs=0.1 * K)
+        limit = one.limit(name)
+        assert (limit.joint, limit.kind, limit.rate) == ("joint1", "swing", pytest.approx(30.0, rel=1e-3))
+    # an implicit brake is faster than the swing that limits
+    braked = small(np.eye(2), np.diag([900.0, 1.0]), np.diag([1e-3, 1e5])).limit("implicitfast")
+    assert (braked.joint, braked.rate) == ("joint0", pytest.approx(30.0, rel=1e-3))
+
+
 # free bases
 
 

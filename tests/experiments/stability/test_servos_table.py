@@ -1,5 +1,7 @@
 """Step limits under a robot's own servos in `stability`: tables, checks, what a run of each size does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import PATHS
@@ -157,6 +159,16 @@ def test_a_closed_form_that_is_off_is_seen_by_the_eigenvalues():
         assert predicted.forms_apart(small, "Euler", limit._replace(dt=(1 + off) * limit.dt)) == pytest.approx(
             off, rel=1e-3
         )
+
+
+def test_a_step_that_is_not_mujocos_is_seen_by_its_radius():
+    found = reading.read(SWING.format(dt=0.002, kv=4))
+    one = predicted.predicted_at(robot_of(found, "robot.xml"), "qpos0", found)
+    small, acting = one.small["fixed"], predicted.acting_at(found, one.at, "fixed")
+    dt = one.limits["fixed", "Euler"].dt
+    assert predicted.radius_apart(acting, one.at, small, "Euler", dt) < 1e-6
+    # above the limit the factor of a stiffness that is 1 % too large is farther off than below it
+    assert predicted.radius_apart(acting, one.at, replace(small, K=1.01 * small.K), "Euler", dt) > 1e-3
 
 
 # tolerances and rules: just inside, just outside
