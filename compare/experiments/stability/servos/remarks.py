@@ -191,8 +191,8 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
     moved = [f"{one.name} {one.at.moved:.2g}" for one in found if one.rests and one.at.moved > RESTS_WITHIN]
     if moved:
         yield (
-            f"Under their servos postures sink to a rest near them, which is what is looked at; from the stated one it is, in "
-            f"{unit}: {some_of(moved)}."
+            f"Under their servos postures move to a rest, found by Newton's method, which is what is looked at; how far it is from "
+            f"the stated one, in {unit}: {some_of(moved)}."
         )
     for one in found:
         if not one.rests:
@@ -216,9 +216,6 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
 def drive_in_words(robot: Robot, found: Sequence[Predicted]) -> Iterator[str]:
     """What of the drive is left out, cut, or known by differences alone."""
     drive = robot.drive
-    if drive.refused:
-        texts = [f"{name}: {why}" for name, why in drive.refused.items()]
-        yield f"Left out of the limits, for they are not known to act by a linear law: {some_of(texts)}."
     off = [f"{one.name} ({one.off})" for one in drive.actuators if one.off]
     if off:
         yield f"These actuators exert nothing: {some_of(off)}."
