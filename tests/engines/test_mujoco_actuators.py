@@ -1,10 +1,13 @@
 """What drives a file's robot, read from its compiled model."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 from files import TWO, mjcf
 
+import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
 from compare.engines.mujoco.lock import ModelError
@@ -187,3 +190,38 @@ def test_a_speed_that_is_locked_does_not_move():
 def test_gains_that_are_no_numbers_are_refused_by_name(actuator, what):
     with pytest.raises(ModelError, match=f"the {what} has a number that is not finite"):
         drive_of(actuator)
+
+
+PLUGIN = """<mujoco><extension><plugin plugin="mujoco.pid"><instance name="p"><config key="kp" value="4"/></instance></plugin>
+</extension><worldbody><body><joint name="a"/><geom size="0.1"/></body></worldbody><actuator>
+<plugin name="x" joint="a" plugin="mujoco.pid" instance="p"/><position joint="a" kp="50"/></actuator></mujoco>"""
+
+
+def test_a_plugin_is_refused_and_exerts_nothing():
+    library = next((Path(mujoco.__file__).parent / "plugin").glob("*actuator*"), None)
+    if library is None:
+        pytest.skip("no plugins beside this MuJoCo")
+    try:
+        reading = read(PLUGIN)
+    except ValueError:  # not yet loaded
+        mujoco.mj_loadPluginLibrary(str(library))
+        reading = read(PLUGIN)
+    assert reading.drive.refused == {"x": "a plugin"}
+    model, data = Acting(reading.model, reading.drive).at(np.zeros(1), np.array([1.0, 0.1]), 0.01, "Euler")
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator[0] == pytest.approx(5.0)
+
+
+def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
+    before = '<orientation site="s" refsite="s" kp="1"/>'
+    motor = '<motor joint="j" gear="3" armature="0.1"/><position tendon="t" kp="2" gear="5"/>'
+    text = since(mjcf(SITES, after=TENDON.format("") + f"<actuator>{before}{motor}</actuator>"))
+    reading, model = read(text), mujoco.MjModel.from_xml_string(text)
+    assert [one.moment for one in reading.drive.actuators[1:]] == [(3.0, 0.0), (5.0, 10.0)]
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    full = np.zeros((2, 2))
+    mujoco.mj_fullM(model, data, full)
+    assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(full)
+    _, moments = Acting(model, reading.drive).along(np.zeros(2))
+    assert moments[1:].tolist() == [[3.0, 0.0], [5.0, 10.0]]

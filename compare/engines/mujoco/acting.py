@@ -12,6 +12,7 @@ from .flags import INTEGRATORS, bit
 from .inventory import NOT_HAD_FIELDS
 from .joints import kind_of
 from .linear import NUDGE
+from .rotors import output_of
 
 # beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
 DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
@@ -57,7 +58,8 @@ class Acting:
                 )
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
                 m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
-                m.actuator_plugin[i] = -1
+                if m.actuator_plugin[i] >= 0:  # it has its own law, whatever stands here
+                    m.actuator_gear[output_of(m, i)] = 0.0
             if (
                 one.refused
                 and hasattr(m, "actuator_damping")
@@ -85,8 +87,8 @@ class Acting:
         m, d = self.model, self.data
         d.qpos[:] = q
         mujoco.mj_fwdPosition(m, d)
-        count = len(self.drive.actuators)
-        moments = np.zeros((count, m.nv))
+        outputs = np.array([output_of(m, i) for i in range(len(self.drive.actuators))], int)
+        moments = np.zeros((len(d.actuator_length), m.nv))
         mujoco.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
         numbers = np.array([tendon.number for tendon in self.drive.tendons], int)
         jacobian = np.zeros((m.ntendon, m.nv))
@@ -95,8 +97,8 @@ class Acting:
             mujoco.mju_sparse2dense(
                 jacobian, d.ten_J.reshape(-1), *(rows or (d.ten_J_rownnz, d.ten_J_rowadr, d.ten_J_colind.reshape(-1)))
             )
-        lengths = np.concatenate([d.actuator_length[:count], d.ten_length[numbers]])
-        return lengths, np.concatenate([moments, jacobian[numbers]])
+        lengths = np.concatenate([d.actuator_length[outputs], d.ten_length[numbers]])
+        return lengths, np.concatenate([moments[outputs], jacobian[numbers]])
 
     def at(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Model and data at rest at a posture, under u of each actuator, whose activations, if any, stay as they are."""

@@ -10,6 +10,7 @@ from ...actuators import Actuator, Drive, Tendon
 from .flags import on
 from .joints import joint_name, kind_of, own_name
 from .lock import editable
+from .rotors import output_of
 
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 WITH_LENGTH = (*OF_A_JOINT, mujoco.mjtTrn.mjTRN_SLIDERCRANK, mujoco.mjtTrn.mjTRN_TENDON, mujoco.mjtTrn.mjTRN_SITE)
@@ -120,7 +121,7 @@ def off(m: mujoco.MjModel, i: int) -> str:
 def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple | None]:
     """The joint at which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
-    gear = float(m.actuator_gear[i, 0])
+    gear = float(m.actuator_gear[output_of(m, i), 0])
     if transmission in OF_A_JOINT:
         moment = np.zeros(m.nv)
         moment[m.jnt_dofadr[target]] = gear
@@ -170,7 +171,7 @@ def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
     found = np.zeros(m.nv)
     for i, damping in enumerate(getattr(m, "actuator_damping", np.zeros(count))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and on(m, "DAMPER"):
-            found[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[i, 0] ** 2
+            found[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[output_of(m, i), 0] ** 2
     return tuple(found.tolist())
 
 

@@ -116,7 +116,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     whole = setup.size == "full"
     taking = [method for method in methods_following(setup, cases, which) if whole or method.engine in COMPARED]
     fixed = [method for method in taking if not method.adaptive]
-    falling = names if whole else [regular.name]
+    # where servos act a fast mode decays first: an order is not seen before the steps are short beside it
+    falling = [case.name for case in cases if not case.controller] if whole else [regular.name]
     # the steps of a robot of many joints may be too few for that
     complete = (whole or not timed) and not setup.robot.is_read
     result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete)
