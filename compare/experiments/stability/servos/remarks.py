@@ -191,8 +191,8 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
     moved = [f"{one.name} {one.at.moved:.2g}" for one in found if one.rests and one.at.moved > RESTS_WITHIN]
     if moved:
         yield (
-            f"Under their servos postures move to a rest, found by Newton's method, which is what is looked at; how far it is from "
-            f"the stated one, in {unit}: {some_of(moved)}."
+            "Under their servos postures move to a rest, found by Newton's method, which is what is looked at; how far it is "
+            f"from the stated one, in {unit}: {some_of(moved)}."
         )
     for one in found:
         if not one.rests:

@@ -67,7 +67,9 @@ def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = Tr
 def left_out_in_words(refused: Mapping[str, str]) -> list[str]:
     """What is left out of the limits, by its name, and why: a sentence, or none."""
     texts = [f"{name}: {why}" for name, why in refused.items()]
-    return [f"Left out of the limits, for they are not known to act by a linear law: {some_of(texts)}."] if texts else []
+    return (
+        [f"Left out of the limits, for they are not known to act by a linear law: {some_of(texts)}."] if texts else []
+    )
 
 
 def own_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict]) -> str:
