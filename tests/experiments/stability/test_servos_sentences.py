@@ -2,7 +2,7 @@
 
 import pytest
 
-from compare.experiments.stability.servos.sentences import at_the_top, in_seconds, left_out_in_words, shaking
+from compare.experiments.stability.servos.sentences import at_the_top, in_seconds, refused_in_words, shaking
 
 ATTACHED = "attached to a scene whose `<option>` states no integrator"
 
@@ -96,5 +96,5 @@ def test_stable_and_far_off_is_said():
 
 
 def test_what_is_left_out_is_named_with_its_reason():
-    assert left_out_in_words({}) == []
-    assert left_out_in_words({"biceps": "a muscle"})[0].endswith("linear law: biceps: a muscle.")
+    assert refused_in_words({}) == []
+    assert refused_in_words({"biceps": "a muscle"})[0].endswith("linear law: biceps: a muscle.")

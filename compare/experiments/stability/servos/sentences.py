@@ -64,7 +64,7 @@ def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = Tr
     return words if integrator == DEFAULT_INTEGRATOR else f"{words} {default_in_words(rows, own, full)}"
 
 
-def left_out_in_words(refused: Mapping[str, str]) -> list[str]:
+def refused_in_words(refused: Mapping[str, str]) -> list[str]:
     """What is left out of the limits, by its name, and why: a sentence, or none."""
     texts = [f"{name}: {why}" for name, why in refused.items()]
     return (
