@@ -286,3 +286,17 @@ def test_a_step_of_a_chain_is_that_of_mujoco():
     posture = at(source)[0]
     assert posture.rest[1] == 0.0 and limit(source, "RK4").limit == "finite"
     assert_the_same_map(source)
+
+
+def test_with_pgs_discrete_has_the_limit_of_euler():
+    text = PATHS["arm7"].read_text().replace("<option ", '<option solver="PGS" ', 1)
+    posture, model = at(text)
+    small, run = posture.small("fixed"), Acting(model, posture.robot.drive, posture.cut)
+    limits = {name: small.limit(name).dt for name in ("Euler", "discrete")}
+    assert limits["discrete"] == pytest.approx(limits["Euler"])
+    if "discrete" in STEPPED:
+        steps = [limits["Euler"] * share for share in (0.99, 1.01)]
+        below, above = (
+            np.abs(np.linalg.eigvals(run.transition(posture.q, posture.u, dt, "discrete"))).max() for dt in steps
+        )
+        assert below < 1.0 < above
