@@ -62,5 +62,5 @@ def test_a_curve_goes_from_below_the_files_step_to_the_limit():
     dts, off = np.array(found).T
     assert dts[0] == pytest.approx(0.002 / 16.0) and dts[-1] == pytest.approx(0.08)
     assert (np.diff(dts) > 0.0).all() and off[-1] > off[0]
-    longest = response.curve(acting_of(at, reading), at, "fixed", "discrete", 0.002, None)
+    longest = response.curve(acting_of(at, reading), at, "fixed", "implicit", 0.002, None)
     assert longest[-1][0] == pytest.approx(response.LASTS)
