@@ -1,4 +1,4 @@
-"""The compiled loop for any tree: the same numbers as the method, and as straight-line code."""
+"""The compiled loops for any tree: the same numbers as the method, and as straight-line code."""
 
 import numpy as np
 import pytest
@@ -15,11 +15,11 @@ def test_generic_loop_is_the_method(rng, bodies):
     n = len(tree.parent)
     for q, qd, tau in rng.uniform(-3, 3, (5, 3, n)):
         M, h, qdd = np.zeros((n, n)), np.empty(n), np.empty(n)
-        generic.compiled().mass_matrix_and_bias(generic.arrays(tree), q, qd, M, h)
+        generic.compiled().repeat_mass_matrix_and_bias(generic.arrays(tree), q, qd, M.ravel(), h, 1)
         expected = tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree)
         assert np.allclose(M, np.tril(expected[0]), rtol=0, atol=1e-13 * np.abs(expected[0]).max())
         assert np.allclose(h, expected[1], rtol=0, atol=1e-12 * np.abs(expected[1]).max())
-        generic.compiled().forward_dynamics(generic.arrays(tree), q, qd, tau, qdd)
+        generic.compiled().repeat_forward_dynamics(generic.arrays(tree), q, qd, tau, qdd, 1)
         assert np.allclose(qdd, tmt.acceleration(q, qd, tau, tree), rtol=1e-9, atol=1e-9)
 
 
@@ -86,5 +86,39 @@ def test_the_loop_evaluates_as_straight_line_code_does(rng, monkeypatch):
             assert np.allclose(loop.rate(y, first[2]), straight.rate(y, first[2]), rtol=0, atol=1e-11)
             with pytest.raises(ValueError, match="shares memory"):
                 loop.each(*states, states[1])
-    with pytest.raises(ValueError, match="composite form alone"):
+    with pytest.raises(ValueError, match="loop over any tree alone"):
         kernels.evaluator(tree, "forward_dynamics", method.mass_matrix_and_bias)
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if METHODS[name].lanes])
+def test_runs_side_by_side_have_the_bits_of_each_alone(name, rng, monkeypatch):
+    """In loops, with balls and slides; runs that diverge end as they do alone."""
+    monkeypatch.setattr(kernels, "LONGEST", 0)
+    tree = tree_of_kinds(rng, bodies=3)
+    q, qd, tau = (np.array(values) for values in zip(*(random_state(rng, tree) for _ in range(kernels.LANES))))
+    qd[5] = 1e200
+    found = []
+    for made in (kernels.stepper, kernels.lane_stepper):
+        paths = [np.concatenate([x[:, None], np.zeros((len(x), 4, x.shape[1]))], axis=1) for x in (q, qd)]
+        ended = np.zeros(len(q), np.int8)
+        count = made(tree, name)(*paths, tau, 0.01, ended)
+        found.append([*paths, ended, count])
+    for alone, beside in zip(*found):
+        assert np.array_equal(alone, beside, equal_nan=True)
+    assert found[0][2][5] and np.count_nonzero(found[0][2]) == 1 and np.isfinite(found[0][0][4]).all()
+
+
+@pytest.mark.parametrize("quantity", kernels.QUANTITIES)
+def test_many_states_of_a_loop_side_by_side_have_the_bits_of_each(quantity, rng, monkeypatch):
+    monkeypatch.setattr(kernels, "LONGEST", 0)
+    tree = tree_of_kinds(rng, bodies=3)
+    states = [
+        np.array(values) for values in zip(*(random_state(rng, tree) for _ in range(19)))
+    ]  # two blocks and a rest
+    n = len(tree.axis)
+    size = n if quantity == "forward_dynamics" else n * (n + 3) // 2
+    rows, columns = np.empty((19, size)), np.empty((size, 19))
+    loop = kernels.evaluator(tree, quantity)
+    loop.each(*states, rows)
+    loop.lanes(*(np.ascontiguousarray(x.T) for x in states), columns)
+    assert np.array_equal(rows, columns.T) and np.isfinite(rows).all()

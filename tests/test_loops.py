@@ -1,16 +1,18 @@
-"""The compiled loops over any tree, function by function: the composite form and the methods over plain numbers.
+"""The compiled loops over any tree, function by function: the dynamics and the methods over plain numbers.
 
 Quaternions are of any length: between the stages of a step they need not have length 1, and only so is it seen who brings
 them back to it.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from trees import random_state, tree_of_kinds
 
 from tmt import composite, generic, loop_runs, loop_stages, loop_states, loops, method, templates
+from tmt.eight import WIDTH
 from tmt.methods import METHODS, lone_speeds, one_step
 from tmt.sine import LIMIT
 
@@ -39,22 +41,56 @@ def stretched(rng, tree):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_loops_are_the_composite_form(seed):
+def test_the_loops_have_the_numbers_of_the_composite_form(seed):
     tree, rng = branched(seed)
     numbers, n = generic.arrays(tree), len(tree.axis)
     for _ in range(3):
         q, qd, tau = stretched(rng, tree)
-        M, h, force, qdd = np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n)
-        loops.mass_matrix_and_bias(numbers, q, qd, M, h)
+        M, h, qdd, w = np.zeros((n, n)), np.empty(n), np.empty(n), np.full(loops.workspace(numbers), np.nan)
+        loops.mass_matrix_and_bias(numbers, q, qd, w, M.ravel(), h)
         expected = [np.array(x) for x in composite.mass_matrix_and_bias(tree, q.tolist(), qd.tolist())]
         assert np.allclose(M, np.tril(expected[0]), rtol=0, atol=64 * EPS * np.abs(expected[0]).max())
         scale = np.abs(expected[0]).max() * np.square(qd).sum() + np.abs(expected[1]).max()
         assert np.allclose(h, expected[1], rtol=0, atol=64 * EPS * scale)
-        loops.reduced_force(numbers, h, q, qd, tau, force)
-        assert np.allclose(force, method.reduced_force(tree, h, q, qd, tau), rtol=0, atol=64 * EPS * scale)
-        loops.forward_dynamics(numbers, q, qd, tau, qdd)
-        solved = np.linalg.solve(expected[0], force)
+        loops.forward_dynamics(numbers, q, qd, tau, w, qdd)
+        solved = np.linalg.solve(expected[0], method.reduced_force(tree, expected[1], q, qd, tau))
         assert np.allclose(qdd, solved, rtol=0, atol=64 * EPS * np.linalg.cond(expected[0]) * np.abs(solved).max())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_eight_states_side_by_side_have_the_bits_of_one(seed):
+    """Mbar, h and qdd; hinges so far out that the library's sine is asked, in some lanes alone."""
+    tree, rng = branched(seed)
+    numbers, n = generic.arrays(tree), len(tree.axis)
+    states = [np.array(values).T.copy() for values in zip(*(stretched(rng, tree) for _ in range(WIDTH)))]
+    hinge = next(joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge")
+    states[0][hinge, 3] = 4.0 * LIMIT
+    many = [np.full((size, WIDTH), np.nan) for size in (loops.workspace(numbers), n * n, n, n)]
+    loops.mass_matrix_and_bias(numbers, *states[:2], *many[:3])
+    loops.forward_dynamics(numbers, *states, many[0], many[3])
+    for l in range(WIDTH):
+        one = [np.full(len(array), np.nan) for array in many]
+        q, qd, tau = (array[:, l].copy() for array in states)
+        loops.mass_matrix_and_bias(numbers, q, qd, *one[:3])
+        loops.forward_dynamics(numbers, q, qd, tau, one[0], one[3])
+        for alone, beside in zip(one[1:], many[1:]):
+            assert np.array_equal(alone, beside[:, l], equal_nan=True) and np.isfinite(alone).any()
+    expected = method.acceleration(tree, *(array[:, 3].tolist() for array in states))
+    assert np.allclose(many[3][:, 3], expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_far_from_the_world_no_digits_are_lost(seed):
+    """A free body, and what it carries, 10 km away along its slides: its motion is the same to the bit."""
+    tree, rng = branched(seed)
+    numbers, n = generic.arrays(replace(tree, stiffness=())), len(tree.axis)
+    q, qd, tau = random_state(rng, tree)
+    near, far, w = np.empty(n), np.empty(n), np.empty(loops.workspace(numbers))
+    loops.forward_dynamics(numbers, q, qd, tau, w, near)
+    assert tree.kind[:3] == ("slide",) * 3 and tree.parent[0] == -1
+    q[:3] += 1e4
+    loops.forward_dynamics(numbers, q, qd, tau, w, far)
+    assert np.array_equal(near, far)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -67,7 +103,7 @@ def test_positions_move_in_the_loops_as_they_do_elsewhere(seed):
         moved, rates = np.empty(len(q)), np.empty(len(qd))
         loop_states.move(numbers, q, u, moved)
         assert np.allclose(moved, tree.coordinates.move(q, u), rtol=0, atol=8 * EPS)
-        loop_states.movement_rates(numbers, u, qd, rates)
+        loop_states.put_rates(numbers, u, qd, rates, 0)
         assert np.allclose(rates, tree.coordinates.rates(u, qd), rtol=1e-12, atol=64 * EPS)
 
 
@@ -129,7 +165,7 @@ def test_the_error_of_a_step_is_estimated_as_stated():
     ]
     expected = squares[0] / math.sqrt(len(sizes) * (squares[0] + 0.01 * squares[1]))
     found = loop_runs.estimate(
-        generic.arrays(tree), np.array(stepping.errors), tolerance, dt, np.array(rates), np.array(changes), q, qd,
+        generic.arrays(tree), np.array(stepping.errors), tolerance, dt, np.ravel(rates), np.ravel(changes), q, qd,
         np.array(new_q), np.array(new_qd),
     )  # fmt: skip
     assert found == pytest.approx(expected, rel=1e-9) and expected > 0.0

@@ -1,6 +1,7 @@
 """Compiled functions of tmt itself: their machine code is kept in the cache folder, and run only if it is the user's own."""
 
 import importlib
+import inspect
 import os
 import pickle
 import shutil
@@ -11,19 +12,19 @@ from pathlib import Path
 import pytest
 from cache_folder import Planted, new_folder, posix, ran  # noqa: F401 (the fixture `folder`)
 
-from tmt import cache
-from tmt.machine_code import compiled
+from tmt import cache, composite, coordinates, eight, inlined, loop_joints, loop_runs, loops, sine, space
+from tmt.machine_code import compiled, sources
 
 ROOT = Path(__file__).resolve().parent.parent
 # one of the loops for any tree, the one that is compiled fastest: whether it was read from the folder, and its result
 PROGRAM = """
 import numpy as np
-from tmt import cache, loops
-total = np.zeros(3)
-loops.add_cross(total, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-print(sum(loops.add_cross.stats.cache_hits.values()), total.tolist(), cache.complaints)
+from tmt import cache, loop_states
+quaternion = np.array([0.0, 3.0, 0.0, 4.0])
+loop_states.normalize(quaternion, 0)
+print(sum(loop_states.normalize.stats.cache_hits.values()), quaternion.tolist(), cache.complaints)
 """
-RESULT = "[0.0, 0.0, 1.0] []\n"
+RESULT = "[0.0, 0.6, 0.0, 0.8] []\n"
 
 
 def double(x):
@@ -161,3 +162,11 @@ def test_a_folder_that_cannot_be_used_only_costs_time(tmp_path, folder, monkeypa
     function = compiled(double)
     shutil.rmtree(folder)
     assert function(1.5) == 3.0 and not folder.exists()
+
+
+def test_the_loops_are_compiled_anew_where_what_is_written_in_them_changes():
+    """Plain functions of other files are written in the place of their calls: all of these are in the loops' machine code."""
+    found = sources(loop_runs)
+    for module in (loop_runs, loops, loop_joints, inlined, eight, space, coordinates, composite, sine):
+        assert inspect.getsource(module) in found, module
+    assert inspect.getsource(cache) not in found

@@ -1,7 +1,6 @@
-"""The composite form as one compiled loop for any tree: nothing to trace and compile for a new model, but slower code.
+"""The dynamics as compiled loops for any tree, see loops.py: nothing to trace and compile for a new model, but slower code.
 
-Straight-line code grows with the number of hinges, and so does the time to compile it; for large trees this loop is used.
-It does what composite.py says; the loops themselves are in loops.py.
+Straight-line code grows with the number of hinges, and so does the time to compile it; for large trees these loops are used.
 """
 
 from collections.abc import Callable
@@ -16,52 +15,60 @@ from .coordinates import KINDS
 
 
 class Arrays(NamedTuple):
-    """A Tree as contiguous arrays, its masses handed inward."""
+    """A Tree as the loops take it, its masses handed inward."""
 
-    kind: np.ndarray  # (n,) 0 hinge, 1 slide, 2 ball
-    parent: np.ndarray  # (n,) int
-    at: np.ndarray  # (n + 1,) where each joint begins in q
-    by: np.ndarray  # (n + 1,) where each joint begins in qd
+    joints: np.ndarray  # (n,) of JOINT, each after the one that carries it
     before: np.ndarray  # (nv,) the speed before each on its path to the world, or -1
-    offset: np.ndarray  # (n, 3)
-    axis: np.ndarray  # (nv, 3)
-    mass: np.ndarray  # (n,)
-    moment: np.ndarray  # (n, 3)
-    second: np.ndarray  # (n, 3, 3)
-    damping: np.ndarray  # (nv,)
-    armature: np.ndarray  # (nv,)
-    stiffness: np.ndarray  # (n,)
-    rest: np.ndarray  # (nq,)
-    reference: np.ndarray  # (n,)
-    gravity: np.ndarray  # (3,)
+    gravity: tuple
+    nq: int
     position_gain: np.ndarray  # (nv, nv), or (0, 0) where there is none
     speed_gain: np.ndarray
+
+
+# what the loops know of a joint, of a hinge or slide the first of several: whole numbers, then doubles, with their shapes
+WHOLE = ("kind", "parent", "at", "by", "count", "forks", "goes_on")
+NUMBERS = {"reference": (), "moves": (), "offset": 3, "axis": 9, "mass": (), "moment": 3, "inertia": 9} | {
+    "armature": 3, "damping": 3, "stiffness": (), "rest": 4
+}  # fmt: skip
+JOINT = np.dtype([(name, "i8") for name in WHOLE] + [(name, "f8", shape) for name, shape in NUMBERS.items()])
 
 
 @lru_cache(maxsize=64)
 def arrays(tree) -> Arrays:
     """The Tree as arrays."""
-    carried, joints = [d.rounded(float) for d in carried_by_joint(tree)], tree.coordinates.joints
+    joints = tree.coordinates.joints
     before = [v - 1 for v in range(len(tree.axis))]
     for parent, joint in zip(tree.parent, joints):
         before[joint.qd.start] = joints[parent].qd.stop - 1 if parent >= 0 else -1
-    return Arrays(
-        np.array([tuple(KINDS).index(kind) for kind in tree.kind]),
-        np.array(tree.parent),
-        np.array([*(joint.q.start for joint in joints), tree.coordinates.nq]),
-        np.array([*(joint.qd.start for joint in joints), tree.coordinates.nv]),
-        np.array(before),
-        np.array(tree.offset),
-        np.array(tree.axis),
-        np.array([d.mass for d in carried], dtype=float),
-        np.array([list(d.moment) for d in carried]),
-        np.array([[list(row) for row in d.second] for d in carried]),
-        *(
-            np.array(getattr(tree, name))
-            for name in ("damping", "armature", "stiffness", "rest", "reference", "gravity")
-        ),
-        *(matrix(gain) for gain in (tree.position_gain, tree.speed_gain)),
-    )
+    gains = (matrix(gain) for gain in (tree.position_gain, tree.speed_gain))
+    return Arrays(np.array(rows(tree), JOINT), np.array(before), tree.gravity, tree.coordinates.nq, *gains)
+
+
+def rows(tree, number=float) -> list[tuple]:
+    """The joints by the names of JOINT, each followed by one that it carries where there is one. number: see composite.py."""
+    order, todo = [], [-1]
+    while todo:
+        order.append(todo.pop())
+        todo += [i for i in reversed(range(len(tree.parent))) if tree.parent[i] == order[-1]]
+    place = {i: k for k, i in enumerate(order, -1)}
+    masses, grounded, result = carried_by_joint(tree), {-1: True}, []
+    for k, i in enumerate(order[1:]):
+        (kind, at, by), parent, own = tree.coordinates.joints[i], tree.parent[i], masses[i].rounded(number)
+        # what only slides carry: the common point O of all that hangs on it moves with it
+        grounded[i] = kind == "slide" and grounded[parent]
+        still = grounded[parent]
+        count = by.stop - by.start
+        result.append((
+            tuple(KINDS).index(kind), place[parent], at.start, by.start, count,
+            any(place[c] != k + 1 for c in range(len(place) - 1) if tree.parent[c] == i),
+            order[k + 2 : k + 3] != [] and tree.parent[order[k + 2]] == i,
+            tree.reference[i], 0.0 if still else 1.0, (0.0,) * 3 if still else tree.offset[i],
+            [x for axis in [*tree.axis[by], *[(0.0,) * 3] * (3 - count)] for x in axis],
+            own.mass, tuple(own.moment), [x for row in own.inertia for x in row],
+            *((*values[by], *(0.0,) * (3 - count)) for values in (tree.armature, tree.damping)),
+            tree.stiffness[i], (*tree.rest[at], *(0.0,) * (4 - (at.stop - at.start))),
+        ))  # fmt: skip
+    return result
 
 
 def matrix(rows) -> np.ndarray:
@@ -76,11 +83,17 @@ def compiled():
     return loop_calls
 
 
-def stepper(tree, stepping) -> Callable:
-    """run(q, qd, tau, dt, ended) of a Tree and a method that has `loop`, as in kernels.stepper."""
-    from . import loop_runs, loop_stages
+def stepper(tree, stepping, lanes=False) -> Callable:
+    """run(q, qd, tau, dt, ended) of a Tree and a method that has `loop`, as in kernels.stepper.
 
-    loop = getattr(loop_stages if stepping.solves_stages else loop_runs, stepping.loop)
+    lanes: of runs that are a multiple of eight, eight side by side where the method has such a loop.
+    """
+    from . import loop_runs, loop_semi_implicit, loop_stages
+
+    known = vars(loop_stages) | vars(loop_semi_implicit) | vars(loop_runs)
+    loop = known[stepping.loop]
+    if lanes:
+        loop = known.get(f"{stepping.loop}_lanes", loop)
     run = partial(loop, arrays(tree), *stepping.looped(tree))
     # of no run: compiled for these types and then for no others, which it would take as they are (whole numbers, say)
     nothing = (

@@ -19,7 +19,7 @@ from .trace import Code
 from .tree import Tree
 from .values import shown
 
-LONGEST = 14_000  # lines of straight-line code that are compiled, which takes half a minute; beyond, the loops of generic.py are
+LONGEST = 14_000  # lines of straight-line code that are compiled, which takes half a minute; beyond, the loops of loops.py are
 INLINED = 0.15  # what a line costs each time it is put in the place of a call, beside 1 where it stands
 LARGEST = 24  # speeds: larger trees are not even traced
 QUANTITIES, SINES = ("forward_dynamics", "mass_matrix_and_bias"), ("sincos", "library_sincos")
@@ -38,16 +38,19 @@ def stepper(tree: Tree, method_name: str, steps: int | None = None) -> Callable:
     """
     checked_model(tree)
     stepping = method_named(method_name)
-    if tree.has_gains and stepping.loop and steps is not None and steps < FEW:
-        return _loop_stepper(tree, stepping)
-    if not is_traced(tree, stepping):
-        if not stepping.loop:
-            raise ValueError(
-                f"method {method_name!r} has no loop over any tree, and for {len(tree.axis)} speeds its straight-line code would "
-                f"have more than {LONGEST} lines; a smaller tree is expected"
-            )
-        return _loop_stepper(tree, stepping)
-    return _stepper(tree, stepping)
+    few = tree.has_gains and stepping.loop and steps is not None and steps < FEW
+    return looped(tree, method_name) if few or not is_traced(tree, stepping) else _stepper(tree, stepping)
+
+
+def looped(tree: Tree, method_name: str, lanes: bool = False) -> Callable:
+    """The run of `stepper`, or of `lane_stepper`, by the loop over any tree; ValueError if the method has none."""
+    stepping = method_named(method_name)
+    if not stepping.loop:
+        raise ValueError(
+            f"method {method_name!r} has no loop over any tree, and for {len(tree.axis)} speeds its straight-line code would "
+            f"have more than {LONGEST} lines; a smaller tree is expected"
+        )
+    return _loop_stepper(tree, stepping, lanes=True) if lanes else _loop_stepper(tree, stepping)
 
 
 def is_traced(tree: Tree, stepping) -> bool:
@@ -92,8 +95,10 @@ def _stepper(tree, stepping):
 
 
 @lru_cache(maxsize=64)
-def _loop_stepper(tree, stepping):
-    return checked_run(generic.stepper(tree, stepping), tree.coordinates.nq, tree.coordinates.nv, stepping.adaptive)
+def _loop_stepper(tree, stepping, lanes=False):
+    return checked_run(
+        generic.stepper(tree, stepping, lanes), tree.coordinates.nq, tree.coordinates.nv, stepping.adaptive
+    )
 
 
 def lane_stepper(tree: Tree, method_name: str) -> Callable:
@@ -102,6 +107,8 @@ def lane_stepper(tree: Tree, method_name: str) -> Callable:
     stepping = method_named(method_name)
     if not stepping.lanes:
         raise ValueError(f"method {method_name!r} has no lanes; an explicit one with a fixed step is expected")
+    if not is_traced(tree, stepping):
+        return looped(tree, method_name, lanes=True)
     return _lane_stepper(tree, stepping)
 
 
@@ -120,7 +127,7 @@ def evaluator(
     the upper triangle of Mbar, then h. Arrays are contiguous: for each of shape (N, nq or nv), out (N, m); for lanes,
     component by component as registers want them, (nq or nv, N) and (m, N). rad, s, kg, m, N m.
     terms: the form of the dynamics that is traced; sine: "sincos" or "library_sincos". Where straight-line code would take long
-    to compile, the loop over any tree evaluates the composite form, and other terms are a ValueError.
+    to compile, the loop over any tree is taken, which has its own form, and other terms are a ValueError.
     """
     checked_model(tree)
     for name, value, accepted in (("quantity", quantity, QUANTITIES), ("sine", sine, SINES)):
@@ -132,7 +139,7 @@ def evaluator(
         if terms is not composite.mass_matrix_and_bias:
             raise ValueError(
                 f"terms {shown(terms)} of {len(tree.axis)} speeds would take more than a minute to compile; for so many the "
-                "composite form alone is evaluated, by a loop"
+                "loop over any tree alone is taken, with its own form"
             )
         return _loop_evaluator(tree, quantity)
     return _evaluator(tree, quantity, terms, sine)

@@ -2,37 +2,41 @@
 
 import numpy as np
 
-from .loops import BALL, forward_dynamics, mass_matrix_and_bias
-from .machine_code import compiled
+from .eight import WIDTH
+from .inlined import get, put
+from .loop_joints import BALL
+from .loops import forward_dynamics, mass_matrix_and_bias, workspace
+from .machine_code import compiled, part
 
 
 @compiled
 def repeat_forward_dynamics(tree, q, qd, tau, qdd, count):
     """The same state so many times, for timing."""
+    w = np.empty(workspace(tree))
     for _ in range(count):
-        forward_dynamics(tree, q, qd, tau, qdd)
+        forward_dynamics(tree, q, qd, tau, w, qdd)
 
 
 @compiled
 def repeat_mass_matrix_and_bias(tree, q, qd, M, h, count):
-    """The same state so many times, for timing."""
+    """The same state so many times, for timing; M (nv * nv,)."""
+    w = np.empty(workspace(tree))
     for _ in range(count):
-        mass_matrix_and_bias(tree, q, qd, M, h)
+        mass_matrix_and_bias(tree, q, qd, w, M, h)
 
 
-@compiled
-def evaluate(tree, dynamics, q, qd, tau, M, out):
-    """qdd of one state, else the rows of the upper triangle of Mbar and then h, to out."""
+@part
+def evaluate(tree, dynamics, q, qd, tau, w, M, out):
+    """qdd of one state, or of eight, else the rows of the upper triangle of Mbar and then h, to out."""
     n = len(qd)
     if dynamics:
-        forward_dynamics(tree, q, qd, tau, out)
+        forward_dynamics(tree, q, qd, tau, w, out)
         return
-    M[:] = 0.0
-    mass_matrix_and_bias(tree, q, qd, M, out[n * (n + 1) // 2 :])
+    mass_matrix_and_bias(tree, q, qd, w, M, out[n * (n + 1) // 2 :])
     k = 0
     for i in range(n):
         for j in range(i, n):
-            out[k] = M[j, i]
+            put(out, k, get(M, j * n + i))
             k += 1
 
 
@@ -41,26 +45,41 @@ def each(tree, dynamics, q, qd, tau, out):
     """One state at a time: rows of q (N, nq), qd, tau (N, nv) to rows of out."""
     n = len(tree.before)
     size = n if dynamics else n * (n + 3) // 2
-    if not (q.shape == (len(q), tree.at[-1]) and qd.shape == tau.shape == (len(q), n) and out.shape == (len(q), size)):
+    if not (q.shape == (len(q), tree.nq) and qd.shape == tau.shape == (len(q), n) and out.shape == (len(q), size)):
         raise ValueError("q of shape (N, nq), qd and tau (N, nv) and out (N, results) are expected")
     apart(q, qd, tau, out)
-    M = np.empty((n, n))
+    w, M = np.empty(workspace(tree)), np.zeros(n * n)
     for i in range(len(q)):
-        evaluate(tree, dynamics, q[i], qd[i], tau[i], M, out[i])
+        evaluate(tree, dynamics, q[i], qd[i], tau[i], w, M, out[i])
 
 
 @compiled
 def lanes(tree, dynamics, q, qd, tau, out):
-    """The same of columns of q (nq, N), qd, tau (nv, N) to columns of out, one state at a time too."""
+    """The same of columns of q (nq, N), qd, tau (nv, N) to columns of out: eight side by side, the rest one at a time."""
     n, count = len(tree.before), q.shape[1]
     size = n if dynamics else n * (n + 3) // 2
-    if not (q.shape == (tree.at[-1], count) and qd.shape == tau.shape == (n, count) and out.shape == (size, count)):
+    if not (q.shape == (tree.nq, count) and qd.shape == tau.shape == (n, count) and out.shape == (size, count)):
         raise ValueError("q of shape (nq, N), qd and tau (nv, N) and out (results, N) are expected")
     apart(q, qd, tau, out)
-    M, result = np.empty((n, n)), np.empty(size)
-    for i in range(count):
-        evaluate(tree, dynamics, q[:, i].copy(), qd[:, i].copy(), tau[:, i].copy(), M, result)
+    w, M, result = np.empty((workspace(tree), WIDTH)), np.zeros((n * n, WIDTH)), np.empty((size, WIDTH))
+    states = np.empty((tree.nq, WIDTH)), np.empty((n, WIDTH)), np.empty((n, WIDTH))
+    for first in range(0, count // WIDTH * WIDTH, WIDTH):
+        for state, given in zip(states, (q, qd, tau)):
+            copy_lanes(given, first, state, 0)
+        evaluate(tree, dynamics, *states, w, M, result)
+        copy_lanes(result, 0, out, first)
+    w, M, result = np.empty(workspace(tree)), np.zeros(n * n), np.empty(size)
+    for i in range(count // WIDTH * WIDTH, count):
+        evaluate(tree, dynamics, q[:, i].copy(), qd[:, i].copy(), tau[:, i].copy(), w, M, result)
         out[:, i] = result
+
+
+@part
+def copy_lanes(given, first, to, start):
+    """Eight columns, from `first` on, to those from `start` on."""
+    for k in range(len(given)):
+        for l in range(WIDTH):
+            to[k, start + l] = given[k, first + l]
 
 
 @compiled
@@ -75,11 +94,11 @@ def apart(q, qd, tau, out):
 def chain(tree, dynamics, size, q, qd, tau, count):
     """The same state count times, each waiting for the one before; size: of the results."""
     n = len(tree.before)
-    if not (len(q) == tree.at[-1] and len(qd) == len(tau) == n):
+    if not (len(q) == tree.nq and len(qd) == len(tau) == n):
         raise ValueError("q of shape (nq,), qd and tau (nv,) are expected")
-    M, result, last = np.empty((n, n)), np.empty(size), 0.0
+    w, M, result, last = np.empty(workspace(tree)), np.zeros(n * n), np.empty(size), 0.0
     for _ in range(count):
-        evaluate(tree, dynamics, q + 1e-300 * last, qd, tau, M, result)
+        evaluate(tree, dynamics, q + 1e-300 * last, qd, tau, w, M, result)
         last = result.sum()
     return last
 
@@ -87,17 +106,17 @@ def chain(tree, dynamics, size, q, qd, tau, count):
 @compiled
 def rate(tree, y, tau):
     """dy/dt of y = (q, qd)."""
-    nq, n = tree.at[-1], len(tree.before)
+    nq, n = tree.nq, len(tree.before)
     if not (len(y) == nq + n and len(tau) == n):
         raise ValueError("y of shape (nq + nv,) and tau of shape (nv,) are expected")
     q, qd, result = y[:nq].copy(), y[nq:].copy(), np.empty(nq + n)
-    for i in range(len(tree.parent)):
-        k, v = tree.at[i], tree.by[i]
-        if tree.kind[i] != BALL:
+    for i in range(len(tree.joints)):
+        k, v = tree.joints[i].at, tree.joints[i].by
+        if tree.joints[i].kind != BALL:
             result[k] = qd[v]
             continue
         w, a, b, c, x, y_, z = q[k], q[k + 1], q[k + 2], q[k + 3], qd[v], qd[v + 1], qd[v + 2]
         result[k], result[k + 1] = -0.5 * (a * x + b * y_ + c * z), 0.5 * (w * x + b * z - c * y_)
         result[k + 2], result[k + 3] = 0.5 * (w * y_ + c * x - a * z), 0.5 * (w * z + a * y_ - b * x)
-    forward_dynamics(tree, q, qd, tau, result[nq:])
+    forward_dynamics(tree, q, qd, tau, np.empty(workspace(tree)), result[nq:])
     return result

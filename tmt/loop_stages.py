@@ -3,9 +3,10 @@
 import numpy as np
 
 from .implicit import CLOSE, ITERATIONS
-from .loop_runs import NUDGE, solve
-from .loop_states import check, end, normalize, turned, unsound
-from .loops import BALL, forward_dynamics
+from .loop_joints import BALL
+from .loop_semi_implicit import NUDGE, solve
+from .loop_states import check, end, normalize, put_product, unsound
+from .loops import forward_dynamics, workspace
 from .machine_code import compiled
 from .templates import NEWTON
 
@@ -15,21 +16,21 @@ def slope_and_jacobian(tree, q, qd, tau, value, by_q, by_qd):
     """qdd (nv,) and its derivatives by a movement of q and by qd, (nv, nv)."""
     n = len(qd)
     place, speeds, torque, found = q + 0j, qd + 0j, tau + 0j, np.empty(n, np.complex128)
-    forward_dynamics(tree, q, qd, tau, value)
-    for i in range(len(tree.parent)):
-        k = tree.at[i]
-        for v in range(tree.by[i], tree.by[i + 1]):
-            half = 0.5j * NUDGE
-            if tree.kind[i] == BALL:
-                j = v - tree.by[i]
-                turned(q + 0j, k, 1.0 + 0j, half * (j == 0), half * (j == 1), half * (j == 2), place)
+    w = np.empty(workspace(tree), np.complex128)
+    forward_dynamics(tree, q, qd, tau, w.real.copy(), value)
+    for i in range(len(tree.joints)):
+        joint, k = tree.joints[i], tree.joints[i].at
+        for j in range(joint.count):
+            half, v = 0.5j * NUDGE, joint.by + j
+            if joint.kind == BALL:
+                put_product(q + 0j, 1.0 + 0j, half * (j == 0), half * (j == 1), half * (j == 2), place, k)
             else:
                 place[k] += NUDGE * 1j
-            forward_dynamics(tree, place, speeds, torque, found)
+            forward_dynamics(tree, place, speeds, torque, w, found)
             by_q[:, v] = found.imag / NUDGE
             place[:] = q
             speeds[v] += NUDGE * 1j
-            forward_dynamics(tree, place, speeds, torque, found)
+            forward_dynamics(tree, place, speeds, torque, w, found)
             by_qd[:, v] = found.imag / NUDGE
             speeds[v] = qd[v]
 
@@ -44,9 +45,9 @@ def stage_states(tree, A, q, qd, dt, a, places, speeds):
             for j in range(count):
                 speeds[i, v] += dt * A[i, j] * a[j, v]
     matrix, right = np.empty((4 * count, 4 * count), a.dtype), np.empty(4 * count, a.dtype)
-    for joint in range(len(tree.parent)):
-        k, v = tree.at[joint], tree.by[joint]
-        if tree.kind[joint] != BALL:
+    for joint in tree.joints:
+        k, v = joint.at, joint.by
+        if joint.kind != BALL:
             for i in range(count):
                 places[i, k] = q[k]
                 for j in range(count):
@@ -79,10 +80,10 @@ def turns(tree, A, q, qd, dt, a, places):
     result = np.zeros((count, count, n, n))
     nudged, moved, speeds = a + 0j, np.empty((count, len(q)), np.complex128), np.empty((count, n), np.complex128)
     start, rates = q + 0j, qd + 0j
-    for joint in range(len(tree.parent)):
-        if tree.kind[joint] != BALL:
+    for joint in tree.joints:
+        if joint.kind != BALL:
             continue
-        k, first = tree.at[joint], tree.by[joint]
+        k, first = joint.at, joint.by
         for j in range(count):
             for v in range(first, first + 3):
                 nudged[j, v] += NUDGE * 1j
@@ -103,19 +104,18 @@ def newton(tree, A, q, qd, tau, dt, a, linear, base, by_q, by_qd, change):
     count, n = a.shape
     places, speeds = np.empty((count, len(q))), np.empty((count, n))
     stage_states(tree, A, q, qd, dt, a, places, speeds)
-    turn, has_balls = np.zeros((1, 1, 1, 1)), (tree.kind == BALL).any()
-    if has_balls:
+    turn, is_ball = np.zeros((1, 1, 1, 1)), np.zeros(n, np.bool_)
+    for joint in tree.joints:
+        is_ball[joint.by : joint.by + joint.count] = joint.kind == BALL
+    if is_ball.any():
         turn = turns(tree, A, q, qd, dt, a, places)
-    is_ball = np.zeros(n, np.bool_)
-    for joint in range(len(tree.parent)):
-        is_ball[tree.by[joint] : tree.by[joint + 1]] = tree.kind[joint] == BALL
     twice = A @ A
     matrix, right, value, off = np.zeros((count * n, count * n)), np.empty(count * n), base.copy(), np.empty(n)
     for i in range(count):
         if linear:
-            for joint in range(len(tree.parent)):
-                k, v = tree.at[joint], tree.by[joint]
-                if tree.kind[joint] != BALL:
+            for joint in tree.joints:
+                k, v = joint.at, joint.by
+                if joint.kind != BALL:
                     off[v] = places[i, k] - q[k]
                     continue
                 w, x, y, z, p = q[k], q[k + 1], q[k + 2], q[k + 3], places[i, k : k + 4]
@@ -154,17 +154,17 @@ def finish(tree, A, b, q, qd, dt, a, new_q, new_qd):
     for i in range(count):
         for v in range(n):
             new_qd[v] += dt * b[i] * a[i, v]
-        for joint in range(len(tree.parent)):
-            k, v = tree.at[joint], tree.by[joint]
-            if tree.kind[joint] != BALL:
+        for joint in tree.joints:
+            k, v = joint.at, joint.by
+            if joint.kind != BALL:
                 new_q[k] += dt * b[i] * speeds[i, v]
                 continue
-            turned(places[i], k, 0.0, speeds[i, v], speeds[i, v + 1], speeds[i, v + 2], rates)
+            put_product(places[i], 0.0, speeds[i, v], speeds[i, v + 1], speeds[i, v + 2], rates, k)
             for j in range(k, k + 4):
                 new_q[j] += dt * b[i] * 0.5 * rates[j]
-    for joint in range(len(tree.parent)):
-        if tree.kind[joint] == BALL:
-            normalize(new_q, tree.at[joint])
+    for joint in tree.joints:
+        if joint.kind == BALL:
+            normalize(new_q, joint.at)
 
 
 @compiled

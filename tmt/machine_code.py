@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import version
-from types import ModuleType
+from types import FunctionType, ModuleType
 
 from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
@@ -59,9 +59,17 @@ def sources(module: ModuleType) -> list[str]:
         for name, value in sorted(vars(each).items()):
             if isinstance(value, int | float):
                 found.append(f"{name} = {value!r}")
-            elif isinstance(value, Dispatcher) and (other := sys.modules[value.__module__]) not in modules:
+            elif is_followed(value, module) and (other := sys.modules[value.__module__]) not in modules:
                 modules.append(other)
     return found
+
+
+def is_followed(value, module) -> bool:
+    """Whether a value of a module, compiled or a plain function of its package, may be in the machine code of what is there."""
+    if isinstance(value, FunctionType):
+        package, *_ = module.__name__.split(".")
+        return value.__module__.split(".")[0] == package and value.__module__ != __name__
+    return isinstance(value, Dispatcher)
 
 
 class Cache(FunctionCache):
@@ -92,3 +100,8 @@ def compiled(function: Callable) -> Callable:
     except Exception:  # whatever is wrong with the folder, or another numba: it only costs time
         pass
     return made
+
+
+def part(function: Callable) -> Callable:
+    """A function that is compiled as a part of others alone: a call that hands arrays on would count who holds them."""
+    return njit(error_model="numpy", forceinline=True)(function)

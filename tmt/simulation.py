@@ -71,7 +71,7 @@ def simulate(
     if stepping.adaptive:
         evaluations = kernels.stepper(model, method, runs * steps)(*arguments, dt, tolerance, codes)
     else:
-        worth = runs * steps >= kernels.WORTH and stepping.lanes and kernels.is_traced(model, stepping)
+        worth = runs * steps >= kernels.WORTH and stepping.lanes
         in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
         if in_lanes:
             part = [array[:in_lanes] for array in arguments]

@@ -24,7 +24,7 @@ class Method:
     adaptive = False  # chooses its own steps, takes a tolerance and has an `attempt`, as AdaptiveRungeKutta does
     solves_stages = False  # its stages solve an equation: it has `start`, `newton` and `finish`, as in implicit.py
     damps_implicitly = False  # its slope takes the joint damping at the rates one dt later
-    # the compiled loop for any tree that follows it, in loop_runs.py or loop_stages.py: it is given looped(tree) first; "": none.
+    # the compiled loop for any tree that follows it, in one of the loop_ files: it is given looped(tree) first; "": none.
     # not inherited, as `step` may be another
     loop = ""
 

@@ -84,7 +84,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
     (q, qd, tau), n = state, len(tree.axis)
     floats = [a.tolist() for a in state]
-    arrays, out, M, h = generic.arrays(tree), np.empty(n), np.empty((n, n)), np.empty(n)
+    arrays, out, M, h = generic.arrays(tree), np.empty(n), np.empty(n * n), np.empty(n)
     run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_RESULTS // n)
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
