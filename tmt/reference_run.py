@@ -1,102 +1,194 @@
-"""A run with many digits, from which the error of every method is measured.
+"""The true motion, from which the error of every method is measured: Taylor's method in pairs of doubles, some 32 digits.
 
-Python's decimal numbers are one more scalar: in C, and several times faster than mpmath's at this length.
+The method is traced on numbers of many digits; series.py computes the series of its straight line, so that nothing is compiled
+for a robot. What is lost is rounding, 1e-30 or so, times the growth of a small difference along the motion. Two runs that
+share neither the form of the equations nor the order show how much it is, see `truth`.
 """
 
 import math
-from collections.abc import Callable
-from decimal import Decimal, localcontext
+from fractions import Fraction
+from functools import partial
+from typing import NamedTuple
 
 import mpmath
 import numpy as np
 
+from . import composite, method, series
+from .coordinates import Coordinates, conjugate, normalized, product
 from .exact import exact_tree
-from .method import acceleration
-from .space import arctan, cos, sin, sqrt
+from .pairs import pair
+from .space import sqrt
 from .trace import Tape
 
-DIGITS = 36
-COLUMNS = 10  # of the extrapolation: order 20
-TERMS = 18  # of the series of sine and cosine up to pi/4: the next is below 1e-40
-with mpmath.workdps(80):
-    HALF_PI = Decimal(mpmath.nstr(mpmath.pi / 2, 75))
-    FACTORIALS = [Decimal(mpmath.nstr(1 / mpmath.factorial(k), 60)) for k in range(2 * TERMS)]
+DIGITS = 60  # of the numbers that are traced
+FORMS = {
+    "composite": partial(composite.mass_matrix_and_bias, number=mpmath.mpf),
+    "literal": method.mass_matrix_and_bias,
+}
+OPERATIONS = {
+    "+": series.ADD, "-": series.SUBTRACT, "*": series.MULTIPLY, "/": series.DIVIDE, "neg": series.NEGATIVE,
+    "sqrt": series.ROOT,
+}  # fmt: skip
+ORDER, OTHER_ORDER = 32, 28
+TOLERANCE = 1e-33  # of the last coefficients in a step, in units of 1 + |value|
+MOST_STEPS = 20_000
+LOOKED_AT = 200  # steps after which a run that would take more than those ends at once
+HALVINGS = 4  # of a turn of at most pi, until its half is below 0.1 rad
+# of arcsin(x) / x as a polynomial in x^2, the highest first: the next is below 1e-36
+ARC_SINE = [Fraction(math.comb(2 * k, k), 4**k * (2 * k + 1)) for k in reversed(range(18))]
 
 
-def sincos(x: Decimal) -> tuple[Decimal, Decimal]:
-    """(sin x, cos x), x in rad: by their series after turning x into [-pi/4, pi/4]."""
-    n = (x / HALF_PI).to_integral_value()
-    r = x - n * HALF_PI
-    z, s, c = -r * r, Decimal(0), Decimal(0)
-    for k in reversed(range(TERMS)):
-        s, c = s * z + FACTORIALS[2 * k + 1], c * z + FACTORIALS[2 * k]
-    s *= r
-    return ((s, c), (c, -s), (-s, -c), (-c, s))[int(n) % 4]
+class TooManySteps(ValueError):
+    """The model is too stiff for a series."""
 
 
-sin.register(Decimal, lambda x: sincos(x)[0])
-cos.register(Decimal, lambda x: sincos(x)[1])
-sqrt.register(Decimal, Decimal.sqrt)
+class Truth(NamedTuple):
+    """A motion at equal times: q and qd, each number as the sum of two doubles."""
+
+    high: np.ndarray  # (records + 1, nq + nv) rad, rad/s
+    low: np.ndarray  # (records + 1, nq + nv)
+    steps: int
 
 
-@arctan.register
-def decimal_arctan(x: Decimal) -> Decimal:
-    """From the double on: sin y - x cos y is sin(y - arctan x) / cos(arctan x), so that each turn triples the digits."""
-    y = Decimal(math.atan(x))
-    for _ in range(2):
-        s, c = sincos(y)
-        y -= (s - x * c) / (c + x * s)
-    return y
+class Lines(NamedTuple):
+    """The equations of one tree under one torque, as series.py reads them."""
+
+    code: np.ndarray  # (operations, 4)
+    rates: np.ndarray  # (nq + nv,) the row that is the rate of each number of the state
+    numbers: np.ndarray  # (2, numbers), in the rows after the state
+    rows: int
 
 
-def slope(tree) -> Callable:
-    """slope(q, qd, tau) -> d(q, qd)/dt, sequences of decimal numbers: the method as it stands, traced, with exact numbers."""
-    tape, coordinates = Tape(Decimal), tree.coordinates
-    sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
-    q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(count))) for name, count in sizes.items())
-    tree = exact_tree(tree, tape.lift)
-    slopes = [*coordinates.component_rates(q, qd), *acceleration(tree, q, qd, tau)]
-    code = tape.function("slope", [*q, *qd, *tau], slopes)
-    scope = {"sincos": sincos, "sqrt": sqrt, "arctan": arctan, "fma": lambda a, b, c: a * b + c, **code.constants}
-    exec(code.text, scope)
-    return lambda q, qd, tau: scope["slope"](*q, *qd, *tau)
+def lines(tree, tau, form: str) -> Lines:
+    """The equations of a tree under constant torque (nv,), N m, in one of FORMS."""
+    tape, coordinates = Tape(mpmath.mpf), tree.coordinates
+    with mpmath.workdps(DIGITS):
+        exact = exact_tree(tree, mpmath.mpf)
+        exact.rest, exact.coordinates = of_length_1(coordinates, exact.rest), Smooth(*coordinates)
+        q, qd = (tape.inputs(*(f"{name}{i}" for i in range(size))) for name, size in zip(("q", "qd"), coordinates[1:]))
+        qdd = method.acceleration(exact, q, qd, [mpmath.mpf(v) for v in tau], FORMS[form])
+        rates = [tape.lift(rate) for rate in (*coordinates.component_rates(q, qd), *qdd)]
+
+        order = tape.needed(rates)
+        row = {x.i: k for k, x in enumerate((*q, *qd))}
+        numbers = [i for i in order if tape.nodes[i][0] == "number"]
+        row |= {i: k for k, i in enumerate(numbers, start=len(row))}
+        code, rows = [], len(row)
+        for i in order:
+            operation, arguments = tape.nodes[i]
+            if operation == "item":
+                row[i] = row[arguments[0]] + 1 + arguments[1]
+            elif i not in row:
+                row[i] = rows
+                operands = [row[a] for a in arguments]
+                made = [series.SLOPE, series.SINE, series.COSINE]
+                if operation != "sincos":
+                    made = [kind(operation, operands, range(len(rates), len(rates) + len(numbers)))]
+                code += [(made_, rows + k, operands[0], operands[-1]) for k, made_ in enumerate(made)]
+                rows += len(made)
+        pairs = np.array([pair(tape.nodes[i][1][0]) for i in numbers]).reshape(-1, 2).T.copy()
+    return Lines(np.array(code).reshape(-1, 4), np.array([row[rate.i] for rate in rates]), pairs, rows)
 
 
-def trajectory(tree, q, qd, tau, duration: float, records: int, steps: int) -> np.ndarray:
-    """The motion under constant torque at records + 1 equal times: (records + 1, nq + nv) decimal numbers, q and qd.
+def kind(operation, operands, numbers) -> int:
+    """What series.py does for an operation of a trace; numbers: the rows in which these stand, the second operand if any."""
+    if operation == "*" and operands[0] in numbers:
+        operands.reverse()
+    if operation == "*" and operands[1] in numbers:
+        return series.SCALE
+    return series.SQUARE if operation == "*" and operands[0] == operands[1] else OPERATIONS[operation]
 
-    q (nq,), qd, tau (nv,): rad, rad/s, N m, taken as what their doubles are exactly; duration in s; steps: a multiple of records.
-    Gragg's modified midpoint rule, extrapolated (Bulirsch and Stoer) to order 20 in every step, in 36 digits. How many of
-    them are right is seen from a second run with half the step.
+
+class Smooth(Coordinates):
+    """Coordinates whose `difference` has a series where it is zero too: no root of what vanishes there."""
+
+    def difference(self, q1, q0) -> list:
+        return [
+            value
+            for kind, at, _ in self.joints
+            for value in (
+                logarithm(product(conjugate(q0[at]), q1[at])) if kind == "ball" else [q1[at.start] - q0[at.start]]
+            )
+        ]
+
+
+def logarithm(p) -> list:
+    """coordinates.logarithm for |p| = 1: by halving the turn until a series of the arc sine takes it."""
+    w, *v = p
+    size = sqrt(w * w)
+    scale = w / size
+    for _ in range(HALVINGS):
+        size = sqrt((1.0 + size) * 0.5)
+        scale = scale / (2.0 * size)
+    x, y, z = (component * scale for component in v)
+    square, share = x * x + y * y + z * z, 0.0
+    for factor in ARC_SINE:
+        share = share * square + mpmath.mpf(factor.numerator) / factor.denominator
+    return [component * (share * 2.0 ** (HALVINGS + 1)) for component in (x, y, z)]
+
+
+def of_length_1(coordinates, q) -> list:
+    """A position with each quaternion at length 1 in all digits."""
+    q = list(q)
+    for joint in coordinates.balls:
+        q[joint.q] = normalized(q[joint.q])
+    return q
+
+
+def trajectory(
+    tree, q, qd, tau, dt: float, steps: int, every: int = 1, form: str = "composite", order: int = ORDER,
+    tolerance: float = TOLERANCE,
+) -> Truth:  # fmt: skip
+    """The motion under constant torque at t = 0, every dt, 2 every dt ... steps dt, these products exact.
+
+    q (nq,), qd, tau (nv,): rad, rad/s, N m, taken as what their doubles are exactly (quaternions at length 1); dt in s, of
+    which nothing else depends. Raises TooManySteps where MOST_STEPS would not do, ValueError if the numbers overflow.
     """
-    if steps % records:
-        raise ValueError(f"steps is {steps}; a multiple of {records} is expected")
-    with localcontext() as context:
-        context.prec = DIGITS
-        torque, nq = [Decimal(float(v)) for v in tau], len(q)
-        traced = slope(tree)
+    code, rates, numbers, rows = lines(tree, [float(v) for v in tau], form)
+    high, low = np.zeros((2, rows, order + 1))
+    n = len(rates)
+    high[n : n + numbers.shape[1], 0], low[n : n + numbers.shape[1], 0] = numbers
+    with mpmath.workdps(DIGITS):
+        start = of_length_1(tree.coordinates, [mpmath.mpf(float(v)) for v in q]) + [mpmath.mpf(float(v)) for v in qd]
+        state = np.array([pair(x) for x in start]).T.copy()
+    times = [Fraction(dt) * k for k in range(0, steps + 1, every)]
+    t, path, count = Fraction(0), [state.copy()], 0
+    while len(path) < len(times):
+        high[:n, 0], low[:n, 0] = state
+        series.expand(code, rates, order + 1, high.reshape(-1), low.reshape(-1))
+        h = step_size(high[:n], tolerance)
+        if not h > 0.0:
+            raise ValueError(f"the motion diverges: at t = {float(t):g} s its numbers overflow")
+        count, end = count + 1, times[-1] if h == math.inf else t + Fraction(h)
+        while len(path) < len(times) and times[len(path)] <= end:
+            path.append(at(times[len(path)] - t, high, low, state.shape))
+        left = float((times[-1] - t) / (end - t))
+        if count + left > MOST_STEPS and (count >= LOOKED_AT):
+            raise TooManySteps(
+                f"the series takes steps of {h:.1e} s at t = {float(t):.3g} s; more than {MOST_STEPS} would be needed"
+            )
+        state, t = at(end - t, high, low, state.shape), end
+    high, low = np.array(path).transpose(1, 0, 2)
+    return Truth(high, low, count)
 
-        def rate(state):
-            return np.array(traced(state[:nq], state[nq:], torque))
 
-        state = np.array([Decimal(float(v)) for v in (*q, *qd)])
-        path, dt = [state], Decimal(duration) / steps
-        for _ in range(records):
-            for _ in range(steps // records):
-                state = extrapolated(rate, state, dt)
-            path.append(state)
-    return np.array(path)
+def step_size(high: np.ndarray, tolerance: float) -> float:
+    """The step with which the last two terms of every series are at most so large, in units of 1 + |value|; NaN: none is."""
+    last = (np.abs(high[:, -2:]) / (1.0 + np.abs(high[:, :1]))).max(axis=0)
+    order = high.shape[1] - 1
+    with np.errstate(divide="ignore"):
+        return float(np.min((tolerance / last) ** (1.0 / np.array([order - 1, order]))))
 
 
-def extrapolated(rate, state, dt):
-    """The state one dt later: midpoint rules with 2, 4, 6, ... substeps, extrapolated in the square of their step."""
-    start, row = rate(state), []
-    for j in range(1, COLUMNS + 1):
-        h = dt / (2 * j)
-        before, now = state, state + h * start
-        for _ in range(2 * j - 1):
-            before, now = now, before + 2 * h * rate(now)
-        coarser, row = row, [(before + now + h * rate(now)) / 2]
-        for k, value in enumerate(coarser, start=1):
-            row.append(row[-1] + (row[-1] - value) * (j - k) ** 2 / (j**2 - (j - k) ** 2))
-    return row[-1]
+def at(time: Fraction, high, low, shape) -> np.ndarray:
+    """The state (2, n) at a time after that of the series, s."""
+    state, th = np.empty(shape), float(time)
+    series.values_at(high, low, th, float(time - Fraction(th)), state)
+    return state
+
+
+def truth(tree, q, qd, tau, dt: float, steps: int, every: int = 1) -> tuple[Truth, float]:
+    """The motion, see `trajectory`; and its largest difference, rad, rad/s, from a run in the literal form, of another order."""
+    first = trajectory(tree, q, qd, tau, dt, steps, every)
+    other = trajectory(tree, q, qd, tau, dt, steps, every, "literal", OTHER_ORDER)
+    return first, float(np.abs((first.high - other.high) + (first.low - other.low)).max())
