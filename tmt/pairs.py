@@ -1,6 +1,6 @@
-"""Numbers of about 32 digits for compiled code: a pair of doubles (high, low), whose sum it is, |low| at most half an ulp of high.
+"""Numbers of about 32 digits for compiled code: the sum of a pair of doubles (high, low), low at most half an ulp of high.
 
-Sums and products in pairs after Dekker and Knuth, whose parts are exact by `fma`; no result may be regrouped by the compiler.
+Sums and products after Knuth and Dekker, exact where they must be by `fma`; the compiler may regroup nothing.
 """
 
 import mpmath

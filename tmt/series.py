@@ -13,7 +13,7 @@ from .machine_code import compiled
 from .pairs import add, divide, joined, multiply, root, sincos, two_sum
 from .sine import fma
 
-ADD, SUBTRACT, NEGATIVE, SCALE, MULTIPLY, SQUARE, ROOT, DIVIDE, SLOPE, SINE, COSINE = range(11)
+ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, SQUARE, ROOT, DIVIDE, SINE, COSINE = range(11)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -43,20 +43,16 @@ def expand(code, rates, width, high, low):
             operation, row, of_a, of_b = code[n]
             r, a, b = row * width, of_a * width, of_b * width
             c, ah, al = r + k, high[a + k], low[a + k]
-            if operation == ADD:
-                high[c], low[c] = add(ah, al, high[b + k], low[b + k])
-                continue
-            if operation == SUBTRACT:
-                high[c], low[c] = add(ah, al, -high[b + k], -low[b + k])
+            if operation in (ADD, SUBTRACT):
+                sign = 1.0 if operation == ADD else -1.0
+                high[c], low[c] = add(ah, al, sign * high[b + k], sign * low[b + k])
                 continue
             if operation == NEGATIVE:
                 high[c], low[c] = -ah, -al
                 continue
-            if operation == SCALE:  # by a number
-                high[c], low[c] = multiply(ah, al, high[b], low[b])
-                continue
-            if operation == SLOPE:  # times t
-                high[c], low[c] = multiply(ah, al, float(k), 0.0)
+            if operation in (SCALE, SLOPE):  # by a number; of the slope of an angle, times t
+                bh, bl = (high[b], low[b]) if operation == SCALE else (float(k), 0.0)
+                high[c], low[c] = multiply(ah, al, bh, bl)
                 continue
             if operation == ROOT and k == 0:
                 high[c], low[c] = root(ah, al)
@@ -67,7 +63,7 @@ def expand(code, rates, width, high, low):
                 continue
 
             first, last = 0, k
-            if operation == SQUARE or operation == ROOT:  # each product of two different ones appears twice
+            if operation in (SQUARE, ROOT):  # each product of two different ones appears twice
                 a = a if operation == SQUARE else r
                 b, first, last = a, int(operation == ROOT), (k - 1) // 2
             elif operation == DIVIDE:
@@ -76,19 +72,18 @@ def expand(code, rates, width, high, low):
                 a, b, first = (r - width, r + width, 1) if operation == SINE else (r - 2 * width, r - width, 1)
             h, l = convolution(high, low, a, b + k, first, last)
 
-            if operation == SQUARE or operation == ROOT:
+            if operation in (SQUARE, ROOT):
                 h, l = 2.0 * h, 2.0 * l
                 if k % 2 == 0:
                     middle = a + k // 2
                     h, l = add(h, l, *multiply(high[middle], low[middle], high[middle], low[middle]))
-            if operation == ROOT:
-                h, l = divide(*add(ah, al, -h, -l), 2.0 * high[r], 2.0 * low[r])
-            elif operation == DIVIDE:
-                h, l = divide(*add(ah, al, -h, -l), high[a], low[a])
-            elif operation == SINE:
-                h, l = divide(h, l, float(k), 0.0)
-            elif operation == COSINE:
-                h, l = divide(h, l, -float(k), 0.0)
+            if operation >= ROOT:
+                bh, bl = (float(k) if operation == SINE else -float(k)), 0.0
+                if operation in (ROOT, DIVIDE):
+                    h, l = add(ah, al, -h, -l)
+                    of = 2.0 if operation == ROOT else 1.0
+                    bh, bl = of * high[a], of * low[a]
+                h, l = divide(h, l, bh, bl)
             high[c], low[c] = h, l
         for i in range(len(rates)):
             rate = rates[i] * width + k
