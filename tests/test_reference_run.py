@@ -19,7 +19,7 @@ from compare.truth.pendulum import exact_swing
 from tmt import composite, reference_run
 from tmt.exact import exact_tree
 from tmt.method import acceleration
-from tmt.reference_run import TooManySteps, trajectory, truth
+from tmt.reference_run import trajectory, truth
 
 BENT = (0.5, 0.3, 1.0)
 ONE_HINGE = tmt.Tree(
