@@ -21,6 +21,8 @@ from .process.crash import described
 from .process.streams import in_one_line
 
 PROGRAM = "python -m compare"
+ANSWERING_STEPS = "stability"  # the experiment of --dt and --integrator
+LONGEST_ASKED = 5.0  # s, that can be asked about
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 EXAMPLES = """examples:
   python -m compare all                          every experiment, report in reports/latest
@@ -28,6 +30,8 @@ EXAMPLES = """examples:
   python -m compare mass --out /tmp/mass         one experiment, report elsewhere
   python -m compare all --mjcf my_arm.xml        your MJCF of the arm compared with the stated numbers
   python -m compare all --mjcf robot.xml         any robot compared with tmt's equations for its compiled model
+  python -m compare stability --mjcf robot.xml --integrator Euler --dt 0.001
+                                                 whether that step is stable under the robot's own servos
   python -m compare all --reference my.py:arm    your equations compared with MuJoCo, which runs the arm
   python -m compare speed --scenes my.toml       your own scenes beside those of the arm
 
@@ -53,6 +57,19 @@ def with_minus(arguments: Sequence[str]) -> list[str]:
         if given[k - 1] == "--joints" and given[k].startswith("-") and not given[k].startswith("--"):
             given[k - 1 : k + 1] = [f"--joints={given[k]}"]
     return given
+
+
+def step_in_seconds(text: str) -> float:
+    """A step that is asked about, s."""
+    try:
+        dt = float(text)
+    except ValueError:
+        dt = 0.0
+    if not 0.0 < dt <= LONGEST_ASKED:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no step; seconds above 0 and at most {LONGEST_ASKED:g} are expected"
+        )
+    return dt
 
 
 def stated_reference(text: str) -> str:
@@ -109,11 +126,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="FILE",
         help="scenes of your own (TOML), beside those of the robot in trajectory, speed and reduction",
     )
+    parser.add_argument(
+        "--dt",
+        type=step_in_seconds,
+        metavar="S",
+        help=f"{ANSWERING_STEPS}: whether this step, s, is stable under the robot's own servos (default: the file's)",
+    )
+    parser.add_argument(
+        "--integrator",
+        type=not_empty,
+        metavar="NAME",
+        help=f"{ANSWERING_STEPS}: the same with this integrator of MuJoCo (default: the file's)",
+    )
     options = parser.parse_args(with_minus(sys.argv[1:] if arguments is None else arguments))
     if options.scenes and options.experiment not in (*FOLLOWING_SCENES, "all"):
         parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
     if options.joints and ":" not in (options.reference or ""):
         parser.error("--joints is for equations of your own (--reference FILE.py:OBJECT or MODULE:OBJECT)")
+    if (options.dt, options.integrator) != (None, None) and options.experiment != ANSWERING_STEPS:
+        parser.error(f"--dt and --integrator are for {ANSWERING_STEPS}; {options.experiment} answers for no other step")
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
     try:
         return carry_out(options, command)
@@ -155,11 +186,12 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     terminal = Terminal()
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
-        compared, robot, mujoco, reading = compared_with(options.reference, options.mjcf, options.joints)
+        compared, robot, mujoco, reading = known = compared_with(options.reference, options.mjcf, options.joints)
         if options.scenes:
             robot = robot.with_scenes(read_scenes(options.scenes, robot))
         if options.experiment != "all" and (reason := skipped(options.experiment, robot)):
             raise Refused(f"{options.experiment} cannot serve {robot.name}: {reason}")
+        asked = known.asked_step(options.dt, options.integrator)
         before = made_by(options.out)
         with new_report(options.out) as folder:
             for line in compared.lines:
@@ -176,6 +208,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference
+                of_run |= {"alone": options.experiment != "all", "asked": asked}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():
@@ -183,7 +216,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 asked = [name for name in names if name not in reasons]
                 sections, causes, needless = experiment.examine(asked, setup, folder, terminal, workers)
             parts, unknown = Parts(), "No verdict could be made."
-            outcome = sections, len(EXPERIMENTS) - len(needless), causes, compared.compared
+            outcome = sections, len(EXPERIMENTS) - len(needless), causes, compared.compared, robot.name
             words = parts.made("the verdict", unknown, verdict.verdict, *outcome)
             reasons |= needless
             origin["seconds"] = round(time.perf_counter() - started, 1)
@@ -194,6 +227,8 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     terminal.say()
     good = verdict.passed(sections) and not parts.broken
     terminal.say(words, "bold green" if good else "bold red")
+    for line in report.top:
+        terminal.say(line)
     for line in parts.lines:
         say_error(line)
     place = f" in place of that of `{before}`" if before not in (None, origin["command"]) else ""

@@ -4,7 +4,6 @@ With the moment J of an actuator, its length l = J q and its law as in actuators
 J' ((g0 u + b0) + (g1 u + b1) J q + (g2 u + b2) J qd).
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -36,11 +35,11 @@ def reason(actuator: Actuator, u: float) -> str:
     return known or ("it pushes away from its target" if actuator.stiffness(u) < 0.0 else "")
 
 
-def controller(drive: Drive, posture: object, q: np.ndarray, targets: float | Sequence[float] = 0.0) -> Controller:
+def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray | float = 0.0) -> Controller:
     """The controller at a posture, by what its keyframe states or by targets that are the posture.
 
-    posture: its name, or the numbers of one without a name; q: (nv,) rad or m, of a ball anything; targets: rad or m, by how
-    much each servo's target is moved, for all speeds or for each, (nv,): its length by the sum of |J| times that.
+    posture: its name, or the numbers of one without a name; q: (nv,) rad or m, of a ball anything; targets: (nv,) rad or m,
+    by how much the servos' targets are moved: the length of each by the sum of |J| times that.
     """
     moved, n = np.broadcast_to(targets, len(q)), len(q)
     moments = [np.zeros(n) if one.moment is None else np.array(one.moment) for one in drive.actuators]
@@ -60,7 +59,7 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: float | Se
 
 
 def moved_target(one: Actuator, u: float, by: float) -> float:
-    """The control at which a servo is without force so much farther, N m aside; of any other actuator u."""
+    """The control at which a servo is without force at a length so much farther; of any other actuator u."""
     stiffness = one.stiffness(u)
     if not (by and stiffness):
         return u

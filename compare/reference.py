@@ -11,7 +11,8 @@ import numpy as np
 
 from .case import SEED
 from .engines import Engine
-from .engines.mujoco import Mujoco, Reading, engine, has_hinges, load, read
+from .engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
+from .engines.mujoco.flags import integrator_by_name
 from .engines.own import Own, OwnEquations, OwnError
 from .joint_map import JointsError, joint_map
 from .own_file import OwnFileError, aside, own_object
@@ -60,6 +61,22 @@ class Compared(NamedTuple):
     robot: Robot
     mujoco: Mujoco
     reading: Reading | None  # None: the robot's numbers are stated
+
+    def asked_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
+        """A step, s, and an integrator that are asked about, the file's where one is None; None: both are.
+
+        ModelError, in one line: there is no such integrator, or no servo to ask about.
+        """
+        if dt is None and integrator is None:
+            return None
+        if self.reading is None or not self.robot.drive.actuators:
+            why = "has no actuator" if self.reading else "is compared by its stated numbers, which have no actuator"
+            raise ModelError(f"--dt and --integrator ask about a robot's own servos, and {self.robot.name} {why}")
+        try:
+            name = integrator_by_name(integrator or self.reading.integrator)
+        except ValueError as error:
+            raise ModelError(f"--integrator: {error}") from None
+        return (self.reading.dt if dt is None else dt), name
 
 
 def compared_with(asked: str | None, path: str | None, joints: str | None = None) -> Compared:

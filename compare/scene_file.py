@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from .case import TORQUES, Case, Scene
-from .given import WrongField, are_numbers, shorten, some
+from .given import WrongField, are_numbers, is_number, shorten, some
 from .robots import Robot
 
-KEYS = ("name", "posture", "q", "speed", "torque", "gravity", "damping", "locked", "duration", "dt")
+KEYS = ("name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt")
 UNITS = {  # of what is given for each joint: of hinges, slides and balls
     "q": {"hinge": "deg", "slide": "m", "ball": "quaternions"},
     "speed": {"hinge": "deg/s", "slide": "m/s", "ball": "deg/s"},
     "torque": {"hinge": "N m", "slide": "N", "ball": "N m"},
+    "targets": {"hinge": "deg", "slide": "m", "ball": "deg"},
 }
 WORDS = {"torque": TORQUES}
 STEPS = 64  # of a scene that states no dt
@@ -31,6 +32,8 @@ class SceneError(ValueError):
 
 def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     """The scenes of a file, of a robot: angles in deg, speeds in deg/s, torques in N m, damping in N m s/rad, times in s.
+
+    torque may be "servos": the robot's own actuators act, with `targets` moved by one number for all joints or one for each.
 
     Of slides m, m/s and N; of a ball a quaternion w, x, y, z, whose length is made 1 if it is within 0.001 of it, and three
     speeds and torques. Each needs a name; it starts at rest with all joints at their reference, free, if nothing else is
@@ -78,13 +81,13 @@ def scene_of(where: str, entry: dict, robot: Robot) -> Scene:
             raise SceneError(
                 f"{where}: posture is {in_toml(value)}; one of {', '.join(robot.poses)} is expected, numbers as q"
             )
-        if key not in UNITS or value in WORDS.get(key, ()):
+        if key not in UNITS or value in WORDS.get(key, ()) or (key == "targets" and is_number(value)):
             continue
         each = robot.coordinates.positions if key == "q" else robot.coordinates.speeds
         if not (are_numbers(value) and len(value) == len(each)):
             units = ", ".join(dict.fromkeys(UNITS[key][kind] for kind in robot.tree.kind))
             count = f"{len(each)} numbers, one per joint ({some(each)}), in {units}"
-            accepted = f"free, hold, or {count}" if key == "torque" else count
+            accepted = f"free, hold, servos, or {count}" if key == "torque" else count
             raise SceneError(f"{where}: {key} is {in_toml(entry[key])}; {accepted} is expected")
     if "q" in values:
         values["posture"] = with_unit_quaternions(where, entry["q"], values.pop("q"), robot)

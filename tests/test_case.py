@@ -78,7 +78,10 @@ def test_what_is_said_of_a_wrong_field(wrong, says):
     [
         ({"posture": "sitting"}, "posture is 'sitting'; zero, hanging, upright, ball catch, bent or 3 numbers"),
         ({"posture": (1, 2)}, "one per joint"),
-        ({"torque": "pull"}, "torque is 'pull'; free, hold, or a torque in N m"),
+        ({"torque": "pull"}, "torque is 'pull'; free, hold, servos, or a torque in N m"),
+        ({"torque": "servos"}, "torque is 'servos'; free, hold or numbers, as no actuator of this robot takes part"),
+        ({"targets": 2.0}, 'targets is 2.0; torque = "servos" is expected'),
+        ({"targets": "far", "torque": "servos"}, "targets is 'far'; a movement in deg .m., for all joints or for each"),
         ({"torque": (1, 2, np.inf)}, "in N m"),
         ({"torque": ()}, "3 numbers, one per joint"),
         ({"speed": "fast"}, "in deg/s"),

@@ -98,6 +98,57 @@ def test_in_all_what_cannot_serve_the_robot_is_skipped_with_the_reason(tmp_path,
     assert f"published     skipped: {reason}" in capsys.readouterr().out.splitlines()
 
 
+SERVO = """<mujoco model="tail"><option timestep="0.002"/><worldbody><body><joint name="swing" axis="0 1 0" damping="0.01"/>
+  <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody>
+  <actuator><position joint="swing" kp="50" kv="800"/></actuator></mujoco>"""
+
+
+def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(tmp_path, capsys):
+    path = tmp_path / "tail.xml"
+    path.write_text(SERVO)
+    asked = ["--dt", "0.001", "--integrator", "Euler"]
+    assert main(["stability", "--quick", "--mjcf", str(path), *asked, "--out", str(tmp_path / "out")]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("TMT and MuJoCo agree in stability"))
+    assert "but tail is not stable at its own step of 2 ms at qpos0: the limit is 1." in lines[at]
+    assert lines[at + 1].startswith("Not stable at its own 2 ms under Euler, MuJoCo's default (limit 1.")
+    assert lines[at + 2].startswith("Asked: 1 ms under Euler: stable (limit 1.")
+    results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    assert not results["passed"] and results["causes"] == []
+    failed = [check for check in results["checks"] if not check["passed"]]
+    assert [(check["quantity"], check["scene"], check["note"]) for check in failed] == [
+        ("stable at its own step", "qpos0", "under Euler, swing")
+    ]
+    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert text.index(lines[at + 1]) < text.index("## Stability") and f"\n- {lines[at + 1]}\n" in text
+    assert lines[at + 1] in (tmp_path / "out" / "index.html").read_text(encoding="utf-8").replace("&#x27;", "'")
+
+
+@pytest.mark.parametrize("arguments, says", [
+    (["--dt", "0.1"], "arm is compared by its stated numbers, which have no actuator"),
+    (["--integrator", "Euler", "--mjcf", str(PATHS["free_body"])], "free_body has no actuator"),
+    (["--integrator", "euler", "--mjcf", str(PATHS["arm7"])], "'euler' is no integrator of MuJoCo; is Euler meant?"),
+    (["--integrator", "heun", "--mjcf", str(PATHS["arm7"])], "'heun' is no integrator of MuJoCo; Euler, implicitfast,"),
+])  # fmt: skip
+def test_a_step_that_cannot_be_answered_for_gets_status_2(tmp_path, capsys, arguments, says):
+    refused(capsys, ["stability", *arguments, "--out", str(tmp_path / "out")], says)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments, says", [
+    (["mass", "--dt", "0.1"], "--dt and --integrator are for stability; mass answers for no other step"),
+    (["all", "--integrator", "Euler"], "--dt and --integrator are for stability; all"),
+    (["stability", "--dt", "0"], "argument --dt: '0' is no step; seconds above 0 and at most 5 are expected"),
+    (["stability", "--dt", "nan"], "'nan' is no step"), (["stability", "--dt", "5.1"], "'5.1' is no step"),
+    (["stability", "--dt", "2ms"], "'2ms' is no step"), (["stability", "--integrator", ""], "argument --integrator: it is empty"),
+])  # fmt: skip
+def test_a_step_that_is_none_or_elsewhere_gets_status_2(capsys, arguments, says):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    assert ended.value.code == 2 and out == "" and len(err.splitlines()) == 1 and says in err
+
+
 def refused(capsys, arguments, says):
     """Status 2, one line that says why, and nothing else."""
     assert main(arguments) == 2

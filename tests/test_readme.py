@@ -11,10 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models import PATHS
 
 from compare.__main__ import main
+from compare.engines.mujoco import reading
+from compare.experiments.stability.servos import full_at
+from compare.experiments.stability.servos.predicted import limit_rows, predicted_at
+from compare.experiments.stability.servos.sentences import at_the_top
 from compare.reference import compared_with
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
 from compare.scene_file import read_scenes
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -127,6 +133,16 @@ def test_the_first_line_of_the_output_is_the_one_that_is_shown(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     Path("robot.xml").write_text(PENDULUM)
     assert compared_with(None, "robot.xml").reference.lines[0] == shown
+
+
+def test_the_answer_for_a_step_is_the_one_that_is_shown():
+    """Its sentence about a file of the tests, from the same rows."""
+    (shown,) = (text.strip() for text in blocks("text") if text.startswith("Stable at its own"))
+    found = reading.read(PATHS["arm7"])
+    robot = robot_of(found, "arm7.xml")
+    predicted = [predicted_at(robot, name, found) for name in robot.positions]
+    full = [row for one in predicted for row in full_at(one, found)]
+    assert at_the_top(limit_rows(predicted, found.dt, found.integrator), full) == shown
 
 
 @pytest.mark.parametrize("text", blocks("toml"))

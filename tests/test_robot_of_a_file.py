@@ -9,6 +9,7 @@ import pytest
 from models import PATHS, random_tree
 
 import tmt
+from compare.actuators import Drive
 from compare.engines.mujoco import engine, read
 from compare.experiments.speed.settings import scenes_of as scenes_of_speed
 from compare.robots.file import COARSER, DURATION, added_damping, coarsest, robot_of, scenes_from
@@ -18,7 +19,15 @@ ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0)
 
 def reading_of(tree, **more):
     """What a reader gives of a tree, with changes."""
-    known = {"name": "", "source": "text", "tree": tree, "features": ("one",), "keyframes": {}, "dt": 0.002}
+    known = {
+        "name": "",
+        "source": "text",
+        "tree": tree,
+        "features": ("one",),
+        "keyframes": {},
+        "dt": 0.002,
+        "drive": Drive(),
+    }
     known |= {"qpos0": np.array(tree.zero), "ranges": (None,) * len(tree.hinge_names)}
     return SimpleNamespace(**known | more)
 

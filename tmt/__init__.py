@@ -121,9 +121,10 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
 @_quantity
 def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Accelerations qdd from Mbar qdd = tau - D qd - k (q - rest) - h, rad/s2, shape (..., nv).
+    """Accelerations qdd from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h, rad/s2, shape (..., nv).
 
-    q, qd, tau: joint positions (..., nq), speeds and torques (..., nv), rad, rad/s, N m. Assignment, parts e and f.
+    q, qd, tau: joint positions (..., nq), speeds and torques (..., nv), rad, rad/s, N m. P and S: the model's position_gain and
+    speed_gain. Assignment, parts e and f.
     """
     q, qd, tau = _states(model, q=q, qd=qd, tau=tau)
     M, h = _method.mass_matrix_and_bias(model, q, qd)
@@ -149,7 +150,7 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
 @_quantity
 def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Total energy, kinetic and potential, J, shape (...); infinite where it is beyond the largest double.
+    """Total energy, kinetic and potential, of no controller, J, shape (...); infinite where it is beyond the largest double.
 
     q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Its zero is that of `potential_energy`.
     """

@@ -13,6 +13,7 @@ assignment's part e in another order.
 """
 
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 import mpmath
@@ -132,14 +133,9 @@ def mass_matrix_and_bias(tree, q, qd, number=float) -> tuple[list, list]:
     n, joints = len(tree.axis), tree.coordinates.joints
     axes = [Vector(*v) for v in tree.axis]
     offsets, turns = zip(*(placed(tree, i, q) for i in range(len(joints))))
-    exact = carried_by_joint(tree)
-    even = [
-        d.even_about(Vector(*map(fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
-        for d, (kind, _, by) in zip(exact, joints)
-    ]
-    own, uneven, even = (
-        [d.rounded(number) for d in ds] for ds in (exact, [d.less(e) for d, e in zip(exact, even)], even)
-    )
+    # fractions take their time; other numbers than floats may be rounded to other digits from call to call
+    parts = rounded_once if number is float and tree.__hash__ else rounded_once.__wrapped__
+    own, uneven, even = map(list, parts(tree, number))
 
     # outward: each frame's motion at qdd = 0, in its own axes
     motions = []
@@ -187,6 +183,18 @@ def mass_matrix_and_bias(tree, q, qd, number=float) -> tuple[list, list]:
             forces[parent], moments[parent] = forces[parent] + force, moments[parent] + moment
             uneven[parent] = uneven[parent].plus(uneven[i].turned(turns[i]).plus(even[i]).moved(offsets[i]))
     return M, h
+
+
+@lru_cache(maxsize=64)
+def rounded_once(tree, number) -> tuple[list, list, list]:
+    """What each joint carries itself, and the part of it that is not even about a hinge, and the part that is."""
+    exact = carried_by_joint(tree)
+    even = [
+        d.even_about(Vector(*map(fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
+        for d, (kind, _, by) in zip(exact, tree.coordinates.joints)
+    ]
+    uneven = [d.less(e) for d, e in zip(exact, even)]
+    return tuple([d.rounded(number) for d in ds] for ds in (exact, uneven, even))
 
 
 def placed(tree, i, q) -> tuple[Vector, Matrix]:

@@ -23,19 +23,23 @@ LONGEST = 14_000  # lines of straight-line code that are compiled, which takes h
 INLINED = 0.15  # what a line costs each time it is put in the place of a call, beside 1 where it stands
 LARGEST = 24  # speeds: larger trees are not even traced
 QUANTITIES, SINES = ("forward_dynamics", "mass_matrix_and_bias"), ("sincos", "library_sincos")
+FEW = 300_000  # steps of all runs together, with gains: up to there the loop is done before a compilation would be
 WORTH = 10_000_000  # steps of all runs together from which lanes are worth their compilation
 
 
-def stepper(tree: Tree, method_name: str) -> Callable:
+def stepper(tree: Tree, method_name: str, steps: int | None = None) -> Callable:
     """Compiled `run(q, qd, tau, dt)` of a Tree and one of METHODS: fills the paths q and qd from their first states.
 
     q, qd: (runs, steps + 1, nq and nv), of which [:, 0] is given; tau (runs, nv); all contiguous, float64; rad, s, N m. It
     returns how often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its
     tolerance too: `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is filled with why each run ended,
-    see templates. Where straight-line code would take long to compile, the loop over any tree follows the method, if it has one.
+    see templates. Where straight-line code would take long to compile, the loop over any tree follows the method, if it has one;
+    and where a tree with gains, of which a robot may have many, is to be followed for no more than so many steps of all runs.
     """
     checked_model(tree)
     stepping = method_named(method_name)
+    if tree.has_gains and stepping.loop and steps is not None and steps < FEW:
+        return _loop_stepper(tree, stepping)
     if not is_traced(tree, stepping):
         if not stepping.loop:
             raise ValueError(

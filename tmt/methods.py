@@ -5,18 +5,19 @@ loop of kernels.py). METHODS may be given further ones, and objects of a user's 
 """
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
 
-from . import dop853, generic
+from . import dop853
 from .coordinates import FLAT
 from .derivatives import amplification as amplification
 from .derivatives import one_step as one_step
 from .implicit import ImplicitRungeKutta
-from .method import bias_rates, mass_matrix_and_bias, reduced_force
-from .space import solve_any
-from .stepping import Method, checked_sums, checked_tableau, completed
+from .method import mass_matrix_and_bias, reduced_force
+from .semi_implicit import SemiImplicitEuler as SemiImplicitEuler
+from .semi_implicit import by_speed as by_speed
+from .semi_implicit import lone_speeds as lone_speeds
+from .stepping import Method, advance, checked_sums, checked_tableau, completed, increments, left_over
 from .values import shown
 
 
@@ -109,160 +110,9 @@ class AdaptiveRungeKutta(RungeKutta):
         return *self.combined(slopes, q, qd, dt, joints), *estimates
 
 
-@dataclass(frozen=True)
-class SemiImplicitEuler(Method):
-    """qd+ = qd + dt a, then q+ = q moved by dt qd+, with a from the linear system
-
-        (Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 (k + P)]) a = tau - D qd - k (q - rest) - P q - S qd - h [- dt (k + P) qd].
-
-    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `lone_bodies`, which have no
-    other body on them or under them; `implicit_gains`: so is a controller's S, in the entries whose two joints lie on one path
-    to the world; `implicit_springs`: so are springs, and all entries of S and P. What MuJoCo calls Euler (none of these),
-    implicit (bias, gains), implicitfast (lone bodies, gains) and discrete (lone bodies, springs, gains). MuJoCo documentation,
-    numerical integration; which gains are implicit was measured.
-    """
-
-    implicit_bias: bool
-    lone_bodies: bool = False
-    implicit_springs: bool = False
-    implicit_gains: bool = False
-
-    damps_implicitly = True
-    loop = "run_semi_implicit"
-
-    def looped(self, tree):
-        """For the compiled loop: whose bias is implicit, (nv,), whether springs are, and which gains, of position and speed."""
-        lone = lone_speeds(tree) if self.lone_bodies else set()
-        own = np.array([self.implicit_bias or v in lone for v in range(len(tree.axis))])
-        return own, self.implicit_springs and tree.has_springs, *map(generic.matrix, self.gains_held(tree))
-
-    def gains_held(self, tree) -> tuple:
-        """The implicit entries of a controller's gains, of position and of speed: (nv, nv) each, () where there are none."""
-        if self.implicit_springs:
-            return tree.position_gain, tree.speed_gain
-        if not (self.implicit_gains and tree.speed_gain):
-            return (), ()
-        return (), tuple(
-            tuple(gain if one else 0.0 for gain, one in zip(*rows)) for rows in zip(tree.speed_gain, on_one_path(tree))
-        )
-
-    def matrix(self, tree, q, qd, dt, terms=mass_matrix_and_bias):
-        """The matrix of the linear system for the slope: Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 k + dt^2 P]."""
-        n = len(qd)
-        matrix = terms(tree, q, [0.0] * n)[0]
-        held = [dt * d for d in tree.damping]
-        if self.implicit_springs and tree.has_springs:
-            held = [x + dt * dt * k for x, k in zip(held, by_speed(tree, tree.stiffness))]
-        matrix = [[matrix[i][j] + (held[i] if i == j else 0.0) for j in range(n)] for i in range(n)]
-        lone = lone_speeds(tree) if self.lone_bodies else set()
-        if self.implicit_bias or lone:
-            rates = bias_rates(tree, q, qd, terms)
-            own = range(n) if self.implicit_bias else lone
-            added = [[dt * rate if i in own else 0.0 for rate in row] for i, row in enumerate(rates)]
-            matrix = [[x + y for x, y in zip(*rows)] for rows in zip(matrix, added)]
-        for gain, power in zip(self.gains_held(tree), (2, 1)):
-            if gain:
-                share = dt * dt if power == 2 else dt
-                matrix = [[x + share * g if g else x for x, g in zip(*rows)] for rows in zip(matrix, gain)]
-        return matrix
-
-    def residual(self, tree, a, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """What a leaves of the linear system above, (nv,): zero where it is the slope, and linear in a.
-
-        dh/dqd a is (h(qd + a) - h(qd - a)) / 2, as h is quadratic in the speeds.
-        """
-        M, h = terms(tree, q, qd)
-        force = reduced_force(tree, h, q, qd, tau)
-        held = [dt * d for d in tree.damping]
-        if self.implicit_springs and tree.has_springs:
-            stiffness = by_speed(tree, tree.stiffness)
-            force = [f - dt * k * v for f, k, v in zip(force, stiffness, qd)]
-            held = [x + dt * dt * k for x, k in zip(held, stiffness)]
-        left = [x + d * y for x, d, y in zip(left_over(M, a, force), held, a)]
-        position_gain, speed_gain = self.gains_held(tree)
-        if position_gain:
-            left = [
-                x + weighted(row, [dt * (v + dt * y) for v, y in zip(qd, a)]) for x, row in zip(left, position_gain)
-            ]
-        if speed_gain:
-            left = [x + weighted(row, [dt * y for y in a]) for x, row in zip(left, speed_gain)]
-        if own := set(range(len(qd))) if self.implicit_bias else lone_speeds(tree) if self.lone_bodies else ():
-            ahead, behind = (terms(tree, q, [v + sign * x for v, x in zip(qd, a)])[1] for sign in (1.0, -1.0))
-            left = [x + 0.5 * dt * (ahead[i] - behind[i]) if i in own else x for i, x in enumerate(left)]
-        return left
-
-    def slope(self, tree, q, qd, tau, dt, terms=mass_matrix_and_bias):
-        """a from the linear system above."""
-        force = reduced_force(tree, terms(tree, q, qd)[1], q, qd, tau)
-        if self.implicit_springs and tree.has_springs:
-            force = [f - dt * k * v for f, k, v in zip(force, by_speed(tree, tree.stiffness), qd)]
-        if position_gain := self.gains_held(tree)[0]:
-            force = [f - weighted(row, [dt * v for v in qd]) for f, row in zip(force, position_gain)]
-        return solve_any(self.matrix(tree, q, qd, dt, terms), force)
-
-    def step(self, slope, q, qd, dt, joints=FLAT):
-        """The state (q, qd) one dt later."""
-        qd = advance(qd, dt, (1.0,), [slope(q, qd)])
-        return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
-
-
-def left_over(M, a, force) -> list:
-    """M a - force."""
-    return [sum((m * x for m, x in zip(row, a)), f * -1.0) for row, f in zip(M, force)]
-
-
-def by_speed(tree, of_joints) -> list:
-    """For each speed the value of its joint."""
-    return [
-        value for value, joint in zip(of_joints, tree.coordinates.joints) for _ in range(joint.qd.start, joint.qd.stop)
-    ]
-
-
-def weighted(row, values):
-    """The sum of the entries of a row times values; 0.0 where all are zero."""
-    return sum((g * x for g, x in zip(row, values) if g), 0.0)
-
-
-@lru_cache(maxsize=64)
-def on_one_path(tree) -> list:
-    """Whether the joints of two speeds lie on one path to the world, (nv, nv)."""
-    before = [{i} for i in range(len(tree.parent))]
-    for i, parent in enumerate(tree.parent):
-        before[i] |= before[parent] if parent >= 0 else set()
-    joint = by_speed(tree, range(len(tree.parent)))
-    return [[i in before[j] or j in before[i] for j in joint] for i in joint]
-
-
-@lru_cache(maxsize=64)
-def lone_speeds(tree) -> set:
-    """The speeds of free bodies that stand alone: three slides and a ball from the world, and nothing on them."""
-    lone = set()
-    for i, kind in enumerate(tree.kind):
-        chain = [i - 3, i - 2, i - 1, i]
-        free = kind == "ball" and i >= 3 and [tree.kind[j] for j in chain] == ["slide"] * 3 + ["ball"]
-        alone = i not in tree.parent and tree.body_hinge.count(i) == 1 and not {*chain[:3]} & {*tree.body_hinge}
-        if free and alone and [tree.parent[j] for j in chain] == [-1, *chain[:3]]:
-            lone |= set(range(tree.coordinates.joints[i - 3].qd.start, tree.coordinates.joints[i].qd.stop))
-    return lone
-
-
 def square(A) -> np.ndarray:
     """The rows of an explicit tableau with zeros on and above its diagonal."""
     return np.array([[*row, *[0.0] * (len(A) - len(row))] for row in A])
-
-
-def increments(dt, weights, slopes, n) -> list:
-    """dt * sum of weights * slopes, (n,); 0.0 where there are none."""
-    return advance([0.0] * n, dt, weights, slopes)
-
-
-def advance(start, dt, weights, slopes):
-    """start + dt * sum of weights * slopes, component by component."""
-    result = []
-    for k, value in enumerate(start):
-        terms = [slope[k] if w == 1.0 else w * slope[k] for w, slope in zip(weights, slopes) if w != 0.0]
-        result.append(value + dt * sum(terms[1:], terms[0]) if terms else value)
-    return result
 
 
 CLASSICAL = (  # Kutta (1901): A, b, c

@@ -69,7 +69,7 @@ def simulate(
 
     codes, evaluations = np.zeros(runs, np.int8), 0
     if stepping.adaptive:
-        evaluations = kernels.stepper(model, method)(*arguments, dt, tolerance, codes)
+        evaluations = kernels.stepper(model, method, runs * steps)(*arguments, dt, tolerance, codes)
     else:
         worth = runs * steps >= kernels.WORTH and stepping.lanes and kernels.is_traced(model, stepping)
         in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
@@ -77,7 +77,7 @@ def simulate(
             part = [array[:in_lanes] for array in arguments]
             evaluations += kernels.lane_stepper(model, method)(*part, dt, codes[:in_lanes])
         rest = [array[in_lanes:] for array in arguments]
-        evaluations += kernels.stepper(model, method)(*rest, dt, codes[in_lanes:])
+        evaluations += kernels.stepper(model, method, runs * steps)(*rest, dt, codes[in_lanes:])
     ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
     t = dt * np.arange(steps + 1)
     q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))

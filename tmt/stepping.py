@@ -136,3 +136,22 @@ def checked_sums(method) -> None:
             raise ValueError(f"row {i} of A sums to {sum(row)}, not to c = {c}")
     if abs(sum(method.b) - 1.0) > 1e-14:
         raise ValueError(f"b sums to {sum(method.b)}, not to 1")
+
+
+def increments(dt, weights, slopes, n) -> list:
+    """dt * sum of weights * slopes, (n,); 0.0 where there are none."""
+    return advance([0.0] * n, dt, weights, slopes)
+
+
+def advance(start, dt, weights, slopes):
+    """start + dt * sum of weights * slopes, component by component."""
+    result = []
+    for k, value in enumerate(start):
+        terms = [slope[k] if w == 1.0 else w * slope[k] for w, slope in zip(weights, slopes) if w != 0.0]
+        result.append(value + dt * sum(terms[1:], terms[0]) if terms else value)
+    return result
+
+
+def left_over(M, a, force) -> list:
+    """M a - force."""
+    return [sum((m * x for m, x in zip(row, a)), f * -1.0) for row, f in zip(M, force)]

@@ -12,9 +12,9 @@ import numpy as np
 from tmt.lock import CLOSE_TO_ONE
 from tmt.values import real_numbers, shown
 
-from ..case import is_number
 from ..coordinates import Coordinates
 from ..engines.own import ARGUMENTS, OwnEquations, is_function
+from ..given import is_number
 from ..joint_map import JointMap, joint_map
 from ..judge.check import over
 from ..judge.entries import Entries

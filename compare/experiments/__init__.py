@@ -20,7 +20,7 @@ EXPERIMENTS = {
     "trajectory": "five seconds of motion, the same scheme in tmt for every integrator",
     "diagnosis": "what explains a difference: one number, one term, a convention; alone, without a file: made faults",
     "speed": "time against error: every method, every step, and what to use",
-    "stability": "step limits, departure from unstable postures, where each method fails",
+    "stability": "step limits, also under a robot's own servos; departure from unstable postures; where methods fail",
     "reduction": "what each scene needs of the model, and what the rest costs",
 }
 

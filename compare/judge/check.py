@@ -30,6 +30,7 @@ RULES = {  # of a verdict: the words between a value and its tolerance, and what
 
 # checks that fail where the program could not go on: they say nothing of an agreement
 ENDS, DRAWN, LOCKABLE = "runs to its end", "figure", "models whose hinges can be locked"
+AT_OWN_STEP = "stable at its own step"  # a check of the robot: it says nothing of an agreement either
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,7 @@ class Result:
     notes: list = field(default_factory=list)  # sentences for the report
     shown: list | None = None  # columns of the table in the report, if not all; none: only in its file
     tables: dict = field(default_factory=dict)  # further tables by name: lists of rows
+    top: list = field(default_factory=list)  # sentences for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that MuJoCo is compared with
 
     def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most") -> Check:

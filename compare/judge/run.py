@@ -130,7 +130,8 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     gone = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
-    nothing = FACTOR * EPS * (sum_of_inertias(tree, tuple(q[0].tolist())) + np.sum(tree.stiffness))
+    stiff = np.sum(tree.stiffness) + (np.trace(tree.position_gain) if tree.position_gain else 0.0)
+    nothing = FACTOR * EPS * (sum_of_inertias(tree, tuple(q[0].tolist())) + stiff)
     return np.maximum(has, np.maximum.accumulate(np.abs(done) + gone)) + nothing
 
 

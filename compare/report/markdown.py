@@ -16,6 +16,7 @@ def markdown(report: Report, body: Sequence[str], parts: Parts) -> str:
     lines = [plain_markdown(line) for line in first_lines(report.reference)]
     lines += [f"# {plain_markdown(title(report.robot))}", f"**{report.verdict}**"]
     lines += [f"**{plain_markdown(line)}**" for line in parts.lines]
+    lines += report.top
     return joined([*lines, *body])
 
 

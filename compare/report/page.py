@@ -27,6 +27,7 @@ def page(report: Report, body: Sequence[str], parts: Parts) -> str:
         reference="".join(f"<p>{html.escape(line)}</p>\n" for line in first_lines(report.reference)),
         colour="#009E73" if passed(sections) and not parts.broken else "#D55E00",
         verdict=html.escape(report.verdict) + "".join(f"<br>{html.escape(line)}" for line in parts.lines),
+        top="".join(f"<p>{words(line)}</p>\n" for line in report.top),
         contents="".join(f'<a href="#{name}">{name}</a>' for name in links),
         body="\n".join(body),
     )

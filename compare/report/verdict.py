@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ..judge.check import DRAWN, ENDS, LOCKABLE, Check, Result
+from ..judge.check import AT_OWN_STEP, DRAWN, ENDS, LOCKABLE, Check, Result
 from ..judge.words import listed
 
 
@@ -37,12 +37,30 @@ class Report(NamedTuple):
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: object | None = None  # a reference.Reference
 
+    @property
+    def top(self) -> list[str]:
+        """What is said of the robot below the verdict, in sentences."""
+        return [text for section in self.sections for text in section.result.top]
 
-def failures(sections: Sequence[Section]) -> tuple[list, list]:
-    """The checks that fail: those that compare, and those that say that something broke off."""
+
+def failures(sections: Sequence[Section]) -> tuple[list, list, list]:
+    """The checks that fail: those that compare, those that say that something broke off, and those of the robot's own step."""
     failed = [check for section in sections for check in section.result.checks if not check.passed]
     broke = [check for check in failed if check.quantity in (ENDS, LOCKABLE) or check.quantity.startswith(f"{DRAWN} ")]
-    return [check for check in failed if check not in broke], broke
+    unstable = [check for check in failed if check.quantity == AT_OWN_STEP]
+    return [check for check in failed if check not in broke and check not in unstable], broke, unstable
+
+
+def unstable_in_words(unstable: Sequence[Check]) -> str:
+    """What step is not stable, at which postures."""
+    worst = min(unstable, key=lambda check: check.tolerance)
+    more = (
+        f" and {len(unstable) - 1} more postures"
+        if len(unstable) > 2
+        else " and one more posture" * (len(unstable) > 1)
+    )
+    step, limit = (f"{1e3 * number:.4g} ms" for number in (worst.value, worst.tolerance))
+    return f"not stable at its own step of {step} at {worst.scene}{more}: the limit is {limit} {worst.note}".rstrip()
 
 
 def passed(sections: Sequence[Section]) -> bool:
@@ -57,22 +75,28 @@ def worst(sections: Sequence[Section]) -> Check | None:
 
 
 def verdict(
-    sections: Sequence[Section], experiments: int, causes: Sequence[dict] = (), compared: str = "The two models"
+    sections: Sequence[Section],
+    experiments: int,
+    causes: Sequence[dict] = (),
+    compared: str = "The two models",
+    robot: str = "the robot",
 ) -> str:
     """The outcome in words, with its cause or its worst figure.
 
-    experiments: how many there are in all; compared: what agrees or does not.
+    experiments: how many there are in all; compared: what agrees or does not; robot: what it is called, whose own step may be
+    unstable: that is no disagreement.
     """
     checks = [check for section in sections for check in section.result.checks]
     empty = listed([section.name for section in sections if not section.result.checks])
     if not checks:
         return f"Nothing was compared in {empty}: the notes there say why."
     sections = [section for section in sections if section.result.checks]
-    differing, broke = failures(sections)
+    differing, broke, unstable = failures(sections)
     failing = {check.experiment for check in differing}
     names = ", ".join(section.name for section in sections if not differing or section.name in failing)
     is_whole, some = len(sections) == experiments, f"{len(sections)} of {experiments} experiments"
     ran = "" if is_whole else f" in {names} ({some}{' ran' if differing else ''})"
+    own = f"{robot} is {unstable_in_words(unstable)}." if unstable else ""
     stopped = f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."
     if differing:
         text = f"{compared} do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
@@ -84,11 +108,16 @@ def verdict(
             text += f"Cause: {causes[0]['text']}{more}.{follow}"
         else:
             text += f"First: {differing[0]}."
-        return f"{text} {stopped}" if broke else text
+        return " ".join(filter(None, (text.rstrip(), stopped * bool(broke), f"Besides, {own}" * bool(own))))
+    passing = len(checks) - len(broke) - len(unstable)
     if broke:
         left = "" if is_whole else f" ({some})"
-        return f"Not everything could be compared{left}; the other {len(checks) - len(broke)} checks pass. {stopped}"
-    text = f"{compared} agree{ran}: all {len(checks)} checks pass." + f" In {empty} nothing was compared." * bool(empty)
+        text = f"Not everything could be compared{left}; the other {passing} checks pass. {stopped}"
+        return text + f" Besides, {own}" * bool(own)
+    text = f"{compared} agree{ran}: all {passing} {'checks that compare them' if own else 'checks'} pass."
+    text += f" In {empty} nothing was compared." * bool(empty)
+    if own:
+        return f"{text[:-1]}; but {own}"
     top = worst(sections)
     if top is None or top.value == 0.0:
         return text
@@ -102,9 +131,12 @@ def verdict(
 def outcome(section: Section) -> str:
     """Whether a section's claim holds, in words."""
     checks = section.result.checks
-    differing, broke = failures([section])
+    differing, broke, unstable = failures([section])
     if differing:
         return f"It does not hold: {len(differing)} of {len(checks)} checks fail."
+    if unstable and not broke:
+        passing = len(checks) - len(unstable)
+        return f"It holds: {passing} checks that compare pass; but the robot is {unstable_in_words(unstable)}."
     if broke:
         return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
     return f"It holds: all {len(checks)} checks pass." if checks else "It is not decided: nothing was compared."

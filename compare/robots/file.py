@@ -21,7 +21,7 @@ LEAST_STEPS, MOST_STEPS_OF_A_FILE = 64, 8192  # of a scene, by its coarsest step
 COARSER = 4  # than the file's own step
 OWN_POSTURES = "qpos0", "middle"  # their names
 SERVOS_ACT = 0.25  # s: a servo has answered then, and its fast modes ask for short steps
-MOVED_TARGETS = {"hinge": 0.1, "slide": 0.02, "ball": 0.0}  # rad or m, in a step response
+MOVED_TARGETS = {"hinge": 6.0, "slide": 0.02, "ball": 0.0}  # deg or m, in a step response
 STILL = 1e-6  # rad/s2 or m/s2: what accelerates less where it is let go stays
 THROWN_UP, TUMBLING = 2.0, (120.0, 60.0, -90.0)  # m/s, and deg/s about a free body's own axes
 SET_GOING = {"hinge": 60.0, "slide": 0.2, "ball": 60.0}  # deg/s or m/s
@@ -142,7 +142,9 @@ def servo_scenes(
     followed = ("speed",) if least <= count else ()
     return [
         Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **given),
-        Scene(f"{start}, step of the servos", start, "servos", moved, tags=("own", "servos", *followed), **given),
+        Scene(
+            f"{start}, step of the servos", start, "servos", targets=moved, tags=("own", "servos", *followed), **given
+        ),
     ]
 
 

@@ -56,7 +56,7 @@ def references(cases: Sequence[Case], map: Callable = map, progress: Callable = 
 
 def reference(case: Case) -> Reference:
     """That of one case, at the times at which every run of it is read; ValueError if none reaches the end of the scene."""
-    count = first_steps(case)
+    count = RECORDS if case.controller else first_steps(case)  # as the coarsest runs of `speed`
     start = (tuple(values.tolist()) for values in (*case.start, case.tau))
     try:
         path, apart = in_pairs(case.tree, *start, case.duration / count, count, count // RECORDS)

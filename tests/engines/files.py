@@ -131,6 +131,7 @@ def case_of(tree: tmt.Tree, locked=None, damping=0.0, gravity=True):
         tree=tree,
         locked=locked or {},
         scene=scene,
+        controller=None,
         added_damping=np.full(len(tree.axis), damping),
         joints=tree.hinge_names,
         coordinates=OfTree(tree),

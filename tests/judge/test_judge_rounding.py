@@ -8,6 +8,7 @@ import pytest
 
 import tmt
 from compare.judge.rounding import OF_A_BALL, band, growth, slope_rounding, step_rounding
+from compare.judge.scale import gain_scale
 from compare.robots.arm import ARM
 from tmt.coordinates import coordinates_of
 from tmt.methods import METHODS, amplification
@@ -28,6 +29,17 @@ def turning(steps, dt, torque=3.0, rate=5.0):
     rounding = (64 * EPS * 2.0 * a + 64 * EPS * torque) / 2.0
     rates = dt * rounding + 8 * EPS * (qd + dt * a)
     return q[:, None], qd[:, None], 8 * EPS * (q + dt * qd) + dt * rates, rates
+
+
+def test_what_a_controller_feeds_back_is_rounded_too():
+    """64 eps of |P| |q| + |S| |qd|, of the disc whose torque these gains all but take away."""
+    driven = dataclasses.replace(TURN, position_gain=((50.0,),), speed_gain=((4.0,),))
+    q, qd, tau, M = np.array([[1.0], [-3.0]]), np.array([[5.0], [-2.0]]), np.array([3.0]), 2.0
+    fed = 50.0 * np.abs(q) + 4.0 * np.abs(qd)
+    assert gain_scale(driven, q, qd) == pytest.approx(fed) and not gain_scale(TURN, q, qd).any()
+    _, size, bound = slope_rounding(METHODS["rk4"], driven, q, qd, tau, 0.1)
+    assert size == pytest.approx(np.abs(3.0 - 50.0 * q - 4.0 * qd)[:, 0] / M)
+    assert bound == pytest.approx(64 * EPS * (M * size + 3.0 + fed[:, 0]) / M, rel=1e-9)
 
 
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "rk4"])

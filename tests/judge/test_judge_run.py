@@ -1,9 +1,12 @@
 """When a run has left, has diverged, and how far it went."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import tmt
+from compare.actuators import Actuator, Drive
 from compare.case import Coordinates
 from compare.judge.run import departure, deviation, deviation_alive, diverged_at, movement_unit, number_or_none
 from compare.robots import Robot
@@ -30,6 +33,29 @@ def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name):
     for q in (None, case.q + [0.1, -0.2, 0.3]):
         assert diverged_at(case, t, *kicked(case, 0.999, q)) is None
         assert diverged_at(case, t, *kicked(case, 1.001, q)) == 0.5
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """A case of one hinge without gravity on a servo of 50 N m/rad whose target is 0.2 rad away."""
+    tree = dataclasses.replace(ARM.tree.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))
+    servo = Actuator("servo", "gamma", (1.0,), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, 0.0))
+    robot = Robot("one", ARM.mjcf, tree, {}, (), drive=Drive((servo,)))
+    return robot.case("step", posture=(30.0,), torque="servos", targets=np.degrees(0.2))
+
+
+def test_a_servo_gives_no_more_than_it_has_stored(driven):
+    """At most 50 (0.2)^2 / 2 = 1 J beyond what it has given: its own work is no gain."""
+    inertia = tmt.mass_matrix(driven.q, driven.tree)[0, 0]
+    for away in (0.0, 0.2, 0.5):
+        given = 1.0 - 25.0 * (away - 0.2) ** 2
+        for share, at in ((0.999, None), (1.001, 0.5)):
+            q, kinetic = np.array([driven.q, driven.q + away]), given + share
+            if kinetic > 0.0:
+                found = diverged_at(
+                    driven, np.array([0.0, 0.5]), q, np.array([[0.0], [np.sqrt(2.0 * kinetic / inertia)]])
+                )
+                assert found == at
 
 
 def test_a_run_has_diverged_where_it_is_not_finite():

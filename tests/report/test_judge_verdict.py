@@ -91,3 +91,33 @@ def test_a_run_that_diverged_is_a_disagreement_and_what_cannot_be_locked_is_none
     assert verdict.verdict([diverged], 1).startswith("The two models do not agree: 1 of 1 checks fail.")
     tied = section("reduction", (verdict.LOCKABLE, 0.0, 1.0, "equal", False))
     assert verdict.verdict([tied], 1).startswith("Not everything could be compared")
+
+
+STEP = ("stable at its own step", 0.002, 0.00111, "at most", False)
+
+
+def test_a_step_of_the_robot_that_is_not_stable_is_no_disagreement():
+    stable = section("stability", GOOD, ("stable at its own step", 0.002, 0.002, "at most", False))
+    assert verdict.passed([stable]) and "all 2 checks pass" in verdict.verdict([stable], 1)
+    unstable = section("stability", GOOD, STEP, STEP, ("stable at its own step", 0.002, 0.001, "at most", False))
+    sections = [section("mass", GOOD), unstable]
+    assert not verdict.passed(sections)
+    assert verdict.failures(sections)[:2] == ([], []) and len(verdict.failures(sections)[2]) == 3
+    found = verdict.verdict(sections, 2, compared="TMT and MuJoCo", robot="arm7")
+    assert found == (
+        "TMT and MuJoCo agree: all 2 checks that compare them pass; but arm7 is not stable at its own step of 2 ms at zero and 2 "
+        "more postures: the limit is 1 ms."
+    )
+    assert verdict.outcome(unstable).startswith(
+        "It holds: 1 checks that compare pass; but the robot is not stable at its own"
+    )
+    said = Lines()
+    say_outcome(said, unstable, 1.0, [])
+    assert said[0].split()[:3] == ["stability", "3", "FAILED"] and said[1].startswith(
+        "  FAIL stability: stable at its own step"
+    )
+
+
+def test_a_disagreement_stays_one_beside_a_step_that_is_not_stable():
+    text = verdict.verdict([section("mass", GOOD, BAD), section("stability", STEP)], 2, robot="arm7")
+    assert text.startswith("The two models do not agree: 1 of 3 checks fail. First: mass: Mbar, zero")

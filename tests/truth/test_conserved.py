@@ -77,3 +77,13 @@ def test_which_momenta_there_are():
         "linear",
         "angular",
     ]
+
+
+def test_a_controller_at_the_joint_that_carries_all_takes_its_momentum_away():
+    for place, left in (((0, 0), 0), ((0, 2), 0), ((2, 0), 1), ((1, 1), 1)):
+        gain = np.zeros((3, 3))
+        gain[place] = 2.0
+        for name in ("position_gain", "speed_gain"):
+            assert len(conserved(dataclasses.replace(tmt.ARM, **{name: gain}))) == left
+    free = tree_of("free_body")
+    assert len(conserved(free)) == 2

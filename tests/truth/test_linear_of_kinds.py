@@ -1,5 +1,8 @@
 """The linearised equations and what a step does to them: slides, balls, springs, damping, bodies that float; and rest."""
 
+import dataclasses
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from models import PATHS, random_tree
@@ -8,8 +11,8 @@ import tmt
 from compare.engines.mujoco import reading
 from compare.robots.file import robot_of
 from compare.truth.conserved import floats
-from compare.truth.derivative import stiffness
-from compare.truth.linear import held
+from compare.truth.derivative import holding, stiffness
+from compare.truth.linear import Held, held
 from compare.truth.postures import posture_names
 from compare.truth.rest import at_rest
 from tmt import METHODS
@@ -57,6 +60,40 @@ def test_a_step_is_the_amplification_of_the_methods_own_step(robots, name, metho
         assert np.abs(at.step(method, dt) - exact).max() < 1e-12 * np.abs(exact).max()
         growth = np.abs(np.linalg.eigvals(exact)).max()
         assert at.growth(method, dt) == pytest.approx(growth, abs=1e-6)
+
+
+@pytest.fixture(scope="module")
+def on_servos(robots):
+    """The gripper where its servos, a tendon's among them, hold it at rest."""
+    case = robots["gripper"].case("on servos", posture="open", torque="servos", gravity=False)
+    end = tmt.simulate(*case.start, case.tau, 5e-3, 4000, "implicitfast", case.tree).q[-1]
+    for _ in range(3):  # Newton's method, with the derivative that is tested
+        left = case.tau - np.array(holding(case.tree, list(end)), float)
+        end = end + np.linalg.solve(stiffness(case.tree, end), left)
+    assert np.abs(left).max() < 1e-9
+    return Held(SimpleNamespace(tree=case.tree, q=end, tau=case.tau, coordinates=case.coordinates, scene=case.scene))
+
+
+@pytest.mark.parametrize("method", FIXED)
+def test_a_step_under_servos_is_the_amplification_of_the_methods_own(on_servos, method):
+    at = on_servos
+    for dt in (1e-3, 0.02):
+        exact = amplification(METHODS[method], at.tree, at.q, np.zeros(at.nv), at.tau, dt)
+        assert np.abs(at.step(method, dt) - exact).max() < 1e-11 * np.abs(exact).max()
+
+
+def test_the_stiffness_under_servos_is_the_derivative_of_what_holds(on_servos):
+    at, nudge = on_servos, 1e-6
+    ends = [
+        [np.array(holding(at.tree, list(at.q + sign * nudge * unit)), float) for unit in np.eye(at.nv)]
+        for sign in (1, -1)
+    ]
+    found = stiffness(at.tree, at.q)
+    assert np.abs((np.array(ends[0]) - ends[1]).T / (2 * nudge) - found).max() < 1e-8 * np.abs(found).max()
+    hinges = dataclasses.replace(tmt.ARM, position_gain=np.diag([5.0, 6.0, 7.0]))
+    assert np.allclose(
+        stiffness(hinges, np.ones(3)) - stiffness(tmt.ARM, np.ones(3)), np.diag([5.0, 6.0, 7.0]), atol=1e-12
+    )
 
 
 def test_a_spherical_pendulum_swings_alike_to_both_sides_and_spins_freely(robots):

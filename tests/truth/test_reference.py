@@ -95,7 +95,7 @@ def test_whether_a_model_is_too_stiff_is_seen_after_a_few_steps(rate, known):
         path = reference_run.trajectory(tree, *start, 0.125, 1)
         assert path.high[-1, 0] == pytest.approx(np.cos(0.125 * rate), abs=1e-9)
     else:
-        with pytest.raises(reference_run.TooManySteps, match="at t = .* s a series takes steps of"):
+        with pytest.raises(reference_run.TooManySteps, match=r"at t = .* s a series takes steps of"):
             reference_run.trajectory(tree, *start, 0.125, 1)
 
 

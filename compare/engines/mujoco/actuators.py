@@ -10,6 +10,7 @@ from ...actuators import Actuator, Drive, Tendon
 from .flags import on
 from .joints import joint_name, kind_of, own_name
 from .lock import editable
+from .rotors import output_of
 
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 WITH_LENGTH = (*OF_A_JOINT, mujoco.mjtTrn.mjTRN_SLIDERCRANK, mujoco.mjtTrn.mjTRN_TENDON, mujoco.mjtTrn.mjTRN_SITE)
@@ -25,17 +26,23 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
     source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of the keyframes.
     """
     count = getattr(model, "nactuator", model.nu)
+    passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
+    by_actuators = np.flatnonzero(model.jnt_actgravcomp[model.dof_jntid]).tolist()
     return Drive(
         actuators=tuple(actuator(model, i) for i in range(count)),
         tendons=tuple(tendon(model, i) for i in range(model.ntendon) if pulls(model, i)),
-        compensation=tuple(map(float, model.body_gravcomp[list(bodies)])),
+        compensation=tuple(map(float, model.body_gravcomp[list(bodies)] * passive)),
         damping=own_damping(model, count),
         controls={keys[k]: u for k, u in stated_controls(model, source).items()},
-        cut={
-            int(model.jnt_dofadr[j]): tuple(map(float, model.jnt_actfrcrange[j]))
-            for j in np.flatnonzero(model.jnt_actfrclimited)
+        ranges={
+            int(model.jnt_dofadr[j]): between(model.jnt_actfrcrange[j]) for j in np.flatnonzero(model.jnt_actfrclimited)
         },
+        tendon_ranges={
+            int(i): between(model.tendon_actfrcrange[i]) for i in np.flatnonzero(model.tendon_actfrclimited)
+        },
+        **{"lifted" if on(model, "ACTUATION") else "unlifted": tuple(by_actuators)},
         unknown=unknown_springs(model),
+        explicit_damping=not on(model, "EULERDAMP"),
     )
 
 
@@ -52,17 +59,20 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     place, inputs = control_of(m, i)
     joint, moment = moment_of(m, i)
     filters = dynamics in ("FILTER", "FILTEREXACT")
+    clamped = inputs and on(m, "CLAMPCTRL") and m.actuator_ctrllimited[place]
+    along_tendon = mujoco.mjtTrn(m.actuator_trntype[i]) == mujoco.mjtTrn.mjTRN_TENDON
     return Actuator(
         name=own_name(m.actuator(i).name, "actuator", i),
         joint=joint,
         moment=moment,
-        gain=numbers(m.actuator_gainprm[i], GAINS.get(gain, 0)),
-        bias=numbers(m.actuator_biasprm[i], BIASES.get(bias, 0)),
+        gain=law(m.actuator_gainprm[i], GAINS.get(gain, 0)),
+        bias=law(m.actuator_biasprm[i], BIASES.get(bias, 0)),
         dynamics=DYNAMICS.get(dynamics, "none"),
         time_constant=max(float(m.actuator_dynprm[i, 0]), mujoco.mjMINVAL) if filters else 0.0,
-        control_range=between(m.actuator_ctrlrange[place]) if inputs and m.actuator_ctrllimited[place] else None,
+        control_range=between(m.actuator_ctrlrange[place]) if clamped else None,
         activation_range=between(m.actuator_actrange[i]) if m.actuator_actlimited[i] else None,
         force_range=between(m.actuator_forcerange[i]) if m.actuator_forcelimited[i] else None,
+        tendon=int(m.actuator_trnid[i, 0]) if along_tendon else -1,
         off=off(m, i),
         refused=refused(m, i, gain, bias, dynamics, inputs),
     )
@@ -111,7 +121,7 @@ def off(m: mujoco.MjModel, i: int) -> str:
 def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple | None]:
     """The joint at which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
-    gear = float(m.actuator_gear[i, 0])
+    gear = float(m.actuator_gear[output_of(m, i), 0])
     if transmission in OF_A_JOINT:
         moment = np.zeros(m.nv)
         moment[m.jnt_dofadr[target]] = gear
@@ -147,6 +157,7 @@ def tendon(m: mujoco.MjModel, i: int) -> Tendon:
     low, high = map(float, m.tendon_lengthspring[i])
     return Tendon(
         own_name(m.tendon(i).name, "tendon", i),
+        i,
         None if moment is None else tuple(moment.tolist()),
         float(m.tendon_stiffness[i]) * on(m, "SPRING"),
         float(m.tendon_damping[i]) * on(m, "DAMPER"),
@@ -160,7 +171,7 @@ def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
     found = np.zeros(m.nv)
     for i, damping in enumerate(getattr(m, "actuator_damping", np.zeros(count))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and on(m, "DAMPER"):
-            found[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[i, 0] ** 2
+            found[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[output_of(m, i), 0] ** 2
     return tuple(found.tolist())
 
 
@@ -185,14 +196,15 @@ def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
 
     The compiled model has zeros where a file states none: the file tells. Of a model compiled elsewhere all zeros are none.
     """
-    keys = None
+    spec = None  # its keyframes live as long as it does
     if source is not None:
         with suppress(ValueError):
-            keys = editable(source).keys
+            spec = editable(source)
+    keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None
     found = {}
     for k in range(m.nkey):
-        control = len(keys[k].ctrl) > 0 if keys and len(keys) == m.nkey else m.key_ctrl[k].any()
-        activation = len(keys[k].act) > 0 if keys and len(keys) == m.nkey else m.key_act[k].any()
+        control = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
+        activation = len(keys[k].act) > 0 if keys else m.key_act[k].any()
         if m.nu and (control or activation):
             found[k] = tuple(stated_u(m, k, i, control, activation) for i in range(getattr(m, "nactuator", m.nu)))
     return found
@@ -211,7 +223,7 @@ def kind(enum, value) -> str:
     return enum(int(value)).name.partition("_")[2]
 
 
-def numbers(values, count: int) -> tuple:
+def law(values, count: int) -> tuple:
     """The first numbers of a law, filled up with zeros to three."""
     return (*map(float, values[:count]), *[0.0] * (3 - count))
 

@@ -28,18 +28,14 @@ class MujocoDynamics:
 
     Columns follow the names of the coordinates, whatever the order in the file; a free joint of the model is four of them.
     bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero, (nq,).
-    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move. driven: the controls
-    and activations under which its actuators act, and the constant part of their torque, see servos.py: of a torque that is
-    given only what goes beyond that part is applied.
+    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move.
     """
 
-    def __init__(self, model, coordinates, bodies, zero, bare=False, driven=None):
+    def __init__(self, model, coordinates, bodies, zero, bare=False):
         # where states are evaluated the file's integrator must not matter, as `discrete` does
         model.opt.integrator = INTEGRATORS["RK4"]
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
-        self.model, self.data, self.driven = model, mujoco.MjData(model), driven
-        if driven:
-            self.data.ctrl[:], self.data.act[:] = driven.ctrl, driven.act
+        self.model, self.data = model, mujoco.MjData(model)
         self.coordinates, self.bodies, self.bare = coordinates, list(bodies), bare
         known = joint_places(model)
         joints = [known[name] for name in coordinates.names]
@@ -189,26 +185,18 @@ class MujocoDynamics:
         runs = len(given[0])
         starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
-        applied, controls = mujoco.mjtState.mjSTATE_QFRC_APPLIED, model.nu if self.driven else 0
-        if self.driven:  # controls come first
-            applied |= mujoco.mjtState.mjSTATE_CTRL
-        torques = np.zeros((runs, steps, controls + model.nv))
-        torques[:, :, :controls] = data.ctrl[:controls]
+        given_as, controls = self.control()
+        torques = np.zeros((runs, steps, len(controls) + model.nv))
+        torques[:, :, : len(controls)] = controls
         for start, torque, *state in zip(starts, torques, *given):
-            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, controls + self.dofs] = state
+            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, len(controls) + self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
         states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
-        options = {
-            "control_spec": int(applied),
-            "nstep": steps,
-            "state": states,
-            "sensordata": sensors,
-            "skip_checks": True,
-        }
+        options = {"control_spec": given_as, "nstep": steps, "state": states, "sensordata": sensors}
 
         def run():
-            rollout([model] * runs, [data], starts, torques, **options)
+            rollout([model] * runs, [data], starts, torques, skip_checks=True, **options)
             return states
 
         return starts, run
@@ -218,13 +206,15 @@ class MujocoDynamics:
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, self.applied(tau)
-        if self.driven:
-            data.ctrl[:], data.act[:] = self.driven.ctrl, self.driven.act
         return model, data
 
     def applied(self, tau):
-        """What of the torques of a case is applied to the joints: not what its actuators exert themselves."""
-        return tau - self.driven.torque if self.driven else tau
+        """What of the torques of a case is applied to the joints: all of it, unless its actuators exert a part."""
+        return tau
+
+    def control(self) -> tuple[int, np.ndarray]:
+        """What a rollout is given at each step, a part of MuJoCo's state: which, and what stands in it before the torque."""
+        return int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), np.zeros(0)
 
     # how the fields are read
 

@@ -14,7 +14,7 @@ from .dynamics import MujocoDynamics
 from .flags import INTEGRATORS
 from .inventory import switch_off
 from .lock import locked_model
-from .servos import engaged
+from .servos import DrivenDynamics
 
 SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
     "Euler": "semi_implicit_euler",
@@ -108,8 +108,8 @@ class Mujoco:
     def dynamics(self, case: Case) -> MujocoDynamics:
         """The dynamics of a case, made anew."""
         model = self.changed(case)
-        driven = engaged(model, case.controller) if case.controller else None
-        dynamics = MujocoDynamics(model, case.coordinates, self.bodies, case.tree.zero, self.bare, driven)
+        parts = model, case.coordinates, self.bodies, case.tree.zero, self.bare
+        dynamics = DrivenDynamics(*parts, case.controller) if case.controller else MujocoDynamics(*parts)
         dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
         return dynamics
 

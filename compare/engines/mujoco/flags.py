@@ -1,6 +1,7 @@
 """Flags and integrators by their names, as far as the installed MuJoCo has them."""
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 
 import mujoco
 
@@ -26,6 +27,18 @@ def bit(members: Sequence[str]) -> int:
         if hasattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"):
             return int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{member}"))
     return 0
+
+
+def integrator_by_name(name: str) -> str:
+    """An integrator of the installed MuJoCo by its name. ValueError, in one line, for another name: which are expected."""
+    if name in INTEGRATORS:
+        return name
+    if name in NAMES:
+        raise ValueError(f"MuJoCo {mujoco.__version__} has no {name}; {', '.join(INTEGRATORS)} are expected")
+    alike = {known.casefold(): known for known in INTEGRATORS}
+    near = get_close_matches(name.casefold(), alike, 1)
+    hint = f"; is {alike[near[0]]} meant?" if near else ";"
+    raise ValueError(f"{name!r} is no integrator of MuJoCo{hint} {', '.join(INTEGRATORS)} are expected")
 
 
 def on(m: mujoco.MjModel, stage: str) -> bool:

@@ -8,6 +8,11 @@ from .joints import own_name
 AT_JOINTS = {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)}
 
 
+def output_of(model: mujoco.MjModel, i: int) -> int:
+    """Where the length, the gear and the moment of an actuator stand: some have several outputs."""
+    return int(model.actuator_outadr[i]) if hasattr(model, "actuator_outadr") else i
+
+
 def rotors(model: mujoco.MjModel) -> np.ndarray:
     """Armature of actuators times gear squared, (nv,), kg m2 or kg; ValueError, by name, where it is not that of a joint.
 
@@ -21,6 +26,6 @@ def rotors(model: mujoco.MjModel) -> np.ndarray:
                 f"actuator {name!r} has armature and acts on no joint; only the armature of joints is compared"
             )
         found[model.dof_jntid == model.actuator_trnid[i, 0]] += (
-            model.actuator_armature[i] * model.actuator_gear[i, 0] ** 2
+            model.actuator_armature[i] * model.actuator_gear[output_of(model, i), 0] ** 2
         )
     return found

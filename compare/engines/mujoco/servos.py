@@ -1,4 +1,4 @@
-"""The actuators of a compiled model, set to act under constant controls."""
+"""A case in which the actuators of the model act, under constant controls: MuJoCo computes their forces itself."""
 
 from typing import NamedTuple
 
@@ -7,6 +7,7 @@ import numpy as np
 
 from ...controller import Controller
 from .actuators import control_of
+from .dynamics import MujocoDynamics
 from .flags import bit
 
 UNLIMITED = (
@@ -24,7 +25,7 @@ class Driven(NamedTuple):
 
 
 def engaged(model: mujoco.MjModel, controller: Controller) -> Driven:
-    """Switch on, in a model, the actuators that take part, without any range; MuJoCo computes their forces itself.
+    """Switch on, in a model, the actuators that take part, without any range.
 
     An activation is held constant: that of a filter by a control that is the same, that of an integrator by none.
     """
@@ -42,3 +43,24 @@ def engaged(model: mujoco.MjModel, controller: Controller) -> Driven:
                 act[model.actuator_actadr[i]] = u
     model.opt.disableactuator = 1 << IDLE
     return Driven(ctrl, act, controller.torque)
+
+
+class DrivenDynamics(MujocoDynamics):
+    """A model whose actuators act: of the torque that is given only what goes beyond the constant part of theirs is applied."""
+
+    def __init__(self, model, coordinates, bodies, zero, bare, controller):
+        self.driven = engaged(model, controller)
+        super().__init__(model, coordinates, bodies, zero, bare)
+        self.data.ctrl[:], self.data.act[:] = self.driven.ctrl, self.driven.act
+
+    def own_copy(self, dt, integrator, q=0.0, v=0.0, tau=0.0):
+        model, data = super().own_copy(dt, integrator, q, v, tau)
+        data.ctrl[:], data.act[:] = self.driven.ctrl, self.driven.act
+        return model, data
+
+    def applied(self, tau):
+        return tau - self.driven.torque
+
+    def control(self):
+        torque, _ = super().control()
+        return torque | int(mujoco.mjtState.mjSTATE_CTRL), self.driven.ctrl  # which comes first

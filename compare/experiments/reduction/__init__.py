@@ -61,6 +61,8 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
     solutions, in a few tenths of a second: enough to see a wrong model.
     """
     result = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}})
+    if left_out := [case.name for case in setup.robot.cases if case.controller]:
+        result.notes.append(f"Scenes in which actuators act are not reduced: {'; '.join(left_out)}.")
     cases = cases or [case for case in setup.robot.cases_of_torque if timed or "fewer joints" in case.scene.tags]
     try:
         fill(result, setup, cases, timed)

@@ -8,7 +8,7 @@ import numpy as np
 import tmt
 
 from ...case import Case
-from ...engines import COMPARED, GRID, Engine, Method, Setting, methods_in
+from ...engines import COMPARED, GRID, Engine, Method, Setting
 from ...judge import timing
 from ...judge.check import Result
 from ...judge.run import diverged_at, leaves_no_digits, movement_unit
@@ -27,8 +27,10 @@ from .settings import (
     coarsest_steps,
     followed,
     methods,
+    methods_following,
     regular_of,
     scenes_of,
+    schemes_in,
     settings_of,
     too_long_next,
     unavailable,
@@ -117,23 +119,16 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.curves["doubles"] = [name for name in names if known[name].why]
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
-    taking = {}
-    for case in cases:
-        of_case = methods(setup.engines, setup.size, which, setup.robot, case)
-        taking = {(method.engine, method.name): method for method in of_case} | taking
-    taking = [method for method in taking.values() if whole or method.engine in COMPARED]
+    taking = [method for method in methods_following(setup, cases, which) if whole or method.engine in COMPARED]
     fixed = [method for method in taking if not method.adaptive]
-    falling = names if whole else [regular.name]
+    # where servos act a fast mode decays first: an order is not seen before the steps are short beside it
+    falling = [case.name for case in cases if not case.controller] if whole else [regular.name]
     # the steps of a robot of many joints may be too few for that
     complete = (whole or not timed) and not setup.robot.is_read
     result.tables["speed_orders"] = advice.orders(result, falling, fixed, complete)
     if timed and setup.robot.coordinates.has_balls:
         result.tables["speed_orders"] += tumbling.orders_on_a_body(result, setup.engines)
-    schemes = {
-        case.name: {method.name: method.scheme for method in methods_in(setup.engines["mujoco"], case).values()}
-        for case in cases
-    }
-    accuracy.check_same_schemes(result, floors, schemes, unit)
+    accuracy.check_same_schemes(result, floors, schemes_in(setup, cases), unit)
     accuracy.check_smallest_errors(result, floors, unit)
     steps = {case.name: coarsest_steps(case) for case in cases}
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)

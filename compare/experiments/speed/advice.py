@@ -67,7 +67,7 @@ def step_response_in_words(table: Sequence[dict], driven: Sequence[str]) -> list
     lines = [line for line in table if line["target_rad"] == ASKED]
 
     def answers(wanted):
-        return "; ".join(answer_in_words(line) for line in lines if (line["scene"] in driven) == wanted)
+        return "; ".join(cheapest_in_words(line) for line in lines if (line["scene"] in driven) == wanted)
 
     if not (answers(True) and answers(False)):
         return []
@@ -77,7 +77,7 @@ def step_response_in_words(table: Sequence[dict], driven: Sequence[str]) -> list
     ]
 
 
-def answer_in_words(line: dict) -> str:
+def cheapest_in_words(line: dict) -> str:
     """The cheapest setting of MuJoCo and of tmt in one line of `advice`."""
     found = [
         f"{line[who]} (dt = {line[f'{who}_dt_s']:.3g} s), {line[f'{who}_ms']:.3g} ms"

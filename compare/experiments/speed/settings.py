@@ -87,6 +87,21 @@ def methods(
     ]
 
 
+def methods_following(setup: Setup, cases: Sequence[Case], which: str) -> list[Method]:
+    """The methods that follow any of the cases, each once."""
+    found = {}
+    for case in cases:
+        of_case = methods(setup.engines, setup.size, which, setup.robot, case)
+        found = {(method.engine, method.name): method for method in of_case} | found
+    return list(found.values())
+
+
+def schemes_in(setup: Setup, cases: Sequence[Case]) -> dict[str, dict[str, str]]:
+    """Of each case by its name {integrator of MuJoCo: the method of tmt that is the same scheme}."""
+    mujoco = setup.engines["mujoco"]
+    return {case.name: {method.name: method.scheme for method in methods_in(mujoco, case).values()} for case in cases}
+
+
 def left_out(engines: Mapping[str, Engine], size: str, robot: Robot | None) -> dict[tuple[str, str], str]:
     """{(engine, method): why it takes no part}: an engine is not there, or what it makes of this robot would take too long."""
     out = {}
@@ -149,8 +164,11 @@ def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, .
 
 
 def coarsest_steps(case: Case) -> int:
-    """The least multiple of 64 that is no less than the scene's own number of steps."""
-    return -(-case.steps // GRID) * GRID
+    """The least multiple of 64 that is no less than the scene's own number of steps; 64 where servos act.
+
+    There a scene's own steps are short for the sake of methods that are explicit in the speeds, as others need not be.
+    """
+    return GRID if case.controller else -(-case.steps // GRID) * GRID
 
 
 def finest_steps(method: Method) -> int:

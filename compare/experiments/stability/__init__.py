@@ -12,7 +12,7 @@ from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.linear import held
-from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs
+from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs, servos
 from .choice import dampings_of
 from .claims_judged import check_claims
 from .equilibria import check_equilibria, planes
@@ -32,6 +32,7 @@ def claim(robot: Robot) -> str:
         "amplification, gives its limit of dt, its growth per step and the time at which an unstable posture is left. "
         "Runs of both engines do as predicted"
         + (", and the assignment's observations follow from the same numbers." if robot.claims else ".")
+        + servos.claim_of_servos(robot)
     )
 
 
@@ -55,7 +56,7 @@ def tolerance(robot: Robot) -> str:
         "within one step or 0.03 s"
         + (", and what forces that are not linear may add," if robot.is_read else "")
         + " of the first crossing of the method's linear map, whose angles are rounded to doubles at each step; where the map "
-        "stays, the run stays."
+        "stays, the run stays." + servos.tolerance_of_servos(robot)
     )
 
 
@@ -116,6 +117,7 @@ def begin(setup: Setup) -> None:
     tongues = about(every and seen.swinging, of(edges, (), edges))
     setup.background["stability"] = {
         "subjects": seen,
+        "servos": servos.begin(setup),
         "limits": ask(limits.limits_and_growths, [held(robot, *point) for point in points], methods=methods, steps=steps,
                       growth_dts=tuple(dict.fromkeys((*FINE_DEPARTURES[::-1], coarse)))),
         "departure": ask(departure.departures, about(seen.saddle, leaving_dts), at=seen.saddle, methods=leaving),
@@ -152,6 +154,7 @@ def rows(setup: Setup) -> Result:
     robot = seen.robot
     result.curves["looked at"] = seen.names
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
+    said = servos.add(result, setup, work["servos"]) if work["servos"] else []
     check_equilibria(result, setup)
     limits.check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
@@ -171,7 +174,7 @@ def rows(setup: Setup) -> Result:
     if seen.centre:
         long_runs.check_newton(result, seen.centre.name, list(work["newton"]))
     result.tables = {name: table for name, table in result.tables.items() if table}
-    result.notes += [*work["not led"], *seen.left_out]
+    result.notes = [*said, *result.notes, *work["not led"], *seen.left_out]
     planes(result, robot, seen, tuple(dict.fromkeys(method.scheme for method in methods)))
     return result
 
@@ -180,11 +183,13 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Limits, the map of growth, regions, the nonlinear edge; departures; the claims; silent failure; a minute."""
     # matplotlib is for the process that draws
     from . import figures_claims, figures_departure, figures_failure, figures_limits
+    from .servos import figures_step
 
     tables, curves, looked_at = result.tables, result.curves, result.curves["looked at"]
     falls = [row for row in tables.get("departure", ()) if row["scene"] == looked_at["marginal"]]
     left = any(row["scene"] == looked_at["saddle"] for row in tables.get("departure", ()))
     drawn = {
+        figures_step.draw_step_response: any(curves.get("step response", {"lines": {}})["lines"].values()),
         figures_limits.draw_limits: bool(looked_at["centres"]),
         figures_limits.draw_regions: bool(curves["points"]),
         figures_departure.draw_departure: left,

@@ -68,9 +68,9 @@ def tolerance_of_file(robot: Robot) -> str:
         "the run, the sum over all earlier steps of that bound, carried to the present by the exact Jacobians of the method's "
         f"own steps. Judged while the band of the positions is below {NARROW:g} {unit} and no run has diverged. A run has "
         f"diverged if it stops, is not finite, or has gained more energy than the {robot.noun}'s motion can have exchanged: "
-        "the whole potential range with the energy of speeds and springs at the start, or, where that is more, the work of the "
-        "torque and of the weight along slides. Where one diverges while the band is narrow, the other must do so at the same "
-        "step."
+        "the whole potential range with the energy of speeds, springs and servos at the start, or, where that is more, the work "
+        "of the torque and of the weight along slides. Where one diverges while the band is narrow, the other must do so at the "
+        "same step."
     )
 
 

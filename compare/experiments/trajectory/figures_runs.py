@@ -94,7 +94,8 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
         if (
             len(f"{case.duration:g}") > 2 or case.duration < 2.0
         ):  # the last number of a column would meet the first of the next
-            lines.xaxis.set_major_locator(MaxNLocator(5, prune="upper"))
+            few = 3 if len(columns) > 3 and case.duration < 1.0 else 5
+            lines.xaxis.set_major_locator(MaxNLocator(few, prune="upper"))
         until.append(f"{c['integrator']} to {c['judged_until_s']:.2f} s")
     place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
     per = " or ".join(f"{one}/s" for one in unit.split(" or "))

@@ -7,7 +7,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...case import Case
-from ...engines import LABELS, WHOSE, Engine
+from ...engines import LABELS, WHOSE, Engine, Method, methods_in
 from ...engines.mujoco.flags import INTEGRATORS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit
@@ -32,6 +32,9 @@ def notes(
         *of_first_order(runs, cases),
         f"MuJoCo's integrators here: {', '.join(engines['mujoco'].methods)}.",
         *of_integrators(robot, engines["mujoco"]),
+        *of_servos(
+            [cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], engines["mujoco"]
+        ),
         *of_left_out(
             [cases[name] for name in dict.fromkeys(name for name, *_ in runs) if name in cases], finer, entries
         ),
@@ -63,14 +66,35 @@ def of_integrators(robot: Robot, mujoco: Engine) -> list[str]:
         return [
             "Your equations are integrated by this project's RK4: of MuJoCo's integrators RK4 alone is compared with it."
         ]
-    schemes, methods = {}, mujoco.methods
-    for method in methods.values():
-        schemes.setdefault(method.scheme, []).append(method.name)
-    said = [f"{' and '.join(names)}: {scheme}" for scheme, names in schemes.items()]
+    methods = mujoco.methods
     lacking = [name for name in INTEGRATORS if name not in methods]
     return [
-        f"Their schemes in tmt, for this {robot.noun}: {'; '.join(said)}.",
+        f"Their schemes in tmt, for this {robot.noun}: {schemes_in_words(methods)}.",
         *(f"No scheme in tmt is that of MuJoCo's {name} for this {robot.noun}: it is left out." for name in lacking),
+    ]
+
+
+def schemes_in_words(methods: Mapping[str, Method]) -> str:
+    """Which integrators are which scheme."""
+    schemes = {}
+    for method in methods.values():
+        schemes.setdefault(method.scheme, []).append(method.name)
+    return "; ".join(f"{' and '.join(names)}: {scheme}" for scheme, names in schemes.items())
+
+
+def of_servos(cases: Sequence[Case], mujoco: Engine) -> list[str]:
+    """What acts in the scenes under a robot's own actuators, what of it is implicit, and what is left out there."""
+    driven = [case for case in cases if case.controller]
+    if not driven:
+        return []
+    names, first = "; ".join(case.name for case in driven), driven[0]
+    left = "; ".join(f"{name}, {why}" for name, why in first.controller.left_out.items())
+    return [
+        f"The {first.robot.noun}'s own actuators act, under constant controls and without their ranges, in: {names}. "
+        f"Their schemes in tmt: {schemes_in_words(methods_in(mujoco, first))}. The velocity gains of two joints on one path to "
+        "the world are implicit in implicitfast and implicit, all gains in discrete, none in Euler and RK4."
+        + f" Left out in both: {left}."
+        * bool(left)
     ]
 
 

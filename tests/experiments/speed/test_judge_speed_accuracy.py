@@ -42,7 +42,7 @@ smallest_errors = partial(judged, accuracy.check_smallest_errors)
 )
 def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
     rows = [row("tmt", "rk4", ours), row("mujoco", "RK4", theirs), row("tmt", "rk4", 1.0, 128)]
-    found = same_schemes(rows, {"bent, free": 1e-10}, SCHEMES)
+    found = same_schemes(rows, {"bent, free": 1e-10}, {"bent, free": SCHEMES})
     assert found == ({} if verdict is None else {"the same error as tmt's rk4": verdict})
 
 

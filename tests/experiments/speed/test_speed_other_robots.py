@@ -7,11 +7,11 @@ import pytest
 from models import PATHS
 
 import tmt
-from compare.engines import Method
+from compare.engines import Method, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import engine, read
 from compare.engines.scipy import Scipy
-from compare.experiments.speed import accuracy, advice, evaluations, floors, settings, tumbling
+from compare.experiments.speed import accuracy, advice, evaluations, floors, row_of_run, settings, tumbling
 from compare.judge.check import Result
 from compare.judge.rounding import growth
 from compare.judge.units import renamed, said, value
@@ -74,7 +74,64 @@ def test_a_run_that_does_not_end_has_no_reference(gripper):
 
 def test_held_scenes_of_a_file_are_not_followed(gripper):
     robot, _, case = gripper
-    assert [other.name for other in settings.scenes_of(robot)] == [case.name] and not case.is_held
+    names = [case.name, "open, step of the servos"]
+    assert [other.name for other in settings.scenes_of(robot)] == names and not case.is_held
+    for size, found in (("full", names), ("quick", names[:1]), ("small", names[:1])):
+        assert [other.name for other in settings.followed(robot, size)] == found
+
+
+def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has(gripper):
+    robot, known, free = gripper
+    step = settings.scenes_of(robot)[-1]
+    stiff = robot_of(read(PATHS["arm7"]), "arm7.xml").cases[-1]
+    assert settings.coarsest_steps(step) == settings.coarsest_steps(stiff) == 64 < stiff.steps
+    assert settings.coarsest_steps(free) == free.steps
+    of_step, of_free = (
+        {(m.engine, m.name): m.scheme for m in settings.methods(known, "full", "all", robot, case)}
+        for case in (step, free)
+    )
+    assert (
+        of_step["mujoco", "implicitfast"] == "implicitfast"
+        and of_free["mujoco", "implicitfast"] == "semi_implicit_euler"
+    )
+    assert ("tmt", "implicitfast") in of_step and ("tmt", "implicitfast") not in of_free
+    setup = Setup(robot, known)
+    assert settings.schemes_in(setup, [step, free])[step.name]["discrete"] == "discrete"
+    names = [(method.engine, method.name) for method in settings.methods_following(setup, [free, step], "all")]
+    assert len(names) == len(set(names)) and set(names) == {*of_step, *of_free}
+
+
+def test_a_step_response_has_the_same_error_in_both(gripper):
+    robot, known, _ = gripper
+    step = settings.scenes_of(robot)[-1]
+    reference_of = reference.references([step])
+    method = {name: known[name].methods_in(step)["implicitfast"] for name in ("mujoco", "tmt")}
+    rows = [
+        row_of_run(step, step, known, method[name], Setting(step.duration, 128), reference_of[step.name])
+        for name in ("mujoco", "tmt")
+    ]
+    assert rows[0]["worst_error_rad"] == pytest.approx(rows[1]["worst_error_rad"], abs=1e-12)
+    assert 1e-7 < rows[0]["worst_error_rad"] < 1e-2 and not rows[0]["diverged"]
+
+
+def test_a_sentence_says_what_to_use_for_a_step_response():
+    line = {"target_rad": 1e-3, "mujoco": "mujoco implicitfast, 128 steps", "mujoco_dt_s": 1 / 512, "mujoco_ms": 0.4,
+            "tmt": "tmt dopri8_adaptive, tolerance 1e-03", "tmt_dt_s": None, "tmt_ms": 0.05}  # fmt: skip
+    other = line | {"target_rad": 1e-6, "mujoco": "mujoco RK4, 9 steps"}
+    nothing = dict.fromkeys(line) | {"target_rad": 1e-3}
+    table = [
+        line | {"scene": "let go"},
+        other | {"scene": "let go"},
+        line | {"scene": "step"},
+        nothing | {"scene": "far"},
+    ]
+    (said_of,) = advice.step_response_in_words(table, ["step"])
+    assert said_of == (
+        "Which integrator and step for 0.001 rad? Where the robot's own servos act: step: mujoco implicitfast, 128 steps (dt = "
+        "0.00195 s), 0.4 ms or tmt dopri8_adaptive, tolerance 1e-03, 0.05 ms. Where they do not: let go: mujoco implicitfast, "
+        "128 steps (dt = 0.00195 s), 0.4 ms or tmt dopri8_adaptive, tolerance 1e-03, 0.05 ms; far: none comes so near."
+    )
+    assert advice.step_response_in_words(table, []) == advice.step_response_in_words(table[:2], ["step"]) == []
 
 
 def test_what_takes_too_long_is_left_out_with_a_reason(gripper):

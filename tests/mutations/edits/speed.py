@@ -23,6 +23,8 @@ EDITS = (
     Edit("advice", "orders", "clear < row['early'] < REGULAR", "True", "the order is measured among errors of rounding"),
     Edit("advice", "near_rounding", "first < CLEAR * _1", "True", "no method need show its order"),
     Edit("advice", "LEAST_ORDER", "7.0", "1.0", "order 8 need only be 1"),
+    Edit("advice", "step_response_in_words", "line['target_rad'] == ASKED", "True", "every error is said to be the one asked"),
+    Edit("speed.settings", "coarsest_steps", "GRID if case.controller else _1", "_1", "steps of a step response begin fine"),
     Edit("accuracy", "check_same_schemes", "FACTOR * floors[scene]", "1e6 * floors[scene]",
          "the same scheme's tolerance: 64 -> 1e6"),
     Edit("accuracy", "check_smallest_errors", "FACTOR * left", "100 * FACTOR * left", "tolerance x 100", nth=1),

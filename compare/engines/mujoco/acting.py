@@ -1,0 +1,215 @@
+"""A file's model in MuJoCo with its actuators: what they are along, what a step does, and runs from near a posture at rest."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import mujoco
+import numpy as np
+from mujoco.rollout import rollout
+
+from ...actuators import UNCUT, Cut, Drive
+from .actuators import OF_A_JOINT, control_of
+from .flags import INTEGRATORS, bit
+from .inventory import NOT_HAD_FIELDS
+from .joints import kind_of
+from .linear import NUDGE
+from .rotors import output_of
+
+# beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
+DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
+LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn
+
+
+class Acting:
+    """A compiled model whose actuators act by their laws alone: no force range, no limit, contact, equality, friction or medium.
+
+    cut: what ranges cut at the posture: it stays what it is there. locked: speeds that do not move. weightless: without gravity.
+    integrator by MuJoCo's name, dt in s.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        drive: Drive,
+        cut: Cut = UNCUT,
+        locked: Sequence[int] = (),
+        weightless: bool = False,
+    ):
+        self.model, self.drive = mujoco.MjModel.__copy__(model), drive
+        m = self.model
+        for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
+            m.opt.disableflags |= bit((flag,))
+        m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
+        for name in set(NOT_HAD_FIELDS) - set(DRIVES):
+            if hasattr(m, name):
+                getattr(m, name)[:] = 0
+        for name in (
+            "actuator_forcelimited",
+            "actuator_ctrllimited",
+            "actuator_actlimited",
+            "jnt_actfrclimited",
+            "tendon_actfrclimited",
+        ):
+            getattr(m, name)[:] = 0
+        for i, one in enumerate(drive.actuators):
+            if not one.acts or i in cut.forces:
+                m.actuator_gaintype[i], m.actuator_biastype[i] = (
+                    mujoco.mjtGain.mjGAIN_FIXED,
+                    mujoco.mjtBias.mjBIAS_AFFINE,
+                )
+                m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
+                m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
+                if m.actuator_plugin[i] >= 0:  # it has its own law, whatever stands here
+                    m.actuator_gear[output_of(m, i)] = 0.0
+            if (
+                one.refused
+                and hasattr(m, "actuator_damping")
+                and mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT
+            ):
+                m.actuator_damping[i] = 0.0
+        for speed, force in cut.sums.items():
+            m.jnt_actfrclimited[m.dof_jntid[speed]], m.jnt_actfrcrange[m.dof_jntid[speed]] = True, force
+        if weightless:
+            m.opt.gravity[:] = 0.0
+        self.data, self.locked = mujoco.MjData(m), tuple(locked)
+        if len(locked):
+            add_armature(m, list(locked), LOCKING * max(1.0, self.mass_matrix(m.qpos0).max()))
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """M, (nv, nv)."""
+        full = np.zeros((self.model.nv, self.model.nv))
+        self.data.qpos[:] = q
+        mujoco.mj_forward(self.model, self.data)
+        mujoco.mj_fullM(self.model, self.data, full)
+        return full
+
+    def along(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lengths (k,) and moments (k, nv) of all actuators and then of the tendons that pull, at a posture."""
+        m, d = self.model, self.data
+        d.qpos[:] = q
+        mujoco.mj_fwdPosition(m, d)
+        outputs = np.array([output_of(m, i) for i in range(len(self.drive.actuators))], int)
+        moments = np.zeros((len(d.actuator_length), m.nv))
+        mujoco.mju_sparse2dense(moments, d.actuator_moment, d.moment_rownnz, d.moment_rowadr, d.moment_colind)
+        numbers = np.array([tendon.number for tendon in self.drive.tendons], int)
+        jacobian = np.zeros((m.ntendon, m.nv))
+        if m.ntendon:
+            rows = (m.ten_J_rownnz, m.ten_J_rowadr, m.ten_J_colind) if hasattr(m, "ten_J_rownnz") else None
+            mujoco.mju_sparse2dense(
+                jacobian, d.ten_J.reshape(-1), *(rows or (d.ten_J_rownnz, d.ten_J_rowadr, d.ten_J_colind.reshape(-1)))
+            )
+        lengths = np.concatenate([d.actuator_length[outputs], d.ten_length[numbers]])
+        return lengths, np.concatenate([moments[outputs], jacobian[numbers]])
+
+    def at(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """Model and data at rest at a posture, under u of each actuator, whose activations, if any, stay as they are."""
+        model = mujoco.MjModel.__copy__(self.model)
+        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+        data = mujoco.MjData(model)
+        data.qpos[:] = q
+        self.drive_by(data, u)
+        return model, data
+
+    def drive_by(self, data: mujoco.MjData, u: np.ndarray) -> None:
+        """Set controls, and activations that stay as they are."""
+        m = self.model
+        for i, one in enumerate(self.drive.actuators):
+            place, inputs = control_of(m, i)
+            if inputs == 1:
+                data.ctrl[place] = 0.0 if one.dynamics == "integrator" else u[i]
+            if one.dynamics != "none" and one.acts:
+                data.act[m.actuator_actadr[i]] = u[i]
+
+    @property
+    def filters(self) -> list[int]:
+        """Where the activations of filters stand that act: they decay by themselves."""
+        return [
+            int(self.model.actuator_actadr[i])
+            for i, one in enumerate(self.drive.actuators)
+            if one.acts and one.dynamics.startswith("filter")
+        ]
+
+    def deviations(
+        self,
+        q: np.ndarray,
+        u: np.ndarray,
+        dt: float,
+        integrator: str,
+        steps: Sequence[int],
+        movement: np.ndarray | float = 0.0,
+        speed: np.ndarray | float = 0.0,
+        activation: float = 0.0,
+        jump: np.ndarray | float = 0.0,
+    ) -> Iterator[np.ndarray]:
+        """A run in parts of so many steps each: how far it is from q after each step, then the activations of filters from u.
+
+        (steps, nv + filters): rad or m, a ball's turn in its own axes. It starts at rest at q, moved by a small movement (nv,),
+        with a speed (nv,) and activations of filters that are off by so much; jump: of u, (k,), once for all. What has left all
+        bounds stays where MuJoCo stopped it.
+        """
+        model, data = self.at(q, np.add(u, jump), dt, integrator)
+        mujoco.mj_integratePos(model, data.qpos, np.broadcast_to(movement, model.nv).astype(float), 1.0)
+        data.qvel[:] = speed
+        rest, filters, controls = data.act.copy(), self.filters, data.ctrl.copy()
+        data.act[filters] += activation
+        spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        state = np.zeros(mujoco.mj_stateSize(model, spec))
+        mujoco.mj_getState(model, data, state, spec)
+        for count in steps:
+            # rollout sets controls anew, and leaves out the initial state
+            states, _ = rollout(model, data, state, np.tile(controls, (1, count, 1)), nstep=count)
+            state = states[0, -1]
+            at = 1 + model.nq + model.nv
+            activations = states[0, :, at : at + model.na] - rest
+            yield np.hstack([self.movements(states[0, :, 1 : 1 + model.nq], q), activations[:, filters]])
+
+    def movements(self, positions: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """From q to positions near it, (..., nq) -> (..., nv)."""
+        m = self.model
+        found = np.zeros((*positions.shape[:-1], m.nv))
+        for j, (a, v) in enumerate(zip(m.jnt_qposadr, m.jnt_dofadr)):
+            kind = kind_of(m, j)
+            single = {"free": 3, "ball": 0}.get(kind, 1)
+            found[..., v : v + single] = positions[..., a : a + single] - q[a : a + single]
+            if kind in ("free", "ball"):
+                # twice the vector of the quaternion from the one to the other: it is near the identity
+                a, v = a + single, v + single
+                w, x = q[a], q[a + 1 : a + 4]
+                w1, x1 = positions[..., a, None], positions[..., a + 1 : a + 4]
+                turn = w * x1 - w1 * x - np.cross(x, x1)
+                found[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 @ x)[..., None])
+        return found
+
+    def changed(
+        self, damping: Mapping[int, float] | None = None, armature: Mapping[int, float] | None = None
+    ) -> "Acting":
+        """The same with other gains of speed, kv, of actuators by number, and more armature of speeds, kg m2 or kg.
+
+        An actuator that holds a speed has the same gain of its control.
+        """
+        other = object.__new__(Acting)
+        other.__dict__.update(self.__dict__ | {"model": mujoco.MjModel.__copy__(self.model)})
+        for i, kv in (damping or {}).items():
+            if self.drive.actuators[i].holds_speed:
+                other.model.actuator_gainprm[i, 0] = kv
+            other.model.actuator_biasprm[i, 2] = -kv
+        for k, more in (armature or {}).items():
+            add_armature(other.model, [k], more)
+        other.data = mujoco.MjData(other.model)
+        return other
+
+    def transition(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> np.ndarray:
+        """d(movement, qd, act)+/d(movement, qd, act) of one step at rest, by central differences of MuJoCo's own; not for RK4."""
+        model, data = self.at(q, u, dt, integrator)
+        size = 2 * model.nv + model.na
+        A = np.zeros((size, size))
+        mujoco.mjd_transitionFD(model, data, NUDGE, True, A, None, None, None)
+        return A
+
+
+def add_armature(model: mujoco.MjModel, speeds: Sequence[int], more: float | np.ndarray) -> None:
+    """More armature at some speeds of a compiled model, kg m2 or kg.
+
+    Of bodies whose inertia never changes the compiler keeps it ready: there dof_armature alone does nothing.
+    """
+    model.dof_armature[speeds] += more
+    model.dof_M0[speeds] += more

@@ -1,0 +1,123 @@
+"""The largest stable step under a robot's own servos as MuJoCo's runs show it, found without the prediction."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ....case import SEED
+from ....engines.mujoco.acting import Acting
+from ....truth.driven import Posture
+from ....truth.step_limits import LIMIT_UP_TO
+
+MOVED_BY, MOVED_LEAST, MOVED_MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, of a joint of middling inertia; of any
+SOUGHT_FROM = 1e-7  # s: from which the limit is sought
+SOUGHT_BY = 4.0  # from one step to the next, upwards, until one fails
+SOUGHT_STEPS, NARROWED_STEPS = 400, 4000  # of a run: upwards, and where the limit is narrowed
+RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
+GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
+GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
+# what changes its sign with every step grows if it does so from part to part after the first two, by so much in all, fold, and
+# at its slowest by so much of its fastest; less of it, of the deviation at the start, is not looked at
+GROWN_SLOWLY, GROWN_EVENLY, GROWN_FROM = 1.003, 0.5, 1e-5
+ASKED_AGAIN = 30.0  # times the deviation, where that decides
+NARROWED = 1e-3  # relative, between a step that holds and one that does not
+
+
+def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | None]:
+    """The largest dt, s, at which no small deviation grows in MuJoCo: ("finite", dt); ("none", None): none grows up to 5 s.
+
+    Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
+    acting: MuJoCo at the posture, with the base that is asked for.
+    """
+    count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 1
+    tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]
+    failed = next((k for k, dt in enumerate(tried) if grows_in_runs(acting, at, integrator, dt, SOUGHT_STEPS)), count)
+    # a short run may not show what hardly grows: the longest step that held is tried once more
+    while failed and grows_in_runs(acting, at, integrator, tried[failed - 1]):
+        failed -= 1
+    if failed in (0, count):
+        return ("none" if failed else "always"), None
+    low, high = tried[failed - 1], tried[failed]
+    while high / low > 1.0 + NARROWED:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if grows_in_runs(acting, at, integrator, middle) else (middle, high)
+    return "finite", float(np.sqrt(low * high))
+
+
+def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
+    """Whether a small random deviation from rest grows in a run of so many steps."""
+    largest, turning = sizes_in_a_run(acting, at, integrator, dt, steps)
+    late = 3 * RUN_PARTS // 4
+    if len(largest) < RUN_PARTS or largest[late:].max() > GROWN_STILL * max(1.0, largest[: RUN_PARTS // 2].max()):
+        return True
+    if steps < NARROWED_STEPS or not hardly_grows(turning):
+        return False
+    # rounding, which may seem to grow, is less of a larger deviation
+    larger = sizes_in_a_run(acting, at, integrator, dt, steps, ASKED_AGAIN)[1]
+    return len(larger) < RUN_PARTS or (hardly_grows(larger) and larger[-1] > GROWN_EVENLY * turning[-1])
+
+
+def hardly_grows(turning: np.ndarray) -> bool:
+    """Whether what changes its sign with every step, by the parts of a run, grows steadily after the first two."""
+    if turning.min() < GROWN_FROM:
+        return False
+    growth = np.diff(np.log(turning[2:]))
+    return bool(growth.sum() > np.log(GROWN_SLOWLY) and growth.min() > GROWN_EVENLY * growth.max())
+
+
+def sizes_in_a_run(
+    acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """By the parts of a run, up to where it has grown far: the largest deviation, and what of it changes its sign every step."""
+    found = []
+    with np.errstate(over="ignore", invalid="ignore"):
+        for off in run_parts(acting, at, integrator, dt, steps, times):
+            size = np.linalg.norm(off, axis=1).max()
+            if not size <= GROWN_FAR:  # or no number
+                break
+            found.append((size, alternating(off)))
+    return np.array(found).reshape(-1, 2).T
+
+
+def alternating(off: np.ndarray) -> float:
+    """The part of deviations (steps, n) that changes its sign with every step, in the mean, so that swings cancel.
+
+    So grows, and hardly, what is damped by explicit and implicit damping almost alike.
+    """
+    changes = np.diff(off, n=4, axis=0) / 16.0
+    weight = np.hanning(len(changes) + 2)[1:-1]
+    return float(np.sqrt(weight @ (changes**2).sum(axis=1) / weight.sum()))
+
+
+def run_parts(
+    acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
+) -> Iterator[np.ndarray]:
+    """Deviations in each part of a run, (steps, n), in units of that at its start, which is so many times the usual one.
+
+    The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
+    by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
+    """
+    rng, kept = np.random.default_rng(SEED), measured_speeds(acting, at)
+    M = acting.mass_matrix(at.q)
+    inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
+    root = np.linalg.cholesky(0.5 * (inner + inner.T))
+    inertia = np.diag(inner)
+    each = times * np.clip(MOVED_BY * np.sqrt(np.median(inertia) / inertia), MOVED_LEAST, MOVED_MOST)
+    movement, speed = np.zeros((2, len(M)))
+    movement[kept] = each * rng.uniform(-1.0, 1.0, len(kept))
+    # what nothing pulls back drifts no farther in the run than it was moved
+    speed[kept] = each * rng.uniform(-1.0, 1.0, len(kept)) / (steps * dt)
+    base = np.setdiff1d(np.arange(len(M)), kept)
+    speed[base] = -np.linalg.solve(M[np.ix_(base, base)], M[np.ix_(base, kept)] @ speed[kept])
+    start = np.linalg.norm(movement[kept] @ root)
+    parts = [steps // RUN_PARTS] * RUN_PARTS
+    for off in acting.deviations(at.q, at.u, dt, integrator, parts, movement, speed, times * MOVED_BY):
+        filters = off[:, len(M) :] / (times * MOVED_BY * np.sqrt(max(1, off.shape[1] - len(M))))
+        yield np.hstack([off[:, kept] @ (root / start), filters])
+
+
+def measured_speeds(acting: Acting, at: Posture) -> list[int]:
+    """The speeds that are measured: with a free base, those that do not follow from the others."""
+    base = "locked" if acting.locked else at.bases[0]
+    names = set(at.small(base).names)
+    return [k for k, name in enumerate(at.robot.coordinates.speeds) if name in names]

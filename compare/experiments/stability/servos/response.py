@@ -1,0 +1,104 @@
+"""How far MuJoCo's response to a step of all servo targets is from the exact one, at a step size."""
+
+import numpy as np
+from scipy.linalg import expm
+
+from ....engines.mujoco.acting import Acting
+from ....truth.driven import Posture
+from .observed import measured_speeds
+
+LASTS = 0.2  # s, of a response; at least one step
+RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, may move
+RESPONSE_LEAST = (
+    1e-3  # of the largest response, rad or m: joints of a kind that answer less count as if they did so much
+)
+RESPONSE_MOST = 100.0  # fold, of the largest response
+CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
+CURVE_MOST = 50_000  # of a run of a curve
+
+
+def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
+    """The largest difference from the exact response over the largest response, in 0.2 s, a ratio.
+
+    Of rad and of m each by themselves, the worse of both; None: no servo, or it diverged. The targets of all servos jump by the
+    same length, so that nothing moves by more than 1e-4 rad or m; u of those with an activation jumps too. Exact: the matrix
+    exponential of the linear equations. Half of the difference of two runs, there and back, has neither an offset nor squares.
+    """
+    jump = jump_of(at)
+    if not jump.any():
+        return None
+    steps = max(1, round(LASTS / dt))
+    kept = measured_speeds(acting, at)
+    exact = exact_response(at, base, jump, dt, steps)
+    size = RESPONSE_SIZE / max(np.abs(exact).max(), 1e-300)
+    with np.errstate(over="ignore", invalid="ignore"):
+        there, back = (
+            next(acting.deviations(at.q, at.u, dt, integrator, [steps], jump=sign * size * jump))
+            for sign in (1.0, -1.0)
+        )
+        off = np.abs((there - back)[:, kept] / (2.0 * size) - exact[:steps])
+    if not off.max() <= RESPONSE_MOST * np.abs(exact).max():  # or no number
+        return None
+    units = np.array(at.robot.coordinates.units)[kept]
+    largest = np.abs(exact).max()
+    ratios = [
+        off[:, units == unit].max() / max(np.abs(exact[:, units == unit]).max(), RESPONSE_LEAST * largest)
+        for unit in set(units)
+    ]
+    return float(max(ratios))
+
+
+def curve(
+    acting: Acting, at: Posture, base: str, integrator: str, file_dt: float, limit: float | None
+) -> list[tuple[float, float]]:
+    """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response."""
+    end = min(limit or LASTS, LASTS)
+    first = max(min(file_dt, end) / CURVE_FROM, LASTS / CURVE_MOST)
+    count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
+    found = [
+        (float(dt), response_error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))
+    ]
+    return [(dt, off) for dt, off in found if off is not None]
+
+
+def jump_of(at: Posture) -> np.ndarray:
+    """By how much u of each actuator jumps so that all targets move by the same length, 1 rad or m, (k,)."""
+    lengths = at.driven.along(at.q).lengths
+    jump = np.zeros(len(at.u))
+    for i, (one, u, length) in enumerate(zip(at.robot.drive.actuators, at.u, lengths)):
+        gain = one.gain[0] + one.gain[1] * length
+        if one.is_servo and gain and i not in at.cut.forces:
+            jump[i] = one.stiffness(u) / gain
+    return jump
+
+
+def exact_response(at: Posture, base: str, jump: np.ndarray, dt: float, steps: int) -> np.ndarray:
+    """Movements of the speeds that count after each step, (steps + 1, n), the last where it rests then: of a jump of u.
+
+    Without stiffness in some direction the last is the rest in the others.
+    """
+    small, force = at.small(base), pushed(at, base, jump)
+    n = len(force)
+    # the state is movement, speed, and a constant 1 that pushes
+    A = np.zeros((2 * n + 1, 2 * n + 1))
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n] = np.linalg.solve(small.M, np.hstack([-small.K, -small.D, force[:, None]]))
+    step, state = expm(dt * A), np.eye(2 * n + 1)[-1]
+    found = []
+    for _ in range(steps):
+        state = step @ state
+        found.append(state[:n])
+    return np.array([*found, np.linalg.lstsq(small.K, force, rcond=1e-9)[0]])
+
+
+def pushed(at: Posture, base: str, jump: np.ndarray) -> np.ndarray:
+    """The force of a jump of u on the speeds of Posture.small, (n,); a free base gives way."""
+    along = at.driven.along(at.q)
+    gains = [one.gain[0] + one.gain[1] * length for one, length in zip(at.robot.drive.actuators, along.lengths)]
+    force = (gains * jump) @ along.moments[: len(jump)]
+    names = at.small(base).names
+    kept = [k for k, name in enumerate(at.whole.names) if name in names]
+    free = [k for k in at.base if k not in kept] if base == "free" else []
+    M = at.whole.M
+    away = M[np.ix_(kept, free)] @ np.linalg.solve(M[np.ix_(free, free)], force[free]) if free else 0.0
+    return force[kept] - away

@@ -1,0 +1,159 @@
+"""A robot under its own servos at a posture: where it comes to rest, and the equations of small deviations there."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+import tmt
+from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
+from tmt.methods import lone_speeds
+
+from ..actuators import Cut
+from .servos import Driven
+from .step_limits import Small
+
+BASES = {
+    "fixed": "the robot stands on the world",
+    "free": "the robot floats, without gravity",
+    "locked": "its free base is held",
+}
+
+
+@dataclass(frozen=True)
+class Posture:
+    """A posture of a robot under u of each actuator: at its name's position, then where it rests.
+
+    ask: see Driven. A robot that floats is without gravity: it has no rest with it.
+    """
+
+    robot: object  # a robots.Robot
+    name: str
+    ask: Callable | None = None
+
+    @cached_property
+    def driven(self) -> Driven:
+        """The tree with its drive. A free body that stands alone neither holds nor moves the rest: it is without weight."""
+        tree, drive = self.robot.tree, self.robot.drive
+        if self.lone:
+            parts = list(drive.compensation or (0.0,) * len(tree.mass))
+            for body, hinge in enumerate(tree.body_hinge):
+                if hinge >= 0 and tree.coordinates.joints[hinge].qd.start in self.lone:
+                    parts[body] = 1.0
+            drive = replace(drive, compensation=tuple(parts))
+        return Driven(tree, drive, self.ask, weightless=bool(self.base))
+
+    @property
+    def start(self) -> np.ndarray:
+        """The posture itself, (nq,)."""
+        return self.robot.posture(self.name)
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        """Of each actuator, see Drive.control."""
+        return self.robot.drive.control(self.name, self.driven.along(self.start).lengths)
+
+    @cached_property
+    def rest(self) -> tuple[np.ndarray, float]:
+        """Where it rests, (nq,), found from the posture, and the size of the force that is left, N m or N; 0.0: it rests."""
+        return self.driven.at_rest(self.start, self.u)
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.rest[0]
+
+    @property
+    def moved(self) -> float:
+        """How far the rest is from the posture, the largest movement of a joint, rad or m."""
+        return float(np.abs(self.robot.coordinates.difference(self.q, self.start)).max())
+
+    @cached_property
+    def lone(self) -> list[int]:
+        """The speeds of free bodies that stand alone, and that no actuator or tendon moves."""
+        alone, pulled = lone_speeds(self.robot.tree), self.pulled
+        return [
+            k for body in floating(self.robot.tree) if alone.issuperset(body) and not pulled & {*body} for k in body
+        ]
+
+    @cached_property
+    def pulled(self) -> set[int]:
+        """The speeds at which an actuator or a tendon acts at the posture."""
+        moments = Driven(self.robot.tree, self.robot.drive, self.ask).along(self.start).moments
+        return set(np.flatnonzero(moments.any(axis=0)).tolist())
+
+    @cached_property
+    def base(self) -> list[int]:
+        """The speeds of free joints that carry the robot, or parts of it, and that no servo or spring of their own holds."""
+        tree, drive = self.robot.tree, self.robot.drive
+        held = np.any([one.moment for one in drive.servos if one.moment] or [[False] * len(tree.axis)], axis=0)
+        held = held | np.repeat(np.array(tree.stiffness or [0.0] * len(tree.kind)) != 0.0, widths(tree))
+        return [k for body in floating(tree) if not held[body].any() for k in body if k not in self.lone]
+
+    @property
+    def bases(self) -> tuple[str, ...]:
+        """With what base limits are asked: of BASES."""
+        if not self.base:
+            return ("fixed",)
+        return ("free", "locked") if len(self.base) + len(self.lone) < len(self.robot.tree.axis) else ("free",)
+
+    @cached_property
+    def cut(self) -> Cut:
+        """What ranges cut at rest."""
+        return self.driven.cut(self.q, self.u)
+
+    @cached_property
+    def whole(self) -> Small:
+        """Small deviations of all speeds."""
+        tree, drive = self.robot.tree, self.robot.drive
+        slopes = self.driven.slopes(self.q, self.u)
+        speeds = np.add(tree.damping, drive.damping or 0.0) * (not drive.explicit_damping)
+        filters = [one for one in drive.actuators if one.acts and one.dynamics in ("filter", "filterexact")]
+        return Small(
+            names=self.robot.coordinates.speeds,
+            M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
+            K=slopes.K,
+            D=slopes.D,
+            damping=speeds,
+            uncut=slopes.uncut,
+            springs=slopes.springs,
+            brakes=slopes.brakes,
+            on_path=on_one_path(tree),
+            poles=tuple((one.name, one.time_constant, one.dynamics == "filterexact") for one in filters),
+        )
+
+    def small(self, base: str) -> Small:
+        """Small deviations with a base of BASES; free bodies that stand alone are left out."""
+        if base == "free":
+            names = [self.whole.names[k] for k in self.base]
+            kept = self.whole.locked(self.lone)
+            return kept.free([k for k, name in enumerate(kept.names) if name in names])
+        return self.whole.locked(sorted({*self.lone, *(self.base if base == "locked" else ())}))
+
+
+def floating(tree: tmt.Tree) -> list[list[int]]:
+    """The six speeds of each free joint: three slides that carry nothing else, and a ball, from the world."""
+    found = []
+    for i in range(3, len(tree.kind)):
+        chain = [i - 3, i - 2, i - 1, i]
+        free = tuple(tree.kind[j] for j in chain) == ("slide",) * 3 + ("ball",)
+        if free and [tree.parent[j] for j in chain] == [-1, *chain[:3]] and not {*chain[:3]} & {*tree.body_hinge}:
+            joints = tree.coordinates.joints
+            found.append(list(range(joints[i - 3].qd.start, joints[i].qd.stop)))
+    return found
+
+
+def widths(tree: tmt.Tree) -> list[int]:
+    """How many speeds each joint has."""
+    return [by.stop - by.start for _, _, by in tree.coordinates.joints]
+
+
+def on_one_path(tree: tmt.Tree) -> np.ndarray:
+    """Whether two speeds are of joints on one path to the root, (nv, nv)."""
+    n = len(tree.parent)
+    before = np.eye(n, dtype=bool)
+    for i, parent in enumerate(tree.parent):
+        if parent >= 0:
+            before[i] |= before[parent]
+    joints = np.repeat(np.arange(n), widths(tree))
+    return (before | before.T)[np.ix_(joints, joints)]

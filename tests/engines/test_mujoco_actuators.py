@@ -1,0 +1,216 @@
+"""What drives a file's robot, read from its compiled model."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from files import TWO, mjcf
+
+import tmt
+from compare.engines.mujoco import read
+from compare.engines.mujoco.acting import Acting, add_armature
+from compare.robots.file import robot_of
+
+TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
+SITES = TWO.replace('name="g"', 'name="g"').replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
+
+
+def drive_of(actuators="", tendon="", content=TWO, before="", keys=""):
+    after = (TENDON.format(tendon) if tendon is not None else "") + f"<actuator>{actuators}</actuator>{keys}"
+    return robot_of(read(mjcf(content, before, after)), "robot.xml").drive
+
+
+LAWS = {  # actuator, and of its record gain, bias, moment, dynamics
+    '<motor joint="j" gear="3"/>': ((1, 0, 0), (0, 0, 0), (3, 0), "none"),
+    '<position joint="k" kp="9" kv="2"/>': ((9, 0, 0), (0, -9, -2), (0, 1), "none"),
+    '<position jointinparent="k" kp="9" gear="-2"/>': ((9, 0, 0), (0, -9, 0), (0, -2), "none"),
+    '<velocity tendon="t" kv="4" gear="5"/>': ((4, 0, 0), (0, 0, -4), (5, 10), "none"),
+    '<damper joint="j" kv="4" ctrlrange="0 1"/>': ((0, 0, -4), (0, 0, 0), (1, 0), "none"),
+    '<intvelocity joint="j" kp="7" kv="1" actrange="-1 1"/>': ((7, 0, 0), (0, -7, -1), (1, 0), "integrator"),
+    '<general joint="j" dyntype="filterexact" dynprm="0.2" gainprm="3"/>': ((3, 0, 0), (0, 0, 0), (1, 0), "filterexact"),
+    '<general joint="j" gaintype="affine" gainprm="1 2 3" biastype="affine" biasprm="4 5 6"/>': (
+        (1, 2, 3), (4, 5, 6), (1, 0), "none",
+    ),
+    # without a kind of bias its numbers mean nothing
+    '<general joint="j" gainprm="2 7 7" biasprm="4 5 6"/>': ((2, 0, 0), (0, 0, 0), (1, 0), "none"),
+    '<motor site="s" gear="1 0 0 0 0 0"/>': ((1, 0, 0), (0, 0, 0), None, "none"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", LAWS)
+def test_the_law_of_an_actuator(text):
+    (one,) = drive_of(text, content=SITES).actuators
+    assert (one.gain, one.bias, one.moment, one.dynamics) == LAWS[text] and one.acts
+
+
+REFUSED = {
+    '<muscle joint="k" lengthrange="0 1"/>': "a law of the kind muscle",
+    '<general joint="k" dyntype="user"/>': "a law of the user's own",
+    '<general joint="k" gaintype="user"/>': "a law of the user's own",
+    '<general joint="k" biastype="user"/>': "a law of the user's own",
+    '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "a DC motor",
+    '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "a transmission of the kind body",
+    '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "a delay",
+    '<general joint="k" damping="1 2"/>': "polynomial damping",
+    '<general tendon="t" damping="1"/>': "damping of its own at no joint",
+    '<pid joint="k" kp="3" ki="1"/>': "a law of the kind pid",
+    '<orientation site="s" refsite="s" kp="1"/>': "a law of the kind so3",
+}
+
+
+def since(text):
+    """The text, or a skip where the installed MuJoCo does not have it."""
+    try:
+        mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        pytest.skip(f"not in this MuJoCo: {' '.join(str(error).split())}")
+    return text
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
+    more = text.replace(" ", ' name="x" ', 1)
+    since(mjcf(SITES, after=TENDON.format("") + f"<actuator>{more}</actuator>"))
+    drive = drive_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES)
+    assert drive.refused == {"x": REFUSED[text]}
+    assert [one.name for one in drive.servos] == ["p"]
+
+
+@pytest.mark.parametrize(
+    ("joint", "tendon", "reason"),
+    [
+        ('stiffness="1 2"', "", {"joint j": "polynomial stiffness"}),
+        ('damping="1 2"', "", {"joint j": "polynomial damping"}),
+        ("", 'stiffness="1 2"', {"tendon t": "polynomial stiffness"}),
+        ("", 'damping="1 2"', {"tendon t": "polynomial damping"}),
+    ],
+)
+def test_springs_and_dampers_that_are_not_linear_are_named(joint, tendon, reason):
+    content = TWO.replace('name="j"', f'name="j" {joint}')
+    since(mjcf(content, after=TENDON.format(tendon)))
+    assert drive_of('<motor joint="k"/>', tendon, content).refused == reason
+
+
+def test_what_the_file_disables_is_off():
+    group = '<option actuatorgroupdisable="2"/>'
+    servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
+    first, second = drive_of(servos, before=group).actuators
+    assert (first.off, second.off) == ("the file disables group 2", "")
+    off = drive_of(servos, before='<option><flag actuation="disable"/></option>')
+    assert not off.servos and {one.off for one in off.actuators} == {"the file disables actuation"}
+
+
+def test_ranges():
+    joint = TWO.replace('name="k"', 'name="k" actuatorfrcrange="-2 3"')
+    servo = '<position joint="j" kp="5" ctrlrange="-1 2" forcerange="-7 8"/><motor tendon="t"/>'
+    drive = drive_of(servo, 'actuatorfrclimited="true" actuatorfrcrange="-4 5"', joint)
+    one, motor = drive.actuators
+    assert (one.control_range, one.force_range, motor.control_range) == ((-1.0, 2.0), (-7.0, 8.0), None)
+    assert (drive.ranges, drive.tendon_ranges, motor.tendon, one.tendon) == ({1: (-2.0, 3.0)}, {0: (-4.0, 5.0)}, 0, -1)
+    assert drive_of(servo, before='<option><flag clampctrl="disable"/></option>').actuators[0].control_range is None
+
+
+def test_tendons_pull_as_far_as_a_flag_lets_them():
+    spring = 'stiffness="7" damping="2" springlength="0.1 0.3"'
+    (tendon,) = drive_of(tendon=spring).tendons
+    assert tendon[:7] == ("t", 0, (1.0, 2.0), 7.0, 2.0, 0.1, 0.3)
+    flag = '<option><flag {}="disable"/></option>'
+    assert drive_of(tendon=spring, before=flag.format("spring")).tendons[0].stiffness == 0.0
+    assert drive_of(tendon=spring, before=flag.format("damper")).tendons[0].damping == 0.0
+    assert not drive_of(tendon="").tendons
+
+
+def test_gravity_compensation_and_damping_by_actuators():
+    body = TWO.replace('name="b"', 'name="b" gravcomp="0.5"').replace('name="j"', 'name="j" actuatorgravcomp="true"')
+    drive = drive_of('<general joint="j" damping="3" gear="2"/>', content=body)
+    assert (drive.compensation, drive.lifted, drive.unlifted, drive.damping) == ((0.5, 0.0), (0,), (), (12.0, 0.0))
+    off = drive_of('<motor joint="j"/>', content=body, before='<option><flag actuation="disable"/></option>')
+    assert (off.lifted, off.unlifted) == ((), (0,))
+    without = '<option><flag spring="disable" damper="disable"/></option>'
+    assert drive_of('<motor joint="j"/>', content=body, before=without).compensation == (0.0, 0.0)
+
+
+KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        ('ctrl="0.5 0.25"', (0.5, 0.25)),
+        ("", None),
+        ('ctrl="0 0"', (0.0, 0.0)),
+    ],
+)
+def test_a_keyframe_states_controls_or_none(key, expected):
+    drive = drive_of('<position joint="j" kp="5"/><motor joint="k"/>', keys=KEYS.format(key))
+    assert drive.controls.get("home") == expected and "plain" not in drive.controls
+
+
+def test_a_keyframe_states_the_activation_of_an_integrator_and_the_control_of_a_filter():
+    actuators = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
+    drive = drive_of(actuators, keys=KEYS.format('ctrl="0.9 0.8" act="0.3 0.2"'))
+    assert drive.controls["home"] == (0.3, 0.8)
+    assert drive_of(actuators, keys=KEYS.format('act="0.3 0.2"')).controls["home"] == (0.3, None)
+
+
+def test_of_a_compiled_model_controls_of_zero_are_none():
+    text = mjcf(TWO, after='<actuator><position joint="j" kp="5"/></actuator>' + KEYS.format('ctrl="0.4"'))
+    reading = read(mujoco.MjModel.from_xml_string(text))
+    assert reading.drive.controls == {"home": (0.4,)}
+
+
+def test_armature_is_added_to_bodies_whose_inertia_never_changes():
+    """A free body, a slide and a wheel: their inertia is stored."""
+    bodies = '<body><freejoint/><geom size="0.1"/></body><body><joint type="slide"/><geom size="0.1"/></body>' + TWO
+    model = read(mjcf(bodies)).model
+    drive = read(mjcf(bodies)).drive
+    before = Acting(model, drive).mass_matrix(model.qpos0)
+    heavy = mujoco.MjModel.__copy__(model)
+    add_armature(heavy, list(range(model.nv)), 2.0)
+    assert Acting(heavy, drive).mass_matrix(model.qpos0) - before == pytest.approx(2.0 * np.eye(model.nv), abs=1e-12)
+
+
+def test_a_speed_that_is_locked_does_not_move():
+    bodies = '<body><freejoint/><geom size="0.1"/></body>' + TWO
+    reading = read(mjcf(bodies))
+    locked = Acting(reading.model, reading.drive, locked=[0, 1, 2, 3, 4, 5])
+    model, data = locked.at(reading.model.qpos0, np.zeros(0), 0.01, "Euler")
+    data.qfrc_applied[:] = 1.0
+    mujoco.mj_step(model, data)
+    assert np.abs(data.qvel[:6]).max() < 1e-6 < np.abs(data.qvel[6:]).max()
+
+
+PLUGIN = """<mujoco><extension><plugin plugin="mujoco.pid"><instance name="p"><config key="kp" value="4"/></instance></plugin>
+</extension><worldbody><body><joint name="a"/><geom size="0.1"/></body></worldbody><actuator>
+<plugin name="x" joint="a" plugin="mujoco.pid" instance="p"/><position joint="a" kp="50"/></actuator></mujoco>"""
+
+
+def test_a_plugin_is_refused_and_exerts_nothing():
+    library = next((Path(mujoco.__file__).parent / "plugin").glob("*actuator*"), None)
+    if library is None:
+        pytest.skip("no plugins beside this MuJoCo")
+    try:
+        reading = read(PLUGIN)
+    except ValueError:  # not yet loaded
+        mujoco.mj_loadPluginLibrary(str(library))
+        reading = read(PLUGIN)
+    assert reading.drive.refused == {"x": "a plugin"}
+    model, data = Acting(reading.model, reading.drive).at(np.zeros(1), np.array([1.0, 0.1]), 0.01, "Euler")
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator[0] == pytest.approx(5.0)
+
+
+def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
+    before = '<orientation site="s" refsite="s" kp="1"/>'
+    motor = '<motor joint="j" gear="3" armature="0.1"/><position tendon="t" kp="2" gear="5"/>'
+    text = since(mjcf(SITES, after=TENDON.format("") + f"<actuator>{before}{motor}</actuator>"))
+    reading, model = read(text), mujoco.MjModel.from_xml_string(text)
+    assert [one.moment for one in reading.drive.actuators[1:]] == [(3.0, 0.0), (5.0, 10.0)]
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    full = np.zeros((2, 2))
+    mujoco.mj_fullM(model, data, full)
+    assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(full)
+    _, moments = Acting(model, reading.drive).along(np.zeros(2))
+    assert moments[1:].tolist() == [[3.0, 0.0], [5.0, 10.0]]

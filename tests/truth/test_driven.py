@@ -1,0 +1,268 @@
+"""Limits of robots under their own servos beside the derivatives of MuJoCo's own steps."""
+
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+import pytest
+from driven_models import with_servos
+from models import PATHS, chain, gymnasium_files
+
+from compare.engines.mujoco import read
+from compare.engines.mujoco.acting import Acting
+from compare.engines.mujoco.flags import INTEGRATORS
+from compare.robots.file import robot_of
+from compare.truth.driven import Posture
+
+STEPPED = [name for name in INTEGRATORS if name != "RK4"]  # whose step MuJoCo differentiates
+LINEAR = {"discrete": 1e-3}  # what the linear map of a step may differ by; of the others 1e-8: central differences
+NOISE = 2e-4  # of a spectral radius of 1 in differences: a free base has it twice
+
+
+@lru_cache(maxsize=128)
+def at(source, name=None):
+    """A posture, by default the first, and what Acting takes of the model."""
+    reading = read(source)
+    robot = robot_of(reading, "robot.xml")
+    return Posture(robot, name or next(iter(robot.positions)), Acting(reading.model, robot.drive).along), reading.model
+
+
+def acting(source, base="fixed", name=None):
+    posture, model = at(source, name)
+    locked = posture.base if base == "locked" else ()
+    return Acting(model, posture.robot.drive, posture.cut, locked=locked, weightless=bool(posture.base))
+
+
+def transition(source, dt, integrator, base="fixed"):
+    """MuJoCo's own, of movements and speeds of all but lone bodies."""
+    posture, model = at(source)
+    kept = [k for k in range(model.nv) if k not in posture.lone]
+    kept += [model.nv + k for k in kept]
+    return acting(source, base).transition(posture.q, posture.u, dt, integrator)[np.ix_(kept, kept)]
+
+
+def assert_the_same_map(source):
+    """What a step makes of every small deviation, entry by entry, in units in which M is the identity."""
+    posture, _ = at(source)
+    assert posture.rest[1] == 0.0
+    small = posture.whole.locked(posture.lone)
+    units = np.kron(np.eye(2), small.root.T)
+    for integrator in STEPPED:
+        for dt in (1e-3, 0.1):
+            theirs = units @ transition(source, dt, integrator) @ np.linalg.inv(units)
+            off = np.abs(small.step(integrator, dt) - theirs).max()
+            assert off <= LINEAR.get(integrator, 1e-8) * max(1.0, np.abs(theirs).max()), integrator
+
+
+def assert_limits(source, integrators=STEPPED):
+    """Below a limit nothing grows in MuJoCo's step, above it something does; how many are finite."""
+    posture, _ = at(source)
+    finite = 0
+    for base in posture.bases:
+        small = posture.small(base)
+        for integrator in integrators:
+            limit = small.limit(integrator)
+            if limit.limit == "finite" and limit.shape is not None:
+                finite += 1
+                below, above = (
+                    np.abs(np.linalg.eigvals(transition(source, share * limit.dt, integrator, base))).max()
+                    for share in (0.99, 1.01)
+                )
+                assert below <= 1.0 + NOISE < above
+    return finite
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_step_of_any_servoed_robot_is_that_of_mujoco(seed):
+    source = with_servos(seed, floats=bool(seed % 2))
+    assert_the_same_map(source)
+    assert_limits(source)
+
+
+@pytest.mark.parametrize("flag", ["eulerdamp", "damper", "spring", "gravity"])
+def test_a_step_is_that_of_mujoco_with_a_stage_switched_off(flag):
+    assert_the_same_map(with_servos(8, flags={flag: "disable"}))
+
+
+@pytest.mark.parametrize("name", ["arm7", "gripper", "quadruped"])
+def test_limits_of_the_models_are_where_a_step_of_mujoco_begins_to_grow(name):
+    assert assert_limits(PATHS[name]) >= 3
+
+
+def test_a_locked_base_is_more_optimistic():
+    for name in ("quadruped", "mixed"):
+        posture, _ = at(PATHS[name])
+        free, locked = (posture.small(base) for base in posture.bases)
+        for integrator in ("Euler", "implicitfast", "RK4"):
+            assert free.limit(integrator).dt < locked.limit(integrator).dt
+
+
+def test_discrete_has_nothing_implicit_that_pushes_away_or_speeds_up():
+    servo = '<position joint="a" kp="100" kv="5"/>'
+    for bias in ("0 20 2", "0 -20 2", "0 20 -2"):
+        assert_the_same_map(one(f'{servo}<general joint="a" biastype="affine" biasprm="{bias}"/>'))
+
+
+def test_a_step_of_rk4_is_that_of_mujoco():
+    source = with_servos(6)
+    posture, model = at(source)
+    dt, n, nudge = posture.whole.limit("RK4").dt, model.nv, 1e-6
+    units, found = np.kron(np.eye(2), posture.whole.root.T), np.zeros((2 * model.nv, 2 * model.nv))
+    coordinates = posture.robot.coordinates
+    for k, aside in enumerate(nudge * np.eye(2 * n)):
+        ends = []
+        for sign in (1.0, -1.0):
+            stepped, data = acting(source).at(posture.q, posture.u, dt, "RK4")
+            data.qpos[:] = coordinates.move(posture.q, sign * aside[:n])
+            data.qvel[:] = sign * aside[n:]
+            mujoco.mj_step(stepped, data)
+            ends.append((data.qpos, data.qvel))
+        found[:n, k] = coordinates.difference(ends[0][0], ends[1][0])
+        found[n:, k] = ends[0][1] - ends[1][1]
+    theirs = units @ (found / (2.0 * nudge)) @ np.linalg.inv(units)
+    assert posture.whole.step("RK4", dt) == pytest.approx(theirs, abs=1e-7 * np.abs(theirs).max())
+
+
+ONE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody><body><joint name="a" {joint}/>
+<geom size="0.1" mass="1" pos="{arm} 0 0"/></body></worldbody><actuator>{actuators}</actuator></mujoco>"""
+
+
+def one(actuators, joint='axis="0 1 0"', gravity=0.0, arm=0.3):
+    return ONE.format(actuators=actuators, joint=joint, gravity=gravity, arm=arm)
+
+
+def limit(source, integrator="Euler"):
+    posture, _ = at(source)
+    return posture.small(posture.bases[0]).limit(integrator)
+
+
+def test_armature_and_the_square_of_a_gear_count():
+    plain = limit(one('<position joint="a" kp="100"/>')).dt
+    geared = limit(one('<position joint="a" kp="100" gear="3"/>')).dt
+    assert plain / geared == pytest.approx(3.0, rel=1e-6)
+    inertia = 0.3**2 + 0.4 * 0.1**2
+    heavier = limit(one('<position joint="a" kp="100"/>', f'axis="0 1 0" armature="{3.0 * inertia}"')).dt
+    assert heavier / plain == pytest.approx(2.0, rel=1e-6)
+
+
+def test_kv_is_explicit_under_euler_and_joint_damping_is_not():
+    servo = limit(one('<position joint="a" kp="100" kv="20"/>')).dt
+    joint = limit(one('<position joint="a" kp="100"/>', 'axis="0 1 0" damping="20"')).dt
+    assert servo < 0.2 * limit(one('<position joint="a" kp="100"/>')).dt < joint
+    assert limit(one('<position joint="a" kp="100" kv="20"/>'), "implicitfast").dt == pytest.approx(joint, rel=1e-8)
+
+
+def test_weight_that_is_taken_away_is_no_stiffness():
+    hangs = one('<position joint="a" kp="0.01" kv="0.1"/>', gravity=-9.81)
+    lifted = hangs.replace("<body>", '<body gravcomp="1">')
+    assert at(hangs)[0].moved > 1.0 and at(lifted)[0].moved < 1e-9
+    assert limit(lifted).dt > limit(hangs).dt
+
+
+def test_a_servo_on_its_range_is_not_stiff():
+    servo = '<position joint="a" kp="1000" forcerange="-1 1"/>'
+    source = one(servo, gravity=-9.81)  # m g r = 2.9 N m: it hangs, the servo pulls with 1
+    posture, _ = at(source)
+    assert posture.rest[1] == 0.0 and posture.cut.forces == pytest.approx({0: -1.0})
+    assert posture.whole.K[0, 0] < 10.0
+    assert_the_same_map(source)
+
+
+@pytest.mark.parametrize("law", ['<motor joint="a"/>', '<velocity joint="a" kv="3"/>',
+                                 '<general joint="a" gaintype="affine" gainprm="1 0 -2" ctrlrange="1 2"/>'])  # fmt: skip
+def test_without_stiffness_it_drifts_unless_it_is_braked(law):
+    found = limit(one(law))
+    assert found.limit == ("drifts" if "motor" in law else "finite")
+
+
+def test_a_posture_upright_is_a_saddle_and_says_how_fast_it_is_left():
+    text = one('<motor joint="a"/>', gravity=9.81).replace('pos="0.3 0 0"', 'pos="0 0 -0.3"')
+    found = limit(text)
+    assert found.limit == "saddle" and found.joint == "a"
+    assert found.rate == pytest.approx(np.sqrt(9.81 * 0.3 / (0.3**2 + 0.4 * 0.1**2)))
+
+
+def test_the_filter_of_an_actuator_that_limits_is_named():
+    servo = (
+        '<general name="slow" joint="a" dyntype="{}" dynprm="0.01" gainprm="30" biastype="affine" biasprm="0 -30 0"/>'
+    )
+    found = limit(one(servo.format("filter"), 'axis="0 1 0" damping="1"'))
+    assert (found.joint, found.dt) == ("slow", pytest.approx(0.02))
+    assert limit(one(servo.format("filterexact"), 'axis="0 1 0" damping="1"')).joint == "a"
+
+
+# bases
+
+DRONE = """<mujoco><worldbody><body><freejoint/><geom size="0.1 0.1 0.02" type="box"/><site name="r" pos="0.05 0 0"/></body>{more}
+</worldbody><actuator>{actuators}</actuator></mujoco>"""
+ROD = """<body pos="0 0 2"><joint name="a" axis="0 1 0"/>
+<geom pos="0.3 0 0" size="0.1"/><site name="tip" pos="0.3 0 0"/></body>"""
+
+
+def test_a_free_body_that_stands_alone_is_left_out_and_one_that_is_pulled_is_not():
+    servo = '<position joint="a" kp="100" kv="10"/>'
+    alone = at(DRONE.format(more=ROD, actuators=servo))[0]
+    assert (len(alone.lone), alone.base, alone.bases) == (6, [], ("fixed",))
+    assert alone.small("fixed").names == ("a",)
+    for more in ('<motor site="r"/>', '<motor site="r" refsite="tip"/>'):
+        assert at(DRONE.format(more=ROD, actuators=servo + more))[0].base == list(range(6))
+    rope = '<tendon><spatial stiffness="9" springlength="0.5"><site site="r"/><site site="tip"/></spatial></tendon>'
+    source = DRONE.format(more=ROD, actuators=servo).replace("<actuator>", rope + "<actuator>")
+    assert at(source)[0].bases == ("free", "locked")
+    # implicitfast up to MuJoCo 3.10 turns a body without joints on it by the mean of two speeds
+    assert assert_limits(source, ("Euler", "implicit")) == 4
+
+
+def test_a_body_that_flies_alone_has_no_locked_base():
+    posture = at(DRONE.format(more="", actuators='<motor site="r" gear="0 0 1 0 0 0"/>'))[0]
+    assert posture.bases == ("free",) and not posture.small("free").names
+
+
+def test_a_base_that_a_spring_holds_stands_on_the_world():
+    source = DRONE.format(more="", actuators='<motor site="r"/>').replace(
+        "<freejoint/>", '<joint type="free" stiffness="500"/>'
+    )
+    posture = at(source)[0]
+    assert posture.bases == ("fixed",) and not posture.driven.weightless and posture.rest[1] == 0.0
+
+
+def test_slides_with_masses_of_their_own_are_no_free_base():
+    ball = '<body><joint name="d" type="ball"/><geom size="0.1"/></body>'
+    gantry = ball
+    for name, axis in (("c", "0 0 1"), ("b", "0 1 0"), ("a", "1 0 0")):
+        gantry = f'<body><joint name="{name}" type="slide" axis="{axis}"/><geom size="0.1"/>{gantry}</body>'
+    servos = "".join(f'<position joint="{name}" kp="99"/>' for name in "abc")
+    posture = at(f"<mujoco><worldbody>{gantry}</worldbody><actuator>{servos}</actuator></mujoco>")[0]
+    assert posture.bases == ("fixed",) and not posture.driven.weightless
+
+
+# files that gymnasium ships: motors and no servo
+
+
+@pytest.mark.parametrize("path", gymnasium_files(), ids=lambda path: path.stem)
+def test_no_file_of_gymnasium_is_called_stable_or_unstable_without_a_rest(path):
+    reading = read(path)
+    robot = robot_of(reading, path.name)
+    for name in robot.positions:
+        posture = Posture(robot, name, Acting(reading.model, robot.drive).along)
+        if posture.rest[1]:
+            continue
+        force, size = posture.driven.forces(posture.q, posture.u)
+        assert size > 0.0 or not force.any()
+        assert np.abs(force).max() <= 1e-9 * size
+        for base in posture.bases:
+            small = posture.small(base)
+            found = small.limit("Euler")
+            lowest = np.linalg.eigvalsh(small.stiff).min()
+            assert (found.limit == "saddle") is bool(lowest < -1e-6)
+            if found.limit in ("finite", "none"):
+                # it is held or braked in every direction
+                assert np.linalg.eigvalsh(small.stiff + small.damped).min() > 0.0
+
+
+def test_a_step_of_a_chain_is_that_of_mujoco():
+    servos = "".join(f'<position joint="joint{k}" kp="500" kv="5"/>' for k in range(1, 9))
+    source = chain(8).replace("</mujoco>", f"<actuator>{servos}</actuator></mujoco>")
+    posture = at(source)[0]
+    assert posture.rest[1] == 0.0 and limit(source, "RK4").limit == "finite"
+    assert_the_same_map(source)

@@ -1,0 +1,197 @@
+"""Forces at rest under any drive, and their derivatives, beside those of MuJoCo."""
+
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+import pytest
+from driven_models import TRANSMISSIONS, with_drive
+
+from compare.engines.mujoco import read
+from compare.engines.mujoco.acting import Acting
+from compare.engines.mujoco.actuators import control_of
+from compare.robots.file import robot_of
+from compare.truth.servos import Driven
+
+ROUNDING, DIFFERENCED = 1e-12, 1e-6  # of the largest force; of the largest derivative, by central differences of NUDGE
+NUDGE = 1e-5
+
+ARM = """<mujoco><compiler angle="radian"/>
+<option gravity="0 0 -9.81"><flag contact="disable" constraint="disable" {flags}/></option>
+<worldbody><body {body}><joint name="a" axis="0 1 0" {joint}/><geom size="0.1" pos="0.3 0 0"/>
+<body pos="0.3 0 0" {body}><joint name="b" axis="0 1 0"/><geom size="0.1" pos="0.2 0.1 0"/></body></body></worldbody>
+<tendon><fixed name="t" {tendon}><joint joint="a" coef="1"/><joint joint="b" coef="2"/></fixed></tendon>
+<actuator>{actuators}</actuator></mujoco>"""
+
+
+def arm(actuators='<motor joint="a"/>', body="", joint="", tendon="", flags=""):
+    return ARM.format(actuators=actuators, body=body, joint=joint, tendon=tendon, flags=flags)
+
+
+@lru_cache(maxsize=64)
+def driven_of(text):
+    """The Driven of a text, and MuJoCo's model as the file has it."""
+    reading = read(text)
+    robot = robot_of(reading, "robot.xml")
+    return Driven(robot.tree, robot.drive, Acting(reading.model, robot.drive).along), reading.model
+
+
+def of_mujoco(driven, model, q, qd, u):
+    """The sum of all forces that MuJoCo has, (nv,)."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = q, qd
+    for i, one in enumerate(driven.drive.actuators):
+        place, inputs = control_of(model, i)
+        data.ctrl[place : place + inputs] = u[i]
+        if one.dynamics != "none":
+            data.act[model.actuator_actadr[i]] = u[i]
+    mujoco.mj_forward(model, data)
+    return data.qfrc_actuator + data.qfrc_passive - data.qfrc_bias
+
+
+def assert_the_same(text, rng, q=None, u=None):
+    """Forces to rounding, and K and D beside central differences of MuJoCo's forces."""
+    driven, model = driven_of(text)
+    n, every = model.nv, driven.drive.actuators
+    if q is None:
+        q = driven.coordinates.move(model.qpos0, rng.uniform(-0.6, 0.6, n))
+    u = rng.uniform(-1.0, 1.0, len(every)) if u is None else u
+    u = np.array([one.clamped(x) for one, x in zip(every, u)])
+    force, size = driven.forces(q, u)
+    assert np.abs(force - of_mujoco(driven, model, q, np.zeros(n), u)).max() <= ROUNDING * max(1.0, size)
+    K, D = np.zeros((2, n, n))
+    for k, step in enumerate(NUDGE * np.eye(n)):
+        by_q = [of_mujoco(driven, model, driven.coordinates.move(q, sign * step), 0.0, u) for sign in (-1.0, 1.0)]
+        by_qd = [of_mujoco(driven, model, q, sign * step, u) for sign in (-1.0, 1.0)]
+        K[:, k], D[:, k] = ((low - high) / (2.0 * NUDGE) for low, high in (by_q, by_qd))
+    slopes = driven.slopes(q, u)
+    for ours, theirs in ((slopes.K, K), (slopes.D, D)):
+        assert np.abs(ours - theirs).max() <= DIFFERENCED * max(1.0, np.abs(theirs).max())
+    return driven, q, u
+
+
+@pytest.mark.parametrize("transmission", TRANSMISSIONS)
+def test_every_law_at_every_transmission_has_the_forces_of_mujoco_and_their_derivatives(transmission, rng):
+    for seed in (1, 2):
+        assert_the_same(with_drive(seed, (transmission,)), rng)
+
+
+@pytest.mark.parametrize("stage", ["gravity", "spring", "damper", "actuation", "clampctrl", "spring damper", ""])
+def test_what_a_flag_switches_off_is_off(stage, rng):
+    assert_the_same(with_drive(3, flags=dict.fromkeys(stage.split(), "disable")), rng)
+
+
+def test_what_is_refused_is_left_out_and_the_rest_is_there(rng):
+    servo = '<position joint="a" kp="30" kv="2"/>'
+    more = '<general joint="b" dyntype="user" gainprm="50"/><position joint="b" kp="3" delay="0.02" nsample="3"/>'
+    q, u = np.array([0.3, -0.4]), np.array([0.7, 0.2, 0.1])
+    with_more, without = driven_of(arm(servo + more))[0], driven_of(arm(servo))[0]
+    assert with_more.drive.refused.keys() == {"actuator 1", "actuator 2"}
+    assert (with_more.forces(q, u)[0] == without.forces(q, u[:1])[0]).all()
+    assert (with_more.slopes(q, u).K == without.slopes(q, u[:1]).K).all()
+
+
+CUT = {  # a drive whose ranges cut at the posture (0.3, -0.4) under controls of 1, and what is cut: forces, sums
+    "a force": (arm('<position joint="a" kp="30" kv="2" forcerange="-5 5"/>'), {0: 5.0}, {}),
+    "the sum of a speed": (
+        arm('<position joint="a" kp="30" kv="2"/><motor joint="a"/><position tendon="t" kp="3"/>',
+            joint='actuatorfrcrange="-9 9"'),
+        {0: 21.0, 1: 1.0},
+        {0: 9.0},
+    ),
+    "the sum of a tendon": (
+        arm('<position tendon="t" kp="20" kv="2"/><motor tendon="t" gear="1"/>',
+            tendon='actuatorfrclimited="true" actuatorfrcrange="-6 6"'),
+        {0: 30.0 * 6.0 / 31.0, 1: 6.0 / 31.0},
+        {},
+    ),
+    "with the weight that is taken away": (
+        arm('<motor joint="a"/>', 'gravcomp="1"', 'actuatorfrcrange="-2 2" actuatorgravcomp="true"'), {0: 1.0}, {0: -2.0},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CUT)
+def test_what_a_range_cuts_has_neither_stiffness_nor_damping(name, rng):
+    text, forces, sums = CUT[name]
+    q, u = np.array([0.3, -0.4]), np.ones(text.count("<motor") + text.count("<position"))
+    driven, q, u = assert_the_same(text, rng, q, u)
+    cut = driven.cut(q, u)
+    assert cut.forces == pytest.approx(forces) and cut.sums == pytest.approx(sums)
+
+
+def test_just_inside_a_range_nothing_is_cut(rng):
+    text = arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>')
+    driven, q, u = assert_the_same(text, rng, np.array([0.3, 0.0]), np.ones(1))
+    assert not driven.cut(q, u).forces and driven.slopes(q, u).D[0, 0] == 2.0
+
+
+def test_a_length_that_does_not_change_has_no_stiffness():
+    """MuJoCo's length of a site without a reference is 0: a servo there has a force and no target that can be missed."""
+    text = arm('<position site="s" kp="100" kv="3" gear="0 0 1 0 0 0"/>').replace(
+        "<geom", '<site name="s" pos="0.3 0 0"/><geom', 1
+    )
+    driven, _ = driven_of(text)
+    slopes = driven.slopes(np.zeros(2), np.zeros(1))
+    assert slopes.D[0, 0] > 0.0 and abs(slopes.K[0, 0]) < 100 * 0.3**2 / 2
+
+
+# rest
+
+
+def test_a_rest_is_found_from_a_posture_that_is_none(rng):
+    text = arm('<position joint="a" kp="300"/><position joint="b" kp="300"/>')
+    driven, model = driven_of(text)
+    q, left = driven.at_rest(np.zeros(2), np.zeros(2))
+    assert left == 0.0 and 0.01 < np.abs(q).max() < 0.5
+    assert np.abs(of_mujoco(driven, model, q, np.zeros(2), np.zeros(2))).max() < 1e-9
+    assert driven.at_rest(q, np.zeros(2))[0] == pytest.approx(q, abs=1e-12)
+
+
+def test_where_there_is_no_rest_the_force_that_is_left_is_said():
+    text = '<mujoco><worldbody><body><joint type="slide" axis="0 0 1"/><geom size="0.1" mass="2"/></body></worldbody></mujoco>'
+    driven, _ = driven_of(text)
+    _, left = driven.at_rest(np.zeros(1), np.zeros(0))
+    assert left == pytest.approx(2.0 * 9.81)
+
+
+def test_a_servo_that_is_too_weak_for_its_range_finds_no_rest():
+    body = '<body><joint name="a" type="slide" axis="0 0 1"/><geom size="0.1" mass="2"/></body>'
+    servo = '<position joint="a" kp="100" forcerange="-{0} {0}"/>'
+    for most, rests in ((19.61, False), (19.63, True)):
+        driven, _ = driven_of(
+            f"<mujoco><worldbody>{body}</worldbody><actuator>{servo.format(most)}</actuator></mujoco>"
+        )
+        assert (driven.at_rest(np.zeros(1), np.zeros(1))[1] == 0.0) is rests
+
+
+def test_what_only_rounding_leaves_is_a_rest():
+    """Straight up, at angles that are no numbers in binary; and at the targets of servos whose gains are none."""
+    text = arm("".join(f'<general joint="{name}" gainprm="0.7" biastype="affine" biasprm="0.1 -0.3 0"/>' for name in "ab"),
+               flags='gravity="disable"')  # fmt: skip
+    driven, _ = driven_of(text)
+    q = np.array([0.1, 0.7])
+    u = np.array([one.target(angle) for one, angle in zip(driven.drive.actuators, q)])
+    assert driven.at_rest(q, u)[1] == 0.0
+    rod = '<body euler="0.3 0 0"><joint axis="0 1 0" ref="0.1"/><geom size="0.1" pos="0.1 0 0.7"/></body>'
+    driven, _ = driven_of(f'<mujoco><compiler angle="radian"/><worldbody>{rod}</worldbody></mujoco>')
+    up, left = driven.at_rest(np.array([0.1 - np.arctan(0.1 / 0.7)]), np.zeros(0))
+    assert left == 0.0 and driven.at_rest(up, np.zeros(0))[1] == 0.0
+
+
+def test_a_rest_is_found_from_where_a_force_is_on_its_range():
+    """The servo is stiff within 5 mrad of its target only; it rests there from wherever it starts."""
+    text = arm(
+        '<position joint="a" kp="1000" forcerange="-5 5"/><position joint="b" kp="1000"/>', flags='gravity="disable"'
+    )
+    driven, _ = driven_of(text)
+    for start in (0.05, 1.0, -2.0):
+        q, left = driven.at_rest(np.array([start, 0.1]), np.array([0.2, 0.1]))
+        assert left == 0.0 and q == pytest.approx([0.2, 0.1], abs=1e-9)
+
+
+def test_a_dead_band_has_no_spring_inside_and_one_outside():
+    text = arm('<motor joint="a"/>', tendon='stiffness="50" springlength="0.1 0.4"', flags='gravity="disable"')
+    driven, _ = driven_of(text)
+    for angle, stiff in ((0.39, 0.0), (0.41, 50.0), (0.2, 0.0), (0.09, 50.0)):
+        assert driven.slopes(np.array([angle, 0.0]), np.zeros(1)).K[0, 0] == pytest.approx(stiff, abs=1e-9)
