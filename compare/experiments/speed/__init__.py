@@ -17,10 +17,10 @@ from ...judge.units import renamed, said
 from ...judge.words import scene_begins
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.reference import DOUBLES, LOST, Reference, has_no_reference, references
+from ...truth.reference import Reference, has_no_reference, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets, tumbling
-from .accuracy import fill_in, spread_in_words
+from .accuracy import fill_in, reference_in_words, spread_in_words
 from .floors import floor
 from .settings import (
     absent_in_words,
@@ -60,18 +60,9 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """What errors are, and how they are judged."""
-    runs = (
-        f"Taylor's method in pairs of doubles, good to {LOST:g} times the growth of a small difference (a second run, in another "
-        "form of the equations and of another order, shows it)"
-    )
-    if robot.is_read:
-        runs += (
-            f", or, where that would take too long, a run in doubles by tmt's {DOUBLES}, whose digits are seen by halving its "
-            "steps: smaller errors are then not known"
-        )
     what = "angles" if movement_unit(robot.coordinates) == "rad" else f"movements ({movement_unit(robot.coordinates)})"
     return (
-        f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {runs}. Checked: "
+        f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {reference_in_words(robot)}. Checked: "
         "that each method of fixed step has its order in the error of the first second, which falls "
         "regularly (of order 8 only the least, for rounding comes before its error has settled; the tests show it in many "
         f"digits); that MuJoCo and the same scheme in tmt make the same error but for rounding, {FACTOR} eps times the growth of "

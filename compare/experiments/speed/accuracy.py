@@ -8,7 +8,7 @@ from ...judge import timing
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...truth.reference import LOST, Reference
+from ...truth.reference import DOUBLES, LOST, Reference
 
 Floors = Mapping[str, float]  # {scene: rad}, what rounding leaves in each
 
@@ -145,6 +145,20 @@ def floors_in_words(rows: list[dict], floors: Floors) -> list[str]:
         f"all methods {came} {'comes' if came == 1 else 'come'} to within {NEAR_ROUNDING} times of it; in {stay} of these the "
         f"last setting is not the most exact, and {below} {'gets' if below == 1 else 'get'} below it."
     ]
+
+
+def reference_in_words(robot: Robot) -> str:
+    """What errors are measured against."""
+    words = (
+        f"Taylor's method in pairs of doubles, good to {LOST:g} times the growth of a small difference (a second run, in another "
+        "form of the equations and of another order, shows it)"
+    )
+    if not robot.is_read:
+        return words
+    return (
+        f"{words}, or, where that would take too long, a run in doubles by tmt's {DOUBLES}, whose digits are seen by halving "
+        "its steps: smaller errors are then not known"
+    )
 
 
 def references_in_words(known: Mapping[str, Reference], floors: Floors) -> list[str]:

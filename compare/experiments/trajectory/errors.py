@@ -27,7 +27,7 @@ def errors_when_free(result: Result, robot: Robot) -> dict[str, tuple]:
     """The same of the other scenes that all methods follow for speed, of which the true motion is known to many digits."""
     errors = {}
     for case, curve in coarsest_runs(result, robot):
-        if known(case) and case.steps == reference.RECORDS:
+        if is_followed(case) and case.steps == reference.RECORDS:
             true = reference.reference(case)
             joints = range(len(case.joints))
             of_run = (true.error(curve[name][0], joints).max() for name in robot.compared)
@@ -35,7 +35,7 @@ def errors_when_free(result: Result, robot: Robot) -> dict[str, tuple]:
     return errors
 
 
-def known(case: Case) -> bool:
+def is_followed(case: Case) -> bool:
     """Whether the true motion of a case is asked for here: not of a file's robot, whose scenes have steps of their own."""
     return "speed" in case.scene.tags and not case.robot.is_read
 
