@@ -78,6 +78,16 @@ def trajectory(
     says no more than these times. form: of FORMS. Raises TooManySteps if a run would take too long, ValueError if its numbers
     overflow.
     """
+    path, count, error = followed(tree, q, qd, tau, dt, steps, every, form, order, tolerance)
+    if error:
+        raise error
+    return Path(*path.transpose(1, 0, 2), count)
+
+
+def followed(
+    tree, q, qd, tau, dt, steps, every=1, form="composite", order=ORDER, tolerance=TOLERANCE
+) -> tuple[np.ndarray, int, ValueError | None]:
+    """The records (k, 2, nq + nv) of a run as far as it goes, the number of its series, and why it ends early, or None."""
     code, rates, numbers, rows = equations(tree, tau, form)
     n, most = len(rates), MOST_OPERATIONS // (BESIDE + len(code))
     high, low = np.zeros((2, rows, order + 1))
@@ -90,17 +100,21 @@ def trajectory(
         series.expand(code, rates, order + 1, high.reshape(-1), low.reshape(-1))
         step = step_size(high[:n], tolerance)
         if not step > 0.0:
-            raise ValueError(f"at t = {float(t):g} s the motion diverges: its numbers overflow")
+            error = ValueError(
+                f"at t = {float(t):g} s numbers overflow: the motion diverges, is too fast, or Mbar is singular"
+            )
+            return np.array(path), count, error
         left, count = float((times[-1] - t) / Fraction(min(step, 2.0 * float(times[-1])))), count + 1
         if count - 1 + left > most and count >= min(SEEN, most):
-            raise TooManySteps(
+            error = TooManySteps(
                 f"at t = {float(t):.3g} s a series takes steps of {step:.1e} s, and in {float(times[-1]):g} s more than {most}"
             )
+            return np.array(path), count, error
         end = times[-1] if step == math.inf else t + Fraction(step)
         while len(path) < len(times) and times[len(path)] <= end:
             path.append(after(times[len(path)] - t, high[:n], low[:n]))
         state, t = after(end - t, high[:n], low[:n]), end
-    return Path(*np.array(path).transpose(1, 0, 2), count)
+    return np.array(path), count, None
 
 
 def equations(tree, tau, form: str) -> Equations:
