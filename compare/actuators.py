@@ -137,6 +137,9 @@ class Drive:
     lifted: tuple[int, ...] = ()
     unlifted: tuple[int, ...] = ()
     unknown: Mapping[str, str] = field(default_factory=dict)
+    discrete_is_euler: bool = (
+        False  # the file's solver is PGS, with which MuJoCo's discrete has no servo implicit (measured)
+    )
     explicit_damping: bool = False  # the file switches off that Euler has the damping of joints implicit
 
     @property

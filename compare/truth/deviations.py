@@ -77,7 +77,7 @@ class Deviations:
         """Whether the closed form holds: K and D are symmetric, and D takes energy away. K may have any sign: see `drifts`."""
         halves = [np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in (self.K, self.D)]
         lowest = np.linalg.eigvalsh(self.damped).min()
-        return all(halves) and lowest >= -VANISHING * np.abs(self.damped).max()
+        return all(halves) and lowest >= -10.0 * ROUNDED_OFF * np.abs(self.damped).max()
 
     @cached_property
     def modes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -135,7 +135,7 @@ class Deviations:
     @cached_property
     def neutral(self) -> float:
         """The rate, 1/s, at which something seems to grow by itself, but within `doubts`."""
-        return 0.0 if self.is_symmetric or self.growing else max(float(self.modes[0].real.max(initial=0.0)), 0.0)
+        return 0.0 if self.growing else max(float(self.modes[0].real.max(initial=0.0)), 0.0)
 
     def joint_of(self, shape: np.ndarray) -> str:
         """The speed that has most of the kinetic energy of a movement."""

@@ -116,8 +116,8 @@ class Posture:
             D=slopes.D,
             damping=speeds,
             uncut=slopes.uncut,
-            springs=slopes.springs,
-            brakes=slopes.brakes,
+            springs=slopes.springs * (not drive.discrete_is_euler),
+            brakes=np.diag(speeds) if drive.discrete_is_euler else slopes.brakes,
             on_path=on_one_path(tree),
             poles=tuple((one.name, one.time_constant, one.dynamics == "filterexact") for one in filters),
         )

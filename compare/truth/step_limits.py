@@ -92,7 +92,7 @@ class Small(Deviations):
 
     def stays(self, integrator: str, dt: float) -> bool:
         """Whether nothing grows in a step but by rounding."""
-        return self.growth(integrator, dt) <= 1.0 + max(NEUTRAL, dt * self.neutral)
+        return self.growth(integrator, dt) <= 1.0 + max(NEUTRAL, 2.0 * dt * self.neutral)
 
     def pole_limits(self, integrator: str) -> list[tuple[float, str]]:
         """Up to which step, s, each filter is stable, and its actuator. RK4 has a filterexact no more exact than a filter."""

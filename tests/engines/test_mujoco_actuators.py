@@ -10,6 +10,7 @@ from files import TWO, mjcf
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
+from compare.engines.mujoco.lock import ModelError
 from compare.robots.file import robot_of
 
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
@@ -214,3 +215,13 @@ def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(full)
     _, moments = Acting(model, reading.drive).along(np.zeros(2))
     assert moments[1:].tolist() == [[3.0, 0.0], [5.0, 10.0]]
+
+
+@pytest.mark.parametrize("actuator, what", [
+    ('<position name="s" joint="j" kp="nan"/>', "gain of actuator 's'"),
+    ('<general name="s" joint="j" biastype="affine" biasprm="0 -inf 0"/>', "bias of actuator 's'"),
+    ('<motor name="s" joint="j" gear="nan"/>', "gear of actuator 's'"),
+])  # fmt: skip
+def test_gains_that_are_no_numbers_are_refused_by_name(actuator, what):
+    with pytest.raises(ModelError, match=f"the {what} has a number that is not finite"):
+        drive_of(actuator)

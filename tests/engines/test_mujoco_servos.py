@@ -12,7 +12,7 @@ DT, STEPS = 1e-3, 20
 CLOSE = 1e-13  # of the largest speed, or of 1 rad or m
 MOVED = {"hinge": 3.0, "slide": 0.02, "ball": 0.0}  # deg, m
 MODEL = """
-<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="{integrator}"/>
+<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="{integrator}" solver="PGS" iterations="1"/>
   <worldbody>
     <body>
       <joint name="a" axis="0 1 0" damping="0.3" armature="0.01" ref="0.2" actuatorfrcrange="-0.1 0.1"/>

@@ -168,6 +168,26 @@ def test_a_servo_on_its_range_is_not_stiff():
     assert_the_same_map(source)
 
 
+def test_where_the_sum_of_a_speed_is_cut_a_tendon_brakes_elsewhere_and_is_implicit_as_it_was():
+    arm = '<body pos="0.6 0 0"><joint name="b" axis="0 1 0" damping="0.2"/><geom size="0.1" mass="1" pos="0.2 0 0"/></body>'
+    both = '<tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" coef="0.5"/></fixed></tendon>'
+    servos = '<position joint="a" kp="1000" kv="50"/><position tendon="t" kp="300" kv="20"/><position joint="b" kp="30" kv="2"/>'
+    source = one(servos, 'axis="0 1 0" actuatorfrcrange="-1 1" damping="0.3"', gravity=-9.81)
+    source = source.replace("</body></worldbody>", f"{arm}</body></worldbody>{both}")
+    posture, _ = at(source)
+    assert posture.rest[1] == 0.0 and posture.cut.sums == pytest.approx({0: -1.0})
+    assert posture.whole.D[0].tolist() == pytest.approx([0.3, 0.0]) and posture.whole.uncut[0, 0] == pytest.approx(20.3)
+    assert_the_same_map(source)
+
+
+@pytest.mark.skipif(not hasattr(mujoco.MjModel.from_xml_string("<mujoco/>"), "actuator_damping"), reason="older MuJoCo")
+def test_damping_of_an_actuator_itself_is_the_joints_and_goes_with_the_square_of_its_gear():
+    source = one('<position joint="a" kp="100" gear="3" damping="0.5"/>')
+    posture, _ = at(source)
+    assert posture.whole.D[0, 0] == posture.whole.damping[0] == pytest.approx(0.5 * 3.0**2)
+    assert_the_same_map(source)
+
+
 @pytest.mark.parametrize("law", ['<motor joint="a"/>', '<velocity joint="a" kv="3"/>',
                                  '<general joint="a" gaintype="affine" gainprm="1 0 -2" ctrlrange="1 2"/>'])  # fmt: skip
 def test_without_stiffness_it_drifts_unless_it_is_braked(law):
@@ -266,3 +286,17 @@ def test_a_step_of_a_chain_is_that_of_mujoco():
     posture = at(source)[0]
     assert posture.rest[1] == 0.0 and limit(source, "RK4").limit == "finite"
     assert_the_same_map(source)
+
+
+def test_with_pgs_discrete_has_the_limit_of_euler():
+    text = PATHS["arm7"].read_text().replace("<option ", '<option solver="PGS" ', 1)
+    posture, model = at(text)
+    small, run = posture.small("fixed"), Acting(model, posture.robot.drive, posture.cut)
+    limits = {name: small.limit(name).dt for name in ("Euler", "discrete")}
+    assert limits["discrete"] == pytest.approx(limits["Euler"])
+    if "discrete" in STEPPED:
+        steps = [limits["Euler"] * share for share in (0.99, 1.01)]
+        below, above = (
+            np.abs(np.linalg.eigvals(run.transition(posture.q, posture.u, dt, "discrete"))).max() for dt in steps
+        )
+        assert below < 1.0 < above

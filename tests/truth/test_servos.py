@@ -120,6 +120,12 @@ def test_what_a_range_cuts_has_neither_stiffness_nor_damping(name, rng):
     assert cut.forces == pytest.approx(forces) and cut.sums == pytest.approx(sums)
 
 
+def test_weight_that_an_actuator_takes_away_has_the_slope_of_weight(rng):
+    text = arm('<motor joint="b"/>', 'gravcomp="1"', 'actuatorgravcomp="true"')
+    driven, q, u = assert_the_same(text, rng, np.array([0.3, -0.4]), np.zeros(1))
+    assert driven.drive.lifted == (0,) and np.abs(driven.slopes(q, u).K).max() < 1e-9
+
+
 def test_just_inside_a_range_nothing_is_cut(rng):
     text = arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>')
     driven, q, u = assert_the_same(text, rng, np.array([0.3, 0.0]), np.ones(1))
@@ -134,6 +140,13 @@ def test_a_length_that_does_not_change_has_no_stiffness():
     driven, _ = driven_of(text)
     slopes = driven.slopes(np.zeros(2), np.zeros(1))
     assert slopes.D[0, 0] > 0.0 and abs(slopes.K[0, 0]) < 100 * 0.3**2 / 2
+
+
+def test_what_turns_with_the_posture_is_named():
+    text = arm('<motor name="m" joint="a"/><motor name="at the site" site="s"/>').replace(
+        "<geom", '<site name="s" pos="0.3 0 0"/><geom', 1
+    )
+    assert driven_of(text)[0].differenced == ("at the site",)
 
 
 # rest

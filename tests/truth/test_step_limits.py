@@ -164,6 +164,28 @@ def test_what_is_left_slowly_beside_a_stiff_servo_is_a_saddle_and_no_limit(name)
     assert held.limit in ("finite", "none")
 
 
+def test_a_limit_is_one_up_to_five_seconds():
+    assert small(1.0, 4.0 / 4.99**2, 0.0).limit("Euler").dt == pytest.approx(4.99, rel=1e-6)
+    assert small(1.0, 4.0 / 5.01**2, 0.0).limit("Euler").limit == "none"
+    turned = [[1.0, 0.01], [0.0, 0.5]]  # K is not symmetric: by eigenvalues
+    for longest, kind in ((4.99, "finite"), (5.01, "none")):
+        limit = small(np.eye(2), 4.0 / longest**2 * np.array(turned), 0.0 * np.eye(2)).limit("Euler")
+        assert limit.limit == kind and (limit.dt is None or limit.dt == pytest.approx(4.99, rel=1e-4))
+    for constant, kind in ((2.49, "finite"), (2.51, "none")):
+        assert small(1.0, 1e-3, 1.0, [1.0], poles=(("servo", constant, False),)).limit("Euler").limit == kind
+
+
+def test_a_little_that_speeds_up_beside_much_that_brakes_is_a_saddle():
+    grows = small(np.eye(2), np.diag([1e8, 100.0]), np.diag([1e9, -0.05])).limit("implicitfast")
+    assert grows.limit == "saddle" and grows.rate == pytest.approx(0.025, rel=1e-4)
+
+
+def test_a_fast_servo_leaves_the_limit_of_a_slow_joint_as_it_is():
+    """K is not symmetric; kv of the one is implicit: 4 + 2 dt - 400 dt^2 = 0 of the other."""
+    K, D = [[1e10, 5e4], [0.0, 400.0]], np.diag([1e9, 1.0])
+    assert small(np.eye(2), K, D).limit("implicitfast").dt == pytest.approx((1.0 + np.sqrt(1601.0)) / 400.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("exact", [False, True])
 def test_a_filter_has_a_limit_of_its_own(exact):
     one = small(1.0, 1.0, 1.0, damping=[1.0], poles=(("servo", 0.05, exact),))
@@ -188,6 +210,20 @@ def test_the_kind_is_that_of_the_equations_and_the_joint_that_of_the_mode():
     assert limit.rate == pytest.approx(np.abs(np.roots([1e-3, 5.0, 100.0])).max())
     softer = small(np.diag([1.0, 1e-3]), np.diag([4.0, 100.0]), np.diag([0.1, 0.01]), damping=[0.1, 0.0]).limit("Euler")
     assert (softer.joint, softer.kind) == ("joint1", "swing")
+
+
+@pytest.mark.parametrize("coupling", [0.0, 1.0])
+def test_the_joint_that_limits_is_the_fast_one_wherever_the_fastest_decay_is(coupling):
+    """Of three swings, one of them fast; K is symmetric or not."""
+    K = np.diag([4.0, 900.0, 25.0])
+    K[0, 2] = coupling
+    for name in EVERY:
+        one = small(np.eye(3), K, 1e-3 * np.eye(3), springs=0.1 * K)
+        limit = one.limit(name)
+        assert (limit.joint, limit.kind, limit.rate) == ("joint1", "swing", pytest.approx(30.0, rel=1e-3))
+    # an implicit brake is faster than the swing that limits
+    braked = small(np.eye(2), np.diag([900.0, 1.0]), np.diag([1e-3, 1e5])).limit("implicitfast")
+    assert (braked.joint, braked.rate) == ("joint0", pytest.approx(30.0, rel=1e-3))
 
 
 # free bases

@@ -13,6 +13,7 @@ from .flags import bit
 UNLIMITED = (
     "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited", "tendon_actfrclimited",
 )  # fmt: skip
+SOLVED, MOST_ITERATIONS = 1e-15, 100
 ACTING, IDLE = 0, 1  # groups of actuators
 
 
@@ -27,11 +28,16 @@ class Driven(NamedTuple):
 def engaged(model: mujoco.MjModel, controller: Controller) -> Driven:
     """Switch on, in a model, the actuators that take part, without any range.
 
-    An activation is held constant: that of a filter by a control that is the same, that of an integrator by none.
+    `discrete` has their gains in a system that is solved by iteration where a tendon couples branches: here to rounding, and by
+    Newton's method, as with PGS it is Euler's scheme. An activation is held constant: that of a filter by a control that is the
+    same, that of an integrator by none.
     """
     model.opt.disableflags &= ~bit(("ACTUATION",))
     for name in UNLIMITED:
-        getattr(model, name)[:] = 0
+        if hasattr(model, name):
+            getattr(model, name)[:] = 0
+    model.opt.solver, model.opt.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVED
+    model.opt.iterations = max(model.opt.iterations, MOST_ITERATIONS)
     ctrl, act = np.zeros(model.nu), np.zeros(model.na)
     for i, u in enumerate(controller.controls):
         model.actuator_group[i] = IDLE if u is None else ACTING

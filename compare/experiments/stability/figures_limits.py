@@ -85,8 +85,9 @@ def draw_limits(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     caption = (
         f"The largest dt at which no mode of the equations of motion grows in a run from {LINEAR_DEVIATION:g} "
         f"{unit_of_movements(robot)}, found by "
-        "bisection, beside the limit predicted from the amplification of one step. "
-        f"{len(off)} of {len(expected)} predicted limits are observed"
+        "bisection, beside the limit predicted from the amplification of one step"
+        + ", without the robot's actuators" * bool(robot.drive.actuators)
+        + f". {len(off)} of {len(expected)} predicted limits are observed"
         + (
             f"; they differ by {100 * float(np.median(off)):.3f} % in the middle and by at most {100 * max(off):.3f} %."
             if off

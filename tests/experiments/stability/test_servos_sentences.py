@@ -2,7 +2,7 @@
 
 import pytest
 
-from compare.experiments.stability.servos.sentences import at_the_top, in_seconds, shaking
+from compare.experiments.stability.servos.sentences import at_the_top, in_seconds, refused_in_words, shaking
 
 ATTACHED = "attached to a scene whose `<option>` states no integrator"
 
@@ -17,7 +17,7 @@ def limits(own=("p", 0.2), euler=("p", 6e-4), file="implicitfast", **more):
             rows.append({
                 "posture": name, "base": "fixed", "integrator": integrator, "limit": kind, "predicted_dt_s": dt,
                 "file_dt_s": 2e-3, "file_integrator": file, "limiting_joint": "joint7",
-                "stable_at_file_dt": dt is None or dt >= 2e-3,
+                "stable_at_file_dt": dt is None or dt >= 2e-3, "step_response_error": 0.004,
             } | more)  # fmt: skip
     return rows
 
@@ -59,6 +59,7 @@ CALM = run("implicitfast", 1e-12, True)
     (limits(own=("p", "drifts", "q", "not_at_rest"), euler=()), [],
      "Whether its own 2 ms under implicitfast is stable cannot be said: p: nothing holds or brakes a movement; q: it does "
      "not rest."),
+    (limits(own=("p", "not_at_rest"), euler=(), base="free"), [], "cannot be said: p: without gravity it does not rest."),
 ])  # fmt: skip
 def test_what_is_said_first(rows, full, said):
     if not any(row["integrator"] == "Euler" for row in rows):
@@ -86,3 +87,14 @@ def test_it_shakes_if_it_does_at_one_posture_of_several():
 ])  # fmt: skip
 def test_times_have_the_digits_that_tell_them_apart(dt, beside, text):
     assert in_seconds(dt, beside) == text
+
+
+def test_stable_and_far_off_is_said():
+    assert "34 % off" in at_the_top(limits(step_response_error=0.34), [])
+    assert "off" not in at_the_top(limits(step_response_error=0.0999), [])
+    assert "off" not in at_the_top(limits(step_response_error=None), [])
+
+
+def test_what_is_left_out_is_named_with_its_reason():
+    assert refused_in_words({}) == []
+    assert refused_in_words({"biceps": "a muscle"})[0].endswith("linear law: biceps: a muscle.")

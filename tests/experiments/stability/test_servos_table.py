@@ -1,8 +1,11 @@
 """Step limits under a robot's own servos in `stability`: tables, checks, what a run of each size does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import PATHS
+from servo_models import FLOATING, posture_of
 
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.flags import INTEGRATORS
@@ -52,6 +55,7 @@ def test_tables_have_their_columns_and_a_row_for_each_posture_base_and_integrato
     assert euler["stable_at_file_dt"] is True and euler["observed_dt_s"] == pytest.approx(
         euler["predicted_dt_s"], rel=5e-3
     )
+    assert euler["observed_dt_s"] != euler["predicted_dt_s"]  # found without it
     assert 0.0 < euler["step_response_error"] < 0.1
 
 
@@ -81,6 +85,19 @@ def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_that_compares_n
         "Stable" if stable else "Not stable at its own 2 ms under Euler, MuJoCo's default (limit 1."
     )
     assert stable == ("What would make 2 ms at qpos0 stable" not in " ".join(said))
+    (row,) = (row for row in result.tables["full_model"] if row["integrator"] == "Euler")
+    assert row["predicted_stable"] is stable
+
+
+def test_of_postures_that_are_not_stable_the_one_with_the_least_limit_is_looked_at():
+    setup = read(SWING.format(dt=0.002, kv=800))
+    one = predicted.predicted_at(setup.robot, "qpos0", setup.reading)
+    limit = one.limits["fixed", "Euler"]
+    three = [
+        one._replace(limits=one.limits | {("fixed", "Euler"): limit._replace(dt=dt)}) for dt in (1.9e-3, 1e-3, 1.5e-3)
+    ]
+    assert servos.least_at(three, "Euler", 2e-3) is three[1]
+    assert servos.least_at(three[:1], "Euler", 1.8e-3) is None
 
 
 def test_a_figure_has_the_files_own_point_and_says_its_number():
@@ -102,6 +119,18 @@ def test_without_actuators_there_is_nothing_new(engines):
     assert "servos" in stability.claim(read(PATHS["gripper"]).robot)
 
 
+def test_the_activation_of_an_actuator_that_is_left_out_is_not_compared():
+    servo = '<position name="servo" joint="swing" kp="50" kv="4"/>'
+    limits = []
+    for more in ("", '<muscle joint="swing" lengthrange="0.1 1"/>'):
+        setup = read(SWING.format(dt=0.002, kv=4).replace(servo, servo + more))
+        said, result = done(setup)
+        limits.append([row["predicted_dt_s"] for row in result.tables["step_limits"]])
+        growth = [check for check in result.checks if check.quantity.startswith("growth of a step")]
+        assert growth and all(check.passed for check in growth)
+    assert limits[0] == limits[1] and "a law of the kind muscle" in " ".join(said)
+
+
 def test_motors_alone_are_called_neither_stable_nor_not():
     source = SWING.format(dt=0.002, kv=4).replace(
         'position name="servo" joint="swing" kp="50" kv="4"', 'motor joint="swing"'
@@ -111,6 +140,47 @@ def test_motors_alone_are_called_neither_stable_nor_not():
     assert not any(check.quantity == AT_OWN_STEP for check in result.checks)
     assert {row["stable_at_file_dt"] for row in result.tables["step_limits"]} == {None}
     assert not any("not stable" in text or "What would make" in text for text in said)
+
+
+def test_a_saddle_has_a_rate_and_neither_a_joint_that_limits_nor_an_answer():
+    setup = read(SWING.format(dt=0.002, kv=0).replace('kp="50"', 'kp="1"').replace("0 0 -0.5", "0 0 0.5"))
+    rows = predicted.limit_rows([predicted.predicted_at(setup.robot, "qpos0", setup.reading)], 0.002, "Euler")
+    for row in rows:
+        assert (row["limit"], row["limiting_joint"], row["stable_at_file_dt"]) == ("saddle", None, None)
+        assert row["mode_per_s"] > 1.0
+
+
+def test_runs_have_the_base_the_weight_and_the_cuts_of_the_rest():
+    at, found = posture_of(FLOATING)
+    locked, free = (predicted.acting_at(found, at, base) for base in ("locked", "free"))
+    assert (locked.locked, free.locked) == (tuple(at.base), ()) and not (locked.model.opt.gravity.any())
+    servo = '<position name="s" joint="swing" kp="1000" forcerange="-1 1"/>'
+    source = SWING.format(dt=0.002, kv=0).replace("0 0 -0.5", "0.5 0 0")
+    at, found = posture_of(source.replace('<position name="servo" joint="swing" kp="50" kv="0"/>', servo))
+    assert at.moved > 1.0 and predicted.acting_at(found, at, "fixed").model.actuator_biasprm[0, 0] == pytest.approx(
+        -1.0
+    )
+
+
+def test_a_closed_form_that_is_off_is_seen_by_the_eigenvalues():
+    setup = read(SWING.format(dt=0.002, kv=4))
+    one = predicted.predicted_at(setup.robot, "qpos0", setup.reading)
+    small, limit = one.small["fixed"], one.limits["fixed", "Euler"]
+    assert predicted.forms_apart(small, "Euler", limit) < 1e-8
+    for off in (1e-5, 0.1):
+        assert predicted.forms_apart(small, "Euler", limit._replace(dt=(1 + off) * limit.dt)) == pytest.approx(
+            off, rel=1e-3
+        )
+
+
+def test_a_step_that_is_not_mujocos_is_seen_by_its_radius():
+    found = reading.read(SWING.format(dt=0.002, kv=4))
+    one = predicted.predicted_at(robot_of(found, "robot.xml"), "qpos0", found)
+    small, acting = one.small["fixed"], predicted.acting_at(found, one.at, "fixed")
+    dt = one.limits["fixed", "Euler"].dt
+    assert predicted.radius_apart(acting, one.at, small, "Euler", dt) < 1e-6
+    # above the limit the factor of a stiffness that is 1 % too large is farther off than below it
+    assert predicted.radius_apart(acting, one.at, replace(small, K=1.01 * small.K), "Euler", dt) > 1e-3
 
 
 # tolerances and rules: just inside, just outside
@@ -130,6 +200,12 @@ def row(**more):
 def test_an_observed_limit_is_within_a_hundredth(result, seen, kind, passed):
     servos.check_observed(result, row(observed_dt_s=seen), kind, False)
     assert [check.passed for check in result.checks] == [passed]
+
+
+@pytest.mark.parametrize("predicted_dt, checks", [(0.99e-7, 0), (1.01e-7, 1)])
+def test_a_limit_below_the_shortest_step_that_is_tried_is_not_compared(result, predicted_dt, checks):
+    servos.check_observed(result, row(predicted_dt_s=predicted_dt), "always", False)
+    assert [check.passed for check in result.checks] == [False] * checks
 
 
 def test_no_limit_is_no_check_where_runs_show_none_and_a_failed_one_where_they_do(result):

@@ -13,7 +13,7 @@ from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
 from .remarks import asked_in_words, lifts_in_words, response_error_at, servo_notes
-from .sentences import DEFAULT_INTEGRATOR, at_the_top, known
+from .sentences import DEFAULT_INTEGRATOR, at_the_top, known, refused_in_words
 
 MOST_POSTURES_DRIVEN = 6  # of named ones the first
 OBSERVED_WITHIN = 0.01  # relative
@@ -145,7 +145,7 @@ def add(result: Result, setup: Setup, work: dict) -> list[str]:
         check_own_step(result, rows)
     full = [row for part in work["full"] for row in part]
     result.tables |= {"step_limits": rows, "full_model": full}
-    result.top = [at_the_top(rows, full, setup.robot.drive.feeds_back)]
+    result.top = [at_the_top(rows, full, setup.robot.drive.feeds_back), *refused_in_words(setup.robot.drive.refused)]
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
     lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]
@@ -180,7 +180,8 @@ def check_steps(result: Result, one: Predicted, steps: Sequence[Steps]) -> None:
 
 def check_observed(result: Result, row: dict, kind: str, several: bool) -> None:
     """The limit in MuJoCo's runs beside the predicted one."""
-    if kind == row["limit"] == "none":
+    below = kind == "always" and row["limit"] == "finite" and row["predicted_dt_s"] < observed.SOUGHT_FROM
+    if kind == row["limit"] == "none" or below:  # shorter steps are not tried
         return
     both = kind == row["limit"] == "finite"
     apart = abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if both else None

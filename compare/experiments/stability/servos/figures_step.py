@@ -41,7 +41,7 @@ def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         )  # fmt: skip
     ax.set(xlabel="dt, s", ylabel="error of the step response, ratio")
     ax.axvline(drawn["rows"][0]["file_dt_s"], color="black", linewidth=0.6, linestyle=":")
-    fig.legend(loc="outside upper center", ncols=2)
+    fig.legend(loc="outside upper center", ncols=2, title=f"at {drawn['posture']}")
     errors = {
         name: row["step_response_error"]
         for name, row in rows.items()

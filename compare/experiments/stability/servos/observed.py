@@ -29,8 +29,8 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
     Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
     acting: MuJoCo at the posture, with the base that is asked for.
     """
-    count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 1
-    tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]
+    count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 2
+    tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]  # the first at most SOUGHT_FROM
     failed = next((k for k, dt in enumerate(tried) if grows_in_runs(acting, at, integrator, dt, SOUGHT_STEPS)), count)
     # a short run may not show what hardly grows: the longest step that held is tried once more
     while failed and grows_in_runs(acting, at, integrator, tried[failed - 1]):

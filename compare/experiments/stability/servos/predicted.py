@@ -132,7 +132,7 @@ def forms_apart(small: Small, integrator: str, limit: Limit) -> float | None:
         return None
 
     def excess(dt):
-        return small.growth(integrator, dt) - 1.0 - NEUTRAL
+        return small.growth(integrator, dt) - 1.0 - max(NEUTRAL, 2.0 * dt * small.neutral)
 
     low, high = limit.dt * (1.0 - NEAR_LIMIT), limit.dt * (1.0 + NEAR_LIMIT)
     if excess(low) <= 0.0 < excess(high):

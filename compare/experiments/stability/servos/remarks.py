@@ -57,7 +57,7 @@ def lifts_in_words(lifted: Sequence[tuple[Predicted, str, list[Lift]]], dt: floa
     for one, integrator, lifts in lifted:
         held = [lift for lift in lifts if lift.tried]
         others = [
-            f"{lift.names[0]} {'any step up to 5 s' if lift.factor is None else f'{in_digits(lift.factor)} times the step'}"
+            f"{lift.names[0]} {'(no limit up to 5 s)' if lift.factor is None else f'({in_digits(lift.factor)} times the limit)'}"
             for lift in held
             if lift.kind == "integrator"
         ]
@@ -94,6 +94,7 @@ def servo_notes(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence
         *differences_in_words(full),
         *rests_in_words(found, rows),
         *drive_in_words(robot, found),
+        "All other notes, figures and tables here are of the robot without its actuators, at postures held by a constant torque.",
     ]
 
 
@@ -174,7 +175,10 @@ def differences_in_words(full: Sequence[dict]) -> Iterator[str]:
         )
     for rows, what in (
         (calm, "stays calm where the limits say that it is not stable: friction, equalities or contacts may hold it"),
-        (shaken, "is not calm where the limits say that it is stable: contacts, limits of joints or a fall move it"),
+        (
+            shaken,
+            "is not calm where the limits say that it is stable: contacts, joint limits, a fall or the way to its rest move it",
+        ),
     ):
         if rows:
             names = [f"{row['posture']} ({row['integrator']})" for row in rows]
@@ -187,13 +191,17 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
     moved = [f"{one.name} {one.at.moved:.2g}" for one in found if one.rests and one.at.moved > RESTS_WITHIN]
     if moved:
         yield (
-            f"Under their servos postures sink to a rest near them, which is what is looked at; from the stated one it is, in "
-            f"{unit}: {some_of(moved)}."
+            "Under their servos postures move to a rest, found by Newton's method, which is what is looked at; how far it is "
+            f"from the stated one, in {unit}: {some_of(moved)}."
         )
     for one in found:
         if not one.rests:
             left, forces = one.at.rest[1], " or ".join(dict.fromkeys(FORCES[u] for u in one.at.robot.coordinates.units))
-            yield f"{one.name} is not at rest under its actuators, and no rest was found near it: {left:.3g} {forces} are left."
+            weightless = ", without gravity, for it floats," * bool(one.at.base)
+            yield (
+                f"{one.name} is not at rest under its actuators{weightless or ','} and no rest was found near it: {left:.3g} "
+                f"{forces} are left."
+            )
         else:
             limit = one.limits[one.at.bases[0], next(iter(one.limits))[1]]
             if limit.limit == "saddle":
@@ -208,9 +216,6 @@ def rests_in_words(found: Sequence[Predicted], rows: Sequence[dict]) -> Iterator
 def drive_in_words(robot: Robot, found: Sequence[Predicted]) -> Iterator[str]:
     """What of the drive is left out, cut, or known by differences alone."""
     drive = robot.drive
-    if drive.refused:
-        texts = [f"{name}: {why}" for name, why in drive.refused.items()]
-        yield f"Left out of the limits, for they are not known to act by a linear law: {some_of(texts)}."
     off = [f"{one.name} ({one.off})" for one in drive.actuators if one.off]
     if off:
         yield f"These actuators exert nothing: {some_of(off)}."

@@ -1,12 +1,13 @@
 """What the limits of the step mean, in sentences made of their rows: at the top of a report, and the notes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ....judge.words import listed
 
 DEFAULT_INTEGRATOR = "Euler"  # MuJoCo's integrator where a file states none
 HIDDEN = "In the full model that cannot be told, which moves under stable integrators too"
 SHAKES = 10.0  # fold, of the speed under an integrator that is stable: then it is the step that shakes it
+FAR_OFF = 0.1  # of the response to a step of the targets: worth a word beside "stable"
 MOST_IN_A_SENTENCE = 6  # postures or actuators in a sentence
 
 
@@ -63,6 +64,14 @@ def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = Tr
     return words if integrator == DEFAULT_INTEGRATOR else f"{words} {default_in_words(rows, own, full)}"
 
 
+def refused_in_words(refused: Mapping[str, str]) -> list[str]:
+    """What is left out of the limits, by its name, and why: a sentence, or none."""
+    texts = [f"{name}: {why}" for name, why in refused.items()]
+    return (
+        [f"Left out of the limits, for they are not known to act by a linear law: {some_of(texts)}."] if texts else []
+    )
+
+
 def own_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict]) -> str:
     """Whether the file's own step is stable under its own integrator."""
     dt, integrator = own[0]["file_dt_s"], own[0]["file_integrator"]
@@ -86,6 +95,9 @@ def own_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict]
     elsewhere = len(postures) > len(own)
     where = f" at {some_of([row['posture'] for row in own])}" if elsewhere else ""
     text = f"S{step}{where} ({limit_in_words(own[0], False, dt)})."
+    worst = max(row["step_response_error"] or 0.0 for row in own)
+    if worst > FAR_OFF:
+        text += f" But stable is not exact: a step of its targets is answered {in_digits(100.0 * worst)} % off."
     return text + (f" At the others that cannot be said: {kinds_in_words(rows)}." if elsewhere else "")
 
 
@@ -147,6 +159,8 @@ def kinds_in_words(rows: Sequence[dict]) -> str:
     """At which postures there is no limit to be said, and why."""
     texts = []
     for kind, why in WITHOUT_LIMIT.items():
-        names = list(dict.fromkeys(row["posture"] for row in rows if row["limit"] == kind and row["base"] != "locked"))
-        texts += [f"{some_of(names)}: {why}"] * bool(names)
+        of = [row for row in rows if row["limit"] == kind and row["base"] != "locked"]
+        weightless = kind == "not_at_rest" and any(row["base"] == "free" for row in of)
+        where = some_of(list(dict.fromkeys(row["posture"] for row in of)))
+        texts += [f"{where}: {'without gravity ' * weightless}{why}"] * bool(of)
     return "; ".join(texts)
