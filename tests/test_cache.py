@@ -147,17 +147,6 @@ def test_planted_code_is_not_run(folder, tmp_path, monkeypatch, open_to_others):
         assert ran == [] and len(cache.complaints) == 1
 
 
-def test_a_file_of_ones_own_in_the_folder(folder):
-    path = cache.own_file("reference.csv")
-    assert path == folder.resolve() / "reference.csv"
-    path.write_text("kept", encoding="utf-8")
-    assert cache.own_file("reference.csv") == path
-    if os.name == "posix":
-        path.chmod(0o666)
-        with pytest.raises(OSError, match="can be written by others"):
-            cache.own_file("reference.csv")
-
-
 def test_a_damaged_file_is_written_anew(folder):
     assert on_disk()
     (file,) = folder.glob("kernel_*.py")

@@ -152,7 +152,7 @@ def test_methods_keep_their_order_with_balls(name, order, monkeypatch):
     monkeypatch.setattr(kernels, "LONGEST", 0)
     tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball", "free"))
     q, qd, tau = random_state(np.random.default_rng(6), tree)
-    truth = np.array(trajectory(tree, q, qd, tau, 0.25, 1, 16)[-1], dtype=float)
+    truth = trajectory(tree, q, qd, tau, 0.25, 1).high[-1]
     errors = []
     for steps in (16, 32):
         motion = tmt.simulate(q, qd, tau, 0.25 / steps, steps, name, tree)
@@ -164,7 +164,7 @@ def test_many_digits_and_compiled_code_meet_with_balls(monkeypatch):
     monkeypatch.setattr(kernels, "LONGEST", 0)
     tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball", "free"))
     q, qd, tau = random_state(np.random.default_rng(6), tree)
-    truth = np.array(trajectory(tree, q, qd, tau, 0.25, 1, 16)[-1], dtype=float)
+    truth = trajectory(tree, q, qd, tau, 0.25, 1).high[-1]
     motion = tmt.simulate(q, qd, tau, 0.25 / 64, 64, "dopri8", tree)
     assert np.abs(np.concatenate([motion.q[-1], motion.qd[-1]]) - truth).max() < 1e-13
     assert abs(np.linalg.norm(motion.q[-1][tree.coordinates.balls[0].q]) - 1.0) < 4 * EPS

@@ -1,14 +1,143 @@
-"""Decimal numbers as one more scalar: their sine and cosine."""
+"""The true motion: beside closed forms, a short run in many digits, heyoka in quad precision, and its own second run."""
+
+import dataclasses
+from fractions import Fraction
+from importlib.util import find_spec
 
 import mpmath
+import numpy as np
+import pytest
+from many_digits import short_run
+from models import PATHS
+from trees import random_state, random_tree, tree_of_kinds
 
-from tmt import reference_run
+import tmt
+from compare.engines.heyoka import variables
+from compare.engines.mujoco import read
+from compare.truth.free_body import free_turning
+from compare.truth.pendulum import exact_swing
+from tmt import composite, reference_run
+from tmt.exact import exact_tree
+from tmt.method import acceleration
+from tmt.reference_run import trajectory, truth
+
+BENT = (0.5, 0.3, 1.0)
+ONE_HINGE = tmt.Tree(
+    hinge_names=["swing"], parent=[-1], offset=[(0.0, 0.0, 0.0)], axis=[(0.0, 1.0, 0.0)], damping=[0.0], body_names=["bob"],
+    body_hinge=[0], mass=[1.0], com=[(0.0, 0.0, -0.5)], inertia=[np.diag([1.0, 0.75, 0.5])], gravity=(0.0, 0.0, -8.0),
+)  # fmt: skip
 
 
-def test_decimal_sine_and_cosine():
-    with reference_run.localcontext() as context, mpmath.workdps(60):
-        context.prec = reference_run.DIGITS
-        for x in ("0", "0.7853981633974483", "-1.6", "3.2", "-100.25", "4.712388980384689857693965"):
-            values = reference_run.sincos(reference_run.Decimal(x))
-            for value, exact in zip(values, (mpmath.sin(mpmath.mpf(x)), mpmath.cos(mpmath.mpf(x)))):
-                assert abs(mpmath.mpf(str(value)) - exact) < mpmath.mpf(10) ** -33
+def off(path, expected, record=-1):
+    """The largest difference of a record from numbers of many digits."""
+    with mpmath.workdps(60):
+        found = [mpmath.mpf(h) + mpmath.mpf(l) for h, l in zip(path.high[record].tolist(), path.low[record].tolist())]
+        return float(max(abs(a - b) for a, b in zip(found, expected)))
+
+
+# what is known without an integrator
+
+
+@pytest.mark.parametrize("form", reference_run.FORMS)
+def test_a_pendulum_is_its_elliptic_function(form):
+    path = trajectory(ONE_HINGE, [2.0], [1.5], [0.0], 0.375, 8, form=form)
+    expected = exact_swing(0.375 * np.arange(9), 2.0, 1.5, 0.0, 2.0)
+    assert max(off(path, [angle], k) for k, angle in enumerate(expected)) < 1e-29
+
+
+def test_a_free_body_turns_by_elliptic_functions():
+    tree = read(PATHS["free_body"]).tree
+    moments, turn, spin = np.diag(tree.inertia[0]), (0.5, 0.5, -0.5, 0.5), (4.0, 1.0, 3.0)
+    tree = dataclasses.replace(tree, inertia=[np.diag(moments)], com=[(0.0, 0.0, 0.0)], damping=[0.0] * 6)
+    path = trajectory(tree, [0.0] * 3 + list(turn), [1.0, 0.0, 2.0, *spin], [0.0] * 6, 0.25, 4)
+    axes = np.array(tree.axis[3:])
+    assert np.array_equal(axes, np.eye(3)) and np.ptp(moments) > 0.0
+    for k in range(5):
+        speeds, quaternions = free_turning([0.25 * k], moments, spin, turn)
+        t, g = mpmath.mpf(0.25 * k), [mpmath.mpf(v) for v in tree.gravity]
+        with mpmath.workdps(60):
+            start = [1, 0, 2]
+            fallen = [v * t + a * t**2 / 2 for v, a in zip(start, g)]
+            speed = [v + a * t for v, a in zip(start, g)]
+        assert off(path, [*fallen, *quaternions[0], *speed, *speeds[0]], k) < 1e-29
+
+
+def test_times_are_exact_multiples_of_the_step():
+    """A slide without force moves by speed times time: 0.1, 0.3, 0.7 are not what their doubles are."""
+    tree = dataclasses.replace(ONE_HINGE, kind=["slide"], gravity=(0.0, 0.0, 0.0))
+    path = trajectory(tree, [0.3], [0.7], [0.0], 0.1, 21, every=3)
+    assert path.high.shape == (8, 2) and path.steps == 1
+    for k, (high, low) in enumerate(zip(path.high[:, 0].tolist(), path.low[:, 0].tolist())):
+        expected = Fraction(0.3) + Fraction(0.7) * 3 * k * Fraction(0.1)
+        assert abs(Fraction(high) + Fraction(low) - expected) < Fraction(1, 10**31)
+
+
+# beside runs of other kinds
+
+
+def test_the_arm_beside_a_short_run_in_many_digits():
+    tree = dataclasses.replace(tmt.ARM, damping=(0.1, 0.2, 0.3))
+    start = BENT, (1.0, -2.0, 3.0), (0.1, 0.2, -0.3)
+    expected = short_run(tree, *start, 0.03125, steps=4)
+    for form in reference_run.FORMS:
+        path = trajectory(tree, *start, 0.0078125, 4, form=form)
+        assert off(path, expected) < 1e-29, form
+        assert off(path, [*start[0], *start[1]], 0) == 0.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_trees_of_every_kind_beside_a_short_run_in_many_digits(seed):
+    """Balls, slides and free joints, springs, armature, damping, axes to the last digit, and a controller."""
+    rng = np.random.default_rng(seed)
+    tree = [random_tree(rng, bodies=2, damping=1.0), tree_of_kinds(rng, bodies=2), with_controller(rng)][seed]
+    start = random_state(rng, tree)
+    expected = short_run(tree, *start, 2.0**-9)
+    for form in reference_run.FORMS:
+        assert off(trajectory(tree, *start, 2.0**-9, 1, form=form), expected) < 1e-28, form
+
+
+def with_controller(rng):
+    """A tree of hinges and slides under a linear controller."""
+    tree = tree_of_kinds(rng, bodies=2, kinds=("hinge", "slide"))
+    gains = rng.normal(size=(2, len(tree.axis), len(tree.axis)))
+    return dataclasses.replace(tree, position_gain=gains[0], speed_gain=gains[1])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_runs_of_other_forms_and_orders_agree(seed):
+    rng = np.random.default_rng(10 + seed)
+    tree = tree_of_kinds(rng, bodies=3)
+    path, apart = truth(tree, *random_state(rng, tree), 0.0625, 4)
+    assert 0.0 < apart < 1e-28 and np.abs(path.low).max() > 0.0
+    assert np.all(np.abs(path.low) <= np.spacing(np.abs(path.high)) / 2)
+
+
+def test_a_seeded_error_in_one_form_sets_the_two_runs_apart(monkeypatch):
+    def wrong(tree, q, qd):
+        return composite.mass_matrix_and_bias(tree, q, [v * (1 + mpmath.mpf(2) ** -60) for v in qd], mpmath.mpf)
+
+    monkeypatch.setitem(reference_run.FORMS, "literal", wrong)
+    assert truth(tmt.ARM, BENT, [1.0] * 3, [0.0] * 3, 0.25, 2)[1] > 1e-20
+
+
+@pytest.mark.skipif(find_spec("heyoka") is None, reason="heyoka is not installed")
+@pytest.mark.parametrize("name", ["arm", "pendulum_ball"])
+def test_heyoka_in_quad_precision_is_an_outside_witness(name):
+    """Another's series, of the literal form on another's numbers of 34 digits."""
+    import heyoka
+
+    if not hasattr(heyoka, "real128"):
+        pytest.skip("heyoka is built without quad precision")
+    tree = tmt.ARM if name == "arm" else read(PATHS[name]).tree
+    start = (BENT, [1.0, -2.0, 0.5]) if name == "arm" else (tree.zero, np.arange(len(tree.axis)) - 2.5)
+    q, qd = variables(tree, "q", "qd")
+    numbers = exact_tree(tree, lambda x: heyoka.expression(heyoka.real128(float(x))))
+    none = [heyoka.expression(heyoka.real128(0.0))] * len(qd)
+    qdd = acceleration(numbers, q, qd, none)
+    system = [*zip(q, numbers.coordinates.component_rates(q, qd)), *zip(qd, qdd)]
+    first = np.array([heyoka.real128(float(v)) for values in start for v in values])
+    stepper = heyoka.taylor_adaptive(system, first, fp_type=heyoka.real128, compact_mode=True)
+    stepper.propagate_until(heyoka.real128(0.5))
+    with mpmath.workdps(40):
+        expected = [mpmath.mpf(str(value)) for value in stepper.state]
+    assert off(trajectory(tree, *start, [0.0] * len(qd), 0.25, 2), expected) < 1e-29

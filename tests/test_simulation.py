@@ -193,3 +193,31 @@ def test_the_last_state_of_a_run_is_looked_at():
     place, why = singular_in(wrist(), q, qd)
     assert place == 2 and why.startswith("Mbar is singular: hinges 'a', 'c' turn")
     assert singular_in(wrist(), q[:2], qd[:2]) is None
+
+
+# the true motion as a method
+
+
+def test_taylor_is_the_true_motion_of_each_run(rng):
+    starts, tau = rng.uniform(-1, 1, (2, 3)), rng.uniform(-1, 1, (2, 3))
+    motion = tmt.simulate(starts, REST, tau, 0.1, 5, "taylor")
+    assert motion.q.shape == (2, 6, 3) and motion.ended.tolist() == [None, None] and motion.evaluations >= 2
+    for run in range(2):
+        near = tmt.simulate(starts[run], REST, tau[run], 0.1 / 256, 5 * 256, "dopri8")
+        assert np.abs(near.q[::256] - motion.q[run]).max() < 1e-13 and np.array_equal(near.t[::256], motion.t)
+    assert np.array_equal(motion.q[:, 0], starts)
+    single = tmt.simulate(starts[1], REST, tau[1], 0.1, 5, "taylor")
+    assert np.array_equal(single.q, motion.q[1]) and single.ended is None
+
+
+def test_taylor_takes_a_tolerance():
+    exact, coarse = (tmt.simulate(BENT, REST, REST, 0.1, 5, "taylor", tolerance=t) for t in (None, 1e-10))
+    assert coarse.evaluations < exact.evaluations and 0.0 < np.abs(coarse.q - exact.q).max() < 1e-7
+
+
+def test_taylor_ends_with_a_reason():
+    motion = tmt.simulate(BENT, [1e200, -1e200, 0.0], REST, 0.1, 5, "taylor")
+    assert motion.ended.startswith("at t = 0 s numbers overflow") and np.isnan(motion.q[1:]).all()
+    assert np.array_equal(motion.q[0], BENT)
+    stiff = dataclasses.replace(tmt.ARM, damping=(1e6, 0.0, 0.0))
+    assert "a series takes steps of" in tmt.simulate(BENT, REST, REST, 0.1, 5, "taylor", stiff).ended

@@ -47,14 +47,6 @@ def own_folder(folder: Path | None = None) -> Path:
     return folder
 
 
-def own_file(name: str) -> Path:
-    """The path of a file in the cache folder, which need not be there; NotOwn unless folder and file are the user's own."""
-    path = own_folder() / name
-    if os.path.lexists(path):
-        check_own(path)
-    return path
-
-
 def check_own(path, on_the_way=False, shut=False) -> None:
     """Raise NotOwn if a file or folder belongs to somebody else or others can write to it.
 

@@ -16,6 +16,8 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
+import mpmath
+
 from .space import IDENTITY, ZERO, Matrix, Vector, rotation, total_vector, turn_of
 
 
@@ -72,6 +74,14 @@ class Distribution(NamedTuple):
         return Distribution(one(self.mass), vectors[0], Matrix(vectors[1:]))
 
 
+def fraction(x) -> Fraction:
+    """A double, or a number of mpmath's, exactly."""
+    if not isinstance(x, mpmath.mpf):
+        return Fraction(x)
+    sign, digits, power, _ = x._mpf_
+    return (-1) ** sign * int(digits) * Fraction(2) ** int(power)
+
+
 NOTHING = Distribution(0, Vector(0, 0, 0), Matrix([[0] * 3] * 3))
 
 
@@ -88,13 +98,13 @@ def carried_by_joint(tree) -> list[Distribution]:
     numbers of the outer bodies become zeros, and what reaches the world drops out.
     """
     joints = tree.coordinates.joints
-    axes = [Vector(*map(Fraction, tree.axis[by.start])) for _, _, by in joints]
-    offsets = [Vector(*(Fraction(x) for x in v)) for v in tree.offset]
+    axes = [Vector(*map(fraction, tree.axis[by.start])) for _, _, by in joints]
+    offsets = [Vector(*map(fraction, v)) for v in tree.offset]
     own = [NOTHING] * len(axes)
     for b, joint in enumerate(tree.body_hinge):
         if joint >= 0:
-            mass, com = Fraction(tree.mass[b]), Vector(*(Fraction(x) for x in tree.com[b]))
-            inertia = [[Fraction(x) for x in row] for row in tree.inertia[b]]
+            mass, com = fraction(tree.mass[b]), Vector(*map(fraction, tree.com[b]))
+            inertia = [[fraction(x) for x in row] for row in tree.inertia[b]]
             half = sum(inertia[i][i] for i in range(3)) / 2
             second = [
                 [(half if i == j else 0) - (inertia[i][j] + inertia[j][i]) / 2 for j in range(3)] for i in range(3)
@@ -180,7 +190,7 @@ def rounded_once(tree, number) -> tuple[list, list, list]:
     """What each joint carries itself, and the part of it that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
     even = [
-        d.even_about(Vector(*map(Fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
+        d.even_about(Vector(*map(fraction, tree.axis[by.start]))) if kind == "hinge" else NOTHING
         for d, (kind, _, by) in zip(exact, tree.coordinates.joints)
     ]
     uneven = [d.less(e) for d, e in zip(exact, even)]

@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from types import SimpleNamespace
 
+import mpmath
+
+from .coordinates import Coordinates, conjugate, normalized, product
 from .space import Vector, sqrt
 from .tree import Tree
 
@@ -10,14 +13,16 @@ NUMBERS = (
     "offset", "damping", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference",
     "position_gain", "speed_gain",
 )  # fmt: skip
+HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 0.1
+with mpmath.workdps(60):  # arcsin x = x (1 + x^2 / 6 + ...), the highest first; the next is below 1e-37
+    ARC_SINE = [mpmath.binomial(2 * k, k) / (4**k * (2 * k + 1)) for k in reversed(range(18))]
 
 
 def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
     """What the method asks of a Tree, each number made by `number` from its double; directions have length 1 in all digits.
 
-    number: mpmath.mpf, or what lifts a float into a trace. Turns about an axis that is a little longer than 1 would not be
-    turns, and regrouped sums
-    would differ from the literal ones by that.
+    number: mpmath.mpf, or another type made from a double. Turns about an axis that is a little longer than 1 would not be
+    turns, and regrouped sums would differ from the literal ones by that.
     """
 
     def lifted(value):
@@ -30,13 +35,15 @@ def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
         if kind == "ball":
             axis.append(_unit(own[1] - axis[-1] * axis[-1].dot(own[1])))
             axis.append(axis[-2].cross(axis[-1]))
+    numbers = {name: lifted(getattr(tree, name)) for name in NUMBERS}
+    numbers["rest"] = of_length_1(tree.coordinates, numbers["rest"])
     return SimpleNamespace(
-        **{name: lifted(getattr(tree, name)) for name in NUMBERS},
+        **numbers,
         axis=tuple(map(tuple, axis)),
         parent=tree.parent,
         kind=tree.kind,
         body_hinge=tree.body_hinge,
-        coordinates=tree.coordinates,
+        coordinates=Analytic(*tree.coordinates),
         moves=tree.moves,
         has_springs=tree.has_springs,
         has_gains=tree.has_gains,
@@ -46,3 +53,39 @@ def exact_tree(tree: Tree, number: Callable) -> SimpleNamespace:
 def _unit(vector) -> Vector:
     """The vector at length 1."""
     return vector * (1 / sqrt(vector.dot(vector)))
+
+
+def of_length_1(coordinates: Coordinates, q) -> list:
+    """A position with each quaternion at length 1 in all digits."""
+    q = list(q)
+    for joint in coordinates.balls:
+        q[joint.q] = normalized(q[joint.q])
+    return q
+
+
+class Analytic(Coordinates):
+    """Coordinates whose `difference` of two quaternions of length 1 has derivatives where it is zero too."""
+
+    def difference(self, q1, q0) -> list:
+        return [
+            value
+            for kind, at, _ in self.joints
+            for value in (
+                logarithm(product(conjugate(q0[at]), q1[at])) if kind == "ball" else [q1[at.start] - q0[at.start]]
+            )
+        ]
+
+
+def logarithm(p) -> list:
+    """coordinates.logarithm without a root of what vanishes: the turn is halved until a series of the arc sine takes it."""
+    w, *v = p
+    cosine = sqrt(w * w)
+    scale = w / cosine
+    for _ in range(HALVINGS):
+        cosine = sqrt((cosine + 1.0) / 2.0)
+        scale = scale / (cosine * 2.0)
+    v = Vector(*v) * scale
+    square, share = v.dot(v), 0.0
+    for factor in ARC_SINE:
+        share = share * square + factor
+    return list(v * (share * 2.0 ** (HALVINGS + 1)))

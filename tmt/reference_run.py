@@ -1,102 +1,179 @@
-"""A run with many digits, from which the error of every method is measured.
+"""The true motion, from which the error of every method is measured: Taylor's method in pairs of doubles, some 32 digits.
 
-Python's decimal numbers are one more scalar: in C, and several times faster than mpmath's at this length.
+The method is traced on numbers of many digits, and series.py reads what it traced: nothing is compiled for a robot. What is
+lost is rounding, about 1e-30 times the growth of a small difference along the motion; `truth` shows it by a second run. The
+torque is constant: where it jumps a run ends and another begins.
 """
 
 import math
-from collections.abc import Callable
-from decimal import Decimal, localcontext
+from fractions import Fraction
+from functools import partial
+from typing import NamedTuple
 
 import mpmath
 import numpy as np
 
-from .exact import exact_tree
-from .method import acceleration
-from .space import arctan, cos, sin, sqrt
+from . import composite, method, series
+from .exact import exact_tree, of_length_1
+from .pairs import pair
 from .trace import Tape
 
-DIGITS = 36
-COLUMNS = 10  # of the extrapolation: order 20
-TERMS = 18  # of the series of sine and cosine up to pi/4: the next is below 1e-40
-with mpmath.workdps(80):
-    HALF_PI = Decimal(mpmath.nstr(mpmath.pi / 2, 75))
-    FACTORIALS = [Decimal(mpmath.nstr(1 / mpmath.factorial(k), 60)) for k in range(2 * TERMS)]
+DIGITS = 60  # of the numbers that are traced
+FORMS = {
+    "composite": partial(composite.mass_matrix_and_bias, number=mpmath.mpf),
+    "literal": method.mass_matrix_and_bias,
+}
+ORDER, OTHER_ORDER = 40, 34
+MOST_LITERAL = 40  # speeds: the literal form of a tree of more takes minutes to trace
+TOLERANCE = 1e-33  # of the last terms in a step, in units of 1 + |value|
+MOST_OPERATIONS = 20_000_000  # of all steps of a run: some 20 s
+BESIDE = 100  # operations, as long as the rest of a step takes
+SEEN = 200  # steps by which it is seen whether a run would take more
+OPERATIONS = {
+    "+": series.ADD, "-": series.SUBTRACT, "neg": series.NEGATIVE, "*": series.MULTIPLY, "/": series.DIVIDE,
+    "sqrt": series.ROOT,
+}  # fmt: skip
 
 
-def sincos(x: Decimal) -> tuple[Decimal, Decimal]:
-    """(sin x, cos x), x in rad: by their series after turning x into [-pi/4, pi/4]."""
-    n = (x / HALF_PI).to_integral_value()
-    r = x - n * HALF_PI
-    z, s, c = -r * r, Decimal(0), Decimal(0)
-    for k in reversed(range(TERMS)):
-        s, c = s * z + FACTORIALS[2 * k + 1], c * z + FACTORIALS[2 * k]
-    s *= r
-    return ((s, c), (c, -s), (-s, -c), (-c, s))[int(n) % 4]
+class TooManySteps(ValueError):
+    """The motion is too fast, or the model too stiff, for a series."""
 
 
-sin.register(Decimal, lambda x: sincos(x)[0])
-cos.register(Decimal, lambda x: sincos(x)[1])
-sqrt.register(Decimal, Decimal.sqrt)
+class Path(NamedTuple):
+    """A motion at equal times, each number as the sum of two doubles."""
+
+    high: np.ndarray  # (records + 1, nq + nv) q and qd, rad and rad/s
+    low: np.ndarray  # (records + 1, nq + nv)
+    steps: int
 
 
-@arctan.register
-def decimal_arctan(x: Decimal) -> Decimal:
-    """From the double on: sin y - x cos y is sin(y - arctan x) / cos(arctan x), so that each turn triples the digits."""
-    y = Decimal(math.atan(x))
-    for _ in range(2):
-        s, c = sincos(y)
-        y -= (s - x * c) / (c + x * s)
-    return y
+class Equations(NamedTuple):
+    """Those of one tree under one torque, as series.py reads them."""
+
+    code: np.ndarray  # (operations, 4)
+    rates: np.ndarray  # (nq + nv,) the row that is the rate of each number of the state
+    numbers: np.ndarray  # (2, numbers), in the rows after the state
+    rows: int
 
 
-def slope(tree) -> Callable:
-    """slope(q, qd, tau) -> d(q, qd)/dt, sequences of decimal numbers: the method as it stands, traced, with exact numbers."""
-    tape, coordinates = Tape(Decimal), tree.coordinates
-    sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv}
-    q, qd, tau = (tape.inputs(*(f"{name}{i}" for i in range(count))) for name, count in sizes.items())
-    tree = exact_tree(tree, tape.lift)
-    slopes = [*coordinates.component_rates(q, qd), *acceleration(tree, q, qd, tau)]
-    code = tape.function("slope", [*q, *qd, *tau], slopes)
-    scope = {"sincos": sincos, "sqrt": sqrt, "arctan": arctan, "fma": lambda a, b, c: a * b + c, **code.constants}
-    exec(code.text, scope)
-    return lambda q, qd, tau: scope["slope"](*q, *qd, *tau)
+def truth(tree, q, qd, tau, dt: float, steps: int, every: int = 1) -> tuple[Path, float]:
+    """The motion, see `trajectory`, and its largest difference from a second run, rad or rad/s.
 
-
-def trajectory(tree, q, qd, tau, duration: float, records: int, steps: int) -> np.ndarray:
-    """The motion under constant torque at records + 1 equal times: (records + 1, nq + nv) decimal numbers, q and qd.
-
-    q (nq,), qd, tau (nv,): rad, rad/s, N m, taken as what their doubles are exactly; duration in s; steps: a multiple of records.
-    Gragg's modified midpoint rule, extrapolated (Bulirsch and Stoer) to order 20 in every step, in 36 digits. How many of
-    them are right is seen from a second run with half the step.
+    The two share neither the order nor, up to 40 speeds, the form of the equations: their difference shows what truncation,
+    rounding and the regrouping of the sums do together.
     """
-    if steps % records:
-        raise ValueError(f"steps is {steps}; a multiple of {records} is expected")
-    with localcontext() as context:
-        context.prec = DIGITS
-        torque, nq = [Decimal(float(v)) for v in tau], len(q)
-        traced = slope(tree)
-
-        def rate(state):
-            return np.array(traced(state[:nq], state[nq:], torque))
-
-        state = np.array([Decimal(float(v)) for v in (*q, *qd)])
-        path, dt = [state], Decimal(duration) / steps
-        for _ in range(records):
-            for _ in range(steps // records):
-                state = extrapolated(rate, state, dt)
-            path.append(state)
-    return np.array(path)
+    first = trajectory(tree, q, qd, tau, dt, steps, every)
+    form = "literal" if len(qd) <= MOST_LITERAL else "composite"
+    second = trajectory(tree, q, qd, tau, dt, steps, every, form, OTHER_ORDER)
+    return first, float(np.abs((first.high - second.high) + (first.low - second.low)).max())
 
 
-def extrapolated(rate, state, dt):
-    """The state one dt later: midpoint rules with 2, 4, 6, ... substeps, extrapolated in the square of their step."""
-    start, row = rate(state), []
-    for j in range(1, COLUMNS + 1):
-        h = dt / (2 * j)
-        before, now = state, state + h * start
-        for _ in range(2 * j - 1):
-            before, now = now, before + 2 * h * rate(now)
-        coarser, row = row, [(before + now + h * rate(now)) / 2]
-        for k, value in enumerate(coarser, start=1):
-            row.append(row[-1] + (row[-1] - value) * (j - k) ** 2 / (j**2 - (j - k) ** 2))
-    return row[-1]
+def trajectory(
+    tree, q, qd, tau, dt: float, steps: int, every: int = 1, form: str = "composite", order: int = ORDER,
+    tolerance: float = TOLERANCE,
+) -> Path:  # fmt: skip
+    """The motion under constant torque at the times 0, every dt, 2 every dt ... up to steps dt, these products exact.
+
+    q (nq,), qd, tau (nv,): rad, rad/s, N m, taken as what their doubles are exactly, quaternions at length 1; dt: s, which
+    says no more than these times. form: of FORMS. Raises TooManySteps if a run would take too long, ValueError if its numbers
+    overflow.
+    """
+    path, count, error = followed(tree, q, qd, tau, dt, steps, every, form, order, tolerance)
+    if error:
+        raise error
+    return Path(*path.transpose(1, 0, 2), count)
+
+
+def followed(
+    tree, q, qd, tau, dt, steps, every=1, form="composite", order=ORDER, tolerance=TOLERANCE
+) -> tuple[np.ndarray, int, ValueError | None]:
+    """The records (k, 2, nq + nv) of a run as far as it goes, the number of its series, and why it ends early, or None."""
+    code, rates, numbers, rows = equations(tree, tau, form)
+    n, most = len(rates), MOST_OPERATIONS // (BESIDE + len(code))
+    high, low = np.zeros((2, rows, order + 1))
+    high[n : n + numbers.shape[1], 0], low[n : n + numbers.shape[1], 0] = numbers
+    times = [Fraction(dt) * k for k in range(0, steps + 1, every)]
+    state, t, count = first_state(tree.coordinates, q, qd), Fraction(0), 0
+    path = [state]
+    while len(path) < len(times):
+        high[:n, 0], low[:n, 0] = state
+        series.expand(code, rates, order + 1, high.reshape(-1), low.reshape(-1))
+        step = step_size(high[:n], tolerance)
+        if not step > 0.0:
+            error = ValueError(
+                f"at t = {float(t):g} s numbers overflow: the motion diverges, is too fast, or Mbar is singular"
+            )
+            return np.array(path), count, error
+        left, count = float((times[-1] - t) / Fraction(min(step, 2.0 * float(times[-1])))), count + 1
+        if count - 1 + left > most and count >= min(SEEN, most):
+            error = TooManySteps(
+                f"at t = {float(t):.3g} s a series takes steps of {step:.1e} s, and in {float(times[-1]):g} s more than {most}"
+            )
+            return np.array(path), count, error
+        end = times[-1] if step == math.inf else t + Fraction(step)
+        while len(path) < len(times) and times[len(path)] <= end:
+            path.append(after(times[len(path)] - t, high[:n], low[:n]))
+        state, t = after(end - t, high[:n], low[:n]), end
+    return np.array(path), count, None
+
+
+def equations(tree, tau, form: str) -> Equations:
+    """The equations of a tree under constant torque (nv,), N m, in one of FORMS."""
+    tape, coordinates = Tape(mpmath.mpf), tree.coordinates
+    with mpmath.workdps(DIGITS):
+        q, qd = (tape.inputs(*(f"{name}{i}" for i in range(size))) for name, size in zip(("q", "qd"), coordinates[1:]))
+        exact = exact_tree(tree, mpmath.mpf)
+        qdd = method.acceleration(exact, q, qd, [mpmath.mpf(float(v)) for v in tau], FORMS[form])
+        rates = [tape.lift(rate) for rate in (*coordinates.component_rates(q, qd), *qdd)]
+
+        order = tape.needed(rates)
+        row = {x.i: k for k, x in enumerate((*q, *qd))}
+        constant = [i for i in order if tape.nodes[i][0] == "number"]
+        row |= {i: k for k, i in enumerate(constant, start=len(row))}
+        code, rows = [], len(row)
+        for i in order:
+            operation, arguments = tape.nodes[i]
+            if operation == "item":
+                row[i] = row[arguments[0]] + 1 + arguments[1]
+            elif i not in row:
+                a, b = row[arguments[0]], row[arguments[-1]]
+                if tape.nodes[arguments[0]][0] == "number" and operation == "*":
+                    a, b = b, a
+                made = [series.SLOPE, series.SINE, series.COSINE]
+                if operation != "sincos":
+                    made = [kind(operation, a, b, range(len(rates), len(rates) + len(constant)))]
+                code += [(act, rows + k, a, b) for k, act in enumerate(made)]
+                row[i], rows = rows, rows + len(made)
+        numbers = np.array([pair(tape.nodes[i][1][0]) for i in constant]).reshape(-1, 2)
+    return Equations(
+        np.array(code, dtype=int).reshape(-1, 4), np.array([row[rate.i] for rate in rates]), numbers.T.copy(), rows
+    )
+
+
+def kind(operation: str, a: int, b: int, numbers: range) -> int:
+    """What series.py does for an operation of a trace on these rows; numbers: the rows of those that are constant."""
+    if operation == "*" and b in numbers:
+        return series.SCALE
+    return series.SQUARE if operation == "*" and a == b else OPERATIONS[operation]
+
+
+def first_state(coordinates, q, qd) -> np.ndarray:
+    """The state in pairs, (2, nq + nv), quaternions at length 1."""
+    with mpmath.workdps(DIGITS):
+        q, qd = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd))
+        return np.array([pair(x) for x in (*of_length_1(coordinates, q), *qd)]).T.copy()
+
+
+def step_size(high: np.ndarray, tolerance: float) -> float:
+    """With which the last two terms of every series are at most so large, in units of 1 + |value|: s; NaN if numbers overflow."""
+    order = high.shape[1] - 1
+    with np.errstate(all="ignore"):
+        last = (np.abs(high[:, -2:]) / (1.0 + np.abs(high[:, :1]))).max(axis=0)
+        return float(np.min((tolerance / last) ** (1.0 / np.array([order - 1, order]))))
+
+
+def after(time: Fraction, high: np.ndarray, low: np.ndarray) -> np.ndarray:
+    """The state (2, nq + nv), so many s after that of the series."""
+    state, rounded = np.empty((2, len(high))), float(time)
+    series.values_at(high, low, rounded, float(time - Fraction(rounded)), state)
+    return state

@@ -46,16 +46,19 @@ def simulate(
     """Motion under constant torque: t (steps+1,) s, q (..., steps+1, nq) and qd (..., steps+1, nv), rad and rad/s.
 
     q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1;
-    method: a key of METHODS. An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of
-    each, in units of 1 + |value|. A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by
-    2^49 rad, Mbar is singular, Newton's method does not find the stages of an implicit method, or an adaptive method would
-    need steps below 1e-9 dt: `ended` of the result says which. Assignment, part i.
+    method: a key of METHODS, or "taylor". An adaptive method takes its own steps between those; tolerance (default 1e-9): the
+    error of each, in units of 1 + |value|. "taylor" is the true motion, rounded once (default tolerance 1e-33): a Taylor series
+    in pairs of doubles, whose evaluations are its steps. A run ends early, with NaN from there on, where the numbers overflow, a
+    hinge has turned by 2^49 rad, Mbar is singular, Newton's method does not find the stages of an implicit method, an adaptive
+    method would need steps below 1e-9 dt, or series take too many: `ended` of the result says which. Assignment, part i.
     """
-    stepping = method_named(method)
+    taylor = isinstance(method, str) and method == "taylor"
+    stepping = method_named("dopri8_adaptive" if taylor else method)
     steps, dt = given.whole("steps", steps), given.positive("dt", dt, "a step in s")
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
-    tolerance = 1e-9 if tolerance is None else given.positive("tolerance", tolerance, "a number")
+    usual = 1e-33 if taylor else 1e-9
+    tolerance = usual if tolerance is None else given.positive("tolerance", tolerance, "a number")
     state = given.states(model, q=q, qd=qd, tau=tau)
     batch, nq, nv = state[0][0].shape, model.coordinates.nq, model.coordinates.nv
     runs = math.prod(batch)
@@ -68,7 +71,9 @@ def simulate(
     from . import kernels  # here, so that `import tmt` need not wait for numba
 
     codes, evaluations = np.zeros(runs, np.int8), 0
-    if stepping.adaptive:
+    if taylor:
+        ended, evaluations = by_series(model, *arguments, dt, steps, tolerance)
+    elif stepping.adaptive:
         evaluations = kernels.stepper(model, method, runs * steps)(*arguments, dt, tolerance, codes)
     else:
         worth = runs * steps >= kernels.WORTH and stepping.lanes
@@ -78,10 +83,23 @@ def simulate(
             evaluations += kernels.lane_stepper(model, method)(*part, dt, codes[:in_lanes])
         rest = [array[in_lanes:] for array in arguments]
         evaluations += kernels.stepper(model, method, runs * steps)(*rest, dt, codes[in_lanes:])
-    ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
+    ended = ended if taylor else reasons(model, path_q, path_qd, codes, dt, tolerance)
     t = dt * np.arange(steps + 1)
     q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))
     return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
+
+
+def by_series(tree, q, qd, tau, dt, steps, tolerance) -> tuple[np.ndarray, int]:
+    """Write the true motions to the paths (runs, steps + 1, nq and nv), which hold the starts: why each ended, and the steps."""
+    from .reference_run import followed  # here, as kernels above
+
+    ended, count = np.full(len(q), None, dtype=object), 0
+    for run in range(len(q)):
+        path, took, error = followed(tree, q[run, 0], qd[run, 0], tau[run], dt, steps, tolerance=tolerance)
+        count, alive = count + took, len(path)
+        q[run, 1:alive], qd[run, 1:alive] = np.split(path[1:, 0], [q.shape[-1]], axis=1)
+        ended[run] = error and str(error)
+    return ended, count
 
 
 def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:

@@ -9,7 +9,6 @@ import math
 import operator
 from collections import Counter
 from collections.abc import Callable
-from decimal import Decimal
 from numbers import Real
 from typing import NamedTuple
 
@@ -34,7 +33,6 @@ class Code(NamedTuple):
 
     text: str
     operations: int  # + - * / and changes of sign; a sine, a cosine, a root count as one each
-    constants: dict  # numbers by the names that stand for them in the text, where they are no floats
 
 
 class Tape:
@@ -144,7 +142,7 @@ class Tape:
         return rule[operation](*values)
 
     def function(self, name, inputs, outputs) -> Code:
-        """Source of `name(inputs) -> outputs`.
+        """Source of `name(inputs) -> outputs`, of a tape of floats.
 
         It takes sines from sincos(x) -> (sin x, cos x), roots from sqrt, arc tangents from arctan, and a product that only goes
         into a sum from fma(a, b, c) = a b + c, rounded once: so every compiler does the same arithmetic.
@@ -153,16 +151,14 @@ class Tape:
         order = self.needed(outputs)
         fused = self.fused(order, outputs)
         text = {i.i: i.name for i in inputs}
-        lines, constants, operations = [], {}, 0
+        lines, operations = [], 0
         for i in order:
             operation, arguments = self.nodes[i]
             operations += operation in FOLD or (operation == "item" and self.nodes[arguments[0]][0] == "sincos")
             if operation == "input":
                 text[i] = arguments[0]
             elif operation == "number":
-                text[i] = repr(arguments[0]) if self.number_type is float else f"c{i}"
-                if self.number_type is not float:
-                    constants[text[i]] = arguments[0]
+                text[i] = repr(arguments[0])
             elif operation == "item":
                 text[i] = f"t{arguments[0]}_{arguments[1]}"
             elif operation == "sincos":
@@ -177,7 +173,7 @@ class Tape:
         names = ", ".join(i.name for i in inputs)
         returns = ", ".join(text[o.i] for o in outputs)
         body = "".join(f"    {line}\n" for line in [*lines, f"return {returns},"])
-        return Code(f"def {name}({names}):\n{body}", operations, constants)
+        return Code(f"def {name}({names}):\n{body}", operations)
 
     def written(self, operation, arguments, product, text) -> str:
         """The right-hand side for one operation; product: the operand that is fused into it, or None."""
@@ -250,7 +246,7 @@ class Expression:
 
     def apply(self, operation, *values):
         """The expression for an operation; NotImplemented if another kind of scalar takes part, which then decides."""
-        if all(isinstance(value, (Expression, Real, Decimal)) for value in values):
+        if all(isinstance(value, (Expression, Real)) for value in values):
             return self.tape.apply(operation, *values)
         return NotImplemented
 

@@ -17,10 +17,10 @@ from ...judge.units import renamed, said
 from ...judge.words import scene_begins
 from ...robots import Robot
 from ...setup import Setup
-from ...truth.reference import DOUBLES, Reference, committed, has_no_reference, references
+from ...truth.reference import Reference, has_no_reference, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, targets, tumbling
-from .accuracy import fill_in, spread_in_words
+from .accuracy import fill_in, reference_in_words, spread_in_words
 from .floors import floor
 from .settings import (
     absent_in_words,
@@ -60,14 +60,9 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """What errors are, and how they are judged."""
-    ours = all(committed(case) for case in scenes_of(robot))
-    made = "a table, made again in part by the tests" if ours else "made for what no table has, and kept"
-    runs = f"runs with many digits ({made})"
-    if robot.is_read:
-        runs = f"a run in doubles by tmt's {DOUBLES}, whose digits are seen by halving its steps: smaller errors are not known"
     what = "angles" if movement_unit(robot.coordinates) == "rad" else f"movements ({movement_unit(robot.coordinates)})"
     return (
-        f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {runs}. Checked: "
+        f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {reference_in_words(robot)}. Checked: "
         "that each method of fixed step has its order in the error of the first second, which falls "
         "regularly (of order 8 only the least, for rounding comes before its error has settled; the tests show it in many "
         f"digits); that MuJoCo and the same scheme in tmt make the same error but for rounding, {FACTOR} eps times the growth of "
@@ -111,7 +106,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     names = [case.name for case in cases]
     floors = dict(zip(names, lefts))
     unit = movement_unit(setup.robot.coordinates)
-    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "doubles": setup.robot.is_read}
+    result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "of_file": setup.robot.is_read}
+    result.curves["doubles"] = [name for name in names if known[name].why]
     # with coarse steps errors are regular in this scene only, not all methods come near, and further engines take too few
     whole = setup.size == "full"
     taking = [method for method in methods_following(setup, cases, which) if whole or method.engine in COMPARED]
@@ -127,7 +123,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     accuracy.check_smallest_errors(result, floors, unit)
     steps = {case.name: coarsest_steps(case) for case in cases}
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)
-    result.notes += accuracy.references_in_words(known, floors, setup.robot.is_read)
+    result.notes += accuracy.references_in_words(known, floors)
     result.notes += accuracy.floors_in_words(result.rows, floors)
     if timed:
         add_times(result, setup, names, of_scenes)
@@ -170,7 +166,7 @@ def rows_of_scene(
     """The rows of one scene without times; and the error that rounding leaves in it, rad."""
     reference = known[case.name]
     # beyond the digits of the reference nothing is known
-    found, left = [], max(floor(case, engines["tmt"].of(case)), reference.halving)
+    found, left = [], max(floor(case, engines["tmt"].of(case)), reference.apart)
     taking, energy = methods(engines, size, which, case.robot, case), true_energy(case, reference)
     for method in taking:
         best, last = np.inf, 0
@@ -219,7 +215,7 @@ def row_of_run(
         motion = read(run())
         ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
         error = reference.error(motion.q, joints)
-        error = np.maximum(error, left) if whole.robot.is_read else error
+        error = np.maximum(error, left) if reference.why else error
         states = [part.copy() for part in true]
         for state, part, own in zip(states, (motion.q, motion.v), free):
             state[:, own] = 0.0 if ended else part

@@ -6,9 +6,9 @@ import numpy as np
 
 from ...judge import timing
 from ...judge.check import Result
-from ...judge.scale import FACTOR
+from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...truth.reference import Reference
+from ...truth.reference import DOUBLES, LOST, Reference
 
 Floors = Mapping[str, float]  # {scene: rad}, what rounding leaves in each
 
@@ -147,21 +147,47 @@ def floors_in_words(rows: list[dict], floors: Floors) -> list[str]:
     ]
 
 
-def references_in_words(known: Mapping[str, Reference], floors: Floors, doubles: bool = False) -> list[str]:
-    """Of which scenes the reference is known to fewer digits than doubles have, in words; of runs in doubles to how many."""
-    if doubles:
-        runs = "; ".join(f"{scene}: {known[scene].halving:.0e} ({known[scene].steps} steps)" for scene in floors)
-        return [
-            "The reference is a run in doubles, of order 8. It differs from the one with half the steps by so many rad, or "
-            f"per s: {runs}. Smaller errors are not known, and have this size, or that of rounding, in tables and figures; a "
-            "reference of many digits is computed for the assignment's arm."
-        ]
-    coarse = [f"{scene}: {known[scene].halving:.0e}" for scene, left in floors.items() if known[scene].halving >= left]
-    if not coarse:
-        return []
-    return [
-        f"The runs with many digits are known to no more than so many rad or rad/s, in place of rounding: {'; '.join(coarse)}."
-    ]
+def reference_in_words(robot: Robot) -> str:
+    """What errors are measured against."""
+    words = (
+        f"Taylor's method in pairs of doubles, good to {LOST:g} times the growth of a small difference (a second run, in another "
+        "form of the equations and of another order, shows it)"
+    )
+    if not robot.is_read:
+        return words
+    return (
+        f"{words}, or, where that would take too long, a run in doubles by tmt's {DOUBLES}, whose digits are seen by halving "
+        "its steps: smaller errors are then not known"
+    )
+
+
+def references_in_words(known: Mapping[str, Reference], floors: Floors) -> list[str]:
+    """To how many digits the reference of each scene is known, in words.
+
+    floors: {scene: what rounding leaves, or, where that is more, how far the reference is from its second run}.
+    """
+    words = []
+    if pairs := [scene for scene in floors if not known[scene].why]:
+        lost = {scene: LOST * floors[scene] / EPS for scene in pairs}
+        sizes = "; ".join(f"{s}: {lost[s]:.0e} ({known[s].apart:.0e}, {known[s].steps} steps)" for s in pairs)
+        beyond = [scene for scene in pairs if known[scene].apart > lost[scene]]
+        what = f"more than that in {', '.join(beyond)}" if beyond else "no more"
+        words.append(
+            f"The reference is a Taylor series in pairs of doubles. {LOST:g} times the growth of a small difference, and in "
+            f"brackets by how much it differs from its second run, rad or rad/s: {sizes}. They differ by {what}."
+        )
+    if doubles := [scene for scene in floors if known[scene].why]:
+        runs = "; ".join(f"{s}: {known[s].apart:.0e} ({known[s].steps} steps; {known[s].why})" for s in doubles)
+        words.append(
+            "A series would take too long, and the reference is a run in doubles, of order 8, in these scenes. It differs from "
+            f"the one with half the steps by so many rad, or per s: {runs}. Smaller errors are not known, and have this size, "
+            "or that of rounding, in tables and figures."
+        )
+    coarse = [s for s, left in floors.items() if not known[s].why and known[s].apart >= left]
+    if coarse:
+        sizes = "; ".join(f"{scene}: {known[scene].apart:.0e}" for scene in coarse)
+        words.append(f"The reference is known to no more than so many rad or rad/s, in place of rounding: {sizes}.")
+    return words
 
 
 def first_order_in_words(rows: list[dict], scenes: Iterable[str]) -> list[str]:

@@ -122,15 +122,15 @@ def orders(result: Result, scenes: Sequence[str], methods: Sequence[Method], com
     for one that is near rounding with its coarsest steps already, wherever it runs. Of the robot of a file, of whose motion
     nothing is known beforehand, only an order that has settled is measured; of what others a sentence says so.
     """
-    table, open_ones, doubles = [], [], result.curves.get("doubles")
+    table, open_ones, of_file = [], [], result.curves.get("of_file")
     for scene in scenes:
-        # of a reference in doubles no smaller errors are known
-        clear = max(CLEAR, NEAR_ROUNDING * result.curves["floors"][scene]) if doubles else CLEAR
+        # what rounding leaves, and what is known of a reference in doubles, differs from robot to robot
+        clear = max(CLEAR, NEAR_ROUNDING * result.curves["floors"][scene]) if of_file else CLEAR
         for method in methods:
             regular = [row for row in early_runs(result, scene, method) if clear < row["early"] < REGULAR]
             if len(regular) < 2:
                 continue
-            if doubles and method.order not in LEAST_ORDER and not has_settled(regular):
+            if of_file and method.order not in LEAST_ORDER and not has_settled(regular):
                 open_ones.append(f"{scene}, {method.engine} {method.name}")
                 continue
             coarse, fine = regular[-2:]  # the finest are those to which the theory applies best

@@ -30,9 +30,9 @@ def colour_of(engine: str) -> str:
     return COLOURS.get(engine, GREY)
 
 
-def least_in_words(result: Result) -> str:
-    """What the least error is, in the legend."""
-    return "what is known of the reference" if result.curves.get("doubles") else "rounding: eps × growth"
+def least_in_words(result: Result, scene: str) -> str:
+    """What the least error of a scene is, in the legend."""
+    return "what is known of the reference" if scene in result.curves.get("doubles", ()) else "rounding: eps × growth"
 
 
 def rows_of_runs(result: Result) -> list[dict]:
@@ -102,7 +102,7 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple[str, Fi
     )  # fmt: skip
     for engine in dict.fromkeys(engine for engine, _ in by_method):
         ax.plot([], [], color=colour_of(engine), linewidth=3, label=written(engine))
-    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=least_in_words(result))
+    ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=least_in_words(result, scene))
     ax.set(xscale="log", yscale="log", xlim=(OF_DIVERGED * 3, FINE_END / 30))
     ax.set(
         xlabel=f"worst error on the way, {result.curves.get('unit', 'rad')} (finer to the right)",

@@ -1,7 +1,7 @@
 import pytest
 
 from compare.robots.arm import ARM
-from compare.truth.reference import committed
+from compare.truth.reference import reference
 
 
 @pytest.fixture(scope="session")
@@ -12,5 +12,5 @@ def bent():
 
 @pytest.fixture(scope="session")
 def known_reference(bent):
-    """Its run with many digits, from the committed table."""
-    return committed(bent)
+    """Its run with many digits, in pairs of doubles."""
+    return reference(bent)

@@ -156,6 +156,15 @@ def test_sentences_of_first_order_and_smaller_models():
 
 
 def test_a_reference_of_few_digits_is_named(known_reference):
-    for halving, named in ((0.99e-14, False), (1e-14, True), (1e-9, True)):
-        known = {"bent, free": known_reference._replace(halving=halving)}
-        assert bool(accuracy.references_in_words(known, {"bent, free": max(1e-14, halving)})) is named
+    for apart, named in ((0.99e-14, False), (1e-14, True), (1e-9, True)):
+        known = {"bent, free": known_reference._replace(apart=apart)}
+        _, *words = accuracy.references_in_words(known, {"bent, free": max(1e-14, apart)})
+        assert bool(words) is named and all("known to no more than" in text for text in words)
+
+
+def test_digits_of_the_reference_are_growth_times_1e_30(known_reference):
+    floors = {"bent, free": 2.0**-52 * 1e4}
+    for apart, said in ((0.99e-26, "They differ by no more."), (1.01e-26, "by more than that in bent, free.")):
+        known = {"bent, free": known_reference._replace(apart=apart, steps=77)}
+        (words,) = accuracy.references_in_words(known, floors)
+        assert f"bent, free: 1e-26 ({apart:.0e}, 77 steps)" in words and words.endswith(said)

@@ -1,4 +1,4 @@
-"""Speed of robots of files: references in doubles, who takes part, orders on a free body, units."""
+"""Speed of robots of files: their references, who takes part, orders on a free body, units."""
 
 from types import SimpleNamespace
 
@@ -40,12 +40,19 @@ def stone():
 
 def test_a_reference_in_doubles_says_its_digits(gripper):
     _, _, case = gripper
-    known = reference.references([case])[case.name]
-    assert known.halving < 1e-13 and known.low.max() == 0.0 and known.steps > case.steps
+    known = reference.in_doubles(case)
+    assert known.apart < 1e-13 and known.low.max() == 0.0 and known.steps > case.steps
     finer = tmt.simulate(*case.start, case.tau, case.duration / 2**14, 2**14, "rk4", case.tree)
-    assert known.error(finer.q[::256], range(4)).max() < 10 * max(known.halving, 1e-15)
+    assert known.error(finer.q[::256], range(4)).max() < 10 * max(known.apart, 1e-15)
     off = known.high[:, 2:3] + 1e-3
     assert known.error(off, [2]) == pytest.approx(1e-3)
+
+
+def test_any_scene_of_a_file_has_a_reference_in_pairs(gripper):
+    for case in gripper[0].cases[-2:]:
+        known, doubles = reference.reference(case), reference.in_doubles(case)
+        assert known.why is None and known.apart < 1e-29 and np.abs(known.low).max() > 0.0
+        assert known.error(doubles.high[:, : case.coordinates.nq], range(4)).max() < 10 * max(doubles.apart, 1e-15)
 
 
 def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
@@ -63,11 +70,6 @@ def test_a_run_that_does_not_end_has_no_reference(gripper):
     fast = case.changed(speed=(1e12, 1e12, 0.0, 0.0))
     with pytest.raises(ValueError, match="do not reach its end"), np.errstate(all="ignore"):
         reference.in_doubles(fast)
-
-
-def test_the_arm_keeps_its_table():
-    case = settings.regular_of(ARM)
-    assert reference.references([case])[case.name].halving < 1e-21
 
 
 def test_held_scenes_of_a_file_are_not_followed(gripper):
@@ -242,14 +244,14 @@ def test_columns_say_rad_only_of_what_is_in_rad():
 
 
 def test_the_digits_of_a_reference_in_doubles_are_said():
-    known = {"s": reference.Reference(None, None, None, 3e-13, 1024)}
-    (words,) = accuracy.references_in_words(known, {"s": 1e-12}, doubles=True)
-    assert "s: 3e-13 (1024 steps)" in words
+    known = {"s": reference.Reference(None, None, None, 3e-13, 1024, None, "a series takes long")}
+    (words,) = accuracy.references_in_words(known, {"s": 1e-12})
+    assert "s: 3e-13 (1024 steps; a series takes long)" in words
 
 
-@pytest.mark.parametrize("doubles, shown", [(True, 0), (False, 1)])
-def test_no_order_is_measured_below_a_reference_in_doubles(doubles, shown):
-    result = Result("speed", curves={"floors": {"s": 1e-9}, "doubles": doubles})
+@pytest.mark.parametrize("of_file, shown", [(True, 0), (False, 1)])
+def test_no_order_of_a_file_is_measured_near_what_is_known(of_file, shown):
+    result = Result("speed", curves={"floors": {"s": 1e-9}, "of_file": of_file})
     result.rows = [
         {"scene": "s", "engine": "tmt", "method": "rk4", "dt_s": dt, "early": early}
         for dt, early in ((4e-3, 2.56e-8), (2e-3, 1.6e-9), (1e-3, 1e-10))
@@ -261,7 +263,7 @@ def test_no_order_is_measured_below_a_reference_in_doubles(doubles, shown):
 def test_an_order_of_a_file_is_asked_where_it_has_settled(change, asked):
     orders = [4.0 + 2.0 * (change or 0.0), 4.0 + (change or 0.0)][change is None :]
     errors = 1e-4 / 2.0 ** np.cumsum([0.0, *orders])
-    result = Result("speed", curves={"floors": {"s": 1e-16}, "doubles": True})
+    result = Result("speed", curves={"floors": {"s": 1e-16}, "of_file": True})
     result.rows = [
         {"scene": "s", "engine": "tmt", "method": "rk4", "dt_s": 0.01 / 2**k, "early": error}
         for k, error in enumerate(errors)
@@ -275,7 +277,7 @@ def test_errors_below_what_is_known_have_its_size(gripper):
     from compare.experiments import speed
 
     robot, known, case = gripper
-    truth = reference.in_doubles(case)
+    truth = reference.in_doubles(case)._replace(why="too stiff")
     setting = settings.halvings(known["tmt"].methods["dopri8"], case)[1]
     row = speed.row_of_run(case, case, known, known["tmt"].methods["dopri8"], setting, truth, 1e-11)
     assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]

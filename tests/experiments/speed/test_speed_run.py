@@ -6,13 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from edited import XML, setup_of
+from models import PATHS
 
 from compare import experiment
 from compare.engines import Method, Setting
-from compare.engines.mujoco import load
+from compare.engines.mujoco import load, read
 from compare.experiments import speed
 from compare.experiments.speed import accuracy, settings
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
 from tmt.methods import METHODS
 
 
@@ -64,8 +66,8 @@ def test_rounding_leaves_eps_times_the_growth(bent, engines):
 
 
 def test_where_the_reference_is_not_known_nothing_is_judged(engines, bent, known_reference):
-    for halving, left in ((1e-30, speed.floor(bent, engines["tmt"].of(bent))), (1e-6, 1e-6)):
-        known = {"bent, free": known_reference._replace(halving=halving)}
+    for apart, left in ((1e-30, speed.floor(bent, engines["tmt"].of(bent))), (1e-6, 1e-6)):
+        known = {"bent, free": known_reference._replace(apart=apart)}
         assert speed.rows_of_scene(bent, engines, known, "small", "same schemes")[1] == left
 
 
@@ -159,7 +161,8 @@ def test_a_robot_without_such_scenes_is_left_out_with_the_reason():
     assert speed.skipped(bare) == "the bare has no scene that every method follows"
 
 
-def test_only_what_a_table_has_is_called_a_table():
-    assert "(a table, made again in part by the tests)" in speed.tolerance(ARM)
-    other = dataclasses.replace(ARM, scenes=(ARM.scenes[0], dataclasses.replace(ARM.scenes[0], name="b", damping=0.1)))
-    assert "(made for what no table has, and kept)" in speed.tolerance(other)
+def test_a_run_in_doubles_is_spoken_of_where_one_may_serve():
+    assert "Taylor's method in pairs of doubles, good to 1e-30 times" in speed.tolerance(ARM)
+    assert "dopri8" not in speed.tolerance(ARM)
+    of_file = robot_of(read(PATHS["gripper"]), "gripper.xml")
+    assert "where that would take too long, a run in doubles by tmt's dopri8" in speed.tolerance(of_file)
