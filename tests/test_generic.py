@@ -100,7 +100,7 @@ def test_runs_side_by_side_have_the_bits_of_each_alone(name, rng, monkeypatch):
     found = []
     for made in (kernels.stepper, kernels.lane_stepper):
         paths = [np.concatenate([x[:, None], np.zeros((len(x), 4, x.shape[1]))], axis=1) for x in (q, qd)]
-        ended = np.zeros(len(q), np.int8)
+        ended = np.zeros((len(q), 2), int)
         count = made(tree, name)(*paths, tau, 0.01, ended)
         found.append([*paths, ended, count])
     for alone, beside in zip(*found):
