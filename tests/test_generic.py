@@ -105,7 +105,7 @@ def test_runs_side_by_side_have_the_bits_of_each_alone(name, rng, monkeypatch):
         found.append([*paths, ended, count])
     for alone, beside in zip(*found):
         assert np.array_equal(alone, beside, equal_nan=True)
-    assert found[0][2][5] and np.count_nonzero(found[0][2]) == 1 and np.isfinite(found[0][0][4]).all()
+    assert found[0][2][5, 0] and np.count_nonzero(found[0][2][:, 0]) == 1 and np.isfinite(found[0][0][4]).all()
 
 
 @pytest.mark.parametrize("quantity", kernels.QUANTITIES)
