@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from tmt.sine import LIMIT, fma, sincos
+from tmt.written import written
 
 
 @njit(cache=CACHE, error_model="numpy")
