@@ -97,6 +97,11 @@ def load(text):
     return executed(name, text, name)
 
 
+def is_kept(name: str) -> bool:
+    """Whether machine code of a function of tmt itself, "module.function", is there; perhaps of another version."""
+    return any((cache_folder() / "__pycache__").glob(f"{name}-*.nbi"))
+
+
 def complain(error) -> None:
     """Say once in a process why the folder is not used; on stderr, unless logging is set up otherwise."""
     if not complaints:

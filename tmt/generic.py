@@ -33,6 +33,7 @@ NUMBERS = {"reference": (), "moves": (), "offset": 3, "axis": 9, "mass": (), "mo
 JOINT = np.dtype([(name, "i8") for name in WHOLE] + [(name, "f8", shape) for name, shape in NUMBERS.items()])
 
 
+WORLD = np.dtype([("gravity", "f8", 3), ("nq", "i8")])
 BODY = np.dtype([("joint", "i8"), ("mass", "f8"), ("com", "f8", 3), ("inertia", "f8", 9)])
 
 
@@ -45,7 +46,13 @@ def arrays(tree, about_world: bool = False) -> Arrays:
     for parent, joint in zip(tree.parent, joints):
         before[joint.qd.start] = joints[parent].qd.stop - 1 if parent >= 0 else -1
     gains = (matrix(gain) for gain in (tree.position_gain, tree.speed_gain))
-    return Arrays(np.array(rows(tree, about_world=about_world), JOINT), np.array(before), tree.gravity, tree.coordinates.nq, *gains)
+    return Arrays(
+        np.array(rows(tree, about_world=about_world), JOINT),
+        np.array(before),
+        tree.gravity,
+        tree.coordinates.nq,
+        *gains,
+    )
 
 
 def order_of(tree) -> list[int]:

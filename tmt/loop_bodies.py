@@ -21,7 +21,7 @@ POSITIONS, ANGULAR_VELOCITIES, JACOBIANS, CONVECTIVE_TERMS, POTENTIAL_ENERGY, EN
 
 @compiled
 def of_bodies(tree, bodies, quantity, q, qd, w, out):
-    """A quantity of one state, or of eight, flat, to out; q (nq,), qd (nv,), w (places(tree),)."""
+    """A quantity of one state, or of eight, flat, to out; q (nq,), qd (nv,), w (workspace(tree),)."""
     for k in range(len(out)):
         put(out, k, zero(w))
     if quantity == SPRING_TORQUE:
@@ -56,7 +56,7 @@ def of_bodies(tree, bodies, quantity, q, qd, w, out):
 
 
 @part
-def places(tree) -> int:
+def workspace(tree) -> int:
     """How many numbers a workspace has."""
     return len(tree.joints) * PLACE
 
