@@ -114,9 +114,13 @@ class Known:
             getting = 0.0 if loops.cache_info().currsize else READ if is_kept("loop_answers.many") else COMPILED
             forms = [Form("literal", 0.0, LITERAL * len(self.tree.mass) * n * n), Form("loop", getting, 0.0)]
             if chosen(forms, wanted, self.by_literal).name == "loop":
-                self.parts, self.loops = parts(self.tree), loops()
+                self.get_loops()
             self.by_literal += wanted
         return self.parts is not None
+
+    def get_loops(self) -> None:
+        """Have the loops answer from now on."""
+        self.loops, self.parts = loops(), parts(self.tree)
 
     def is_worth_lines(self, quantity, count) -> bool:
         """Whether straight-line code is there for so many states, or is got now."""

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-import tmt
+from tmt import literal
 
 from ...case import Case
 from ...engines import COMPARED, GRID, Engine, Method, Setting
@@ -186,7 +186,7 @@ def rows_of_scene(
 def true_energy(case: Case, reference: Reference) -> np.ndarray:
     """The energy of the reference of a scene at its times, J, (times,)."""
     nq = case.coordinates.nq
-    return tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+    return literal.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
 
 
 def row_of_run(
@@ -219,7 +219,7 @@ def row_of_run(
         states = [part.copy() for part in true]
         for state, part, own in zip(states, (motion.q, motion.v), free):
             state[:, own] = 0.0 if ended else part
-        off = np.abs(tmt.energy(*states, tree) - energy).max()
+        off = np.abs(literal.energy(*states, tree) - energy).max()
     return {
         "scene": case.name, "engine": method.engine, "method": method.name,
         "dt_s": setting.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
