@@ -22,9 +22,9 @@ from .choice import Form, chosen
 from .tree import Tree
 from .values import real_numbers
 
-# estimates, s: of the literal form an evaluation, for each body and pair of speeds, and a call, in evaluations; of the loops
-# their compilation, their reading from the cache folder with numba's import, and an evaluation in lanes, for each speed
-LITERAL, CALL, COMPILED, READ, LOOP = 1.3e-8, 200, 12.0, 0.6, 1.5e-8
+# estimates, s: of the literal form an evaluation, for each body and pair of speeds and for each speed, and a call, in
+# evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and an evaluation
+LITERAL, LITERAL_JOINT, CALL, COMPILED, READ, LOOP = 1.2e-8, 4e-7, 220, 9.0, 0.6, 1.5e-8
 APART = 1e-3  # s of work for each further thread
 BLOCK = 2048  # states that are laid out for straight-line code at a time, and stay near the processor
 SHAPES = {  # of a result, m bodies and n speeds
@@ -111,8 +111,9 @@ class Known:
         """Whether the loops are there, or are got now, as the literal form would have taken longer than that for all so far."""
         if self.parts is None:
             n, wanted = len(self.rest), CALL + count
+            each = LITERAL * len(self.tree.mass) * n * n + LITERAL_JOINT * n
             getting = 0.0 if loops.cache_info().currsize else READ if is_kept("loop_answers.many") else COMPILED
-            forms = [Form("literal", 0.0, LITERAL * len(self.tree.mass) * n * n), Form("loop", getting, 0.0)]
+            forms = [Form("literal", 0.0, each), Form("loop", getting, 0.0)]
             if chosen(forms, wanted, self.by_literal).name == "loop":
                 self.get_loops()
             self.by_literal += wanted
