@@ -200,7 +200,7 @@ def test_code_is_got_when_the_literal_form_has_cost_as_much(monkeypatch):
     monkeypatch.setattr(answers, "loops", lambda: asked.append(known.by_literal) or None)
     monkeypatch.setattr(answers.Known, "get_loops", lambda self: setattr(self, "parts", answers.loops() or ()))
     answers.loops.cache_info = lambda: type("Info", (), {"currsize": 0})
-    monkeypatch.setattr(answers, "is_kept", lambda name: True)
+    monkeypatch.setattr(answers, "getting_loops", lambda: answers.READ)
     each = answers.LITERAL * 2 * 9 + answers.LITERAL_JOINT * 3
     calls = int(answers.READ / each / (answers.CALL + 1))
     for _ in range(calls):

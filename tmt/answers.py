@@ -25,6 +25,7 @@ from .values import real_numbers
 # estimates, s: of the literal form an evaluation, for each body and pair of speeds and for each speed, and a call, in
 # evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and an evaluation
 LITERAL, LITERAL_JOINT, CALL, COMPILED, READ, LOOP = 1.2e-8, 4e-7, 220, 9.0, 0.6, 1.5e-8
+TAKEN = 2e-3  # s for each speed, to write a Tree as the loops take it
 APART = 1e-3  # s of work for each further thread
 BLOCK = 2048  # states that are laid out for straight-line code at a time, and stay near the processor
 SHAPES = {  # of a result, m bodies and n speeds
@@ -111,10 +112,13 @@ class Known:
         """Whether the loops are there, or are got now, as the literal form would have taken longer than that for all so far."""
         if self.parts is None:
             n, wanted = len(self.rest), CALL + count
-            each = LITERAL * len(self.tree.mass) * n * n + LITERAL_JOINT * n
-            getting = 0.0 if loops.cache_info().currsize else READ if is_kept("loop_answers.many") else COMPILED
-            forms = [Form("literal", 0.0, each), Form("loop", getting, 0.0)]
-            if chosen(forms, wanted, self.by_literal).name == "loop":
+            literally = Form("literal", 0.0, LITERAL * len(self.tree.mass) * n * n + LITERAL_JOINT * n)
+
+            def pay(getting) -> bool:
+                forms = literally, Form("loop", getting + TAKEN * n, 0.0)
+                return chosen(forms, wanted, self.by_literal) is not literally
+
+            if pay(0.0) and (loops.cache_info().currsize or (pay(READ) and pay(getting_loops()))):
                 self.get_loops()
             self.by_literal += wanted
         return self.parts is not None
@@ -172,6 +176,12 @@ def loops():
     loop_answers.one.disable_compile()
     loop_answers.many.disable_compile()
     return loop_answers
+
+
+@lru_cache(maxsize=1)
+def getting_loops() -> float:
+    """What it takes until the loops are there, s."""
+    return READ if is_kept("loop_answers.many") else COMPILED
 
 
 def parts(tree) -> tuple:
