@@ -22,6 +22,7 @@ rng = np.random.default_rng(seed)
 tree = tree_of_kinds(rng, bodies=5, along_axes=True)  # of length 1 in any number of digits
 q, qd, tau = ([mpmath.mpf(x) for x in values.tolist()] for values in random_state(rng, tree))
 exact, nv = exact_tree(tree, mpmath.mpf), len(tree.axis)
+exact.rest, exact.coordinates = [mpmath.mpf(x) for x in tree.rest], tree.coordinates  # as their doubles are, in all digits
 Joint = namedtuple("Joint", generic.JOINT.names)
 numbers = generic.arrays(tree)._replace(joints=[Joint(*row) for row in generic.rows(tree, mpmath.mpf)], gravity=exact.gravity)
 w, M, h, qdd = [None] * loops.workspace(numbers), [0] * (nv * nv), [None] * nv, [None] * nv
