@@ -46,7 +46,10 @@ def answered(quantity: str, model: Tree, q, qd=None, tau=None):
     if known is not None and type(q) is ndarray and q.ndim == 1:
         found = known.of_one(quantity, q, qd, tau)
     if found is None and isinstance(model, Tree):
-        found = remembered(model).of_any(quantity, q, qd, tau)
+        try:
+            found = remembered(model).of_any(quantity, q, qd, tau)
+        except MemoryError:
+            found = None
     if found is None:
         found = getattr(literal, quantity)(*(given for given in (q, qd, tau) if given is not None), model)
     return found
