@@ -5,7 +5,6 @@ depends on how much was asked so far in this process, see choice.py, and never o
 """
 
 import math
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -14,18 +13,20 @@ from itertools import pairwise
 import numpy as np
 from numpy import ndarray
 
-from . import literal, singular
+from . import kernels, literal, singular
 from .arm import ARM
 from .cache import is_kept
 from .calls import refused
-from .choice import Form, chosen
+from .choice import LEAST_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
+from .following import cores
+from .source import LANES
 from .tree import Tree
 from .values import real_numbers
 
 # estimates, s: of the literal form an evaluation, for each body and pair of speeds and for each speed, and a call, in
-# evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and an evaluation
-LITERAL, LITERAL_JOINT, CALL, COMPILED, READ, LOOP = 1.2e-8, 4e-7, 220, 9.0, 0.6, 1.5e-8
-TAKEN = 2e-3  # s for each speed, to write a Tree as the loops take it
+# evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and for each speed
+# what it takes to write a Tree as they want it
+LITERAL, LITERAL_JOINT, CALL, COMPILED, READ, WRITTEN = 1.2e-8, 4e-7, 220, 9.0, 0.6, 2e-3
 APART = 1e-3  # s of work for each further thread
 BLOCK = 2048  # states that are laid out for straight-line code at a time, and stay near the processor
 SHAPES = {  # of a result, m bodies and n speeds
@@ -62,6 +63,8 @@ class Known:
         self.tree = tree  # held, so that no other has its id
         self.rest, self.may_be_singular, self.parts = np.zeros(len(tree.axis)), not tree.never_singular, None
         self.by_literal = 0.0  # evaluations so far, while there are no loops
+        # of straight-line code: what is there, its lines and whether they are kept on disk, and evaluations so far
+        self.lanes, self.lines, self.asked = {}, {}, {}
         sizes = {"m": len(tree.mass), "n": len(tree.axis)}
         self.shapes = {name: tuple(sizes.get(size, size) for size in shape) for name, shape in SHAPES.items()}
 
@@ -102,7 +105,7 @@ class Known:
         if quantity == "acceleration" and self.may_be_singular and self.is_singular(q):
             return None
         out = np.empty((count, math.prod(self.shapes[quantity])))
-        answers = self.by_straight_lines if self.is_worth_lines(quantity, count) else self.by_loops
+        answers = self.by_lines if self.has_lines(quantity, count) else self.by_loops
         return as_returned(quantity, out, self.shapes[quantity], batch) if answers(quantity, q, *rates, out) else None
 
     def is_singular(self, q) -> bool:
@@ -118,7 +121,7 @@ class Known:
             literally = Form("literal", 0.0, LITERAL * len(self.tree.mass) * n * n + LITERAL_JOINT * n)
 
             def pay(getting) -> bool:
-                forms = literally, Form("loop", getting + TAKEN * n, 0.0)
+                forms = literally, Form("loop", getting + WRITTEN * n, 0.0)
                 return chosen(forms, wanted, self.by_literal) is not literally
 
             if pay(0.0) and (loops.cache_info().currsize or (pay(READ) and pay(getting_loops()))):
@@ -130,41 +133,59 @@ class Known:
         """Have the loops answer from now on."""
         self.loops, self.parts = loops(), parts(self.tree)
 
-    def is_worth_lines(self, quantity, count) -> bool:
-        """Whether straight-line code is there for so many states, or is got now."""
-        return False
+    def has_lines(self, quantity, count) -> bool:
+        """Whether straight-line code is there for so many states, or is got now as the loops would have taken longer so far."""
+        of = OF_STRAIGHT_LINES.get(quantity)
+        if of is None or count < LANES:
+            return False
+        if of not in self.lanes and self.pays(
+            LEAST_LINES * len(self.rest), LEAST_LINES * len(self.rest), True, of, count
+        ):
+            if of not in self.lines:  # traced only where it could pay
+                straight = kernels.is_evaluated_straight(self.tree)
+                self.lines[of] = straight and (
+                    *kernels.lines_of_evaluator(self.tree),
+                    kernels.is_evaluator_on_disk(self.tree, of),
+                )
+            if self.lines[of] and self.pays(*self.lines[of], of, count):
+                self.lanes[of] = kernels.evaluator(self.tree, of).lanes
+        self.asked[of] = self.asked.get(of, 0) + count
+        return of in self.lanes
+
+    def pays(self, compiled, used, kept, of, count) -> bool:
+        """Whether so many lines of straight-line code are worth getting."""
+        loop = Form("loop_lanes", 0.0, loop_each(len(self.rest), lanes=True))
+        straight = Form(
+            "straight_line_lanes", straight_line_getting(compiled, kept), straight_line_each(used, lanes=True)
+        )
+        return chosen((loop, straight), count, self.asked.get(of, 0)) is straight
 
     def by_loops(self, quantity, q, qd, tau, out) -> bool:
         """Fill rows of results; whether they are right."""
 
-        def answers(some):
-            rates = (rows if len(rows) == 1 else rows[some] for rows in (qd, tau))
-            return self.loops.many(*self.parts, q[some], *rates, self.loops.QUANTITIES[quantity], out[some])
+        def answers(part):
+            rates = (rows if len(rows) == 1 else rows[part] for rows in (qd, tau))
+            return self.loops.many(*self.parts, q[part], *rates, self.loops.QUANTITIES[quantity], out[part])
 
-        return all(side_by_side(answers, len(out), LOOP * len(self.rest)))
+        return all(side_by_side(answers, len(out), loop_each(len(self.rest), lanes=True)))
 
-    def by_straight_lines(self, quantity, q, qd, tau, out) -> bool:
-        """The same with straight-line code, a block of states after the other."""
-        from . import kernels
-
+    def by_lines(self, quantity, q, qd, tau, out) -> bool:
+        """The same by straight-line code, a block of states after the other."""
         of, nq, n = OF_STRAIGHT_LINES[quantity], len(self.tree.rest), len(self.rest)
-        lanes, loops, size = (
-            kernels.evaluator(self.tree, of).lanes, self.loops, n if of == "forward_dynamics" else n * (n + 3) // 2
-        )  # fmt: skip
+        lanes, loops, number = self.lanes[of], self.loops, self.loops.QUANTITIES[quantity]
+        size = n if of == "forward_dynamics" else n * (n + 3) // 2
 
-        def answers(some):
-            columns = None
-            for first in range(some.start, some.stop, BLOCK):
-                width = min(BLOCK, some.stop - first)
-                if columns is None or width < BLOCK:
-                    columns = [np.empty((rows, width)) for rows in (nq, n, n, size)]
+        def answers(part):
+            for first in range(part.start, part.stop, BLOCK):
+                count = min(BLOCK, part.stop - first)
+                columns = [np.empty((rows, count)) for rows in (nq, n, n, size)]
                 for rows, to in zip((q, qd, tau), columns):
                     loops.to_columns(rows, first, to)
                 lanes(*columns)
-                loops.to_rows(columns[-1], loops.QUANTITIES[quantity], out, first)
-            return loops.right(self.parts[0], q[some], *(r if len(r) == 1 else r[some] for r in (qd, tau)), out[some])
+                loops.to_rows(columns[-1], number, out, first)
+            return loops.right(self.parts[0], q[part], *(r if len(r) == 1 else r[part] for r in (qd, tau)), out[part])
 
-        return all(side_by_side(answers, len(out), LOOP * n / 4))
+        return all(side_by_side(answers, len(out), straight_line_each(self.lines[of][1], lanes=True)))
 
 
 @lru_cache(maxsize=1)
@@ -184,7 +205,7 @@ def loops():
 @lru_cache(maxsize=1)
 def getting_loops() -> float:
     """What it takes until the loops are there, s."""
-    return READ if is_kept("loop_answers.many") else COMPILED
+    return READ if is_kept("loop_answers.many-*") else COMPILED
 
 
 def parts(tree) -> tuple:
@@ -209,14 +230,6 @@ def side_by_side(work: Callable, count: int, each: float) -> list:
         return [work(slices[0])]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(work, slices))
-
-
-def cores() -> int:
-    """How many processors this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        return os.cpu_count() or 1
 
 
 def remembered(tree) -> Known:

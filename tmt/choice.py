@@ -40,3 +40,34 @@ class Asked:
 def asked(*kind) -> Asked:
     """The count of a kind, such as a Tree and the name of what is asked; `asked(...).count += wanted` after each question."""
     return Asked()
+
+
+# estimates in s, measured once on one machine: of them only ratios matter
+TRACED = 3e-5  # to trace a line of straight-line code
+COMPILED = 1.1e-3  # to compile it
+READ = 0.05  # to read a module from the cache folder
+LEAST_LINES = 30  # for one speed, at least: where so few would not pay nothing is traced
+LOOPS_READ = 0.3
+LOOPS_COMPILED = {  # for the first time on a machine
+    "run_tableau": 2.5, "run_tableau_lanes": 5.0, "run_adaptive": 4.0, "run_semi_implicit": 7.0, "run_implicit": 17.0,
+}  # fmt: skip
+
+
+def straight_line_each(lines: float, lanes: bool = False) -> float:
+    """What one evaluation takes in so many lines, s."""
+    return 6e-9 + 0.035e-9 * lines if lanes else 15e-9 + 0.22e-9 * lines
+
+
+def loop_each(speeds: int, lanes: bool = False) -> float:
+    """What one evaluation takes in a loop over any tree, s."""
+    return (17e-9 if lanes else 75e-9) * (1 + speeds)
+
+
+def straight_line_getting(lines: float, kept: bool) -> float:
+    """What it takes until straight-line code is there, s; kept: its machine code is on disk."""
+    return TRACED * lines + (READ if kept else COMPILED * lines)
+
+
+def loop_getting(name: str, kept: bool) -> float:
+    """What it takes until a loop of that name is there, s."""
+    return LOOPS_READ if kept else LOOPS_COMPILED.get(name, max(LOOPS_COMPILED.values()))

@@ -3,6 +3,7 @@
 Straight-line code grows with the number of hinges, and so does the time to compile it; for large trees these loops are used.
 """
 
+import sys
 from collections.abc import Callable
 from functools import lru_cache, partial
 from types import SimpleNamespace
@@ -109,14 +110,27 @@ def compiled():
     return loop_calls
 
 
+def loops() -> dict:
+    """The compiled loops of all methods by their names."""
+    from . import loop_runs, loop_semi_implicit, loop_stages
+
+    return vars(loop_stages) | vars(loop_semi_implicit) | vars(loop_runs)
+
+
+def is_compiled(name: str) -> bool:
+    """Whether a loop of that name is there in this process."""
+    modules = (
+        sys.modules.get(f"{__package__}.{module}") for module in ("loop_runs", "loop_semi_implicit", "loop_stages")
+    )
+    return any(vars(module)[name].signatures for module in modules if module and name in vars(module))
+
+
 def stepper(tree, stepping, lanes=False) -> Callable:
-    """run(q, qd, tau, dt, ended) of a Tree and a method that has `loop`, as in kernels.stepper.
+    """run(q, qd, tau, dt, ended, every) of a Tree and a method that has `loop`, as in kernels.stepper.
 
     lanes: of runs that are a multiple of eight, eight side by side where the method has such a loop.
     """
-    from . import loop_runs, loop_semi_implicit, loop_stages
-
-    known = vars(loop_stages) | vars(loop_semi_implicit) | vars(loop_runs)
+    known = loops()
     loop = known[stepping.loop]
     if lanes:
         loop = known.get(f"{stepping.loop}_lanes", loop)
@@ -127,7 +141,7 @@ def stepper(tree, stepping, lanes=False) -> Callable:
         np.empty((0, 1, tree.coordinates.nv)),
         np.empty((0, len(tree.axis))),
     )
-    run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty(0, np.int8))
+    run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty((0, 2), np.int64), 1)
     loop.disable_compile()
     return run
 

@@ -38,7 +38,7 @@ def one(joints, outer, bodies, before, world, gains, q, qd, tau, quantity, out):
         return False
     places = with_world(outer, before, world, gains)
     evaluate(tree, places, bodies, quantity, q, qd, tau, np.empty(numbers(tree)), np.zeros(nv * nv), out)
-    return of_length_1(tree, q) and finite(q) and finite(qd) and finite(tau) and finite(out)
+    return of_length_1(joints, q) and finite(q) and finite(qd) and finite(tau) and finite(out)
 
 
 @compiled
@@ -58,7 +58,7 @@ def many(joints, outer, bodies, before, world, gains, q, qd, tau, quantity, out)
     for i in range(full, len(q)):
         rates, torque = qd[i if len(qd) > 1 else 0], tau[i if len(tau) > 1 else 0]
         evaluate(tree, places, bodies, quantity, q[i], rates, torque, w, M, out[i])
-    return right(tree, q, qd, tau, out)
+    return right(joints, q, qd, tau, out)
 
 
 @part
@@ -81,10 +81,10 @@ def given(results, rows, first):
 
 
 @compiled
-def right(tree, q, qd, tau, out):
+def right(joints, q, qd, tau, out):
     """Whether rows of states are states, and results finite."""
     for i in range(len(q)):
-        if not of_length_1(tree, q[i]):
+        if not of_length_1(joints, q[i]):
             return False
     return finite(q.ravel()) and finite(qd.ravel()) and finite(tau.ravel()) and finite(out.ravel())
 
@@ -127,11 +127,11 @@ def finite(values) -> bool:
 
 
 @part
-def of_length_1(tree, q) -> bool:
+def of_length_1(joints, q) -> bool:
     """Whether the quaternions are of length 1."""
-    for i in range(len(tree.joints)):
-        if tree.joints[i].kind == BALL:
-            k = tree.joints[i].at
+    for i in range(len(joints)):
+        if joints[i].kind == BALL:
+            k = joints[i].at
             square = q[k] * q[k] + q[k + 1] * q[k + 1] + q[k + 2] * q[k + 2] + q[k + 3] * q[k + 3]
             if not SHORTEST <= square <= LONGEST:
                 return False

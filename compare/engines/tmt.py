@@ -84,7 +84,10 @@ class TmtDynamics:
         return literal.energy(q, v, self.tree)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
+        # the same code in every process, but for controllers, of which a robot may have many
+        form = "straight_line" if kernels.is_traced(self.tree, method_named(method)) else "loop"
+        form = None if self.tree.has_gains else form
+        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance, form=form)
         return Motion(*motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
@@ -96,7 +99,7 @@ class TmtDynamics:
         every, dt = setting.every, setting.duration / setting.steps
         paths = [np.full((1, setting.steps + 1, len(start)), np.nan) for start in (q, v)]
         paths[0][0, 0], paths[1][0, 0] = q, v
-        codes = np.zeros(1, np.int8)
+        codes = np.zeros((1, 2), int)
         tolerance = () if setting.tolerance is None else (setting.tolerance,)
         run = partial(kernels.stepper(self.tree, method), *paths, np.array(tau, float)[None], dt, *tolerance, codes)
         t = np.linspace(0.0, setting.duration, GRID + 1)
