@@ -3,14 +3,16 @@
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
 from trees import random_state, tree_of_kinds
 
 import tmt
-from tmt import answers, cache, literal
+from tmt import answers, cache, cores, literal
 from tmt.choice import Form, chosen
 
 EPS = np.finfo(float).eps
@@ -89,14 +91,11 @@ def test_threads_change_no_bit(loops, monkeypatch):
     loops(tree)
     alone = tmt.acceleration(q, qd, tau, tree)
     used = []
-    monkeypatch.setattr(answers, "cores", lambda: 3)
-    monkeypatch.setattr(answers, "ThreadPoolExecutor", lambda n: used.append(n) or Pool(n))
-    monkeypatch.setattr(answers, "APART", 1e-9)
+    monkeypatch.setattr(cores, "cores", lambda: 3)
+    monkeypatch.setattr(cores, "ThreadPoolExecutor", lambda n: used.append(n) or ThreadPoolExecutor(n))
+    monkeypatch.setattr(cores, "APART", 1e-9)
     assert np.array_equal(tmt.acceleration(q, qd, tau, tree), alone)
     assert used and {*used} == {3}
-
-
-Pool = answers.ThreadPoolExecutor
 
 
 @pytest.mark.parametrize(
@@ -194,19 +193,20 @@ def test_a_short_question_never_waits_for_a_compiler(calls, compiled, loops):
     assert light and later is compiled and off <= 1e-12
 
 
-def test_code_is_got_when_the_literal_form_has_cost_as_much(monkeypatch):
-    tree = replace(tmt.ARM, mass=(2.5, 1.5))
-    known, asked = answers.Known(tree), []
-    monkeypatch.setattr(answers, "loops", lambda: asked.append(known.by_literal) or None)
-    monkeypatch.setattr(answers.Known, "get_loops", lambda self: setattr(self, "parts", answers.loops() or ()))
-    answers.loops.cache_info = lambda: type("Info", (), {"currsize": 0})
-    monkeypatch.setattr(answers, "getting_loops", lambda: answers.READ)
-    each = answers.LITERAL * 2 * 9 + answers.LITERAL_JOINT * 3
-    calls = int(answers.READ / each / (answers.CALL + 1))
-    for _ in range(calls):
-        assert not known.has_loops(1)
-    assert known.has_loops(1) or known.has_loops(1)
-    assert len(asked) == 1
+@pytest.mark.parametrize("there, kept", [(True, True), (False, True), (False, False)])
+def test_code_is_got_when_the_literal_form_has_cost_as_much(there, kept, monkeypatch):
+    known = answers.Known(tmt.ARM)
+    monkeypatch.setattr(answers, "loops", lru_cache(lambda: None))
+    monkeypatch.setattr(answers, "getting_loops", lambda: answers.READ if kept else answers.COMPILED)
+    monkeypatch.setattr(answers.Known, "get_loops", lambda self: setattr(self, "parts", ()))
+    if there:
+        answers.loops()
+    getting = (0.0 if there else answers.READ if kept else answers.COMPILED) + answers.WRITTEN * 3
+    calls = getting / (answers.CALL + 1) / (answers.LITERAL * 2 * 9 + answers.LITERAL_JOINT * 3)
+    assert not any(known.has_loops(1) for _ in range(int(calls)))
+    assert known.has_loops(1) and calls > 5
+    many = answers.Known(tmt.ARM)
+    assert many.has_loops(10_000_000)  # at once
 
 
 def test_the_first_of_equals_is_chosen():

@@ -5,10 +5,7 @@ depends on how much was asked so far in this process, see choice.py, and never o
 """
 
 import math
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from numpy import ndarray
@@ -18,7 +15,8 @@ from .arm import ARM
 from .cache import is_kept
 from .calls import refused
 from .choice import LEAST_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
-from .following import cores
+from .cores import side_by_side
+from .generic import in_parts
 from .source import LANES
 from .tree import Tree
 from .values import real_numbers
@@ -27,8 +25,7 @@ from .values import real_numbers
 # evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and for each speed
 # what it takes to write a Tree as they want it
 LITERAL, LITERAL_JOINT, CALL, COMPILED, READ, WRITTEN = 1.2e-8, 4e-7, 220, 9.0, 0.6, 2e-3
-APART = 1e-3  # s of work for each further thread
-BLOCK = 2048  # states that are laid out for straight-line code at a time, and stay near the processor
+BLOCK = 1024  # states that are laid out for straight-line code at a time, and stay near the processor
 SHAPES = {  # of a result, m bodies and n speeds
     "com_positions": ("m", 3), "angular_velocities": ("m", 3), "jacobians": (2, "m", 3, "n"), "convective_terms": (2, "m", 3),
     "potential_energy": (), "energy": (), "spring_torque": ("n",), "acceleration": ("n",), "mass_matrix": ("n", "n"),
@@ -67,6 +64,7 @@ class Known:
         self.lanes, self.lines, self.asked = {}, {}, {}
         sizes = {"m": len(tree.mass), "n": len(tree.axis)}
         self.shapes = {name: tuple(sizes.get(size, size) for size in shape) for name, shape in SHAPES.items()}
+        self.sizes = {name: math.prod(shape) for name, shape in self.shapes.items()}
 
     def of_one(self, quantity, q, qd, tau):
         """The quantity of one state; None where there are no loops yet, or they cannot take what is given."""
@@ -75,13 +73,15 @@ class Known:
         qd, tau = self.rest if qd is None else qd, self.rest if tau is None else tau
         if not type(qd) is type(tau) is ndarray:
             return None
-        shape = self.shapes[quantity]
-        out = np.empty(math.prod(shape))
+        shape, size, number = self.shapes[quantity], self.sizes[quantity], self.numbers[quantity]
+        out = np.empty(size)
         try:
-            answers = self.loops.one(*self.parts, q, qd, tau, self.loops.QUANTITIES[quantity], out)
+            answers = self.loops.one(*self.parts, q, qd, tau, number, out)
         except refused():  # of another type, not contiguous
             return None
-        return as_returned(quantity, out, shape) if answers else None
+        if not answers:
+            return None
+        return out if len(shape) == 1 else as_returned(quantity, out, shape)
 
     def of_any(self, quantity, *given):
         """The quantity of states of any batch shape; None where the literal form is to answer."""
@@ -104,7 +104,7 @@ class Known:
         rates = [self.rest[None] if a is None else rows_of(a, batch if a.ndim > 1 else ()) for a in arrays[1:]]
         if quantity == "acceleration" and self.may_be_singular and self.is_singular(q):
             return None
-        out = np.empty((count, math.prod(self.shapes[quantity])))
+        out = np.empty((count, self.sizes[quantity]))
         answers = self.by_lines if self.has_lines(quantity, count) else self.by_loops
         return as_returned(quantity, out, self.shapes[quantity], batch) if answers(quantity, q, *rates, out) else None
 
@@ -131,7 +131,8 @@ class Known:
 
     def get_loops(self) -> None:
         """Have the loops answer from now on."""
-        self.loops, self.parts = loops(), parts(self.tree)
+        self.loops, self.parts = loops(), in_parts(self.tree)
+        self.numbers = self.loops.QUANTITIES
 
     def has_lines(self, quantity, count) -> bool:
         """Whether straight-line code is there for so many states, or is got now as the loops would have taken longer so far."""
@@ -165,14 +166,14 @@ class Known:
 
         def answers(part):
             rates = (rows if len(rows) == 1 else rows[part] for rows in (qd, tau))
-            return self.loops.many(*self.parts, q[part], *rates, self.loops.QUANTITIES[quantity], out[part])
+            return self.loops.many(*self.parts, q[part], *rates, self.numbers[quantity], out[part])
 
         return all(side_by_side(answers, len(out), loop_each(len(self.rest), lanes=True)))
 
     def by_lines(self, quantity, q, qd, tau, out) -> bool:
         """The same by straight-line code, a block of states after the other."""
         of, nq, n = OF_STRAIGHT_LINES[quantity], len(self.tree.rest), len(self.rest)
-        lanes, loops, number = self.lanes[of], self.loops, self.loops.QUANTITIES[quantity]
+        lanes, loops, number = self.lanes[of], self.loops, self.numbers[quantity]
         size = n if of == "forward_dynamics" else n * (n + 3) // 2
 
         def answers(part):
@@ -183,7 +184,11 @@ class Known:
                     loops.to_columns(rows, first, to)
                 lanes(*columns)
                 loops.to_rows(columns[-1], number, out, first)
-            return loops.right(self.parts[0], q[part], *(r if len(r) == 1 else r[part] for r in (qd, tau)), out[part])
+                block = slice(first, first + count)  # checked while it is near the processor
+                rates = (rows if len(rows) == 1 else rows[block] for rows in (qd, tau))
+                if not loops.right(self.parts[0], q[block], *rates, out[block]):
+                    return False
+            return True
 
         return all(side_by_side(answers, len(out), straight_line_each(self.lines[of][1], lanes=True)))
 
@@ -194,7 +199,7 @@ def loops():
     from . import loop_answers
 
     # of one state, and of none: compiled for these types and then for no others, which numba would take as they are
-    of, zeros, out = parts(ARM), np.zeros(3), np.empty(3)
+    of, zeros, out = in_parts(ARM), np.zeros(3), np.empty(3)
     loop_answers.one(*of, zeros, zeros, zeros, loop_answers.BIAS, out)
     loop_answers.many(*of, *(rows[None] for rows in (zeros, zeros, zeros)), loop_answers.BIAS, out[None])
     loop_answers.one.disable_compile()
@@ -206,30 +211,6 @@ def loops():
 def getting_loops() -> float:
     """What it takes until the loops are there, s."""
     return READ if is_kept("loop_answers.many-*") else COMPILED
-
-
-def parts(tree) -> tuple:
-    """The Tree as compiled functions take it."""
-    from . import generic
-
-    inner, outer, n = generic.arrays(tree), generic.arrays(tree, about_world=True), len(tree.axis)
-    gains = np.zeros((2, n, n) if tree.has_gains else (2, 0, 0))
-    for of, gain in zip(gains, (inner.position_gain, inner.speed_gain)):
-        if len(gain):
-            of[:] = gain
-    world = np.array([(inner.gravity, inner.nq)], generic.WORLD)
-    return inner.joints, outer.joints, generic.bodies(tree), inner.before, world, gains
-
-
-def side_by_side(work: Callable, count: int, each: float) -> list:
-    """work(slice) of parts of so many evaluations, in threads where each has enough to do; each: s of an evaluation."""
-    threads = max(1, min(cores(), int(count * each / APART)))
-    ends = [count * k // threads // 32 * 32 for k in range(threads)] + [count]
-    slices = [slice(*pair) for pair in pairwise(ends)]
-    if threads == 1:
-        return [work(slices[0])]
-    with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(work, slices))
 
 
 def remembered(tree) -> Known:

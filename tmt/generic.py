@@ -98,6 +98,17 @@ def rows(tree, number=float, about_world=False) -> list[tuple]:
     return result
 
 
+def in_parts(tree) -> tuple:
+    """The Tree as loop_answers.py takes it: arrays one by one."""
+    inner, outer, n = arrays(tree), arrays(tree, about_world=True), len(tree.axis)
+    gains = np.zeros((2, n, n) if tree.has_gains else (2, 0, 0))
+    for of, gain in zip(gains, (inner.position_gain, inner.speed_gain)):
+        if len(gain):
+            of[:] = gain
+    world = np.array([(inner.gravity, inner.nq)], WORLD)
+    return inner.joints, outer.joints, bodies(tree), inner.before, world, gains
+
+
 def matrix(rows) -> np.ndarray:
     """Rows as an array of two dimensions, whatever their number."""
     return np.array(rows, dtype=float).reshape(len(rows), len(rows))

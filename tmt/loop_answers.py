@@ -38,7 +38,7 @@ def one(joints, outer, bodies, before, world, gains, q, qd, tau, quantity, out):
         return False
     places = with_world(outer, before, world, gains)
     evaluate(tree, places, bodies, quantity, q, qd, tau, np.empty(numbers(tree)), np.zeros(nv * nv), out)
-    return of_length_1(joints, q) and finite(q) and finite(qd) and finite(tau) and finite(out)
+    return of_length_1(joints, q.reshape(1, -1)) and finite(q) and finite(qd) and finite(tau) and finite(out)
 
 
 @compiled
@@ -83,10 +83,13 @@ def given(results, rows, first):
 @compiled
 def right(joints, q, qd, tau, out):
     """Whether rows of states are states, and results finite."""
-    for i in range(len(q)):
-        if not of_length_1(joints, q[i]):
-            return False
-    return finite(q.ravel()) and finite(qd.ravel()) and finite(tau.ravel()) and finite(out.ravel())
+    return (
+        of_length_1(joints, q)
+        and finite(q.ravel())
+        and finite(qd.ravel())
+        and finite(tau.ravel())
+        and finite(out.ravel())
+    )
 
 
 @part
@@ -119,32 +122,35 @@ def numbers(tree) -> int:
 
 @part
 def finite(values) -> bool:
-    """Whether all of them are finite: of others the sum of x - x is not zero."""
-    total = 0.0
+    """Whether all of them are; counted, as that is done for several side by side."""
+    others = 0
     for x in values:
-        total += x - x
-    return total == 0.0
+        others += 0 if abs(x) < np.inf else 1
+    return others == 0
 
 
 @part
 def of_length_1(joints, q) -> bool:
-    """Whether the quaternions are of length 1."""
+    """Whether the quaternions in rows of positions are of length 1."""
     for i in range(len(joints)):
         if joints[i].kind == BALL:
             k = joints[i].at
-            square = q[k] * q[k] + q[k + 1] * q[k + 1] + q[k + 2] * q[k + 2] + q[k + 3] * q[k + 3]
-            if not SHORTEST <= square <= LONGEST:
-                return False
+            for p in q[:, k : k + 4]:
+                if not SHORTEST <= p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] <= LONGEST:
+                    return False
     return True
 
 
 @compiled
 def to_columns(rows, first, columns):
     """As many rows as there are columns, from `first` on; one may stand for all."""
-    step = 1 if len(rows) > 1 else 0
-    for i in range(columns.shape[1]):
+    if len(rows) == 1:
         for k in range(len(columns)):
-            columns[k, i] = rows[(first + i) * step, k]
+            columns[k] = rows[0, k]
+        return
+    for k in range(len(columns)):
+        for i in range(columns.shape[1]):
+            columns[k, i] = rows[first + i, k]
 
 
 @compiled
@@ -159,6 +165,6 @@ def to_rows(columns, quantity, out, first):
                     out[first + l, i * n + j] = out[first + l, j * n + i] = columns[k, l]
                 k += 1
         return
-    for l in range(columns.shape[1]):
-        for k in range(n):
+    for k in range(n):
+        for l in range(columns.shape[1]):
             out[first + l, k] = columns[len(columns) - n + k, l]
