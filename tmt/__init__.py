@@ -12,6 +12,9 @@ Units: rad, s, kg, m, N m, J; of a slide m and N. Frames: inertial frame at the 
 are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd, with h = `bias` (MuJoCo's
 qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that holds the arm at rest
 where no springs act.
+
+The functions of states answer with NumPy (literal.py) until compiled code is worth getting, and then with that, see answers.py:
+results differ in the last bits, and what is wrong is said in the same words.
 """
 
 import numpy as np
