@@ -1,0 +1,47 @@
+"""The figure of what forward dynamics cost as a chain grows."""
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from ...judge.check import Result
+from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
+from .growth import label, times_of
+
+# colour, dash and mark of each implementation
+LOOKS = {
+    "literal": (GREY, ":", "o"),
+    "mj_forward": (ORANGE, "-", "s"),
+    "mujoco_equal_work": (RED, "--", "D"),
+    "mujoco_batch": (ORANGE, ":", "^"),
+    "pinocchio_aba": (PINK, "-.", "v"),
+    "straight_line": (BLUE, "-", "P"),
+    "loop": (GREEN, "-", "X"),
+    "loop_lanes": (SKY, "--", "*"),
+}
+
+
+def draw_growth(result: Result) -> tuple[str, Figure, str]:
+    """Nanoseconds of a state against joints, a line for each implementation, with its exponent."""
+    rows, powers = result.tables["growth"], result.curves["exponents"]
+    fig = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    ax = fig.subplots()
+    for name in dict.fromkeys(row["implementation"] for row in rows):
+        times = times_of(rows, name)
+        colour, dash, mark = LOOKS.get(name, (GREY, "-", "x"))
+        power = f" ($n^{{{powers[name].power:.2f}}}$)" if name in powers else ""
+        ax.plot(
+            list(times), list(times.values()), color=colour, linestyle=dash, marker=mark, markersize=5, linewidth=1.2,
+            label=label(name) + power,
+        )  # fmt: skip
+    numbers = list(dict.fromkeys(row["n"] for row in rows))
+    ax.set(xscale="log", yscale="log", xlabel="joints of the chain, n", ylabel="ns per state")
+    ax.set_xticks(numbers, [str(n) for n in numbers])
+    ax.xaxis.set_minor_locator(NullLocator())
+    fig.legend(loc="outside upper center", ncols=3, fontsize=8)
+    fitted = {(power.first, power.last) for power in powers.values()}
+    ranges = " and ".join(f"{first} to {last}" for first, last in sorted(fitted, reverse=True))
+    caption = (
+        f"Forward dynamics of a chain of 1 to {max(numbers)} hinges, none of them along a coordinate axis, one state."
+    )
+    caption += f" Powers of n are fitted by least squares to the logarithms, over {ranges} joints." if fitted else ""
+    return "speed_growth", fig, caption
