@@ -253,4 +253,4 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     yield partial(figures_times.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)
     if "growth" in result.tables:
-        yield partial(figures_growth.draw_growth, result)
+        yield partial(figures_growth.draw_chain, result)

@@ -5,7 +5,7 @@ from matplotlib.ticker import NullLocator
 
 from ...judge.check import Result
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
-from .growth import label, times_of
+from .growth import cost_by_joints, label
 
 # colour, dash and mark of each implementation
 LOOKS = {
@@ -20,23 +20,27 @@ LOOKS = {
 }
 
 
-def draw_growth(result: Result) -> tuple[str, Figure, str]:
+def draw_chain(result: Result) -> tuple[str, Figure, str]:
     """Nanoseconds of a state against joints, a line for each implementation, with its exponent."""
     rows, powers = result.tables["growth"], result.curves["exponents"]
-    fig = Figure(figsize=(WIDTH, 4.6), layout="constrained")
-    ax = fig.subplots()
+    fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
+    upper, lower = fig.subplots(
+        2, 1, sharex=True, height_ratios=(1, 2.5)
+    )  # what is in Python is far above what is compiled
     for name in dict.fromkeys(row["implementation"] for row in rows):
-        times = times_of(rows, name)
+        times = cost_by_joints(rows, name)
         colour, dash, mark = LOOKS.get(name, (GREY, "-", "x"))
         power = f" ($n^{{{powers[name].power:.2f}}}$)" if name in powers else ""
-        ax.plot(
+        (upper if name == "literal" else lower).plot(
             list(times), list(times.values()), color=colour, linestyle=dash, marker=mark, markersize=5, linewidth=1.2,
             label=label(name) + power,
         )  # fmt: skip
     numbers = list(dict.fromkeys(row["n"] for row in rows))
-    ax.set(xscale="log", yscale="log", xlabel="joints of the chain, n", ylabel="ns per state")
-    ax.set_xticks(numbers, [str(n) for n in numbers])
-    ax.xaxis.set_minor_locator(NullLocator())
+    for ax in (upper, lower):
+        ax.set(xscale="log", yscale="log", ylabel="ns per state")
+    lower.set_xlabel("joints of the chain, n")
+    lower.set_xticks(numbers, [str(n) for n in numbers])
+    lower.xaxis.set_minor_locator(NullLocator())
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
     fitted = {(power.first, power.last) for power in powers.values()}
     ranges = " and ".join(f"{first} to {last}" for first, last in sorted(fitted, reverse=True))

@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,7 +26,7 @@ from ...robots import Robot
 from ...robots.chain import chain
 from .evaluations import EQUAL, FORWARD, WHOLE
 
-TOGETHER = 32_768  # angles of the states that one call evaluates: they stay in the caches
+ANGLES_AT_ONCE = 32_768  # angles of the states that one call evaluates: they stay in the caches
 COLD_START = "from compare.experiments.speed.implementations import compilation; compilation()"
 
 
@@ -65,26 +65,22 @@ def chain_of(n: int, **limits) -> Chain:
     text = chain(n)
     reading = read(text)
     robot = Robot(f"chain of {n}", Path("chain.xml"), reading.tree, {}, ())
-    count = max(LANES, TOGETHER // n // LANES * LANES)
+    count = max(LANES, ANGLES_AT_ONCE // n // LANES * LANES)
     states = np.random.default_rng([SEED, n]).uniform(-3.0, 3.0, (3, count, n))
     return Chain(n, text, reading.tree, engine(reading).of(robot.case()), tuple(states), **limits)
 
 
-def again_and_again(evaluate: Callable, *arguments) -> Callable[[int], object]:
-    """run(times): the same call so many times."""
-
-    def run(times):
-        for _ in range(times):
-            evaluate(*arguments)
-
-    return run
+def again_and_again(evaluate: Callable, arguments: Sequence, times: int) -> None:
+    """The same call so many times."""
+    for _ in range(times):
+        evaluate(*arguments)
 
 
 def literal(of: Chain) -> Made:
     """The method as it stands, on Python's floats."""
     state = [array[0].tolist() for array in of.states]
     operations = traced_operations(of.tree, method.mass_matrix_and_bias)
-    return Made(again_and_again(method.acceleration, of.tree, *state), operations=operations)
+    return Made(partial(again_and_again, method.acceleration, (of.tree, *state)), operations=operations)
 
 
 def straight_line(of: Chain) -> Made | str:
@@ -99,7 +95,7 @@ def straight_line(of: Chain) -> Made | str:
     each = executed(f"chain_of_{of.n}", text.replace("CACHE", "False"), f"chain_of_{of.n}").each
     taken = time.process_time() - begin
     arrays = [*of.states, np.empty_like(of.states[0])]
-    return Made(again_and_again(each, *arrays), len(arrays[0]), taken, operations)
+    return Made(partial(again_and_again, each, arrays), len(arrays[0]), taken, operations)
 
 
 def one_at_a_time(text: str) -> str:
@@ -117,14 +113,14 @@ def traced_operations(tree: tmt.Tree, *form: Callable) -> int | None:
 def loop(of: Chain) -> Made:
     """The loop over any tree, one state at a time."""
     arrays = [*of.states, np.empty_like(of.states[0])]
-    run = again_and_again(generic.compiled().each, generic.arrays(of.tree), True, *arrays)
+    run = partial(again_and_again, generic.compiled().each, (generic.arrays(of.tree), True, *arrays))
     return Made(run, len(arrays[0]), cold_start()["loop"] if of.cold else None)
 
 
 def loop_lanes(of: Chain) -> Made:
     """The same loop, eight states side by side."""
     arrays = [np.array(array.T, order="C") for array in (*of.states, of.states[0])]
-    run = again_and_again(generic.compiled().lanes, generic.arrays(of.tree), True, *arrays)
+    run = partial(again_and_again, generic.compiled().lanes, (generic.arrays(of.tree), True, *arrays))
     return Made(run, arrays[0].shape[1], cold_start()["loop_lanes"] if of.cold else None)
 
 
