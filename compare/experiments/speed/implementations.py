@@ -89,7 +89,7 @@ def straight_line(of: Chain) -> Made | str:
     if operations is None:
         return "it has so many lines that a loop takes its place"
     if operations > of.most:
-        return f"it has more than {of.most:,.0f} operations, which `--growth` compiles"
+        return f"it has more than {of.most:,.0f} operations; `speed --growth` compiles it, unless it is to be quick"
     begin = time.process_time()
     text = one_at_a_time(evaluator_source(of.tree, FORWARD, composite.mass_matrix_and_bias, "sincos"))
     each = executed(f"chain_of_{of.n}", text.replace("CACHE", "False"), f"chain_of_{of.n}").each

@@ -61,7 +61,7 @@ def test_what_has_no_time_has_an_empty_row_and_a_reason(known):
     rows, reasons = known
     assert dict.fromkeys(COLUMNS) | {"n": 2, "implementation": "straight_line"} in rows
     assert reasons["straight-line code is not timed with 2 joints"] == (
-        "it has more than 100 operations, which `--growth` compiles"
+        "it has more than 100 operations; `speed --growth` compiles it, unless it is to be quick"
     )
 
 
