@@ -14,7 +14,7 @@ from ...judge import timing
 from ...setup import Setup
 from . import operations, processor
 from .affordable import left_out_in_words, lengths, most_states, states_of
-from .peers import Peers, peers_in_words
+from .peers import FEWER, Peers, peers_in_words
 from .settings import coarsest_steps, regular_of
 from .ways import (
     EACH,
@@ -60,16 +60,18 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
         calls[processor.PEAK, name, side_by_side, 1] = run, count * side_by_side
     with ThreadPoolExecutor(2) as pool:
         for count in numbers:
-            some = [a[:count] for a in states]
-            for key, run in (of_many_states(tree, some, pool) | (peers.of_many_states(some) if peers else {})).items():
+            for key, run in of_many_states(tree, [a[:count] for a in states], pool).items():
                 calls[key] = again(run, CALLS // count, count)
+        for key, run in (peers.of_many_states(states) if peers else {}).items():
+            calls[key] = again(run, key[2] // FEWER, key[2])
         taken = timing.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
     overhead = simulate_overhead(regular_of(setup.robot))
     words = costs_in_words(nanoseconds, overhead, lengths(tree), setup.robot.name, missing)
     known = known_operations(tree)
     words += processor.near_in_words(nanoseconds, known, operations.OF_SINE)
-    words += peers_in_words(nanoseconds, in_lanes_of(nanoseconds), peers) if peers else []
+    lanes = in_lanes_of(nanoseconds) or in_lanes_of(nanoseconds, LOOP_IN_LANES)
+    words += peers_in_words(nanoseconds, lanes, peers) if peers else []
     return evaluation_rows(nanoseconds, known, peers.absent if peers else {}), words + left_out_in_words(tree)
 
 
@@ -80,9 +82,9 @@ def known_operations(tree: tmt.Tree) -> dict[tuple[str, str], int]:
     return {(FORWARD, name): found[form] for form, names in ways.items() if form in found for name in names}
 
 
-def in_lanes_of(ns: Mapping[tuple, float]) -> dict[int, float]:
+def in_lanes_of(ns: Mapping[tuple, float], name: str = IN_LANES) -> dict[int, float]:
     """Nanoseconds of a state's forward dynamics in lanes, on one thread, by the number of states."""
-    return {key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1}
+    return {key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, name) and key[2] > 1 and key[3] == 1}
 
 
 def per_state(counts: dict, times: list[list[float]]) -> dict:

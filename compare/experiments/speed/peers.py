@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 import tmt
+from tmt import kernels
 
-from ...engines.heyoka import compiled_accelerations
+from ...engines.heyoka import Heyoka, compiled_accelerations
 from ...engines.pinocchio import PinocchioCalls
 from ...judge.scale import EPS, FACTOR, acceleration_scale, bias_scale, spring_scale
 from ...setup import Setup
-from .ways import FORWARD, RK4_STEP
+from .ways import FORWARD, IN_LANES, RK4_STEP
 
 COMPILED, COMPILED_FAST = "heyoka, compiled function", "heyoka, compiled function, fast math"
 ABA, ABA_OF_NOTHING, ABA_OF_MANY = (
@@ -20,7 +21,7 @@ ABA, ABA_OF_NOTHING, ABA_OF_MANY = (
 )
 BATCH = "MuJoCo, batch"
 CALL = "call"  # what is timed in the place of an evaluation
-MOST_AT_ONCE = 10_000  # states that these are asked for in one call, but heyoka
+FEWER, MORE = 1000, 10_000  # states in one call
 COMPARED_AT = 20  # states at which accelerations are compared before they are timed
 
 
@@ -31,7 +32,7 @@ class Peers:
         from ...engines.mujoco.batch import BatchedCalls  # MuJoCo where it is needed
 
         self.setup, self.tree, self.batches, self.absent = setup, setup.robot.tree, BatchedCalls, {}
-        heyoka = setup.engines["heyoka"]
+        heyoka = Heyoka()
         self.heyoka = self.unless(heyoka.unavailable() or heyoka.too_long(self.tree), (FORWARD, COMPILED))
         why = PinocchioCalls.unavailable() or PinocchioCalls.unfit(self.tree)
         self.pinocchio, self.of_tolerance = None, None
@@ -56,23 +57,25 @@ class Peers:
             yield CALL, ABA_OF_NOTHING, self.pinocchio.call_loop()
 
     def of_many_states(self, states: Sequence[np.ndarray]) -> dict[tuple, Callable]:
-        """{(quantity, implementation, states, threads): run} for many states, (N, nq and nv)."""
-        count, runs = len(states[0]), {}
-        if count == 1:
-            return runs
+        """{(quantity, implementation, states, threads): run} for the first of many states, (N, nq and nv), N > 1.
+
+        heyoka's function, and the lanes beside it, take so many that the call from Python weighs little.
+        """
+        runs, some = {}, [np.ascontiguousarray(part[:FEWER]) for part in states]
         if self.heyoka:
-            given, out = np.concatenate([part.T for part in states]).copy(), np.empty(states[1].T.shape)
+            wide = [np.ascontiguousarray(part[:MORE].T) for part in states]
+            given, out = np.concatenate(wide), np.empty(wide[1].shape)
             for name, fastest in ((COMPILED, False), (COMPILED_FAST, True)):
                 function = compiled_accelerations(self.tree, fastest)
-                runs[FORWARD, name, count, 1] = lambda function=function: function(given, outputs=out)
-        if count > MOST_AT_ONCE:
-            return runs
-        if self.pinocchio and (run := self.pinocchio.aba_of_many(*states)):
-            runs[FORWARD, ABA_OF_MANY, count, 1] = run
+                runs[FORWARD, name, out.shape[1], 1] = lambda function=function: function(given, outputs=out)
+            lanes, found = kernels.evaluator(self.tree, FORWARD).lanes, np.empty(out.shape)
+            runs[FORWARD, IN_LANES, out.shape[1], 1] = lambda: lanes(*wide, found)
+        if self.pinocchio and (run := self.pinocchio.aba_of_many(*some)):
+            runs[FORWARD, ABA_OF_MANY, len(some[0]), 1] = run
         for threads in (1, 2) if self.batch else ():
-            calls = self.batches(self.setup.engines["mujoco"].of(self.setup.robot.case()), *states, threads)
-            runs[FORWARD, BATCH, count, threads] = calls.forward
-            runs[RK4_STEP, BATCH, count, threads] = calls.step
+            calls = self.batches(self.setup.engines["mujoco"].of(self.setup.robot.case()), *some, threads)
+            runs[FORWARD, BATCH, len(some[0]), threads] = calls.forward
+            runs[RK4_STEP, BATCH, len(some[0]), threads] = calls.step
         return runs
 
 
