@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-COMPILED = (
+ROWS_COMPILED = (
     "Rows that are called compiled show what the functions of tmt return once compiled code answers; the others are the method "
     "as it stands."
 )
