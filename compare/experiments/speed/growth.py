@@ -31,7 +31,7 @@ class Extent(NamedTuple):
 
 EXTENTS = {
     "whole": Extent((1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 5, cold=True),
-    "short": Extent((1, 2, 3, 4, 6, 8), 2, most=1100),
+    "short": Extent((1, 2, 3, 4, 6, 8), 2, most=600),
     "small": Extent((1, 2, 3), 1, most=100),
 }
 
