@@ -6,6 +6,7 @@ import numpy as np
 
 import tmt
 from tmt import kernels, method
+from tmt.trace import Code
 
 from ...case import Coordinates
 
@@ -31,7 +32,16 @@ def lengths(tree: tmt.Tree) -> list[int] | None:
     """Of the straight-line code of the literal and of the composite form; None: none is made for so many joints."""
     if not kernels.is_evaluated_straight(tree):
         return None
-    return [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
+    return [
+        code.operations
+        for code in (kernels.slope_source(tree, "rk4", method.mass_matrix_and_bias), straight_line(tree))
+    ]
+
+
+@lru_cache(maxsize=8)
+def straight_line(tree: tmt.Tree) -> Code:
+    """The forward dynamics of a tree in straight lines, of the composite form."""
+    return kernels.slope_source(tree, "rk4")
 
 
 def literal_is_compiled(tree: tmt.Tree) -> bool:
