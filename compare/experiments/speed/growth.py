@@ -31,8 +31,8 @@ class Extent(NamedTuple):
 
 EXTENTS = {
     "whole": Extent((1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 5, cold=True),
-    "short": Extent((1, 2, 3, 4, 6, 8), 2, most=1100),
-    "small": Extent((1, 2, 3), 1, most=100),
+    "short": Extent((1, 2, 3, 4, 6, 8), 2, most=600),
+    "small": Extent((1, 2, 3), 1, most=200),
 }
 
 
@@ -120,16 +120,16 @@ def cost_by_joints(rows: Sequence[dict], name: str) -> dict[int, float]:
 
 
 def exponents(rows: Sequence[dict]) -> dict[str, Exponent]:
-    """Of each implementation that was timed for two numbers of joints: of the straight line through the logarithms.
+    """Of each implementation that was timed for three numbers of joints: of the straight line through the logarithms.
 
-    By least squares, from 8 joints on where more than one number is; else over all.
+    By least squares, from 8 joints on where three numbers are; else over all.
     """
     found = {}
     for name in dict.fromkeys(row["implementation"] for row in rows):
         times = cost_by_joints(rows, name)
         many = {n: value for n, value in times.items() if n >= MANY_JOINTS}
-        times = many if len(many) > 1 else times
-        if len(times) > 1:
+        times = many if len(many) > 2 else times
+        if len(times) > 2:
             power, _ = np.polyfit(np.log(list(times)), np.log(list(times.values())), 1)
             found[name] = Exponent(float(power), min(times), max(times))
     return found

@@ -39,7 +39,7 @@ EDITS = (
     Edit("speed.growth", "exponents", "n >= MANY_JOINTS", "True", "short chains are fitted too"),
     Edit("speed.growth", "straight_in_words", "looped[n] / straight[n]", "straight[n] / looped[n]", "ratios are inverted"),
     Edit("speed.growth", "extent_of", "setup.robot.is_read", "False", "every robot's run pays for the chain"),
-    Edit("speed.implementations", "straight_line", "operations > of.most", "False", "long code is compiled unasked"),
+    Edit("speed.implementations", "straight_line_of", "count > of.most", "False", "long code is compiled unasked"),
     # engines
     Edit("engines.scipy", "as_far_as_it_goes", "t[int(np.argmin(finite)) - 1]", "t[0]", "every run ends at its start"),
     Edit("engines.tmt", "TmtDynamics.prepare", "path[0, ::every].copy()", "path[0, -65:].copy()",
