@@ -173,6 +173,7 @@ WRONG = {
     "no unit quaternion": (BALL, (np.array([1.0, 1.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))),
     "one of many no unit quaternion": (BALL, (np.array([[1, 0, 0, 0]] * 9 + [[1, 0.01, 0, 0]]), np.zeros(3), np.zeros(3))),
     "singular": (WRIST, (np.zeros(3), np.zeros(3), np.zeros(3))),
+    "singular but for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), np.zeros(3), np.zeros(3))),
     "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], np.zeros(3), np.zeros(3))),
     "no model": ("arm", (np.zeros(3), np.zeros(3), np.zeros(3))),
 }  # fmt: skip
