@@ -41,8 +41,8 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     if n <= IN_PYTHON:
         yield FORWARD, "literal, Python floats", plain
     answers.remembered(tree).get_loops()
-    yield FORWARD, CALLED, called(tmt.acceleration, q, qd, tau, tree)
-    yield MASS_MATRIX, MASS_CALLED, called(tmt.mass_matrix, q, tree)
+    yield FORWARD, CALLED, calling(tmt.acceleration, q, qd, tau, tree)
+    yield MASS_MATRIX, MASS_CALLED, calling(tmt.mass_matrix, q, tree)
     loops = generic.compiled()
     yield FORWARD, LOOP, lambda count: loops.repeat_forward_dynamics(arrays, q, qd, tau, out, count)
     yield TERMS, LOOP, lambda count: loops.repeat_mass_matrix_and_bias(arrays, q, qd, M, h, count)
@@ -60,7 +60,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     yield RK4_STEP, EACH, steps
 
 
-def called(function: Callable, *given) -> Callable:
+def calling(function: Callable, *given) -> Callable:
     """loop(count): a function called so many times from Python."""
 
     def loop(count):
