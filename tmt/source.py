@@ -122,7 +122,7 @@ def lanes_source(tree, stepping) -> str:
         "size_k": len(asked) * n * LANES,
         "first": ", ".join(f"{name}[b + l, 0, {i}]" for name, i in places),
         "given": ", ".join(f"tau[b + l, {i}]" for i in range(n)),
-        "store": ", ".join(f"{name}[b + l, s, {i}]" for name, i in places),
+        "store": ", ".join(f"{name}[b + l, record, {i}]" for name, i in places),
         "rows_x": ", ".join(_row("x", i) for i in range(nq + n)),
         "rows_y": ", ".join(_row("y", i) for i in range(nq + n)),
         "rows_tau": ", ".join(_row("x", nq + n + i) for i in range(n)),

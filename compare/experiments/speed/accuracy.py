@@ -179,9 +179,9 @@ def references_in_words(known: Mapping[str, Reference], floors: Floors) -> list[
     if doubles := [scene for scene in floors if known[scene].why]:
         runs = "; ".join(f"{s}: {known[s].apart:.0e} ({known[s].steps} steps; {known[s].why})" for s in doubles)
         words.append(
-            "A series would take too long, and the reference is a run in doubles, of order 8, in these scenes. It differs from "
-            f"the one with half the steps by so many rad, or per s: {runs}. Smaller errors are not known, and have this size, "
-            "or that of rounding, in tables and figures."
+            "A series would take too long, or overflow, and the reference is a run in doubles, of order 8, in these scenes. It "
+            f"differs from the one with half the steps by so many rad, or per s: {runs}. Smaller errors are not known, and have "
+            "this size, or that of rounding, in tables and figures."
         )
     coarse = [s for s, left in floors.items() if not known[s].why and known[s].apart >= left]
     if coarse:
