@@ -30,7 +30,7 @@ from .evaluations import EQUAL, WHOLE
 from .operations import of_source, operations_of
 from .ways import FORWARD
 
-ANGLES_AT_ONCE = 32_768  # angles of the states that one call evaluates: they stay in the caches
+ANGLES_AT_ONCE = 16_384  # angles of the states that one call evaluates: they stay in the caches
 IN_BATCH = 32  # states of a batch of MuJoCo's
 FEW_STATES = 2  # at which accelerations are compared before they are timed
 COLD_START = "from compare.experiments.speed.implementations import compilation; compilation()"

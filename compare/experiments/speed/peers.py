@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-import tmt
-from tmt import kernels
+from tmt import kernels, literal
 
 from ...engines.heyoka import Heyoka, compiled_accelerations
 from ...engines.pinocchio import PinocchioCalls
@@ -84,7 +83,7 @@ def difference(calls: PinocchioCalls, states: Sequence[np.ndarray]) -> float:
     (q, v, tau), tree = states, calls.tree
     acting = np.abs(tau) + np.abs(v) * np.array(tree.damping) + spring_scale(tree, q)
     force = bias_scale(tree, q, v) + acting.max(axis=1)
-    off = np.abs(calls.acceleration(q, v, tau) - tmt.acceleration(q, v, tau, tree)).max(axis=1)
+    off = np.abs(calls.acceleration(q, v, tau) - literal.acceleration(q, v, tau, tree)).max(axis=1)
     return float((off / (FACTOR * EPS * acceleration_scale(tree, q, force))).max())
 
 

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 import tmt
-from tmt import answers, generic, kernels, method
+from tmt import answers, generic, kernels, literal, method
 from tmt.cores import cores
 from tmt.methods import METHODS
 
@@ -51,9 +51,9 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
         return
     forward, terms = kernels.evaluator(tree, FORWARD), kernels.evaluator(tree, TERMS)
     if literal_is_compiled(tree):
-        literal = kernels.evaluator(tree, FORWARD, method.mass_matrix_and_bias, "library_sincos")
+        as_stated = kernels.evaluator(tree, FORWARD, method.mass_matrix_and_bias, "library_sincos")
         library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
-        yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
+        yield FORWARD, "literal, traced, library's sine", lambda count: as_stated.chain(q, qd, tau, count)
         yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
     yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)
     yield TERMS, WAITING, lambda count: terms.chain(q, qd, tau, count)
@@ -103,7 +103,7 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoo
     if count == 1:  # a call from Python for one state: what it costs is the call
         return runs
     if count <= 1000 and n <= IN_PYTHON:
-        runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.literal.acceleration(q, qd, tau, tree)
+        runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: literal.acceleration(q, qd, tau, tree)
     if not kernels.is_traced(tree, METHODS["rk4"]):
         return runs
     in_lanes = count // kernels.LANES * kernels.LANES

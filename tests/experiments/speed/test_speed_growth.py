@@ -87,25 +87,25 @@ def test_an_implementation_that_is_not_there_has_no_row_but_a_reason():
 def test_a_time_is_that_of_one_state(monkeypatch):
     """The fastest call of all passes, over what it did and how many states that has."""
     monkeypatch.setattr(growth, "often_enough", lambda run: 50)
-    passes = iter([{"a": 2e-3}, {"a": 1e-3}, {"a": 3e-3}])
-    monkeypatch.setattr(growth.timing, "fastest", lambda calls, rounds: {one: next(passes)["a"] for one in calls})
+    passes = iter([2e-3, 1e-3, 3e-3])
+    monkeypatch.setattr(growth.timing, "fastest", lambda calls, rounds: dict.fromkeys(calls, next(passes)))
     one = Implementation("a", "a", nothing, lambda of: Made(nothing, 4, 0.5, 7))
-    (found,), _ = growth.rows_of_chain(chain_of(1), [one], 3)
+    (found,), _ = costs_of_growth(Extent((1,), 3), nothing, [one])
     assert found == row(1, "a", pytest.approx(1e9 * 1e-3 / (50 * 4)), 0.5, 7)
 
 
-def test_what_takes_long_is_timed_in_one_pass_alone(monkeypatch):
+def test_in_each_pass_chains_are_timed_one_after_the_other_and_what_takes_long_in_the_first_alone(monkeypatch):
     asked = []
 
     def fastest(calls, rounds):
-        asked.append([one.name for one in calls])
-        return {one: {"short": 1e-3, "long": growth.timing.ONCE}[one.name] for one in calls}
+        asked.append([(n, one.name) for n, one in calls])
+        return {(n, one): {"short": 1e-3, "long": growth.timing.ONCE}[one.name] for n, one in calls}
 
     monkeypatch.setattr(growth.timing, "fastest", fastest)
-    ones = [Implementation(name, name, nothing, lambda of: Made(lambda times: None)) for name in ("short", "long")]
+    ones = [Implementation(name, name, nothing, lambda of: Made(nothing)) for name in ("short", "long")]
     monkeypatch.setattr(growth, "often_enough", lambda run: 1)
-    growth.rows_of_chain(chain_of(1), ones, 3)
-    assert asked == [["short", "long"], ["short"], ["short"]]
+    costs_of_growth(Extent((1, 2), 3), nothing, ones)
+    assert asked == [[(n, "short"), (n, "long")] for n in (1, 2)] + [[(n, "short")] for n in (1, 2, 1, 2)]
 
 
 @pytest.mark.parametrize(
