@@ -54,7 +54,6 @@ RULES = {
     "difference": (series.SUBTRACT, lambda x, y: x - y),
     "change of sign": (series.NEGATIVE, lambda x, y: -x),
     "product": (series.MULTIPLY, lambda x, y: x * y),
-    "square": (series.SQUARE, lambda x, y: x * x),
     "quotient": (series.DIVIDE, lambda x, y: x / y),
     "root": (series.ROOT, lambda x, y: mpmath.sqrt(x)),
 }
@@ -92,10 +91,11 @@ def y_at(t):
 
 
 def expanded(code, rates):
-    """The series of all rows: x, y, the two numbers, and what is computed."""
+    """The series of all rows: x, y, the two numbers, and what is computed; rates: the rows that are those of x and y."""
+    code = [*code, *((series.RATE, k, rate, 0) for k, rate in enumerate(rates))]
     high, low = np.zeros((2, ROWS, ORDER + 1))
     high[:4, 0] = FIRST
-    series.expand(np.array(code), np.array(rates), ORDER + 1, high.reshape(-1), low.reshape(-1))
+    series.expand(np.array(code), ORDER + 1, high.reshape(-1), low.reshape(-1))
     with mpmath.workdps(60):
         return [[exact(*c) for c in zip(*row)] for row in zip(high.tolist(), low.tolist())]
 

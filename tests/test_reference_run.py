@@ -45,6 +45,20 @@ def test_a_pendulum_is_its_elliptic_function(form):
     assert max(off(path, [angle], k) for k, angle in enumerate(expected)) < 1e-29
 
 
+@pytest.mark.parametrize("form", reference_run.FORMS)
+@pytest.mark.parametrize("axis, arm", [((1, 2, 2), (2, 1, -2)), ((3, -1, 1), (0, 1, 1))])
+def test_an_axis_has_length_1_in_all_digits(axis, arm, form):
+    """Of these no double has the direction; pulled along its arm each is the pendulum of frequency 2 per second."""
+    square, arm = sum(x * x for x in arm), tuple(map(float, arm))
+    tree = dataclasses.replace(
+        ONE_HINGE, axis=[axis], com=[arm], inertia=[square * np.eye(3)], gravity=tuple(8.0 * x for x in arm)
+    )
+    assert sum(Fraction(x) ** 2 for x in tree.axis[0]) != 1
+    path = trajectory(tree, [2.0], [1.5], [0.0], 0.375, 8, form=form)
+    expected = exact_swing(0.375 * np.arange(9), 2.0, 1.5, 0.0, 2.0)
+    assert max(off(path, [angle], k) for k, angle in enumerate(expected)) < 1e-28
+
+
 def test_a_free_body_turns_by_elliptic_functions():
     tree = read(PATHS["free_body"]).tree
     moments, turn, spin = np.diag(tree.inertia[0]), (0.5, 0.5, -0.5, 0.5), (4.0, 1.0, 3.0)

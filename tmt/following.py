@@ -4,13 +4,13 @@ What is there in this process costs nothing to get, what lies in the cache folde
 decides. Lanes and cores change nothing but the time: all code of one kind gives the same bits.
 """
 
-import os
 from collections.abc import Callable
 from itertools import pairwise
 
 from . import choice, generic, given, kernels
 from .cache import is_kept
 from .choice import Form, chosen
+from .cores import cores
 from .methods import METHODS, method_named
 from .source import LANES
 from .stepping import Method
@@ -130,11 +130,6 @@ class Runs:
                 )
             self.estimates[form] = Form(form, 0.0 if form in self.there else getting, each)
         return self.estimates[form]
-
-
-def cores() -> int:
-    """Of the machine, those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def runs_of(tree: Tree, name: str) -> Runs:

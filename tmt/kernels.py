@@ -168,6 +168,17 @@ def evaluator(
     return _evaluator(tree, quantity, terms, sine)
 
 
+def lines_of_evaluator(tree: Tree) -> tuple[float, float]:
+    """Of straight-line code of `evaluator`: those that are compiled, and those that one evaluation runs through."""
+    return 4.0 * _slope_lines(tree), _slope_lines(tree)
+
+
+def is_evaluator_on_disk(tree: Tree, quantity: str) -> bool:
+    """Whether machine code of the straight-line code of `evaluator` lies in the cache folder."""
+    source = evaluator_source(tree, quantity, composite.mass_matrix_and_bias, "sincos")
+    return is_kept(f"{name_of(source)}.*")
+
+
 def is_evaluated_straight(tree: Tree) -> bool:
     """Whether `evaluator` compiles straight-line code for a tree: some four times as it stands, in loops of their own."""
     return len(tree.axis) <= LARGEST and 1.7 * _slope_lines(tree) <= LONGEST / 1.5

@@ -51,7 +51,6 @@ class Equations(NamedTuple):
     """Those of one tree under one torque, as series.py reads them."""
 
     code: np.ndarray  # (operations, 4)
-    rates: np.ndarray  # (nq + nv,) the row that is the rate of each number of the state
     numbers: np.ndarray  # (2, numbers), in the rows after the state
     rows: int
 
@@ -88,8 +87,8 @@ def followed(
     tree, q, qd, tau, dt, steps, every=1, form="composite", order=ORDER, tolerance=TOLERANCE
 ) -> tuple[np.ndarray, int, ValueError | None]:
     """The records (k, 2, nq + nv) of a run as far as it goes, the number of its series, and why it ends early, or None."""
-    code, rates, numbers, rows = equations(tree, tau, form)
-    n, most = len(rates), MOST_OPERATIONS // (BESIDE + len(code))
+    code, numbers, rows = equations(tree, tau, form)
+    n, most = tree.coordinates.nq + tree.coordinates.nv, MOST_OPERATIONS // (BESIDE + len(code))
     high, low = np.zeros((2, rows, order + 1))
     high[n : n + numbers.shape[1], 0], low[n : n + numbers.shape[1], 0] = numbers
     times = [Fraction(dt) * k for k in range(0, steps + 1, every)]
@@ -97,12 +96,16 @@ def followed(
     path = [state]
     while len(path) < len(times):
         high[:n, 0], low[:n, 0] = state
-        series.expand(code, rates, order + 1, high.reshape(-1), low.reshape(-1))
+        series.expand(code, order + 1, high.reshape(-1), low.reshape(-1))
         step = step_size(high[:n], tolerance)
         if not step > 0.0:
             error = ValueError(
                 f"at t = {float(t):g} s numbers overflow: the motion diverges, is too fast, or Mbar is singular"
             )
+            if np.isfinite(high[:n, 1]).all():
+                error = TooManySteps(
+                    f"at t = {float(t):.3g} s the terms of a series overflow: the motion is too fast for it"
+                )
             return np.array(path), count, error
         left, count = float((times[-1] - t) / Fraction(min(step, 2.0 * float(times[-1])))), count + 1
         if count - 1 + left > most and count >= min(SEEN, most):
@@ -126,9 +129,9 @@ def equations(tree, tau, form: str) -> Equations:
         qdd = method.acceleration(exact, q, qd, [mpmath.mpf(float(v)) for v in tau], FORMS[form])
         rates = [tape.lift(rate) for rate in (*coordinates.component_rates(q, qd), *qdd)]
 
-        order = tape.needed(rates)
+        order, is_number = tape.needed(rates), lambda i: tape.nodes[i][0] == "number"
         row = {x.i: k for k, x in enumerate((*q, *qd))}
-        constant = [i for i in order if tape.nodes[i][0] == "number"]
+        constant = [i for i in order if is_number(i)]
         row |= {i: k for k, i in enumerate(constant, start=len(row))}
         code, rows = [], len(row)
         for i in order:
@@ -136,25 +139,17 @@ def equations(tree, tau, form: str) -> Equations:
             if operation == "item":
                 row[i] = row[arguments[0]] + 1 + arguments[1]
             elif i not in row:
+                if operation == "*":  # by a number, if it is one of the two: then the second
+                    arguments = sorted(arguments, key=is_number)
                 a, b = row[arguments[0]], row[arguments[-1]]
-                if tape.nodes[arguments[0]][0] == "number" and operation == "*":
-                    a, b = b, a
                 made = [series.SLOPE, series.SINE, series.COSINE]
                 if operation != "sincos":
-                    made = [kind(operation, a, b, range(len(rates), len(rates) + len(constant)))]
+                    made = [series.SCALE if operation == "*" and is_number(arguments[1]) else OPERATIONS[operation]]
                 code += [(act, rows + k, a, b) for k, act in enumerate(made)]
                 row[i], rows = rows, rows + len(made)
         numbers = np.array([pair(tape.nodes[i][1][0]) for i in constant]).reshape(-1, 2)
-    return Equations(
-        np.array(code, dtype=int).reshape(-1, 4), np.array([row[rate.i] for rate in rates]), numbers.T.copy(), rows
-    )
-
-
-def kind(operation: str, a: int, b: int, numbers: range) -> int:
-    """What series.py does for an operation of a trace on these rows; numbers: the rows of those that are constant."""
-    if operation == "*" and b in numbers:
-        return series.SCALE
-    return series.SQUARE if operation == "*" and a == b else OPERATIONS[operation]
+        code += [(series.RATE, k, row[rate.i], 0) for k, rate in enumerate(rates)]
+    return Equations(np.array(code), numbers.T.copy(), rows)
 
 
 def first_state(coordinates, q, qd) -> np.ndarray:

@@ -13,7 +13,7 @@ from .machine_code import compiled
 from .pairs import add, divide, joined, multiply, root, sincos, two_sum
 from .sine import fma
 
-ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, SQUARE, ROOT, DIVIDE, SINE, COSINE = range(11)
+ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, ROOT, DIVIDE, SINE, COSINE, RATE = range(11)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -28,15 +28,15 @@ def convolution(high, low, a, b, first, last):
         x, y = high[i], high[m]
         p = x * y
         total, e = two_sum(total, p)
-        error += e + (fma(x, y, -p) + (x * low[m] + low[i] * y))
+        error += e + fma(x, low[m], fma(low[i], y, fma(x, y, -p)))
     return joined(total, error)
 
 
 @compiled
-def expand(code, rates, width, high, low):
+def expand(code, width, high, low):
     """Write the coefficients of the state (its first are there) and of all that it is computed by.
 
-    rates: of each number of the state the row that is its derivative; width: of a row; high, low: flat.
+    width: of a row; high, low: flat. The last operations are those that make the state's next coefficients from their rates.
     """
     for k in range(width - 1):
         for n in range(len(code)):
@@ -57,37 +57,35 @@ def expand(code, rates, width, high, low):
             if operation == ROOT and k == 0:
                 high[c], low[c] = root(ah, al)
                 continue
-            if operation >= SINE and k == 0:
+            if operation in (SINE, COSINE) and k == 0:
                 sh, sl, ch, cl = sincos(ah, al)
                 high[c], low[c] = (sh, sl) if operation == SINE else (ch, cl)
                 continue
 
             first, last = 0, k
-            if operation in (SQUARE, ROOT):  # each product of two different ones appears twice
-                a = a if operation == SQUARE else r
-                b, first, last = a, int(operation == ROOT), (k - 1) // 2
+            if operation == ROOT:
+                a, b, first, last = r, r, 1, k - 1
             elif operation == DIVIDE:
                 a, b, first = b, r, 1
-            elif operation >= SINE:  # the slope of the angle stands before the sine, and that before the cosine
+            elif operation in (
+                SINE,
+                COSINE,
+            ):  # the slope of the angle stands before the sine, and that before the cosine
                 a, b, first = (r - width, r + width, 1) if operation == SINE else (r - 2 * width, r - width, 1)
+            elif operation == RATE:
+                c, last = c + 1, -1
             h, l = convolution(high, low, a, b + k, first, last)
 
-            if operation in (SQUARE, ROOT):
-                h, l = 2.0 * h, 2.0 * l
-                if k % 2 == 0:
-                    middle = a + k // 2
-                    h, l = add(h, l, *multiply(high[middle], low[middle], high[middle], low[middle]))
-            if operation >= ROOT:
-                bh, bl = (float(k) if operation == SINE else -float(k)), 0.0
-                if operation in (ROOT, DIVIDE):
+            if operation > MULTIPLY:
+                bh, bl = -float(k) if operation == COSINE else float(k), 0.0
+                if operation == RATE:
+                    h, l, bh = ah, al, float(k + 1)
+                elif operation in (ROOT, DIVIDE):
                     h, l = add(ah, al, -h, -l)
                     of = 2.0 if operation == ROOT else 1.0
                     bh, bl = of * high[a], of * low[a]
                 h, l = divide(h, l, bh, bl)
             high[c], low[c] = h, l
-        for i in range(len(rates)):
-            rate = rates[i] * width + k
-            high[i * width + k + 1], low[i * width + k + 1] = divide(high[rate], low[rate], float(k + 1), 0.0)
 
 
 @compiled

@@ -11,9 +11,9 @@ import math
 from math import atan as arctan, sqrt
 
 import numpy as np
-from numba import njit
+from numba import carray, njit
 
-from tmt.sine import LIMIT, fma, sincos
+from tmt.sine import LIMIT, block, fma, sincos, widest
 from tmt.written import written
 
 
@@ -102,6 +102,7 @@ SLOPES = '''
 @njit("void(float64[::1], float64[::1], uint64, float64)", cache=CACHE, error_model="numpy")
 def slopes(x, k, o, dt):
     """The slopes of a block of states, of which x holds the arguments, row by row; to k from o on."""
+    widest()
     for l in range(np.uint64({W})):
         {results} = slope({arguments})
 '''
@@ -113,6 +114,7 @@ def run(q, qd, tau, dt, ended, every):
     {check}
     if q.shape[0] % {W} != 0:
         raise ValueError("a multiple of {W} runs is expected")
+    widest()
     evaluations = 0
     x, y, k = np.empty({size_x}), np.empty({size_y}), np.empty({size_k})
     alive = np.empty({W}, dtype=np.bool_)
@@ -195,20 +197,22 @@ def lanes(q, qd, tau, out):
     if not (q.shape == ({nq}, q.shape[1]) and qd.shape == tau.shape == ({n}, q.shape[1]) and out.shape == ({m}, q.shape[1])):
         raise ValueError("q of shape ({nq}, N), qd and tau ({n}, N) and out ({m}, N) are expected")
     apart(q, qd, tau, out)
-    x, y = np.empty({size_x}), np.empty({size_y})
+    widest()
+    y = carray(block({size_y}), {size_y})
     flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
     count = q.shape[1]
     for b in range(0, count - {W} + 1, {W}):
         {begins}
         for l in range(np.uint64({W})):
-            {gather}
-        for l in range(np.uint64({W})):
             {results} = quantity({arguments})
+        beyond = np.uint64(0)
         for l in range(np.uint64({W})):
             {scatter}
-        for l in range({W}):
-            if not {sound_lane}:
-                {lane_out} = by_library({lane_in})
+            beyond += np.uint64(0) if {sound_lane} else np.uint64(1)
+        if beyond:
+            for l in range({W}):
+                if not {sound_place}:
+                    {lane_out} = by_library({lane_in})
     for i in range(count // {W} * {W}, count):
         {column_out} = quantity({column_in})
         if not {sound_column}:

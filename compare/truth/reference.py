@@ -100,7 +100,7 @@ def in_doubles(case: Case) -> Reference:
     apart, path, count = min(found, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
     if not np.isfinite(apart):
         raise ValueError(
-            f"scene {case.name!r}: runs with up to {count} steps of {DOUBLES} do not reach its end; a slower start or a "
+            f"scene {case.name!r}: runs with up to {found[-1][2]} steps of {DOUBLES} do not reach its end; a slower start or a "
             "shorter scene is expected"
         )
     high = np.concatenate(path, axis=1)

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-import tmt
+from tmt import literal
 
 from ...case import Case
 from ...engines import COMPARED, GRID, Engine, Method, Setting
@@ -19,8 +19,9 @@ from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import Reference, has_no_reference, references
 from ...truth.smallest import reduced
-from . import accuracy, advice, evaluations, targets, tumbling
+from . import accuracy, advice, evaluations, growth, targets, tumbling
 from .accuracy import fill_in, reference_in_words, spread_in_words
+from .affordable import forms_in_words
 from .floors import floor
 from .settings import (
     absent_in_words,
@@ -125,6 +126,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)
     result.notes += accuracy.references_in_words(known, floors)
     result.notes += accuracy.floors_in_words(result.rows, floors)
+    followed = forms_in_words(cases, [method.name for method in taking if method.engine == "tmt"])
+    result.notes += [followed] * bool(followed)
     if timed:
         add_times(result, setup, names, of_scenes)
     result.notes += accuracy.first_order_in_words(result.rows, floors)
@@ -153,6 +156,7 @@ def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Seq
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
     result.notes += [*sentences, *spread_in_words(spread), PARTS]
+    growth.add_growth(result, setup)
     if not setup.robot.is_read:  # of a file nothing was aimed at
         aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
         result.tables["speed_targets"] = aims
@@ -186,7 +190,7 @@ def rows_of_scene(
 def true_energy(case: Case, reference: Reference) -> np.ndarray:
     """The energy of the reference of a scene at its times, J, (times,)."""
     nq = case.coordinates.nq
-    return tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+    return literal.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
 
 
 def row_of_run(
@@ -219,7 +223,7 @@ def row_of_run(
         states = [part.copy() for part in true]
         for state, part, own in zip(states, (motion.q, motion.v), free):
             state[:, own] = 0.0 if ended else part
-        off = np.abs(tmt.energy(*states, tree) - energy).max()
+        off = np.abs(literal.energy(*states, tree) - energy).max()
     return {
         "scene": case.name, "engine": method.engine, "method": method.name,
         "dt_s": setting.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
@@ -242,7 +246,7 @@ def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
-    from . import figures_evaluations, figures_times  # matplotlib is for the process that draws
+    from . import figures_evaluations, figures_growth, figures_times  # matplotlib is for the process that draws
 
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
@@ -251,3 +255,5 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     yield partial(figures_times.draw_evaluations, result)
     yield partial(figures_times.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)
+    if "growth" in result.tables:
+        yield partial(figures_growth.draw_chain, result)
