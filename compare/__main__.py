@@ -22,6 +22,7 @@ from .process.streams import in_one_line
 
 PROGRAM = "python -m compare"
 ANSWERING_STEPS = "stability"  # the experiment of --dt and --integrator
+GROWING = "speed"  # the experiment of --growth
 LONGEST_ASKED = 5.0  # s, that can be asked about
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 EXAMPLES = """examples:
@@ -32,6 +33,7 @@ EXAMPLES = """examples:
   python -m compare all --mjcf robot.xml         any robot compared with tmt's equations for its compiled model
   python -m compare stability --mjcf robot.xml --integrator Euler --dt 0.001
                                                  whether that step is stable under the robot's own servos
+  python -m compare speed --growth               what a chain costs as it grows from 1 joint to 64
   python -m compare all --reference my.py:arm    your equations compared with MuJoCo, which runs the arm
   python -m compare speed --scenes my.toml       your own scenes beside those of the arm
 
@@ -100,12 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="where the report goes (default: %(default)s)",
     )
     parser.add_argument("--quick", action="store_true", help="fewer states, in seconds")
-    parser.add_argument(
-        "--mjcf",
-        type=not_empty,
-        metavar="FILE",
-        help="your model, an MJCF file",
-    )
+    parser.add_argument("--mjcf", type=not_empty, metavar="FILE", help="your model, an MJCF file")
     parser.add_argument(
         "--reference",
         type=stated_reference,
@@ -138,6 +135,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="NAME",
         help=f"{ANSWERING_STEPS}: the same with this integrator of MuJoCo (default: the file's)",
     )
+    parser.add_argument(
+        "--growth",
+        action="store_true",
+        help=f"{GROWING}: what a chain costs as it grows to 64 joints, not to 8 as in a whole run for the arm",
+    )
     options = parser.parse_args(with_minus(sys.argv[1:] if arguments is None else arguments))
     if options.scenes and options.experiment not in (*FOLLOWING_SCENES, "all"):
         parser.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {options.experiment} follows no scene")
@@ -145,6 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("--joints is for equations of your own (--reference FILE.py:OBJECT or MODULE:OBJECT)")
     if (options.dt, options.integrator) != (None, None) and options.experiment != ANSWERING_STEPS:
         parser.error(f"--dt and --integrator are for {ANSWERING_STEPS}; {options.experiment} answers for no other step")
+    if options.growth and options.experiment != GROWING:
+        parser.error(f"--growth is for {GROWING}; {options.experiment} times no chain that grows")
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
     try:
         return carry_out(options, command)
@@ -208,7 +212,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference
-                of_run |= {"alone": options.experiment != "all", "asked": asked}
+                of_run |= {"alone": options.experiment != "all", "asked": asked, "growth": options.growth}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():

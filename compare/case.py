@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 import tmt
+from tmt import literal
 from tmt.lock import CLOSE_TO_ONE
 from tmt.tree import GAINS
 
@@ -166,9 +167,9 @@ class Case:
         """Torque at the free joints, N m, (nv,)."""
         torque = self.scene.torque
         if torque == "hold":
-            torque = tmt.gravity_balance(self.posture, self.whole)
+            torque = literal.gravity_balance(self.posture, self.whole)
             if self.whole.has_springs:
-                torque = torque + tmt.spring_torque(self.posture, self.whole)
+                torque = torque + literal.spring_torque(self.posture, self.whole)
         elif self.controller:
             torque = self.controller.torque
         elif torque == "free":

@@ -117,6 +117,8 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
             ["mass", "--scenes", "my.toml"],
             "--scenes is for trajectory, speed, reduction and all; mass follows no scene",
         ),
+        (["mass", "--growth"], "--growth is for speed; mass times no chain that grows"),
+        (["all", "--growth"], "--growth is for speed; all times no chain that grows"),
         (["speed", "--scenes", ""], "--scenes: it is empty"),
         (["speed", "--scenes", "my.toml"], "cannot read my.toml: No such file or directory"),
         (["mass", "--mjcf", "missing.xml"], "cannot read missing.xml: No such file or directory"),

@@ -123,13 +123,6 @@ def test_every_loop_takes_the_methods_own_steps(name):
         assert np.allclose(paths[:, 0, -1], state, rtol=1e-12, atol=1e-12), stepper
 
 
-def test_few_steps_are_followed_by_the_loop_and_many_by_code_of_their_own():
-    assert kernels.stepper(DRIVEN, "rk4", 100) is kernels._loop_stepper(DRIVEN, method_named("rk4"))
-    for steps in (None, kernels.FEW):
-        assert kernels.stepper(DRIVEN, "rk4", steps) is kernels._stepper(DRIVEN, method_named("rk4"))
-    assert kernels.stepper(FORK, "rk4", 100) is kernels._stepper(FORK, method_named("rk4"))
-
-
 @pytest.mark.parametrize(
     "name, speed, position",
     [

@@ -100,12 +100,12 @@ def test_runs_side_by_side_have_the_bits_of_each_alone(name, rng, monkeypatch):
     found = []
     for made in (kernels.stepper, kernels.lane_stepper):
         paths = [np.concatenate([x[:, None], np.zeros((len(x), 4, x.shape[1]))], axis=1) for x in (q, qd)]
-        ended = np.zeros(len(q), np.int8)
+        ended = np.zeros((len(q), 2), int)
         count = made(tree, name)(*paths, tau, 0.01, ended)
         found.append([*paths, ended, count])
     for alone, beside in zip(*found):
         assert np.array_equal(alone, beside, equal_nan=True)
-    assert found[0][2][5] and np.count_nonzero(found[0][2]) == 1 and np.isfinite(found[0][0][4]).all()
+    assert found[0][2][5, 0] and np.count_nonzero(found[0][2][:, 0]) == 1 and np.isfinite(found[0][0][4]).all()
 
 
 @pytest.mark.parametrize("quantity", kernels.QUANTITIES)

@@ -9,8 +9,10 @@ from trees import random_tree
 
 import tmt
 from compare.judge.scale import EPS, FACTOR, bias_scale
-from tmt import kernels, method
+from compare.judge.timing import vectors
+from tmt import composite, kernels, method
 from tmt.methods import METHODS, one_step
+from tmt.source import evaluator_source, lanes_source
 from tmt.trace import Tape
 
 
@@ -85,3 +87,19 @@ def test_a_tree_of_one_hinge_compiles_in_every_form(rng):
         kernels.stepper(tree, name)(*one, tau[: kernels.LANES], 0.01)
         kernels.lane_stepper(tree, name)(*side_by_side, tau[: kernels.LANES], 0.01)
         assert np.array_equal(one, side_by_side) and np.isfinite(one).all(), name
+
+
+def test_lanes_lie_in_the_widest_registers():
+    register = {"AVX-512": "zmm", "AVX2": "ymm"}.get(vectors().rpartition(" ")[2])
+    if not register:
+        pytest.skip(f"what the registers of {vectors()} are called is not known here")
+    tree, known = tmt.ARM.lock({"alpha": 0.1, "beta": 0.2}), {}
+    for text in (
+        evaluator_source(tree, "mass_matrix_and_bias", composite.mass_matrix_and_bias, "sincos"),
+        lanes_source(tree, METHODS["semi_implicit_euler"]),
+    ):
+        exec(text.replace("cache=CACHE", "cache=False"), known)  # numba keeps no text of what it reads from a cache
+    for name in ("lanes", "slopes", "run"):
+        (code,) = known[name].inspect_asm().values()
+        fused = [line for line in code.splitlines() if line.strip().startswith(("vfmadd", "vfnmadd")) and "pd" in line]
+        assert fused and all(register in line for line in fused), name

@@ -14,7 +14,7 @@ import sys
 from collections import namedtuple
 import mpmath, numpy as np
 from trees import random_state, tree_of_kinds
-from tmt import composite, generic, loops, method
+from tmt import generic, loop_bodies, loops, method
 from tmt.exact import exact_tree
 
 mpmath.mp.dps, seed = 50, int(sys.argv[1])
@@ -35,6 +35,26 @@ loops.forward_dynamics(numbers, q, qd, tau, w, qdd)
 force = method.reduced_force(exact, bias, q, qd, tau)
 left = [sum(m * x for m, x in zip(row, qdd)) - f for row, f in zip(Mbar, force)]
 print(max(map(abs, force)) > 1, mpmath.nstr(max(map(abs, left))))
+Body = namedtuple("Body", generic.BODY.names)
+joints = [Joint(*row) for row in generic.rows(tree, mpmath.mpf, about_world=True)]
+own = zip(generic.bodies(tree), exact.mass, exact.com, exact.inertia)
+bodies = [Body(int(row["joint"]), m, com, [x for line in I for x in line]) for row, m, com, I in own]
+outer, parts, m = numbers._replace(joints=joints), method.bodies(exact, q, qd), len(bodies)
+w = [None] * loop_bodies.workspace(outer)
+in_line = lambda vectors: [x for v in vectors for x in v]
+columns = lambda of: [[*column][k] for b in parts for k in range(3) for column in getattr(b, of)]
+energy = method.potential(parts, exact.gravity) + method.spring_energy(exact, q)
+expected = {
+    "POSITIONS": in_line(b.x for b in parts), "ANGULAR_VELOCITIES": in_line(b.omega for b in parts),
+    "JACOBIANS": columns("T") + columns("B"),
+    "CONVECTIVE_TERMS": in_line(b.v_conv for b in parts) + in_line(b.w_conv for b in parts),
+    "POTENTIAL_ENERGY": [energy], "ENERGY": [energy + method.kinetic(parts, qd, exact.armature)],
+    "SPRING_TORQUE": method.spring_torque(exact, q),
+}
+for name, values in expected.items():
+    out = [None] * len(values)
+    loop_bodies.of_bodies(outer, bodies, getattr(loop_bodies, name), q, qd, w, out)
+    print(max(map(abs, values)) > 0.1, mpmath.nstr(max(abs(x - y) for x, y in zip(out, values))))
 print(*tree.kind, any(tree.stiffness))
 """
 
@@ -47,5 +67,5 @@ def test_the_loops_are_the_method_in_50_digits(seed):
     )
     assert run.returncode == 0, run.stderr
     *found, kinds = (line.split() for line in run.stdout.splitlines())
-    assert len(found) == 3 and all(some == "True" and float(off) < 1e-45 for some, off in found)
+    assert len(found) == 10 and all(some == "True" and float(off) < 1e-45 for some, off in found)
     assert {*kinds} == {"hinge", "slide", "ball", "True"}

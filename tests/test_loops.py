@@ -126,7 +126,7 @@ def test_a_state_that_cannot_be_gone_on_from_has_its_reason():
 def followed(tree, stepping, q, qd, tau, dt, steps):
     """The paths (steps + 1, nq and nv) of one run by the loop of a method, and its evaluations."""
     paths = [np.concatenate([[x], np.full((steps, len(x)), np.nan)])[None] for x in (q, qd)]
-    count = generic.stepper(tree, stepping)(*paths, tau[None], dt, np.zeros(1, np.int8))
+    count = generic.stepper(tree, stepping)(*paths, tau[None], dt, np.zeros((1, 2), int), 1)
     return paths[0][0], paths[1][0], count
 
 
@@ -174,11 +174,11 @@ def test_the_error_of_a_step_is_estimated_as_stated():
 def test_the_adaptive_loop_comes_as_near_as_its_tolerance_says():
     tree, rng = branched(1)
     q, qd, tau = random_state(rng, tree)
-    run, ended = generic.stepper(tree, METHODS["dopri8_adaptive"]), np.zeros(1, np.int8)
+    run, ended = generic.stepper(tree, METHODS["dopri8_adaptive"]), np.zeros((1, 2), int)
     ends, counts = [], []
     for tolerance in (1e-4, 1e-8, 1e-13):
         paths = [np.array([[x, x]]) for x in (q, qd)]
-        counts.append(run(*paths, tau[None], 0.5, tolerance, ended))
+        counts.append(run(*paths, tau[None], 0.5, tolerance, ended, 1))
         ends.append(np.concatenate([path[0, 1] for path in paths]))
     errors = [np.abs(end - ends[-1]).max() for end in ends[:-1]]
     assert errors[0] < 1e-3 and 0.0 < errors[1] < 1e-7 and counts[0] < counts[1] < counts[2] and not ended.any()

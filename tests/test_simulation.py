@@ -12,9 +12,8 @@ import pytest
 
 import tmt
 from compare.judge.rounding import band
-from tmt import kernels
 from tmt.methods import METHODS, one_step
-from tmt.simulation import singular_in
+from tmt.simulation import FORMS, singular_in
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
@@ -119,19 +118,17 @@ def test_a_run_says_why_it_ended(method, start, more, says):
     assert 0 <= last < 200 and np.isnan(motion.q[last + 1 :]).all() and np.isnan(motion.qd[last + 1 :]).all()
 
 
-def test_in_a_batch_each_run_says_why_it_ended(rng, monkeypatch):
+def test_in_a_batch_each_run_says_why_it_ended():
     qd = np.zeros((2, 20, 3))
     qd[1, 3], qd[0, 4] = 1e8, np.nextafter(np.inf, 0)
-    single = tmt.simulate(BENT, qd, REST, 0.01, 30)
+    single = tmt.simulate(BENT, qd, REST, 0.01, 30, form="straight_line")
     assert single.ended.shape == (2, 20)
     assert {place for place in np.ndindex(2, 20) if single.ended[place]} == {(1, 3), (0, 4)}
-    monkeypatch.setattr(kernels, "WORTH", 1)
-    lanes = tmt.simulate(BENT, qd, REST, 0.01, 30)
-    assert np.array_equal(lanes.ended, single.ended)
-    large = tmt.simulate(BENT, qd, REST, 0.01, 30, model=tmt.ARM)
-    monkeypatch.setattr(kernels, "LONGEST", 0)
-    large = tmt.simulate(BENT, qd, REST, 0.01, 30)
-    assert np.array_equal(large.ended != None, single.ended != None)  # noqa: E711
+    for form in FORMS:
+        other = tmt.simulate(BENT, qd, REST, 0.01, 30, form=form)
+        assert other.form == form and np.array_equal(other.ended != None, single.ended != None)  # noqa: E711
+        if form.startswith("straight"):
+            assert np.array_equal(other.ended, single.ended)
 
 
 def test_a_motion_is_three_arrays_and_more():

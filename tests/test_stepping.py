@@ -115,8 +115,7 @@ def test_a_method_of_ones_own(own, order, rng, monkeypatch):
     assert np.allclose(
         one_step(own, tmt.ARM, q[0], qd[0], tau[0], 0.01), [mine.q[0, 1], mine.qd[0, 1]], rtol=0, atol=1e-12
     )
-    monkeypatch.setattr(kernels, "WORTH", 1)
-    lanes = tmt.simulate(q, qd, tau, 0.01, 20, "mine")
+    lanes = tmt.simulate(q, qd, tau, 0.01, 20, "mine", form="straight_line_lanes")
     assert np.array_equal(lanes.q, mine.q) and np.array_equal(lanes.qd, mine.qd)
     with pytest.raises(ValueError, match="'mine' has a fixed step and takes no tolerance"):
         tmt.simulate(BENT, REST, REST, 0.1, 1, "mine", tolerance=1e-6)

@@ -81,11 +81,21 @@ def private(path, group) -> bool:
     return group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name} and not further
 
 
-def load(text):
-    """The module with this source, its machine code from the cache folder if that is the user's own and can be used."""
+def name_of(text) -> str:
+    """The name of the module with this source."""
     # numba versions do not read each other's machine code: each keeps its own
     key = "\n".join([version("numba"), SINE.read_text(encoding="utf-8"), text])
-    name = "kernel_" + hashlib.sha256(key.encode()).hexdigest()[:16]
+    return "kernel_" + hashlib.sha256(key.encode()).hexdigest()[:16]
+
+
+def is_kept(pattern) -> bool:
+    """Whether there is machine code of such a name in the cache folder; it is not looked at."""
+    return any((cache_folder() / "__pycache__").glob(f"{pattern}.nbi"))
+
+
+def load(text):
+    """The module with this source, its machine code from the cache folder if that is the user's own and can be used."""
+    name = name_of(text)
     try:
         return from_disk(name, text.replace("CACHE", "True"), own_folder())
     except NotOwn as error:

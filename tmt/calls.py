@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
+from .given import whole
 from .values import shown
 
-NOT_ASKED = np.zeros(0, np.int8)  # where nobody wants to know why runs ended
+NOT_ASKED = np.zeros((0, 2), np.int64)  # where nobody wants to know why runs ended
 
 
 def refused() -> tuple:
@@ -36,28 +37,30 @@ class Evaluator(NamedTuple):
 def checked_run(compiled, nq, n, adaptive) -> Callable:
     """The run of kernels.stepper."""
     shapes = {
-        "q": f"(runs, steps + 1, {nq})",
-        "qd": f"(runs, steps + 1, {n})",
+        "q": f"(runs, records, {nq})",
+        "qd": f"(runs, records, {n})",
         "tau": f"(runs, {n})",
-        "ended": "(runs,)",
+        "ended": "(runs, 2)",
     }
 
-    def run(q, qd, tau, dt, ended=NOT_ASKED):
+    def run(q, qd, tau, dt, ended=NOT_ASKED, every=1):
         if not type(q) is type(qd) is type(tau) is type(ended) is ndarray:
             q, qd, tau, ended = plain(shapes, q, qd, tau, ended)
         if type(dt) is not float:
             dt = real("dt", dt)
+        if type(every) is not int:
+            every = whole("every", every)
         try:
-            return compiled(q, qd, tau, dt, ended)
+            return compiled(q, qd, tau, dt, ended, every)
         except refused() as error:
             raise refusal(error, shapes, q, qd, tau, ended) from None
 
-    def run_adaptive(q, qd, tau, dt, tolerance, ended=NOT_ASKED):
+    def run_adaptive(q, qd, tau, dt, tolerance, ended=NOT_ASKED, every=1):
         if not type(q) is type(qd) is type(tau) is type(ended) is ndarray:
             q, qd, tau, ended = plain(shapes, q, qd, tau, ended)
-        dt, tolerance = real("dt", dt), real("tolerance", tolerance)
+        dt, tolerance, every = real("dt", dt), real("tolerance", tolerance), whole("every", every)
         try:
-            return compiled(q, qd, tau, dt, tolerance, ended)
+            return compiled(q, qd, tau, dt, tolerance, ended, every)
         except refused() as error:
             raise refusal(error, shapes, q, qd, tau, ended) from None
 
@@ -117,7 +120,7 @@ def plain(shapes, *arrays) -> list[np.ndarray]:
 def refusal(error, shapes, *arrays) -> Exception:
     """A ValueError that says which of the arrays compiled code cannot take; the error itself if all of them look right."""
     for (name, shape), array in zip(shapes.items(), arrays):
-        dtype = np.dtype(np.int8 if name == "ended" else np.float64)
+        dtype = np.dtype(np.int64 if name == "ended" else np.float64)
         wanted = f"a contiguous array of {dtype} of shape {shape} that can be written is expected"
         if array.dtype != dtype or array.ndim != 1 + shape.rstrip(",)").count(","):
             return ValueError(f"{name} has shape {array.shape} and numbers of type {array.dtype}; {wanted}")

@@ -3,6 +3,7 @@
 Straight-line code grows with the number of hinges, and so does the time to compile it; for large trees these loops are used.
 """
 
+import sys
 from collections.abc import Callable
 from functools import lru_cache, partial
 from types import SimpleNamespace
@@ -33,30 +34,56 @@ NUMBERS = {"reference": (), "moves": (), "offset": 3, "axis": 9, "mass": (), "mo
 JOINT = np.dtype([(name, "i8") for name in WHOLE] + [(name, "f8", shape) for name, shape in NUMBERS.items()])
 
 
+WORLD = np.dtype([("gravity", "f8", 3), ("nq", "i8")])
+BODY = np.dtype([("joint", "i8"), ("mass", "f8"), ("com", "f8", 3), ("inertia", "f8", 9)])
+
+
 @lru_cache(maxsize=64)
-def arrays(tree) -> Arrays:
-    """The Tree as arrays."""
+def arrays(tree, about_world: bool = False) -> Arrays:
+    """The Tree as arrays; about_world: its places are those about the origin of the world, and no longer about the first joint
+    that turns."""
     joints = tree.coordinates.joints
     before = [v - 1 for v in range(len(tree.axis))]
     for parent, joint in zip(tree.parent, joints):
         before[joint.qd.start] = joints[parent].qd.stop - 1 if parent >= 0 else -1
     gains = (matrix(gain) for gain in (tree.position_gain, tree.speed_gain))
-    return Arrays(np.array(rows(tree), JOINT), np.array(before), tree.gravity, tree.coordinates.nq, *gains)
+    return Arrays(
+        np.array(rows(tree, about_world=about_world), JOINT),
+        np.array(before),
+        tree.gravity,
+        tree.coordinates.nq,
+        *gains,
+    )
 
 
-def rows(tree, number=float) -> list[tuple]:
-    """The joints by the names of JOINT, each followed by one that it carries where there is one. number: see composite.py."""
+def order_of(tree) -> list[int]:
+    """The joints as the loops walk them, each followed by one that it carries where there is one; before them the world, -1."""
     order, todo = [], [-1]
     while todo:
         order.append(todo.pop())
         todo += [i for i in reversed(range(len(tree.parent))) if tree.parent[i] == order[-1]]
+    return order
+
+
+def bodies(tree) -> np.ndarray:
+    """The bodies of a Tree, (m,) of BODY: `joint` is the place of the joint among those of `arrays`, -1 the world."""
+    place = {i: k for k, i in enumerate(order_of(tree), -1)}
+    own = zip(tree.body_hinge, tree.mass, tree.com, tree.inertia)
+    return np.array(
+        [(place[joint], mass, com, [x for row in inertia for x in row]) for joint, mass, com, inertia in own], BODY
+    )
+
+
+def rows(tree, number=float, about_world=False) -> list[tuple]:
+    """The joints by the names of JOINT in the order of `order_of`. number: see composite.py."""
+    order = order_of(tree)
     place = {i: k for k, i in enumerate(order, -1)}
     masses, grounded, result = carried_by_joint(tree), {-1: True}, []
     for k, i in enumerate(order[1:]):
         (kind, at, by), parent, own = tree.coordinates.joints[i], tree.parent[i], masses[i].rounded(number)
         # what only slides carry: the common point O of all that hangs on it moves with it
         grounded[i] = kind == "slide" and grounded[parent]
-        still = grounded[parent]
+        still = grounded[parent] and not about_world
         count = by.stop - by.start
         result.append((
             tuple(KINDS).index(kind), place[parent], at.start, by.start, count,
@@ -71,6 +98,17 @@ def rows(tree, number=float) -> list[tuple]:
     return result
 
 
+def in_parts(tree) -> tuple:
+    """The Tree as loop_answers.py takes it: arrays one by one."""
+    inner, outer, n = arrays(tree), arrays(tree, about_world=True), len(tree.axis)
+    gains = np.zeros((2, n, n) if tree.has_gains else (2, 0, 0))
+    for of, gain in zip(gains, (inner.position_gain, inner.speed_gain)):
+        if len(gain):
+            of[:] = gain
+    world = np.array([(inner.gravity, inner.nq)], WORLD)
+    return inner.joints, outer.joints, bodies(tree), inner.before, world, gains
+
+
 def matrix(rows) -> np.ndarray:
     """Rows as an array of two dimensions, whatever their number."""
     return np.array(rows, dtype=float).reshape(len(rows), len(rows))
@@ -83,14 +121,27 @@ def compiled():
     return loop_calls
 
 
+def loops() -> dict:
+    """The compiled loops of all methods by their names."""
+    from . import loop_runs, loop_semi_implicit, loop_stages
+
+    return vars(loop_stages) | vars(loop_semi_implicit) | vars(loop_runs)
+
+
+def is_compiled(name: str) -> bool:
+    """Whether a loop of that name is there in this process."""
+    modules = (
+        sys.modules.get(f"{__package__}.{module}") for module in ("loop_runs", "loop_semi_implicit", "loop_stages")
+    )
+    return any(vars(module)[name].signatures for module in modules if module and name in vars(module))
+
+
 def stepper(tree, stepping, lanes=False) -> Callable:
-    """run(q, qd, tau, dt, ended) of a Tree and a method that has `loop`, as in kernels.stepper.
+    """run(q, qd, tau, dt, ended, every) of a Tree and a method that has `loop`, as in kernels.stepper.
 
     lanes: of runs that are a multiple of eight, eight side by side where the method has such a loop.
     """
-    from . import loop_runs, loop_semi_implicit, loop_stages
-
-    known = vars(loop_stages) | vars(loop_semi_implicit) | vars(loop_runs)
+    known = loops()
     loop = known[stepping.loop]
     if lanes:
         loop = known.get(f"{stepping.loop}_lanes", loop)
@@ -101,7 +152,7 @@ def stepper(tree, stepping, lanes=False) -> Callable:
         np.empty((0, 1, tree.coordinates.nv)),
         np.empty((0, len(tree.axis))),
     )
-    run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty(0, np.int8))
+    run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty((0, 2), np.int64), 1)
     loop.disable_compile()
     return run
 

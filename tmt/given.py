@@ -15,6 +15,8 @@ from .lock import CLOSE_TO_ONE
 from .tree import Tree
 from .values import real_numbers, shown
 
+SMALL = 1e8  # B, that any machine has
+
 
 def quantity(function: Callable) -> Callable:
     """The function without NumPy's warnings, which no caller can place; what does not fit into memory is a ValueError."""
@@ -77,6 +79,8 @@ def checked_model(model) -> None:
 
 def positive(name, value, kind) -> float:
     """The value as a finite float above 0."""
+    if type(value) is float and 0.0 < value < math.inf:
+        return value
     try:
         number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -88,23 +92,26 @@ def positive(name, value, kind) -> float:
 
 def whole(name, value) -> int:
     """The value as an int of at least 1."""
+    if type(value) is int and value >= 1:
+        return value
     if not isinstance(value, numbers.Integral) or isinstance(value, bool) or value < 1:
         raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
     return int(value)
 
 
-def paths(runs, steps, nq, nv) -> tuple[np.ndarray, np.ndarray]:
-    """NaN for the q and qd of so many runs, (runs, steps + 1, nq or nv); ValueError if there is no memory for it."""
-    size = runs * (steps + 1) * (nq + nv) * 8
+def paths(runs, steps, every, nq, nv) -> tuple[np.ndarray, np.ndarray]:
+    """Arrays for the q and qd of so many runs, (runs, steps / every + 1, nq or nv); ValueError if there is no memory for them."""
+    records = steps // every + 1
+    size = runs * records * (nq + nv) * 8
     try:
-        if size > memory():
+        if size > SMALL and size > memory():
             raise MemoryError
-        return np.full((runs, steps + 1, nq), np.nan), np.full((runs, steps + 1, nv), np.nan)
+        return np.empty((runs, records, nq)), np.empty((runs, records, nv))
     except MemoryError:
         size = f"{size / 1e9:.3g} GB" if size < 10**100 else "more than 1e+100 B"
         raise ValueError(
             f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would take {size} of "
-            "memory, more than there is"
+            "memory, more than there is; with every=k each k-th of them is kept"
         ) from None
 
 

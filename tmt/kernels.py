@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 
 from . import composite, generic
-from .cache import load
+from .cache import is_kept, load, name_of
 from .calls import Evaluator, checked_evaluator, checked_run
 from .given import checked_model
 from .methods import METHODS, method_named
@@ -23,23 +23,30 @@ LONGEST = 14_000  # lines of straight-line code that are compiled, which takes h
 INLINED = 0.15  # what a line costs each time it is put in the place of a call, beside 1 where it stands
 LARGEST = 24  # speeds: larger trees are not even traced
 QUANTITIES, SINES = ("forward_dynamics", "mass_matrix_and_bias"), ("sincos", "library_sincos")
-FEW = 300_000  # steps of all runs together, with gains: up to there the loop is done before a compilation would be
-WORTH = 10_000_000  # steps of all runs together from which lanes are worth their compilation
 
 
-def stepper(tree: Tree, method_name: str, steps: int | None = None) -> Callable:
+def stepper(tree: Tree, method_name: str) -> Callable:
     """Compiled `run(q, qd, tau, dt)` of a Tree and one of METHODS: fills the paths q and qd from their first states.
 
     q, qd: (runs, steps + 1, nq and nv), of which [:, 0] is given; tau (runs, nv); all contiguous, float64; rad, s, N m. It
     returns how often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its
-    tolerance too: `run(q, qd, tau, dt, tolerance)`. A last argument (runs,) of int8, zeros, is filled with why each run ended,
-    see templates. Where straight-line code would take long to compile, the loop over any tree follows the method, if it has one;
-    and where a tree with gains, of which a robot may have many, is to be followed for no more than so many steps of all runs.
+    tolerance too: `run(q, qd, tau, dt, tolerance)`. Two arguments more: `ended` (runs, 2) of int64, zeros, is filled with why
+    each run ended, see templates, and after how many steps; `every`: the paths hold each so-manyth state alone. Where
+    straight-line code would take long to compile, the loop over any tree follows the method, if it has one.
     """
     checked_model(tree)
     stepping = method_named(method_name)
-    few = tree.has_gains and stepping.loop and steps is not None and steps < FEW
-    return looped(tree, method_name) if few or not is_traced(tree, stepping) else _stepper(tree, stepping)
+    return _stepper(tree, stepping) if is_traced(tree, stepping) else looped(tree, method_name)
+
+
+def run_in(form: str, tree: Tree, method_name: str) -> Callable:
+    """The run of `stepper` in a form of following.SIDE_BY_SIDE, or ValueError; for lanes the runs are a multiple of theirs."""
+    stepping, lanes = method_named(method_name), form.endswith("_lanes")
+    if lanes and not stepping.lanes:
+        raise ValueError(f"method {method_name!r} has no lanes; an explicit one with a fixed step is expected")
+    if form.startswith("loop"):
+        return looped(tree, method_name, lanes)
+    return (_lane_stepper if lanes else _stepper)(tree, stepping)
 
 
 def looped(tree: Tree, method_name: str, lanes: bool = False) -> Callable:
@@ -71,6 +78,17 @@ def _cost(tree, stepping):
     )
 
 
+def lines(tree: Tree, stepping) -> tuple[float, float]:
+    """Of straight-line code that is traced: those that are compiled, and those that one evaluation runs through."""
+    length, slope = _run_source(tree, stepping).count("\n"), _slope_lines(tree)
+    return _cost(tree, stepping), length if stepping.solves_stages else slope + (length - slope) / stepping.stages
+
+
+def is_on_disk(tree: Tree, stepping, lanes: bool) -> bool:
+    """Whether machine code of straight-line code that is traced lies in the cache folder."""
+    return is_kept(f"{name_of((_lanes_source if lanes else _run_source)(tree, stepping))}.*")
+
+
 def _least_lines(tree, stepping):
     """How many times the lines of the slopes those of a step are at least, about: measured on trees of 3 to 15 speeds."""
     if stepping.solves_stages:
@@ -86,6 +104,11 @@ def _slope_lines(tree):
 @lru_cache(maxsize=64)
 def _run_source(tree, stepping):
     return run_source(tree, stepping)
+
+
+@lru_cache(maxsize=64)
+def _lanes_source(tree, stepping):
+    return lanes_source(tree, stepping)
 
 
 @lru_cache(maxsize=64)
@@ -114,7 +137,7 @@ def lane_stepper(tree: Tree, method_name: str) -> Callable:
 
 @lru_cache(maxsize=64)
 def _lane_stepper(tree, stepping):
-    run = load(lanes_source(tree, stepping)).run
+    run = load(_lanes_source(tree, stepping)).run
     return checked_run(run, tree.coordinates.nq, tree.coordinates.nv, adaptive=False)
 
 
@@ -145,6 +168,17 @@ def evaluator(
     return _evaluator(tree, quantity, terms, sine)
 
 
+def lines_of_evaluator(tree: Tree) -> tuple[float, float]:
+    """Of straight-line code of `evaluator`: those that are compiled, and those that one evaluation runs through."""
+    return 4.0 * _slope_lines(tree), _slope_lines(tree)
+
+
+def is_evaluator_on_disk(tree: Tree, quantity: str) -> bool:
+    """Whether machine code of the straight-line code of `evaluator` lies in the cache folder."""
+    source = evaluator_source(tree, quantity, composite.mass_matrix_and_bias, "sincos")
+    return is_kept(f"{name_of(source)}.*")
+
+
 def is_evaluated_straight(tree: Tree) -> bool:
     """Whether `evaluator` compiles straight-line code for a tree: some four times as it stands, in loops of their own."""
     return len(tree.axis) <= LARGEST and 1.7 * _slope_lines(tree) <= LONGEST / 1.5
@@ -172,12 +206,13 @@ def slope_source(tree: Tree, method_name: str, terms: Callable = composite.mass_
 
 def _clear(caches):
     for cached in caches:
-        cached.cache_clear()
+        (cached.clear if isinstance(cached, dict) else cached.cache_clear)()
 
 
-for _public, *_cached in (
-    (stepper, _stepper, _loop_stepper, _run_source, _cost),
-    (lane_stepper, _lane_stepper),
-    (evaluator, _evaluator, _loop_evaluator),
+OF_STEPPERS = [_stepper, _loop_stepper, _run_source, _cost, _lane_stepper, _lanes_source]  # and what following.py adds
+for _public, _cached in (
+    (stepper, OF_STEPPERS),
+    (lane_stepper, OF_STEPPERS),
+    (evaluator, [_evaluator, _loop_evaluator]),
 ):
     _public.cache_clear = partial(_clear, _cached)

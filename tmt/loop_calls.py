@@ -25,13 +25,10 @@ def repeat_mass_matrix_and_bias(tree, q, qd, M, h, count):
         mass_matrix_and_bias(tree, q, qd, w, M, h)
 
 
-@part
-def evaluate(tree, dynamics, q, qd, tau, w, M, out):
-    """qdd of one state, or of eight, else the rows of the upper triangle of Mbar and then h, to out."""
+@compiled
+def terms(tree, q, qd, w, M, out):
+    """The rows of the upper triangle of Mbar and then h, of one state, or of eight, to out."""
     n = len(qd)
-    if dynamics:
-        forward_dynamics(tree, q, qd, tau, w, out)
-        return
     mass_matrix_and_bias(tree, q, qd, w, M, out[n * (n + 1) // 2 :])
     k = 0
     for i in range(n):
@@ -48,9 +45,18 @@ def each(tree, dynamics, q, qd, tau, out):
     if not (q.shape == (len(q), tree.nq) and qd.shape == tau.shape == (len(q), n) and out.shape == (len(q), size)):
         raise ValueError("q of shape (N, nq), qd and tau (N, nv) and out (N, results) are expected")
     apart(q, qd, tau, out)
-    w, M = np.empty(workspace(tree)), np.zeros(n * n)
+    w, M, result = np.empty(workspace(tree)), np.zeros(n * n), np.empty(size)
+    place, speeds, torque = np.empty(tree.nq), np.empty(n), np.empty(n)
     for i in range(len(q)):
-        evaluate(tree, dynamics, q[i], qd[i], tau[i], w, M, out[i])
+        # a part of an array that is handed on costs more than to copy it
+        copy(q[i], place)
+        copy(qd[i], speeds)
+        copy(tau[i], torque)
+        if dynamics:
+            forward_dynamics(tree, place, speeds, torque, w, result)
+        else:
+            terms(tree, place, speeds, w, M, result)
+        copy(result, out[i])
 
 
 @compiled
@@ -66,12 +72,25 @@ def lanes(tree, dynamics, q, qd, tau, out):
     for first in range(0, count // WIDTH * WIDTH, WIDTH):
         for state, given in zip(states, (q, qd, tau)):
             copy_lanes(given, first, state, 0)
-        evaluate(tree, dynamics, *states, w, M, result)
+        if dynamics:
+            forward_dynamics(tree, *states, w, result)
+        else:
+            terms(tree, *states[:2], w, M, result)
         copy_lanes(result, 0, out, first)
     w, M, result = np.empty(workspace(tree)), np.zeros(n * n), np.empty(size)
     for i in range(count // WIDTH * WIDTH, count):
-        evaluate(tree, dynamics, q[:, i].copy(), qd[:, i].copy(), tau[:, i].copy(), w, M, result)
+        if dynamics:
+            forward_dynamics(tree, q[:, i].copy(), qd[:, i].copy(), tau[:, i].copy(), w, result)
+        else:
+            terms(tree, q[:, i].copy(), qd[:, i].copy(), w, M, result)
         out[:, i] = result
+
+
+@part
+def copy(given, to):
+    """One array's numbers to another."""
+    for k in range(len(to)):
+        to[k] = given[k]
 
 
 @part
@@ -98,7 +117,10 @@ def chain(tree, dynamics, size, q, qd, tau, count):
         raise ValueError("q of shape (nq,), qd and tau (nv,) are expected")
     w, M, result, last = np.empty(workspace(tree)), np.zeros(n * n), np.empty(size), 0.0
     for _ in range(count):
-        evaluate(tree, dynamics, q + 1e-300 * last, qd, tau, w, M, result)
+        if dynamics:
+            forward_dynamics(tree, q + 1e-300 * last, qd, tau, w, result)
+        else:
+            terms(tree, q + 1e-300 * last, qd, w, M, result)
         last = result.sum()
     return last
 

@@ -215,8 +215,13 @@ def along(w, at, acting):
 
 
 @inlined
+def moved_from_rest(q, k, rest):
+    """The movement of a ball from its rest, see coordinates.py."""
+    return Vector(*logarithm(product(conjugate([rest[j] for j in range(4)]), [q[k + j] for j in range(4)])))
+
+
+@inlined
 def take_spring_of_ball(q, k, stiffness, rest, w, at):
-    """Take off k times the movement from the rest, see coordinates.py."""
-    moved = logarithm(product(conjugate([rest[j] for j in range(4)]), [q[k + j] for j in range(4)]))
-    for j in range(3):
-        w[at + j * SPEED] = w[at + j * SPEED] - stiffness * moved[j]
+    """Take off k times the movement from the rest."""
+    for j, moved in enumerate(moved_from_rest(q, k, rest)):
+        w[at + j * SPEED] = w[at + j * SPEED] - stiffness * moved

@@ -52,39 +52,44 @@ def combine(tree, b, q, qd, dt, u, rates, changes, new_q, new_qd):
 
 
 @compiled
-def run_tableau(tree, A, b, mean_speed, q, qd, tau, dt, ended):
-    """Fill q and qd (runs, steps + 1, nq or nv) by an explicit Runge-Kutta method, while finite; evaluations of the dynamics."""
-    check(tree, q, qd, tau, ended)
+def run_tableau(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
+    """Fill q and qd (runs, records, nq or nv) by an explicit Runge-Kutta method, while finite; evaluations of the dynamics."""
+    check(tree, q, qd, tau, ended, every)
     evaluations, n = 0, len(tree.before)
     w, u, place, speeds = np.empty(workspace(tree)), np.empty(n), np.empty(tree.nq), np.empty(n)
     rates, changes = np.empty(len(b) * n), np.empty(len(b) * n)
+    state, rate = np.empty(tree.nq), np.empty(n)
     for i in range(q.shape[0]):
-        for k in range(1, q.shape[1]):
-            stages(tree, A, mean_speed, q[i, k - 1], qd[i, k - 1], tau[i], dt, w, u, place, speeds, rates, changes)
-            combine(tree, b, q[i, k - 1], qd[i, k - 1], dt, u, rates, changes, q[i, k], qd[i, k])
+        state[:], rate[:] = q[i, 0], qd[i, 0]
+        for k in range(1, (q.shape[1] - 1) * every + 1):
+            stages(tree, A, mean_speed, state, rate, tau[i], dt, w, u, place, speeds, rates, changes)
+            combine(tree, b, state, rate, dt, u, rates, changes, state, rate)
             evaluations += len(b)
-            why = unsound(tree, q[i, k], qd[i, k])
+            why = unsound(tree, state, rate)
             if why:
-                end(q, qd, k, ended, i, why)
+                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
+            if k % every == 0:
+                q[i, k // every], qd[i, k // every] = state, rate
     return evaluations
 
 
 @compiled
-def run_tableau_lanes(tree, A, b, mean_speed, q, qd, tau, dt, ended):
+def run_tableau_lanes(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
     """The same of runs that are a multiple of eight, eight side by side; the same bits."""
-    check(tree, q, qd, tau, ended)
+    check(tree, q, qd, tau, ended, every)
     if len(q) % WIDTH:
         raise ValueError("a multiple of 8 runs is expected")
     evaluations, n, alive = 0, len(tree.before), np.empty(WIDTH, np.bool_)
     w, state, place = np.empty((workspace(tree), WIDTH)), np.empty((tree.nq, WIDTH)), np.empty((tree.nq, WIDTH))
     rate, speeds, torque, u = np.empty((n, WIDTH)), np.empty((n, WIDTH)), np.empty((n, WIDTH)), np.empty((n, WIDTH))
     rates, changes = np.empty((len(b) * n, WIDTH)), np.empty((len(b) * n, WIDTH))
+    one, its_rate = np.empty(tree.nq), np.empty(n)
     for first in range(0, len(q), WIDTH):
         for l in range(WIDTH):
             state[:, l], rate[:, l], torque[:, l] = q[first + l, 0], qd[first + l, 0], tau[first + l]
         alive[:] = True
-        for k in range(1, q.shape[1]):
+        for k in range(1, (q.shape[1] - 1) * every + 1):
             if not alive.any():
                 break
             stages(tree, A, mean_speed, state, rate, torque, dt, w, u, place, speeds, rates, changes)
@@ -92,19 +97,21 @@ def run_tableau_lanes(tree, A, b, mean_speed, q, qd, tau, dt, ended):
             for l in range(WIDTH):
                 i = first + l
                 if alive[l]:
-                    q[i, k], qd[i, k] = state[:, l], rate[:, l]
+                    one[:], its_rate[:] = state[:, l], rate[:, l]
                     evaluations += len(b)
-                    why = unsound(tree, q[i, k], qd[i, k])
+                    why = unsound(tree, one, its_rate)
                     if why:
-                        end(q, qd, k, ended, i, why)
+                        end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                         alive[l] = False
+                    elif k % every == 0:
+                        q[i, k // every], qd[i, k // every] = one, its_rate
     return evaluations
 
 
 @compiled
-def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended):
+def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended, every):
     """The same as run_tableau by a method that chooses its own steps."""
-    check(tree, q, qd, tau, ended)
+    check(tree, q, qd, tau, ended, every)
     evaluations, n = 0, len(tree.before)
     w, u, place, along = np.empty(workspace(tree)), np.empty(n), np.empty(tree.nq), np.empty(n)
     rates, changes = np.empty(len(b) * n), np.empty(len(b) * n)
@@ -112,7 +119,7 @@ def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended):
     for i in range(q.shape[0]):
         state[:], speeds[:] = q[i, 0], qd[i, 0]
         wanted, why = dt / 8.0, 0
-        for k in range(1, q.shape[1]):
+        for k in range(1, (q.shape[1] - 1) * every + 1):
             left = dt
             while left > 0.0 and why == 0:
                 pieces = math.ceil(left / wanted)
@@ -132,9 +139,10 @@ def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended):
                 if why == 0 and not h > 1e-9 * dt:
                     why = SMALL
             if why:
-                end(q, qd, k, ended, i, why)
+                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
-            q[i, k], qd[i, k] = state, speeds
+            if k % every == 0:
+                q[i, k // every], qd[i, k // every] = state, speeds
     return evaluations
 
 

@@ -16,22 +16,23 @@ NUDGE = 1e-100
 
 
 @compiled
-def run_semi_implicit(tree, own, springs, position_gain, speed_gain, q, qd, tau, dt, ended):
-    """Fill q and qd (runs, steps + 1, nq or nv), while finite; evaluations of the dynamics.
+def run_semi_implicit(tree, own, springs, position_gain, speed_gain, q, qd, tau, dt, ended, every):
+    """Fill q and qd (runs, records, nq or nv), while finite; evaluations of the dynamics.
 
     own (nv,): whose bias is implicit too; springs: whether they are; position_gain, speed_gain: their implicit entries.
     """
-    check(tree, q, qd, tau, ended)
+    check(tree, q, qd, tau, ended, every)
     evaluations, n = 0, len(tree.before)
     M, h, force, u, w = np.empty(n * n), np.empty(n), np.empty(n), np.empty(n), np.empty(workspace(tree))
+    place, speeds = np.empty(tree.nq), np.empty(n)
     held = with_held(tree, springs, position_gain, speed_gain, dt)
     across = own.any()
     for gain in (position_gain, speed_gain):
         for v in range(len(gain)):
             across = across or gain[v, :v].any() or gain[v, v + 1 :].any()
     for i in range(q.shape[0]):
-        for k in range(1, q.shape[1]):
-            place, speeds = q[i, k - 1], qd[i, k - 1]
+        place[:], speeds[:] = q[i, 0], qd[i, 0]
+        for k in range(1, (q.shape[1] - 1) * every + 1):
             if across:
                 M[:] = 0.0
                 mass_matrix_and_bias(held, place, speeds, w, M, h)
@@ -54,14 +55,16 @@ def run_semi_implicit(tree, own, springs, position_gain, speed_gain, q, qd, tau,
             else:
                 forward_dynamics(held, place, speeds, tau[i], w, force)
             for v in range(n):
-                qd[i, k, v] = speeds[v] + dt * force[v]
-                u[v] = dt * qd[i, k, v]
-            move(tree, place, u, q[i, k])
+                speeds[v] += dt * force[v]
+                u[v] = dt * speeds[v]
+            move(tree, place, u, place)
             evaluations += 1
-            why = unsound(tree, q[i, k], qd[i, k])
+            why = unsound(tree, place, speeds)
             if why:
-                end(q, qd, k, ended, i, why)
+                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
+            if k % every == 0:
+                q[i, k // every], qd[i, k // every] = place, speeds
     return evaluations
 
 

@@ -168,15 +168,15 @@ def finish(tree, A, b, q, qd, dt, a, new_q, new_qd):
 
 
 @compiled
-def run_implicit(tree, A, b, q, qd, tau, dt, ended):
-    """Fill q and qd (runs, steps + 1, nq or nv) by an implicit Runge-Kutta method; evaluations of the dynamics."""
-    check(tree, q, qd, tau, ended)
+def run_implicit(tree, A, b, q, qd, tau, dt, ended, every):
+    """Fill q and qd (runs, records, nq or nv) by an implicit Runge-Kutta method; evaluations of the dynamics."""
+    check(tree, q, qd, tau, ended, every)
     evaluations, n, count = 0, len(tree.before), len(b)
     a, change, base = np.empty((count, n)), np.empty((count, n)), np.empty(n)
-    by_q, by_qd = np.empty((n, n)), np.empty((n, n))
+    by_q, by_qd, state, speeds = np.empty((n, n)), np.empty((n, n)), np.empty(tree.nq), np.empty(n)
     for i in range(q.shape[0]):
-        for k in range(1, q.shape[1]):
-            state, speeds = q[i, k - 1], qd[i, k - 1]
+        state[:], speeds[:] = q[i, 0], qd[i, 0]
+        for k in range(1, (q.shape[1] - 1) * every + 1):
             slope_and_jacobian(tree, state, speeds, tau[i], base, by_q, by_qd)
             a[:] = 0.0
             newton(tree, A, state, speeds, tau[i], dt, a, True, base, by_q, by_qd, change)
@@ -194,9 +194,11 @@ def run_implicit(tree, A, b, q, qd, tau, dt, ended):
                 if not np.isfinite(size):
                     break
             if why == 0:
-                finish(tree, A, b, state, speeds, dt, a, q[i, k], qd[i, k])
-                why = unsound(tree, q[i, k], qd[i, k])
+                finish(tree, A, b, state, speeds, dt, a, state, speeds)
+                why = unsound(tree, state, speeds)
             if why:
-                end(q, qd, k, ended, i, why)
+                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
+            if k % every == 0:
+                q[i, k // every], qd[i, k // every] = state, speeds
     return evaluations

@@ -84,20 +84,24 @@ def unsound(tree, q, qd) -> int:
 
 
 @compiled
-def check(tree, q, qd, tau, ended):
+def check(tree, q, qd, tau, ended, every):
     nv = len(tree.before)
     if not (
         q.shape == (len(tau), q.shape[1], tree.nq)
         and qd.shape == (len(tau), q.shape[1], nv)
         and tau.shape[1] == nv
-        and len(ended) in (0, len(q))
+        and ended.shape in ((0, 2), (len(q), 2))
+        and every >= 1
     ):
-        raise ValueError("q of shape (runs, steps + 1, nq), qd (runs, steps + 1, nv) and tau (runs, nv) are expected")
+        raise ValueError(
+            "q of shape (runs, records, nq), qd (runs, records, nv), tau (runs, nv), ended (runs, 2) and every of at least 1 "
+            "are expected"
+        )
 
 
 @compiled
-def end(q, qd, k, ended, i, why):
-    """Nothing is known of run i from state k on."""
+def end(q, qd, k, ended, i, why, steps):
+    """Nothing is known of run i from record k on, and after so many steps."""
     q[i, k:], qd[i, k:] = np.nan, np.nan
     if len(ended):
-        ended[i] = why
+        ended[i, 0], ended[i, 1] = why, steps

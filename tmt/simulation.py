@@ -1,137 +1,187 @@
 """Motion by a method of integration, and why it ended where it did."""
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import given, singular
+from . import following, given, singular
 from .arm import ARM
-from .methods import method_named
 from .templates import NEWTON, OVERFLOW, SMALL, TURNED
 from .tree import Tree
+from .values import shown
+
+DOUBLE = np.dtype(float)
+FORMS = "straight_line", "straight_line_lanes", "loop", "loop_lanes"  # of compiled code, see following.py
 
 
 class _Path(NamedTuple):
-    t: np.ndarray  # (steps + 1,) s
-    q: np.ndarray  # (..., steps + 1, nq) rad
-    qd: np.ndarray  # (..., steps + 1, nv) rad/s
+    t: np.ndarray  # (records,) s
+    q: np.ndarray  # (..., records, nq) rad
+    qd: np.ndarray  # (..., records, nv) rad/s
 
 
 class Motion(_Path):
     """The t, q, qd of a simulation, and what else is known of it.
 
     ended: why a run ended early, a line that says when, or None; for a batch an array of its shape. Its states are NaN from
-    there on. evaluations: of the dynamics, of all runs; those of an implicit method with their Jacobian.
+    there on. evaluations: of the dynamics, of all runs; those of an implicit method with their Jacobian. form: what followed
+    it: "straight_line" or "loop", of many runs "straight_line_lanes" or "loop_lanes", or "series".
     """
 
     ended: str | np.ndarray | None
     evaluations: int
+    form: str
 
-    def __new__(cls, t, q, qd, ended, evaluations):
+    def __new__(cls, t, q, qd, ended, evaluations, form):
         motion = super().__new__(cls, t, q, qd)
-        motion.ended, motion.evaluations = ended, evaluations
+        motion.ended, motion.evaluations, motion.form = ended, evaluations, form
         return motion
 
     def __reduce__(self):
         """How a copy is made, in this process or another."""
-        return type(self), (*self, self.ended, self.evaluations)
+        return type(self), (*self, self.ended, self.evaluations, self.form)
 
 
 def simulate(
     q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
-    tolerance: float | None = None,
+    tolerance: float | None = None, every: int = 1, form: str | None = None,
 ) -> Motion:  # fmt: skip
-    """Motion under constant torque: t (steps+1,) s, q (..., steps+1, nq) and qd (..., steps+1, nv), rad and rad/s.
+    """Motion under constant torque: t (records,) s, q (..., records, nq) and qd (..., records, nv), rad and rad/s.
 
-    q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1;
-    method: a key of METHODS, or "taylor". An adaptive method takes its own steps between those; tolerance (default 1e-9): the
-    error of each, in units of 1 + |value|. "taylor" is the true motion, rounded once (default tolerance 1e-33): a Taylor series
-    in pairs of doubles, whose evaluations are its steps. A run ends early, with NaN from there on, where the numbers overflow, a
-    hinge has turned by 2^49 rad, Mbar is singular, Newton's method does not find the stages of an implicit method, an adaptive
-    method would need steps below 1e-9 dt, or series take too many: `ended` of the result says which. Assignment, part i.
+    q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1; every:
+    only the states after each so many steps are kept, a divisor of steps: records = steps / every + 1. method: a key of METHODS,
+    or "taylor". An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units of
+    1 + |value|. "taylor" is the true motion, rounded once (default tolerance 1e-33): a Taylor series in pairs of doubles, whose
+    evaluations are its steps. form: of the compiled code, one of FORMS; None: that which answers soonest, which with much to do
+    is another than with little, and differs in the last bits. A run ends early, with NaN from there on, where the numbers
+    overflow, a hinge has turned by 2^49 rad, Mbar is singular, Newton's method does not find the stages of an implicit method,
+    an adaptive method would need steps below 1e-9 dt, or series take too many: `ended` of the result says which. Assignment,
+    part i.
     """
     taylor = isinstance(method, str) and method == "taylor"
-    stepping = method_named("dopri8_adaptive" if taylor else method)
-    steps, dt = given.whole("steps", steps), given.positive("dt", dt, "a step in s")
+    follower = following.runs_of(model, "dopri8_adaptive" if taylor else method)
+    stepping = follower.stepping
+    steps, every, dt = given.whole("steps", steps), given.whole("every", every), given.positive("dt", dt, "a step in s")
+    if steps % every:
+        raise ValueError(
+            f"every is {shown(every)}, of which steps = {shown(steps)} is no multiple; a divisor is expected"
+        )
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
+    if form is not None and (not isinstance(form, str) or form not in FORMS or taylor):
+        raise ValueError(f"form is {shown(form)}; known are {', '.join(FORMS)}" + ", and none for taylor" * taylor)
     usual = 1e-33 if taylor else 1e-9
     tolerance = usual if tolerance is None else given.positive("tolerance", tolerance, "a number")
-    state = given.states(model, q=q, qd=qd, tau=tau)
-    batch, nq, nv = state[0][0].shape, model.coordinates.nq, model.coordinates.nv
-    runs = math.prod(batch)
-    path_q, path_qd = given.paths(runs, steps, nq, nv)
+    batch, *start = starts(model, q, qd, tau)
+    runs = len(start[0])
+    path_q, path_qd = given.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
-        raise ValueError(f"dt is {dt:g} and steps is {given.shown(steps)}; their product is beyond the largest double")
-    path_q[:, 0], path_qd[:, 0], tau = (np.stack(part, axis=-1).reshape(runs, len(part)) for part in state)
-    arguments = path_q, path_qd, np.ascontiguousarray(tau)
-
-    from . import kernels  # here, so that `import tmt` need not wait for numba
-
-    codes, evaluations = np.zeros(runs, np.int8), 0
+        raise ValueError(f"dt is {dt:g} and steps is {shown(steps)}; their product is beyond the largest double")
+    path_q[:, 0], path_qd[:, 0], tau = start
     if taylor:
-        ended, evaluations = by_series(model, *arguments, dt, steps, tolerance)
-    elif stepping.adaptive:
-        evaluations = kernels.stepper(model, method, runs * steps)(*arguments, dt, tolerance, codes)
+        form = "series"
+        ended, evaluations = by_series(model, path_q, path_qd, tau, dt, steps, every, tolerance)
     else:
-        worth = runs * steps >= kernels.WORTH and stepping.lanes
-        in_lanes = runs // kernels.LANES * kernels.LANES if worth else 0
-        if in_lanes:
-            part = [array[:in_lanes] for array in arguments]
-            evaluations += kernels.lane_stepper(model, method)(*part, dt, codes[:in_lanes])
-        rest = [array[in_lanes:] for array in arguments]
-        evaluations += kernels.stepper(model, method, runs * steps)(*rest, dt, codes[in_lanes:])
-    ended = ended if taylor else reasons(model, path_q, path_qd, codes, dt, tolerance)
-    t = dt * np.arange(steps + 1)
+        codes, settings = np.zeros((runs, 2), np.int64), (dt, tolerance) if stepping.adaptive else (dt,)
+        form, evaluations = follower.follow(path_q, path_qd, tau, settings, codes, every, form)
+
+        def between(run, record):
+            """The states of a run from a record to the next, (every + 1, nq and nv)."""
+            paths = [
+                np.repeat(path[run : run + 1, record : record + 1], every + 1, axis=1) for path in (path_q, path_qd)
+            ]
+            follower.run(form.removesuffix("_lanes"))(*paths, tau[run : run + 1], *settings)
+            return [path[0] for path in paths]
+
+        if follower.never_singular and not codes.any():
+            ended = np.full(runs, None, dtype=object)
+        else:
+            ended = reasons(model, path_q, path_qd, codes, dt, tolerance, every, between)
+    t = dt * np.arange(0, steps + 1, every)
     q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))
-    return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
+    return Motion(t, q, qd, ended.reshape(batch)[()], evaluations, form)
 
 
-def by_series(tree, q, qd, tau, dt, steps, tolerance) -> tuple[np.ndarray, int]:
-    """Write the true motions to the paths (runs, steps + 1, nq and nv), which hold the starts: why each ended, and the steps."""
+def starts(model, q, qd, tau) -> tuple:
+    """The batch shape, and q (runs, nq), qd and tau (runs, nv), contiguous, after all checks of given.states."""
+    if type(q) is type(qd) is type(tau) is np.ndarray and q.dtype is qd.dtype is tau.dtype is DOUBLE:
+        nq, nv, batch = model.coordinates.nq, model.coordinates.nv, q.shape[:-1]
+        if q.shape == (*batch, nq) and qd.shape == tau.shape == (*batch, nv) and not model.coordinates.balls:
+            found = [np.ascontiguousarray(values).reshape(-1, values.shape[-1]) for values in (q, qd, tau)]
+            # with a number that is not finite no sum of squares is
+            if all(np.vdot(values, values) < np.inf for values in found):
+                return batch, *found
+    state = given.states(model, q=q, qd=qd, tau=tau)
+    batch = state[0][0].shape
+    return batch, *(np.stack(part, axis=-1).reshape(math.prod(batch), len(part)) for part in state)
+
+
+def by_series(tree, q, qd, tau, dt, steps, every, tolerance) -> tuple[np.ndarray, int]:
+    """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from .reference_run import followed  # here, as kernels above
 
     ended, count = np.full(len(q), None, dtype=object), 0
     for run in range(len(q)):
-        path, took, error = followed(tree, q[run, 0], qd[run, 0], tau[run], dt, steps, tolerance=tolerance)
+        path, took, error = followed(tree, q[run, 0], qd[run, 0], tau[run], dt, steps, every, tolerance=tolerance)
         count, alive = count + took, len(path)
         q[run, 1:alive], qd[run, 1:alive] = np.split(path[1:, 0], [q.shape[-1]], axis=1)
+        q[run, alive:], qd[run, alive:] = np.nan, np.nan
         ended[run] = error and str(error)
     return ended, count
 
 
-def reasons(tree, q, qd, codes, dt, tolerance) -> np.ndarray:
+def reasons(
+    tree, q, qd, codes, dt, tolerance, every: int = 1, between: Callable[[int, int], list[np.ndarray]] | None = None
+) -> np.ndarray:
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
-    q, qd: the paths (runs, steps + 1, nq and nv); codes: why the compiled loop ended each, 0: it did not.
+    q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did not, and after how
+    many steps. Where each so-manyth state is kept alone, between(run, record) are all from a record to the next.
     """
     why = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
         return why
+    steps, codes = codes[:, 1].copy(), codes[:, 0]
     if not tree.never_singular:
         for run in range(len(codes)):
-            if found := singular_in(tree, q[run], qd[run]):
-                k, why[run] = found
-                q[run, k + 1 :] = qd[run, k + 1 :] = np.nan
+            if found := singular_step(tree, q[run], qd[run], every, between and partial(between, run)):
+                steps[run], why[run] = found
+                q[run, steps[run] // every + 1 :] = qd[run, steps[run] // every + 1 :] = np.nan
     words = {
         OVERFLOW: "the motion diverges: within a step its numbers overflow, or its angles pass 2^49 rad",
         TURNED: "a hinge turns by 2^49 rad or more, where doubles are too far apart for a sine",
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
     }
+    hinges = [joint for joint in tree.coordinates.joints if joint.kind == "hinge"]
     for run in (run for run in range(len(codes)) if codes[run] or why[run]):
-        last = int(np.argmax(np.isnan(q[run, :, 0]))) - 1
+        record, last = divmod(int(steps[run]), every)
+        path, speeds = between(run, record) if last else (q[run, record:], qd[run, record:])
         code = int(codes[run])
-        hinges = [joint for joint in tree.coordinates.joints if joint.kind == "hinge"]
-        reach = max(
-            (max(abs(q[run, last, at][0]), dt * abs(qd[run, last, by][0])) for _, at, by in hinges), default=0.0
-        )
+        reach = max((max(abs(path[last, at][0]), dt * abs(speeds[last, by][0])) for _, at, by in hinges), default=0.0)
         if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages
-        why[run] = f"at t = {last * dt:g} s: {why[run] or words[code]}"
+        why[run] = f"at t = {steps[run] * dt:g} s: {why[run] or words[code]}"
     return why
+
+
+def singular_step(tree, q, qd, every, between) -> tuple[int, str] | None:
+    """The first step of a run after which Mbar is singular, as far as `singular_in` looks, and the words for it.
+
+    Where each so-manyth state is kept alone it also looks at those before the last record and where the rates change most.
+    """
+    found = singular_in(tree, q, qd)
+    if every == 1:
+        return found
+    last = int(np.isfinite(q[:, 0]).sum()) - 1
+    change = np.abs(np.diff(qd[: last + 1], axis=0)).max(axis=1)
+    more = {min(last, len(q) - 2), int(np.argmax(change)) if len(change) else 0}
+    looked = [(0, every, found), *((record * every, 1, singular_in(tree, *between(record))) for record in more)]
+    return min(((first + stride * found[0], found[1]) for first, stride, found in looked if found), default=None)
 
 
 def singular_in(tree, q, qd) -> tuple[int, str] | None:

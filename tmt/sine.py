@@ -8,6 +8,7 @@ an eighth of a radian apart, both are NaN, so that a caller can take the library
 
 from llvmlite import ir
 from numba import njit, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 LIMIT = 2.0**49  # rad
@@ -42,6 +43,30 @@ def from_bits(typingctx, i):
         return builder.bitcast(arguments[0], ir.DoubleType())
 
     return types.float64(types.int64), generate
+
+
+@intrinsic
+def widest(typingctx):
+    """Lets the compiler take the widest registers in the function that calls this: left alone, it may take half of them."""
+
+    def generate(context, builder, signature, arguments):
+        # an attribute with a value, which llvmlite writes but does not add of itself
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        return context.get_dummy_value()
+
+    return types.none(), generate
+
+
+@intrinsic(prefer_literal=True)
+def block(typingctx, size):
+    """A pointer to so many doubles of the function's own, a literal number: the compiler knows that no other leads there."""
+
+    def generate(context, builder, signature, arguments):
+        place = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), size.literal_value))
+        place.align = 64  # of a widest register
+        return builder.bitcast(place, ir.DoubleType().as_pointer())
+
+    return types.CPointer(types.float64)(size), generate
 
 
 @njit(forceinline=True, error_model="numpy")

@@ -11,9 +11,9 @@ import math
 from math import atan as arctan, sqrt
 
 import numpy as np
-from numba import njit
+from numba import carray, njit
 
-from tmt.sine import LIMIT, fma, sincos
+from tmt.sine import LIMIT, block, fma, sincos, widest
 
 
 @njit(cache=CACHE, error_model="numpy")
@@ -24,35 +24,43 @@ def library_sincos(x):
 
 CHECK = """\
 if not (q.shape == (len(tau), q.shape[1], {nq}) and qd.shape == (len(tau), q.shape[1], {n}) and tau.shape[1] == {n}
-            and len(ended) in (0, len(q))):
-        raise ValueError("q of shape (runs, steps + 1, {nq}), qd (runs, steps + 1, {n}) and tau (runs, {n}) are expected")"""
+            and ended.shape in ((0, 2), (len(q), 2)) and every >= 1):
+        raise ValueError("q of shape (runs, records, {nq}), qd (runs, records, {n}), tau (runs, {n}), ended (runs, 2) and "
+                         "every of at least 1 are expected")"""
 
 RUN = '''
-@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, int8[::1])", cache=CACHE, error_model="numpy")
-def run(q, qd, tau, dt, ended):
-    """Fill q and qd (batch, steps + 1, n) from their first state, until one is not finite; evaluations of the dynamics.
+@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, int64[:, ::1], int64)", cache=CACHE, nogil=True, error_model="numpy")
+def run(q, qd, tau, dt, ended, every):
+    """Fill q and qd (batch, records, n) with each so-manyth state after their first; evaluations of the dynamics.
 
-    ended (batch,), or empty: why each run ended.
+    NaN from where one is not finite. ended (batch, 2), or (0, 2): why each run ended, and after how many steps.
     """
     {check}
     evaluations = 0
     for b in range(q.shape[0]):
         {state} = {first}
         {torque} = {given}
+        sound = True
         for k in range(1, q.shape[1]):
-            {state}{used} = step({state}, {torque}, dt)
-            evaluations += {cost}
-            if not {sound}:
-                if len(ended):
-                    ended[b] = {why}
+            for s in range(every):
+                {state}{used} = step({state}, {torque}, dt)
+                evaluations += {cost}
+                sound = {sound}
+                if not sound:
+                    q[b, k:], qd[b, k:] = np.nan, np.nan
+                    if len(ended):
+                        ended[b, 0], ended[b, 1] = {why}, (k - 1) * every + s
+                    break
+            if not sound:
                 break
             {store} = {state}
     return evaluations
 '''
 
 ADAPTIVE = '''
-@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, f8, int8[::1])", cache=CACHE, error_model="numpy")
-def run(q, qd, tau, dt, tolerance, ended):
+@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, f8, int64[:, ::1], int64)", cache=CACHE, nogil=True,
+      error_model="numpy")
+def run(q, qd, tau, dt, tolerance, ended, every):
     """As the run of a method with a fixed step."""
     {check}
     evaluations = 0
@@ -62,23 +70,28 @@ def run(q, qd, tau, dt, tolerance, ended):
         wanted = dt / 8.0
         sound = True
         for k in range(1, q.shape[1]):
-            left = dt
-            while left > 0.0 and sound:
-                pieces = math.ceil(left / wanted)
-                h = left / pieces
-                {new}, {errors5}, {errors3} = attempt({state}, {torque}, h)
-                evaluations += {stages}
-                e5 = {squares5}
-                e3 = {squares3}
-                error = e5 / math.sqrt({components} * (e5 + 0.01 * e3)) if e5 > 0.0 else 0.0
-                if error < 1.0:
-                    {state} = {new}
-                    left = left - h if pieces > 1 else 0.0
-                wanted = h * (min(6.0, max(0.333, 0.9 * error ** {exponent})) if error > 0.0 else 6.0 if error == 0.0 else 0.333)
-                sound = {sound} and h > 1e-9 * dt
+            for s in range(every):
+                left = dt
+                while left > 0.0 and sound:
+                    pieces = math.ceil(left / wanted)
+                    h = left / pieces
+                    {new}, {errors5}, {errors3} = attempt({state}, {torque}, h)
+                    evaluations += {stages}
+                    e5 = {squares5}
+                    e3 = {squares3}
+                    error = e5 / math.sqrt({components} * (e5 + 0.01 * e3)) if e5 > 0.0 else 0.0
+                    if error < 1.0:
+                        {state} = {new}
+                        left = left - h if pieces > 1 else 0.0
+                    factor = min(6.0, max(0.333, 0.9 * error ** {exponent})) if error > 0.0 else 6.0 if error == 0.0 else 0.333
+                    wanted = h * factor
+                    sound = {sound} and h > 1e-9 * dt
+                if not sound:
+                    q[b, k:], qd[b, k:] = np.nan, np.nan
+                    if len(ended):
+                        ended[b, 0], ended[b, 1] = {small} if {sound} else {why}, (k - 1) * every + s
+                    break
             if not sound:
-                if len(ended):
-                    ended[b] = {small} if {sound} else {why}
                 break
             {store} = {state}
     return evaluations
@@ -88,17 +101,19 @@ SLOPES = '''
 @njit("void(float64[::1], float64[::1], uint64, float64)", cache=CACHE, error_model="numpy")
 def slopes(x, k, o, dt):
     """The slopes of a block of states, of which x holds the arguments, row by row; to k from o on."""
+    widest()
     for l in range(np.uint64({W})):
         {results} = slope({arguments})
 '''
 
 RUN_LANES = '''
-@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, int8[::1])", cache=CACHE, nogil=True, error_model="numpy")
-def run(q, qd, tau, dt, ended):
+@njit("int64(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8, int64[:, ::1], int64)", cache=CACHE, nogil=True, error_model="numpy")
+def run(q, qd, tau, dt, ended, every):
     """As the run of one state at a time, for a batch that is a multiple of {W}."""
     {check}
     if q.shape[0] % {W} != 0:
         raise ValueError("a multiple of {W} runs is expected")
+    widest()
     evaluations = 0
     x, y, k = np.empty({size_x}), np.empty({size_y}), np.empty({size_k})
     alive = np.empty({W}, dtype=np.bool_)
@@ -108,31 +123,38 @@ def run(q, qd, tau, dt, ended):
             {rows_tau} = {given}
             alive[l] = True
         left = {W}
-        for s in range(1, q.shape[1]):
-            evaluations += left * {cost}
+        for record in range(1, q.shape[1]):
+            for s in range(every):
+                evaluations += left * {cost}
 {stages}
-            for l in range(np.uint64({W})):
-                {lane_new} = combined({known})
-            left = 0
-            for l in range({W}):
-                if alive[l]:
-                    {state} = {rows_x}
-                    alive[l] = {sound}
+                for l in range(np.uint64({W})):
+                    {lane_new} = combined({known})
+                left = 0
+                for l in range({W}):
                     if alive[l]:
-                        {rows_y} = {state}
-                        {store} = {state}
-                        left += 1
-                    elif len(ended):
-                        ended[b + l] = {why}
+                        {state} = {rows_x}
+                        alive[l] = {sound}
+                        if alive[l]:
+                            {rows_y} = {state}
+                            left += 1
+                        else:
+                            q[b + l, record:], qd[b + l, record:] = np.nan, np.nan
+                            if len(ended):
+                                ended[b + l, 0], ended[b + l, 1] = {why}, (record - 1) * every + s
+                if left == 0:
+                    break
             if left == 0:
                 break
+            for l in range({W}):
+                if alive[l]:
+                    {store} = {rows_y}
     return evaluations
 '''
 
 STAGE = """\
-            for l in range(np.uint64({W})):
-                {arguments} = stage_{j}({known})
-            slopes(x, k, np.uint64({offset}), dt)
+                for l in range(np.uint64({W})):
+                    {arguments} = stage_{j}({known})
+                slopes(x, k, np.uint64({offset}), dt)
 """
 
 EVALUATE = '''
@@ -174,20 +196,22 @@ def lanes(q, qd, tau, out):
     if not (q.shape == ({nq}, q.shape[1]) and qd.shape == tau.shape == ({n}, q.shape[1]) and out.shape == ({m}, q.shape[1])):
         raise ValueError("q of shape ({nq}, N), qd and tau ({n}, N) and out ({m}, N) are expected")
     apart(q, qd, tau, out)
-    x, y = np.empty({size_x}), np.empty({size_y})
+    widest()
+    y = carray(block({size_y}), {size_y})
     flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
     count = q.shape[1]
     for b in range(0, count - {W} + 1, {W}):
         {begins}
         for l in range(np.uint64({W})):
-            {gather}
-        for l in range(np.uint64({W})):
             {results} = quantity({arguments})
+        beyond = np.uint64(0)
         for l in range(np.uint64({W})):
             {scatter}
-        for l in range({W}):
-            if not {sound_lane}:
-                {lane_out} = by_library({lane_in})
+            beyond += np.uint64(0) if {sound_lane} else np.uint64(1)
+        if beyond:
+            for l in range({W}):
+                if not {sound_place}:
+                    {lane_out} = by_library({lane_in})
     for i in range(count // {W} * {W}, count):
         {column_out} = quantity({column_in})
         if not {sound_column}:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-import tmt
+from tmt import literal
 
 from ..diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ..diagnosis.consistency import conditions, symmetric
@@ -129,8 +129,8 @@ def of_forces(given: Given, which: np.ndarray) -> str:
     """What explains accelerations that do not follow from the right Mbar and h: damping, springs and the like; "": nothing."""
     tree, q, qd, tau = given.tree, given.q[which], given.qd[which], given.tau[which]
     qdd = given.values["acceleration"][which]
-    M, h = tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree)
-    pull = tmt.spring_torque(q, tree) if tree.has_springs else 0.0
+    M, h = literal.mass_matrix(q, tree), literal.bias(q, qd, tree)
+    pull = literal.spring_torque(q, tree) if tree.has_springs else 0.0
     acting = tau - np.array(tree.damping) * qd - pull - h - np.einsum("sij,sj->si", M, qdd)
     scale = Entries(tree, q, qd)
     allowed = SHARPER * (FACTOR * EPS + given.rtol) * scale.residual(scale.force(tau), qdd)

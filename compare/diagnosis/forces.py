@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt import literal
 
 from .words import EXPLAINS, Cause, nice, together
 
@@ -77,7 +78,7 @@ def causes_of_forces(
 def forms(tree: tmt.Tree, q, qd, tau, h) -> Iterator[tuple[str, str, str, np.ndarray]]:
     """Options: place, stated, what explains, and the force that is left over with it."""
     drag = np.array(tree.damping) * qd
-    pull = tmt.spring_torque(q, tree) if tree.has_springs else np.zeros_like(qd)
+    pull = literal.spring_torque(q, tree) if tree.has_springs else np.zeros_like(qd)
     for place, stated, term in (
         ("torque in the acceleration", "tau", -tau),
         ("bias in the acceleration", "- h", h),

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt import literal
 
 from ..coordinates import Coordinates
 from ..joint_map import PER_UNIT, Joint, JointMap
@@ -84,7 +85,7 @@ def program_options(equations: Equations) -> Iterator[Variant]:
         opposite = with_bias(lambda h: h - drag)
         yield Variant(1, "option", "damping D qd", "not in h", "in h, of the other sign", opposite)
     if tree.has_springs:
-        pull = tmt.spring_torque(equations.q, tree)
+        pull = literal.spring_torque(equations.q, tree)
         yield Variant(1, "option", "springs k (q - rest)", "not in h", "in h", with_bias(lambda h: h + pull))
     if any(tree.armature):
         yield Variant(1, "option", "armature", "on the diagonal of Mbar", "left out", without_rotors)

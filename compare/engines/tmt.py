@@ -1,12 +1,12 @@
 """tmt's own equations, integrated by its compiled loops."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
 import numpy as np
 
 import tmt
-from tmt import kernels
+from tmt import answers, kernels, literal
 from tmt.methods import method_named
 from tmt.simulation import reasons
 
@@ -54,37 +54,40 @@ class TmtDynamics:
         self.tree, self.coordinates = case.tree, case.coordinates
 
     def com_positions(self, q) -> np.ndarray:
-        return tmt.com_positions(q, self.tree)
+        return literal.com_positions(q, self.tree)
 
     def angular_velocities(self, q, v) -> np.ndarray:
-        return tmt.angular_velocities(q, v, self.tree)
+        return literal.angular_velocities(q, v, self.tree)
 
     def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
-        return tmt.jacobians(q, self.tree)
+        return literal.jacobians(q, self.tree)
 
     def convective_terms(self, q, v) -> tuple[np.ndarray, np.ndarray]:
-        return tmt.convective_terms(q, v, self.tree)
+        return literal.convective_terms(q, v, self.tree)
 
     def mass_matrix(self, q) -> np.ndarray:
-        return tmt.mass_matrix(q, self.tree)
+        return literal.mass_matrix(q, self.tree)
 
     def bias(self, q, v) -> np.ndarray:
-        return tmt.bias(q, v, self.tree)
+        return literal.bias(q, v, self.tree)
 
     def gravity_balance(self, q) -> np.ndarray:
-        return tmt.gravity_balance(q, self.tree)
+        return literal.gravity_balance(q, self.tree)
 
     def acceleration(self, q, v, tau) -> np.ndarray:
-        return tmt.acceleration(q, v, tau, self.tree)
+        return literal.acceleration(q, v, tau, self.tree)
 
     def potential_energy(self, q) -> np.ndarray:
-        return tmt.potential_energy(q, self.tree)
+        return literal.potential_energy(q, self.tree)
 
     def energy(self, q, v) -> np.ndarray:
-        return tmt.energy(q, v, self.tree)
+        return literal.energy(q, v, self.tree)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
+        # the same code in every process, but for controllers, of which a robot may have many
+        form = "straight_line" if kernels.is_traced(self.tree, method_named(method)) else "loop"
+        form = None if self.tree.has_gains else form
+        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance, form=form)
         return Motion(*motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
@@ -96,7 +99,7 @@ class TmtDynamics:
         every, dt = setting.every, setting.duration / setting.steps
         paths = [np.full((1, setting.steps + 1, len(start)), np.nan) for start in (q, v)]
         paths[0][0, 0], paths[1][0, 0] = q, v
-        codes = np.zeros(1, np.int8)
+        codes = np.zeros((1, 2), int)
         tolerance = () if setting.tolerance is None else (setting.tolerance,)
         run = partial(kernels.stepper(self.tree, method), *paths, np.array(tau, float)[None], dt, *tolerance, codes)
         t = np.linspace(0.0, setting.duration, GRID + 1)
@@ -107,3 +110,14 @@ class TmtDynamics:
             return Motion(t, *(path[0, ::every].copy() for path in paths), evaluations, ended, taken)
 
         return run, read
+
+
+class Compiled:
+    """A Tree's quantities as who calls tmt gets them once the compiled loops answer; they are got here if they are not there."""
+
+    def __init__(self, tree: tmt.Tree):
+        self.tree = tree
+        answers.remembered(tree).get_loops()
+
+    def __getattr__(self, quantity: str) -> Callable:
+        return partial(getattr(tmt, quantity), model=self.tree)

@@ -6,10 +6,11 @@ from functools import partial
 import numpy as np
 
 import tmt
-from tmt import method
+from tmt import literal, method
 from tmt.dual import seeded
 
 from ..engines import LABELS, WHOSE
+from ..engines.tmt import Compiled
 from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import gravity_scale
@@ -77,7 +78,7 @@ def rows(setup: Setup) -> Result:
         force = scale.force(tau)
         qdd, engine_qdd = (d.acceleration(q, qd, tau) for d in dynamics)
         of_scale = engine_qdd if robot.own else qdd  # of one's own nothing need be a number
-        M, springs = ours.mass_matrix(q), tmt.spring_torque(q, tree) if tree.has_springs else 0.0
+        M, springs = ours.mass_matrix(q), literal.spring_torque(q, tree) if tree.has_springs else 0.0
 
         result.agree(sample, "bias", torques, ours.bias(q, qd), theirs.bias(q, qd), scale.bias, truth="bias")
         result.agree(sample, "qdd", rates, qdd, engine_qdd, scale.acceleration(force, of_scale), truth="acceleration")
@@ -92,6 +93,14 @@ def rows(setup: Setup) -> Result:
             result.agree(sample, "energy", "J", ours.energy(q, qd), theirs.energy(q, qd), scale.energy, truth="energy")
             potential = ours.potential_energy(q), theirs.potential_energy(q)
             result.agree(sample, "potential energy", "J", *potential, scale.potential_energy, truth="potential_energy")
+            if sample is setup.random:
+                compiled = Compiled(tree)
+                fast = compiled.acceleration(q, qd, tau)
+                result.agree(sample, "bias, compiled", torques, compiled.bias(q, qd), theirs.bias(q, qd), scale.bias)
+                result.agree(sample, "qdd, compiled", rates, fast, engine_qdd, scale.acceleration(force, qdd))
+                energies = (compiled.energy(q, qd), theirs.energy(q, qd)), (compiled.potential_energy(q), potential[1])
+                result.agree(sample, "energy, compiled", "J", *energies[0], scale.energy)
+                result.agree(sample, "potential energy, compiled", "J", *energies[1], scale.potential_energy)
         elif "energy" in robot.own:  # which may be zero where one likes
             zero, rest = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
             above = (engine.energy(q, qd) - engine.energy(zero, rest) for engine in dynamics)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tmt
-from tmt import method
+from tmt import literal, method
 
 from ..judge.words import listed
 from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines, plain
@@ -25,7 +25,7 @@ UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E
 def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
     """The robot with the axes of its joints in two postures, from the method's own frames."""
     poses = sketched(robot)
-    parts = {name: (chains(robot, q), tmt.com_positions(q, robot.tree)) for name, q in poses.items()}
+    parts = {name: (chains(robot, q), literal.com_positions(q, robot.tree)) for name, q in poses.items()}
     size = max(np.ptp(np.concatenate([*lines, coms]), axis=0).max() for lines, coms in parts.values()) or 1.0  # m
     few = max(len(robot.joints), len(robot.tree.mass)) <= SKETCHED_BY_NAME
     arrows = {name: axes(robot, q, (0.57 if few else 0.1) * size) for name, q in poses.items()}
@@ -150,7 +150,7 @@ def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
     ]
     ends = [
         np.stack([origins[joint], com])
-        for joint, com in zip(tree.body_hinge, tmt.com_positions(q, tree))
+        for joint, com in zip(tree.body_hinge, literal.com_positions(q, tree))
         if joint >= 0 and joint not in tree.parent
     ]
     return links + ends

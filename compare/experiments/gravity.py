@@ -6,9 +6,11 @@ from functools import partial
 import numpy as np
 
 import tmt
+from tmt import literal
 
 from ..case import Coordinates
 from ..engines import LABELS, WHOSE
+from ..engines.tmt import Compiled
 from ..judge.check import Result
 from ..judge.entries import Entries, has_own_scales, per_speed, scales, unit
 from ..judge.scale import gravity_scale, spring_scale
@@ -104,11 +106,14 @@ def rows(setup: Setup) -> Result:
         q, scale = sample.q, scales(tree, is_read, sample.q)
         held, engine_held = ours.gravity_balance(q), theirs.gravity_balance(q)
         result.agree(sample, "holding torque", units, held, engine_held, scale.weight, truth="gravity_balance")
+        if sample is setup.random and not setup.robot.own:
+            compiled = Compiled(tree).gravity_balance(q)
+            result.agree(sample, "holding torque, compiled", units, compiled, engine_held, scale.weight)
         if "gravity" in setup.robot.own:
             still = ours.bias(q, np.zeros(tree.coordinates.nv))
             result.agree(sample, "yours: gravity - bias at rest", units, held, still, scale.weight)
         if tree.has_springs:
-            held, engine_held = held + tmt.spring_torque(q, tree), theirs.inverse(q, 0.0, 0.0)
+            held, engine_held = held + literal.spring_torque(q, tree), theirs.inverse(q, 0.0, 0.0)
             result.agree(sample, "holding torque, springs too", units, held, engine_held, scale.holding)
         if sample is not setup.random:
             result.curves.setdefault("postures", {})[sample.name] = {name: held[0], "mujoco": engine_held[0]}
@@ -132,7 +137,7 @@ def rows(setup: Setup) -> Result:
         q, scale = sample.q, scales(tree, is_read, sample.q)
         # the other way round, MuJoCo's torque would leave the same number with the other sign
         at_rest = np.zeros((len(q), tree.coordinates.nv))
-        torque = ours.gravity_balance(q) + (tmt.spring_torque(q, tree) if tree.has_springs else 0.0)
+        torque = ours.gravity_balance(q) + (literal.spring_torque(q, tree) if tree.has_springs else 0.0)
         left = theirs.acceleration(q, at_rest, torque)
         allowed = scale.acceleration(scale.holding, 0.0)
         result.agree(sample, f"qdd of MuJoCo under {WHOSE[name]} torque", rates, at_rest, left, allowed)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..engines import LABELS
 from ..engines.mujoco.accelerations import convective_accelerations
+from ..engines.tmt import Compiled
 from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR, reaches
@@ -21,6 +22,7 @@ CLEARLY = 1e3  # of two ways, one is wrong if it is off by so many times more
 TITLE = "Kinematics: do the bodies move alike?"
 
 
+OF_COMPILED = ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv")
 OF_TMT = ("com_positions", "angular_velocities", "jacobians", "convective_terms")
 
 
@@ -79,7 +81,7 @@ def rows(setup: Setup) -> Result:
     for sample in (setup.named, setup.random):
         q, qd = sample.q, sample.qd
         scale = scales(tree, setup.robot.is_read, q, qd)
-        found = {}
+        found, faster = {}, {}
         if "com_positions" in brings:
             found["x_b"] = [dynamics.com_positions(q) for dynamics in engines]
         if "angular_velocities" in brings:
@@ -93,6 +95,10 @@ def rows(setup: Setup) -> Result:
                 convective[1] = convective_accelerations(engines[1], q, qd)
                 result.notes.append(wrong)
             found["v_conv"], found["w_conv"] = zip(*convective)
+        if sample is setup.random and not setup.robot.own:
+            compiled = Compiled(tree)
+            values = compiled.com_positions(q), compiled.angular_velocities(q, qd), *compiled.jacobians(q)
+            faster = dict(zip(OF_COMPILED, (*values, *compiled.convective_terms(q, qd))))
         of_quantities = {
             "x_b": ("m", scale.positions, "com_positions"),
             "omega_b": ("rad/s", scale.angular_velocities, "angular_velocities"),
@@ -104,6 +110,8 @@ def rows(setup: Setup) -> Result:
         for quantity, (ours, theirs) in found.items():
             of, size, truth = of_quantities[quantity]
             result.agree(sample, quantity, of, ours, theirs, size, truth=truth)
+            if quantity in faster:
+                result.agree(sample, f"{quantity}, compiled", of, faster[quantity], theirs, size)
         result.notes += sample.notes
     return result
 

@@ -6,9 +6,10 @@ from functools import partial
 import numpy as np
 from scipy.optimize import minimize
 
-import tmt
+from tmt import literal
 
 from ..engines import LABELS
+from ..engines.tmt import Compiled
 from ..judge.check import Result, over
 from ..judge.entries import has_own_scales, scales
 from ..judge.scale import EPS, FACTOR
@@ -59,7 +60,9 @@ def at_angles(robot: Robot, angles: np.ndarray) -> np.ndarray:
 
 def largest_condition(robot: Robot) -> float:
     """The condition number of the stated Mbar where it is said to be largest."""
-    return float(np.linalg.cond(tmt.mass_matrix(at_angles(robot, np.radians(robot.conditioning.worst)), robot.tree)))
+    return float(
+        np.linalg.cond(literal.mass_matrix(at_angles(robot, np.radians(robot.conditioning.worst)), robot.tree))
+    )
 
 
 def condition_grid(robot: Robot, mass_matrix: Callable, degrees: float) -> tuple:
@@ -93,6 +96,9 @@ def rows(setup: Setup) -> Result:
         M = {name: dynamics.mass_matrix(sample.q) for name, dynamics in compared.items()}
         scale = scales(robot.tree, robot.is_read, sample.q)
         result.agree(sample, "Mbar", units, M[ours], M[theirs], scale.mass_matrix, truth="mass_matrix")
+    if not robot.own:
+        compiled = Compiled(robot.tree).mass_matrix(sample.q)
+        result.agree(sample, "Mbar, compiled", units, compiled, M[theirs], scale.mass_matrix)
     check_symmetry(result, M[ours], scale.mass_matrix if own else None)  # MuJoCo's is one triangle written twice
     for name, dynamics in compared.items():
         check_definiteness(result, LABELS[name], M[name], in_units=own)

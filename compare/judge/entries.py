@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import tmt
+from tmt import literal
 from tmt.singular import mass_matrices
 
 from .scale import (
@@ -80,7 +81,7 @@ class Numbers:
     @cached_property
     def energy(self) -> np.ndarray:
         speeds = np.abs(self.qd)
-        M = np.abs(tmt.mass_matrix(self.q, self.tree))
+        M = np.abs(literal.mass_matrix(self.q, self.tree))
         return self.potential_energy + np.einsum("si,sij,sj->s", speeds, M, speeds) / 2
 
     def force(self, tau: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 import tmt
+from tmt import literal
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 
 from ..case import Case, Coordinates, rates_at
@@ -77,7 +78,7 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
     )
     with np.errstate(over="ignore", invalid="ignore"):  # of a run that is about to end
         done = work(case, good[0])
-        energy = tmt.energy(*good, case.tree) - done
+        energy = literal.energy(*good, case.tree) - done
         bad = ~finite | ~(energy - energy[0] <= exchanged(case, good[0], done))
     return float(t[bad][0]) if bad.any() else None
 
@@ -116,8 +117,8 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     # what slides have moved at the start belongs to the reach; what they move from there is the way that they have gone
     has = (
         2.0 * gravity_scale(case.robot.tree, case.posture)
-        + tmt.energy(q[0], case.v, tree)
-        - tmt.potential_energy(q[0], tree)
+        + literal.energy(q[0], case.v, tree)
+        - literal.potential_energy(q[0], tree)
     )
     if tree.position_gain:
         # and its servos what they give back until they are without force; what they cannot is the work of a motor
@@ -126,7 +127,7 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
         has = has + pull @ give @ pull / 2.0
         done = coordinates.difference(q, q[0]) @ (case.tau - gain @ give @ case.tau)
     if tree.has_springs:
-        has = has + tmt.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
+        has = has + literal.spring_torque(q[0], tree) @ coordinates.difference(q[0], np.array(tree.rest)) / 2.0
     slides = [i for kind, _, by in coordinates.places.joints if kind == "slide" for i in range(by.start, by.stop)]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     gone = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import tmt
+from tmt import literal
 
 EPS = float(np.finfo(float).eps)
 FACTOR = 64
@@ -38,9 +39,9 @@ def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndar
 
 def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """Convective + Euler + gravity terms of the bias, each by its absolute value, N m, (states,)."""
-    T, B = tmt.jacobians(q, tree)
-    v_conv, w_conv = tmt.convective_terms(q, qd, tree)
-    omega = tmt.angular_velocities(q, qd, tree)
+    T, B = literal.jacobians(q, tree)
+    v_conv, w_conv = literal.convective_terms(q, qd, tree)
+    omega = literal.angular_velocities(q, qd, tree)
     inertia = np.array(tree.inertia)
     moments = np.abs(np.einsum("bij,sbj->sbi", inertia, w_conv))
     moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
@@ -51,12 +52,12 @@ def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
 
 def mass_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """Largest entry of Mbar, kg m2, (states,)."""
-    return np.abs(tmt.mass_matrix(q, tree)).max(axis=(1, 2))
+    return np.abs(literal.mass_matrix(q, tree)).max(axis=(1, 2))
 
 
 def condition(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """Condition number of Mbar in the 2-norm, (states,)."""
-    return np.linalg.cond(tmt.mass_matrix(q, tree))
+    return np.linalg.cond(literal.mass_matrix(q, tree))
 
 
 def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: ArrayLike | None = None) -> np.ndarray:
@@ -65,7 +66,7 @@ def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: Ar
     force: scale of the forces, N m, (states,). size: |qdd| where it is known; without it, its bound |Mbar^-1| force,
     so that the scale is (cond(Mbar) + 1) |Mbar^-1| force. Norms of Mbar are its eigenvalues.
     """
-    eigenvalues = np.linalg.eigvalsh(tmt.mass_matrix(q, tree))
+    eigenvalues = np.linalg.eigvalsh(literal.mass_matrix(q, tree))
     size = force / eigenvalues[:, 0] if size is None else size
     return (eigenvalues[:, -1] * size + force) / eigenvalues[:, 0]
 

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 import tmt
+from tmt import literal
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
 from tmt.tree import GAINS
 
@@ -101,7 +102,7 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Dri
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
     inverse = np.linalg.pinv(mass_matrix, hermitian=True)
-    accelerations = inverse @ -(weight + tmt.spring_torque(q, tree))
+    accelerations = inverse @ -(weight + literal.spring_torque(q, tree))
     added = added_damping(inverse, accelerations)
     rests = np.abs(accelerations).max() < STILL
     going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * (3 if kind == "ball" else 1))}

@@ -3,7 +3,7 @@
 import numpy as np
 
 import tmt
-from tmt import method
+from tmt import literal, method
 from tmt.dual import seeded
 
 
@@ -14,7 +14,7 @@ def stiffness(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """
     if set(tree.kind) == {"hinge"} and not (tree.has_springs or tree.has_gains):
         quarter = np.pi / 2 * np.eye(len(q))
-        return (tmt.gravity_balance(q + quarter, tree) - tmt.gravity_balance(q - quarter, tree)) / 2
+        return (literal.gravity_balance(q + quarter, tree) - literal.gravity_balance(q - quarter, tree)) / 2
     moved = moving(tree, q, np.eye(tree.coordinates.nv))
     return np.array(slopes(moved, holding(tree, moved)))
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import eig, eigh
 
 import tmt
-from tmt import METHODS, composite, method
+from tmt import METHODS, composite, literal, method
 from tmt.dual import seeded
 
 from ..case import SEED, Case, Coordinates
@@ -30,14 +30,14 @@ def modes(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     K u = frequency^2 Mbar u, modes with u' Mbar u = 1.
     """
-    squares, shapes = eigh(stiffness(tree, q), tmt.mass_matrix(q, tree))
+    squares, shapes = eigh(stiffness(tree, q), literal.mass_matrix(q, tree))
     return np.sqrt(squares), shapes
 
 
 def small_oscillation(t: np.ndarray, tree: tmt.Tree, q: np.ndarray, away: np.ndarray) -> np.ndarray:
     """Positions, rad, (times, nq), of the linear modes about q, let go at rest so far `away`, (nv,) rad."""
     frequencies, shapes = modes(tree, q)
-    parts = shapes.T @ tmt.mass_matrix(q, tree) @ away
+    parts = shapes.T @ literal.mass_matrix(q, tree) @ away
     return Coordinates(tree.hinge_names, tree.kind).move(q, np.cos(np.outer(t, frequencies)) * parts @ shapes.T)
 
 
@@ -99,7 +99,7 @@ class Held:
     @cached_property
     def mass_matrix(self) -> np.ndarray:
         """Mbar, kg m2, (nv, nv)."""
-        return tmt.mass_matrix(self.q, self.tree)
+        return literal.mass_matrix(self.q, self.tree)
 
     @cached_property
     def matrix(self) -> np.ndarray:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 import tmt
+from tmt import literal
 
 from ..case import Coordinates
 from .derivative import stiffness
@@ -21,9 +22,9 @@ def at_rest(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | None:
     Newton's method in the modes of the mass matrix at q, with the size of each stiffness: what would climb goes down.
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
-    largest, height, inertia = 0.0, potential(tree, q), tmt.mass_matrix(q, tree)
+    largest, height, inertia = 0.0, potential(tree, q), literal.mass_matrix(q, tree)
     for _ in range(MOST_TRIED):
-        force = -tmt.gravity_balance(q, tree) - tmt.spring_torque(q, tree)
+        force = -literal.gravity_balance(q, tree) - literal.spring_torque(q, tree)
         K = stiffness(tree, q)
         squares, shapes = eigh(0.5 * (K + K.T), inertia)
         flat = FLAT * np.abs(squares).max()
@@ -49,4 +50,4 @@ def at_rest(tree: tmt.Tree, q: np.ndarray) -> np.ndarray | None:
 
 def potential(tree: tmt.Tree, q: np.ndarray) -> float:
     """Of gravity and springs, J."""
-    return float(tmt.potential_energy(q, tree))
+    return float(literal.potential_energy(q, tree))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt import literal
 from tmt.methods import by_speed
 
 from ..actuators import Cut, Drive
@@ -174,7 +175,7 @@ class Driven:
         of_tendons = pulls.forces[count:] @ along.moments[count:]
         whole, away = self.weights(q)
         away.torque[[*self.drive.lifted, *self.drive.unlifted]] = 0.0
-        springs = tmt.spring_torque(q, self.tree)
+        springs = literal.spring_torque(q, self.tree)
         sizes = [one.largest(x, length) for one, x, length in zip(self.drive.actuators, u, along.lengths) if one.acts]
         sizes += [one.largest(length) for one, length in zip(self.drive.tendons, along.lengths[count:])]
         levers = np.abs(along.moments[[one.acts for one in self.drive.actuators] + [True] * len(self.drive.tendons)])

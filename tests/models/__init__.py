@@ -3,7 +3,9 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from .seeded import KINDS, chain, random_tree
+from compare.robots.chain import chain
+
+from .seeded import KINDS, random_tree
 
 __all__ = ["KINDS", "PATHS", "chain", "gymnasium_files", "random_tree"]
 

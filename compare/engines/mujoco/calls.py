@@ -4,7 +4,8 @@ The C library that the Python package brings is called through its function poin
 """
 
 import ctypes
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -22,8 +23,14 @@ def library() -> ctypes.CDLL | None:
     """MuJoCo's shared library, if it lies where the package usually has it."""
     for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
         for path in sorted(Path(mujoco.__file__).parent.glob(pattern)):
-            return ctypes.CDLL(str(path))
+            return opened(str(path))
     return None
+
+
+@cache
+def opened(path: str) -> ctypes.CDLL:
+    """A library, one for all that ask for it."""
+    return ctypes.CDLL(path)
 
 
 class MinimalCalls:
@@ -89,7 +96,7 @@ class MinimalCalls:
             # what the addresses point to must live as long as the call
             return lambda count, _=self: loop(*arguments, count)
 
-        terms, dynamics = equal_work(call)
+        terms, dynamics = equal_work(library())
         return {
             "MuJoCo, mj_forward": ("forward_dynamics", run(repeated, call["mj_forward"], *self.addresses)),
             "MuJoCo, equal work": ("forward_dynamics", run(dynamics, *self.addresses, force, solution)),
@@ -123,6 +130,7 @@ class MinimalCalls:
 BEFORE_RNE = ("mj_kinematics", "mj_comPos", "mass matrix", "mj_comVel")  # before mj_rne, in this order
 
 
+@cache
 def functions(lib: ctypes.CDLL) -> dict[str, Callable]:
     """MuJoCo's functions of model and data by their names."""
     more = {"mj_rne": (ctypes.c_int, ctypes.c_void_p), "mj_solveM": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)}
@@ -140,8 +148,10 @@ def repeated(function, model, data, count):
         function(model, data)
 
 
-def equal_work(call: Mapping[str, Callable]) -> tuple[Callable, Callable]:
-    """Compiled loops: mass matrix and bias; and the acceleration from them."""
+@cache
+def equal_work(lib: ctypes.CDLL) -> tuple[Callable, Callable]:
+    """Compiled loops over a library's functions, of any model: mass matrix and bias; and the acceleration from them."""
+    call = functions(lib)
     kinematics, com, inertia, velocities = (call[name] for name in BEFORE_RNE)
     factor, rne, solve = call["mj_factorM"], call["mj_rne"], call["mj_solveM"]
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 import tmt
+from tmt import literal
 from tmt.stepping import stepped
 
 from ...case import Case
@@ -97,7 +98,7 @@ class OwnDynamics:
             return own.acceleration(q, v, np.asarray(tau) - case.added_damping * v + lifted)
         forces = tau - np.array(self.tree.damping) * v - self.bias(q, v)
         if self.tree.has_springs:
-            forces = forces - tmt.spring_torque(q, self.tree)
+            forces = forces - literal.spring_torque(q, self.tree)
         return np.linalg.solve(self.mass_matrix(q), forces[..., None])[..., 0]
 
     def energy(self, q, v) -> np.ndarray:

@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 
 import tmt
+from tmt import literal
 from tmt.values import shown
 
 from ...case import Coordinates
@@ -108,7 +109,7 @@ class OwnEquations:
         if self.tree is None:
             return np.zeros(np.shape(v))
         drag = np.array(self.tree.damping) * v
-        return drag + tmt.spring_torque(q, self.tree) if self.tree.has_springs else drag
+        return drag + literal.spring_torque(q, self.tree) if self.tree.has_springs else drag
 
     def energy(self, q, v) -> np.ndarray:
         """J, (...); its zero is its own."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt import literal
 
 from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.consistency import Condition
@@ -101,7 +102,7 @@ def search(setup: Setup) -> Found:
         diagnosis = diagnosed_as_stated(tree, names, joints, q, qd, (M, h), sizes, SECONDS)
     else:
         diagnosis = diagnose(tree, names, q, qd, values, allowed, SECONDS)
-    right = packed(tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree), tree.coordinates.nv, len(q))
+    right = packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree), tree.coordinates.nv, len(q))
     off = over(np.abs(values - right), allowed)
     acting, size = left_over(tree, q, qd, tau, M, h, np.asarray(given.acceleration(q, qd, tau)))
     force_ratio = largest_ratio(over(np.abs(acting), size))
@@ -131,7 +132,7 @@ def sizes_of(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray,
 
 def left_over(tree: tmt.Tree, q, qd, tau, M, h, qdd) -> tuple[np.ndarray, np.ndarray]:
     """tau - D qd - k (q - rest) - h - M qdd, (states, nv), with all of one source, and its tolerance."""
-    pull = tmt.spring_torque(q, tree) if tree.has_springs else 0.0
+    pull = literal.spring_torque(q, tree) if tree.has_springs else 0.0
     acting = tau - np.array(tree.damping) * qd - pull - h - np.einsum("sij,sj->si", M, qdd)
     scale = Entries(tree, q, qd)
     sizes = scale.mass_matrix + np.abs(M)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import tmt
+from tmt import literal
 
 from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.places import OF_ZERO
@@ -206,14 +207,16 @@ def why_invisible(fault: Fault) -> str:
     tree, q = fault.tree, search_states(fault.tree, AT["search"])[0]
     if fault.make[0] == "tree":
         edited = fault.make[1]
-        if np.abs(tmt.com_positions(q, edited) - tmt.com_positions(q, tree)).max() > 1e-9 * max(1.0, np.abs(q).max()):
-            moved = tmt.com_positions(q, edited) - tmt.com_positions(q, tree)
+        if np.abs(literal.com_positions(q, edited) - literal.com_positions(q, tree)).max() > 1e-9 * max(
+            1.0, np.abs(q).max()
+        ):
+            moved = literal.com_positions(q, edited) - literal.com_positions(q, tree)
             if np.ptp(moved, axis=(0, 1)).max() < 1e-9:
                 return "all bodies are displaced by the same: M and h do not depend on where the robot stands"
             return "positions differ, M and h do not: the robot is the same in a mirror, or displaced along an axis"
         if np.array_equal(edited.inertia, tree.inertia):
             return "M and h do not depend on it: what it moves lies on the axis"
-        turns = tmt.jacobians(q, tree)[1]
+        turns = literal.jacobians(q, tree)[1]
         for b, body in enumerate(tree.body_names):
             axes = [k for k in range(3) if np.abs(turns[:, b, k]).max() < 1e-12]
             touched = {k for k in range(3) if np.any(np.array(edited.inertia[b])[k] != np.array(tree.inertia[b])[k])}

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-import tmt
+from tmt import literal
 
 from ...engines.mujoco.inventory import MODELLED, OPEN
 from ...engines.mujoco.stated import Stated, stated_numbers
@@ -105,7 +105,7 @@ def compare_number(result: Result, number: Stated, unit: str) -> list[dict]:
 def check_forces(result: Result, setup: Setup) -> None:
     """Checks that nothing acts but what the equations have: of a sum with springs and damping but for its rounding."""
     tree, sample = setup.robot.tree, setup.random
-    largest = np.abs(sample.qd * tree.damping).max() + np.abs(tmt.spring_torque(sample.q, tree)).max()
+    largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
     for source, force in setup.compared()["mujoco"].other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == PASSIVE else 0.0
         most = float(np.abs(force).max())

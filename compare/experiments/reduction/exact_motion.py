@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 import tmt
+from tmt import literal
 from tmt.reference import DIGITS, distance
 
 from ...case import SEED, Case
@@ -185,10 +186,10 @@ def equilibrium(robot: Robot) -> str | None:
     if not_linear(tree):
         return None
     names = [*robot.postures, *robot.positions]
-    torques = {name: np.abs(tmt.gravity_balance(robot.posture(name), tree)).max() for name in names}
+    torques = {name: np.abs(literal.gravity_balance(robot.posture(name), tree)).max() for name in names}
     rest = [name for name, torque in torques.items() if torque <= FACTOR * EPS * gravity_scale(tree)]
     stable = [name for name in rest if held(robot, name).kind == "centre"]
-    return min(stable, key=lambda name: float(tmt.potential_energy(robot.posture(name), tree)), default=None)
+    return min(stable, key=lambda name: float(literal.potential_energy(robot.posture(name), tree)), default=None)
 
 
 def not_linear(tree: tmt.Tree) -> str | None:
@@ -207,7 +208,9 @@ def odd(tree: tmt.Tree, q: np.ndarray) -> bool:
     That is, whether Mbar is the same and the torque of gravity the opposite on the other side, at random places.
     """
     away = np.random.default_rng(SEED).uniform(-1.0, 1.0, (3, len(q)))
-    masses, torques = ([f(q + side * away, tree) for side in (1, -1)] for f in (tmt.mass_matrix, tmt.gravity_balance))
+    masses, torques = (
+        [f(q + side * away, tree) for side in (1, -1)] for f in (literal.mass_matrix, literal.gravity_balance)
+    )
     same = np.abs(masses[0] - masses[1]).max(axis=(1, 2)) <= FACTOR * EPS * mass_scale(tree, q + away)
     opposite = np.abs(torques[0] + torques[1]).max(axis=1) <= FACTOR * EPS * gravity_scale(tree)
     return bool(same.all() and opposite.all())

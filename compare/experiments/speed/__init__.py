@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-import tmt
+from tmt import literal
 
 from ...case import Case
 from ...engines import COMPARED, GRID, Engine, Method, Setting
@@ -19,7 +19,7 @@ from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import Reference, has_no_reference, references
 from ...truth.smallest import reduced
-from . import accuracy, advice, evaluations, targets, tumbling
+from . import accuracy, advice, evaluations, growth, targets, tumbling
 from .accuracy import fill_in, reference_in_words, spread_in_words
 from .floors import floor
 from .settings import (
@@ -153,6 +153,7 @@ def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Seq
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
     result.notes += [*sentences, *spread_in_words(spread), PARTS]
+    growth.add_growth(result, setup)
     if not setup.robot.is_read:  # of a file nothing was aimed at
         aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
         result.tables["speed_targets"] = aims
@@ -186,7 +187,7 @@ def rows_of_scene(
 def true_energy(case: Case, reference: Reference) -> np.ndarray:
     """The energy of the reference of a scene at its times, J, (times,)."""
     nq = case.coordinates.nq
-    return tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+    return literal.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
 
 
 def row_of_run(
@@ -219,7 +220,7 @@ def row_of_run(
         states = [part.copy() for part in true]
         for state, part, own in zip(states, (motion.q, motion.v), free):
             state[:, own] = 0.0 if ended else part
-        off = np.abs(tmt.energy(*states, tree) - energy).max()
+        off = np.abs(literal.energy(*states, tree) - energy).max()
     return {
         "scene": case.name, "engine": method.engine, "method": method.name,
         "dt_s": setting.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
@@ -242,7 +243,7 @@ def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
-    from . import figures_evaluations, figures_times  # matplotlib is for the process that draws
+    from . import figures_evaluations, figures_growth, figures_times  # matplotlib is for the process that draws
 
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
@@ -251,3 +252,5 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     yield partial(figures_times.draw_evaluations, result)
     yield partial(figures_times.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)
+    if "growth" in result.tables:
+        yield partial(figures_growth.draw_chain, result)

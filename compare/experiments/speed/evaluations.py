@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 import tmt
-from tmt import generic, kernels, method
+from tmt import generic, kernels, literal, method
 from tmt.methods import METHODS
 
 from ...case import SEED, Case
@@ -138,7 +138,7 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoo
     if count == 1:  # a call from Python for one state: what it costs is the call
         return runs
     if count <= 1000 and n <= IN_PYTHON:
-        runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: tmt.acceleration(q, qd, tau, tree)
+        runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: literal.acceleration(q, qd, tau, tree)
     if not kernels.is_traced(tree, METHODS["rk4"]):
         return runs
     in_lanes = count // kernels.LANES * kernels.LANES

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 import tmt
+from tmt import literal
 
 from ...case import Case
 from ...engines import LABELS, Engine, Method
@@ -67,7 +68,7 @@ def observed(case: Case, t: np.ndarray, run: dict) -> dict:
     """
     fine = np.isfinite(np.concatenate([run["q"], run["qd"]], axis=1)).all(axis=1)
     energy = np.full(len(t), np.nan)
-    energy[fine] = tmt.energy(run["q"][fine], run["qd"][fine], case.tree)
+    energy[fine] = literal.energy(run["q"][fine], run["qd"][fine], case.tree)
     reach = potential_range(case)
     wrong = ~(energy - energy[0] <= reach) | np.append(False, np.diff(run["time"]) <= 0.0)
     return {
@@ -90,10 +91,10 @@ def highest_potential(tree: tmt.Tree, q: np.ndarray, sign: float) -> float:
     V is a + b cos q_i + c sin q_i in each angle, so its derivatives there and a quarter of a turn on say where it is highest.
     """
     q, least, before = np.array(q), 1e-12 * gravity_scale(tree), -np.inf
-    while ((now := sign * tmt.potential_energy(q, tree)) > before + least).any():
+    while ((now := sign * literal.potential_energy(q, tree)) > before + least).any():
         before = now
         for i, turn in enumerate(np.pi / 2 * np.eye(q.shape[1])):
-            here, ahead = sign * tmt.gravity_balance(np.array([q, q + turn]), tree)[..., i]
+            here, ahead = sign * literal.gravity_balance(np.array([q, q + turn]), tree)[..., i]
             q[:, i] += np.arctan2(here, -ahead)
     return float(now.max())
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-import tmt
+from tmt import literal
 
 from ...case import Case
 from ...engines import Engine, Method
@@ -31,7 +31,7 @@ def long_run(method: Method, dt: float, case: Case, engines: Mapping[str, Engine
         ended = diverged_at(case, t, q, qd)
         off = np.full(steps + 1, np.nan)
         alive = t < (np.inf if ended is None else ended)
-        off[alive] = tmt.energy(q[alive], qd[alive], case.tree)
+        off[alive] = literal.energy(q[alive], qd[alive], case.tree)
     off -= off[0]
     every = max(1, steps // CURVE_POINTS)
     kind, change = ("diverges", None) if ended is not None else behaviour(off)

@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-import tmt
+from tmt import literal
 
 from ...engines import Engine, Method
 from ...truth.linear import NEGLIGIBLE, Held
@@ -22,7 +22,7 @@ def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.nd
     """
     if method.engine == "mujoco":
         own = engines["mujoco"].of(at.case).gravity_balance(at.q)
-        return own + tmt.spring_torque(at.q, at.tree) if at.tree.has_springs else own
+        return own + literal.spring_torque(at.q, at.tree) if at.tree.has_springs else own
     tau = variants(at.tau, 2)
     return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
 

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 import tmt
+from tmt import literal
 
 from ...case import Case
 from ...engines import LABELS, Dynamics, Engine, Method, compared, one_of_each_scheme, same_scheme
@@ -50,7 +51,7 @@ def constants(case: Case) -> dict[tuple, Callable]:
 
     Energy, and without gravity the momentum of the first joint, if that is a hinge or a slide without a spring.
     """
-    first, found = case.robot.joints[0], {("energy", "J"): partial(tmt.energy, model=case.tree)}
+    first, found = case.robot.joints[0], {("energy", "J"): partial(literal.energy, model=case.tree)}
     turns = case.robot.tree.kind[0] != "ball" and not case.robot.tree.stiffness[0]
     if not any(case.tree.gravity) and first in case.joints and turns:
         unit = {"hinge": "N m s", "slide": "N s"}[case.robot.tree.kind[0]]
@@ -60,10 +61,10 @@ def constants(case: Case) -> dict[tuple, Callable]:
 
 def roundings(case: Case) -> tuple[float, float]:
     """Up to where a drift of the energy, J, and of the momentum of the first joint may be rounding."""
-    momenta, springs = np.abs(tmt.mass_matrix(case.q, case.tree)) @ np.abs(case.v), 0.0
+    momenta, springs = np.abs(literal.mass_matrix(case.q, case.tree)) @ np.abs(case.v), 0.0
     if case.tree.has_springs:
         off = case.coordinates.difference(case.q, np.array(case.tree.rest))
-        springs = tmt.spring_torque(case.q, case.tree) @ off / 2.0
+        springs = literal.spring_torque(case.q, case.tree) @ off / 2.0
     return DRIFT_ROUNDED * (
         gravity_scale(case.tree, case.q) + momenta @ np.abs(case.v) / 2 + springs
     ), DRIFT_ROUNDED * momenta[0]
@@ -136,4 +137,4 @@ def drift_ratio(one: float, other: float) -> float:
 
 def momentum_along(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Momentum of the first joint, which hangs on the world, along a run: N m s about a hinge, N s along a slide."""
-    return np.einsum("sj,sj->s", tmt.mass_matrix(q, tree)[:, 0], v)
+    return np.einsum("sj,sj->s", literal.mass_matrix(q, tree)[:, 0], v)

@@ -26,7 +26,7 @@ EDITS = (
     Edit("run", "LEFT", "0.1", "0.13", "an arm has left when it is 0.13 rad away"),
     Edit("run", "departure", "t[away][0]", "t[away][-1]", "the last time away is that of leaving"),
     Edit("run", "exchanged", "2.0 * gravity_scale(_1, _2)", "6.0 * gravity_scale(_1, _2)", "the bound of the energy x 3"),
-    Edit("run", "exchanged", "_1 + tmt.energy(q[0], case.v, tree) - _2", "_1 + 3 * tmt.energy(q[0], case.v, tree) - _2",
+    Edit("run", "exchanged", "_1 + literal.energy(q[0], case.v, tree) - _2", "_1 + 3 * literal.energy(q[0], case.v, tree) - _2",
          "the energy at the start x 3"),
     Edit("run", "ORDER_MARGIN", "0.15", "3", "orders may be off by 3"),
     Edit("run", "MOVES", "0.1", "0.001", "a run that hardly moves is enough"),

@@ -33,6 +33,13 @@ EDITS = (
     Edit("accuracy", "error", "row['diverged']", "False", "a run that diverged has an error"),
     Edit("targets", "targets.add", "reached >= aim", "reached <= aim", "a missed aim is met"),
     Edit("targets", "targets.add", "slow / fast", "fast / slow", "ratios are inverted"),
+    Edit("speed.growth", "rows_of_chain", "times[one] * made[one].states", "times[one]", "time of all states as that of one"),
+    Edit("speed.growth", "rows_of_chain", "min(taken, seconds[one])", "taken", "the last pass is reported"),
+    Edit("speed.growth", "exponents", "np.log(list(times))", "np.sqrt(list(times))", "the exponent is of no power"),
+    Edit("speed.growth", "exponents", "n >= MANY_JOINTS", "True", "short chains are fitted too"),
+    Edit("speed.growth", "straight_in_words", "looped[n] / straight[n]", "straight[n] / looped[n]", "ratios are inverted"),
+    Edit("speed.growth", "extent_of", "setup.robot.is_read", "False", "every robot's run pays for the chain"),
+    Edit("speed.implementations", "straight_line", "operations > of.most", "False", "long code is compiled unasked"),
     # engines
     Edit("engines.scipy", "as_far_as_it_goes", "t[int(np.argmin(finite)) - 1]", "t[0]", "every run ends at its start"),
     Edit("engines.tmt", "TmtDynamics.prepare", "path[0, ::every].copy()", "path[0, -65:].copy()",

@@ -1,0 +1,311 @@
+"""What a chain costs as it grows: its rows and empty cells, exponents, sentences, the figure, and where it is asked for."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_hex
+from models import PATHS
+
+import tmt
+from compare import experiment
+from compare.__main__ import main
+from compare.engines.mujoco import load, read
+from compare.experiments.speed import figures_growth, growth, implementations
+from compare.experiments.speed.growth import Exponent, Extent, costs_of_growth, exponents
+from compare.experiments.speed.implementations import IMPLEMENTATIONS, Implementation, Made, chain_of
+from compare.judge.check import Result
+from compare.judge.scale import EPS
+from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+
+COLUMNS = ["n", "implementation", "ns_per_state", "compile_s", "operations"]
+
+
+def nothing(*_):
+    pass
+
+
+def row(n, name, ns, compile_s=None, operations=None):
+    return dict(zip(COLUMNS, (n, name, ns, compile_s, operations)))
+
+
+def of_power(name, power, numbers, first=100.0):
+    return [row(n, name, first * n**power) for n in numbers]
+
+
+@pytest.fixture(scope="module")
+def known():
+    """The costs of chains of 1 and 2 joints, of which the code of the first alone is compiled, and reasons."""
+    return costs_of_growth(Extent((1, 2), 2, most=100), nothing)
+
+
+def test_there_is_a_row_for_each_number_and_each_implementation(known):
+    rows, _ = known
+    names = [one.name for one in IMPLEMENTATIONS if not one.unavailable()]
+    assert {*names} >= {"literal", "straight_line", "loop", "loop_lanes"}
+    assert [(row["n"], row["implementation"]) for row in rows] == [(n, name) for n in (1, 2) for name in names]
+    assert all(list(row) == COLUMNS for row in rows)
+    timed = {(row["n"], row["implementation"]): row for row in rows if row["ns_per_state"]}
+    assert {(n, name) for n in (1, 2) for name in names} - timed.keys() == {(2, "straight_line")}
+    assert all(row["ns_per_state"] > 0.0 for row in timed.values())
+    assert timed[1, "straight_line"]["compile_s"] > 0.0
+    assert (
+        timed[1, "straight_line"]["operations"] < timed[1, "literal"]["operations"] < timed[2, "literal"]["operations"]
+    )
+
+
+def test_what_has_no_time_has_an_empty_row_and_a_reason(known):
+    rows, reasons = known
+    assert dict.fromkeys(COLUMNS) | {"n": 2, "implementation": "straight_line"} in rows
+    assert reasons["straight-line code is not timed with 2 joints"] == (
+        "it has more than 100 operations; `speed --growth` compiles it, unless it is to be quick"
+    )
+
+
+def test_an_implementation_that_is_not_there_has_no_row_but_a_reason():
+    calls = []
+    here = Implementation("here", "here", nothing, lambda of: Made(calls.append, 4))
+    elsewhere = Implementation("elsewhere", "the other", lambda: "it is not installed", None)
+    picky = Implementation("picky", "the third", nothing, lambda of: "too long" if of.n > 1 else Made(calls.append))
+    rows, reasons = costs_of_growth(Extent((1, 2, 3), 1), nothing, (here, elsewhere, picky))
+    assert [(r["n"], r["implementation"], r["ns_per_state"] is None) for r in rows] == [
+        (1, "here", False), (1, "picky", False), (2, "here", False), (2, "picky", True), (3, "here", False), (3, "picky", True)
+    ]  # fmt: skip
+    assert reasons == {
+        "the other takes no part": "it is not installed",
+        "the third is not timed with 2, 3 joints": "too long",
+    }
+    assert growth.chain_in_words([], {}, reasons) == [
+        "Growth: the other takes no part: it is not installed.", "Growth: the third is not timed with 2, 3 joints: too long."
+    ]  # fmt: skip
+
+
+def test_a_time_is_that_of_one_state(monkeypatch):
+    """The fastest call of all passes, over what it did and how many states that has."""
+    monkeypatch.setattr(growth, "often_enough", lambda run: 50)
+    passes = iter([{"a": 2e-3}, {"a": 1e-3}, {"a": 3e-3}])
+    monkeypatch.setattr(growth.timing, "fastest", lambda calls, rounds: {one: next(passes)["a"] for one in calls})
+    one = Implementation("a", "a", nothing, lambda of: Made(nothing, 4, 0.5, 7))
+    (found,), _ = growth.rows_of_chain(chain_of(1), [one], 3)
+    assert found == row(1, "a", pytest.approx(1e9 * 1e-3 / (50 * 4)), 0.5, 7)
+
+
+def test_what_takes_long_is_timed_in_one_pass_alone(monkeypatch):
+    asked = []
+
+    def fastest(calls, rounds):
+        asked.append([one.name for one in calls])
+        return {one: {"short": 1e-3, "long": growth.timing.ONCE}[one.name] for one in calls}
+
+    monkeypatch.setattr(growth.timing, "fastest", fastest)
+    ones = [Implementation(name, name, nothing, lambda of: Made(lambda times: None)) for name in ("short", "long")]
+    monkeypatch.setattr(growth, "often_enough", lambda run: 1)
+    growth.rows_of_chain(chain_of(1), ones, 3)
+    assert asked == [["short", "long"], ["short"], ["short"]]
+
+
+@pytest.mark.parametrize(
+    "lasts, least, most", [(1e-6, 1000, 2500), (1e-4, 10, 25), (0.9e-3, 2, 2), (1.1e-3, 1, 1), (1.0, 1, 1)]
+)
+def test_a_timed_call_takes_a_millisecond_or_is_one_evaluation(lasts, least, most, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(growth.time, "perf_counter", lambda: now[0])
+
+    def run(times):
+        now[0] += lasts * times
+
+    assert least <= growth.often_enough(run) <= most
+
+
+def test_what_is_timed_is_right():
+    """Each form of tmt gives the accelerations of the states that it is timed with."""
+    of = chain_of(2)
+    q, qd, tau = of.states
+    expected = tmt.acceleration(q[:64], qd[:64], tau[:64], of.tree)
+    assert len(q) % 32 == 0 and len(q) * of.n <= implementations.ANGLES_AT_ONCE
+    for one in (
+        implementations.literal,
+        implementations.straight_line,
+        implementations.loop,
+        implementations.loop_lanes,
+    ):
+        made = one(of)
+        evaluate, arguments = made.run.args
+        result = evaluate(*arguments)
+        found = np.array(result)[None] if made.states == 1 else arguments[-1]
+        found = found.T if one is implementations.loop_lanes else found
+        assert len(found) == made.states
+        found = found[:64]
+        assert np.abs(found - expected[: len(found)]).max() < 1e4 * EPS * np.abs(expected).max(), one.__name__
+        made.run(2)
+
+
+def test_code_for_one_state_at_a_time_has_no_other_loops():
+    text = implementations.one_at_a_time(
+        implementations.evaluator_source(
+            chain_of(1).tree, "forward_dynamics", implementations.composite.mass_matrix_and_bias, "sincos"
+        )
+    )
+    named = [line.split("(")[0] for line in text.splitlines() if line.startswith("def ")]
+    assert named == ["def library_sincos", "def quantity", "def by_library", "def apart", "def each"]
+
+
+def test_straight_line_code_of_many_joints_is_not_made():
+    made = implementations.straight_line(chain_of(30))
+    assert made == "it has so many lines that a loop takes its place"
+    assert implementations.traced_operations(chain_of(30).tree) is None
+
+
+def test_the_loops_are_compiled_anew_in_a_process_of_their_own(monkeypatch):
+    asked = []
+
+    def run(command, env, **more):
+        asked.append((command[1:], env["TMT_CACHE"]))
+        return implementations.subprocess.CompletedProcess(command, 0, '{"loop": 1.5, "loop_lanes": 2.5}', "")
+
+    monkeypatch.setattr(implementations.subprocess, "run", run)
+    implementations.cold_start.cache_clear()
+    of = chain_of(1, cold=True)
+    assert (implementations.loop(of).compile_s, implementations.loop_lanes(of).compile_s) == (1.5, 2.5)
+    implementations.cold_start.cache_clear()
+    ((command, folder),) = asked
+    assert command == ["-c", "from compare.experiments.speed.implementations import compilation; compilation()"]
+    assert not implementations.Path(folder).exists()
+    assert implementations.loop(of._replace(cold=False)).compile_s is None
+
+
+def test_what_that_process_prints(capsys):
+    implementations.compilation()
+    taken = json.loads(capsys.readouterr().out)
+    assert list(taken) == ["loop", "loop_lanes"] and all(seconds >= 0.0 for seconds in taken.values())
+
+
+def test_exponents_of_known_series():
+    long = (1, 2, 4, 8, 16, 32, 64)
+    rows = of_power("a", 1.25, long) + of_power("b", 2.0, (1, 2, 8)) + of_power("c", 1.0, (4,))
+    rows += [row(n, "d", 1000.0 if n < 8 else 100.0 * n) for n in long] + [row(2, "e", None)]
+    found = exponents(rows)
+    assert found == {
+        "a": Exponent(pytest.approx(1.25), 8, 64), "b": Exponent(pytest.approx(2.0), 1, 8),
+        "d": Exponent(pytest.approx(1.0), 8, 64),
+    }  # fmt: skip
+
+
+def test_exponents_in_words():
+    said = growth.powers_in_words(
+        {"loop": Exponent(1.04, 8, 64), "literal": Exponent(2.5, 8, 64), "straight_line": Exponent(1.5, 1, 8)}
+    )
+    assert said == [
+        "Forward dynamics of a chain of n hinges, none of them along a coordinate axis, grow from 8 to 64 joints the loop as "
+        "n^1.04, the literal form in Python as n^2.50; from 1 to 8 joints straight-line code as n^1.50."
+    ]
+    assert growth.powers_in_words({}) == []
+
+
+def test_where_straight_line_code_wins_in_words():
+    def said(**ratios):
+        return growth.straight_in_words([
+            row(int(n[1:]), name, value) for n, ratio in ratios.items()
+            for name, value in (("loop", 100.0 * ratio), ("straight_line", 100.0))
+        ])  # fmt: skip
+
+    start = "One state at a time, straight-line code takes"
+    assert said(n1=8.0, n2=2.5, n4=1.5) == [f"{start} 8 to 1.5 times less than the loop with 1, 2, 4 joints."]
+    assert said(n1=8.0, n2=2.5, n4=0.9) == [
+        f"{start} 8 to 2.5 times less than the loop with 1, 2 joints, and no less with 4 joints."
+    ]
+    assert said(n1=3.0, n2=1.0) == [f"{start} 3 times less than the loop with 1 joint, and no less with 2 joints."]
+    assert said(n1=0.5, n2=1.0) == [f"{start} no less time than the loop with 1, 2 joints."]
+    assert said() == [] and growth.straight_in_words([row(1, "straight_line", 3.0), row(2, "loop", 3.0)]) == []
+
+
+def test_what_the_longest_chain_costs_in_words():
+    rows = [
+        row(1, "mujoco_equal_work", 1.0),
+        row(8, "mujoco_equal_work", 2000.0),
+        row(8, "loop", 500.0),
+        row(8, "literal", 8000.0),
+    ]
+    assert growth.most_joints_in_words([*rows, row(8, "straight_line", None)]) == [
+        "With 8 joints MuJoCo's equal work takes 2,000 ns a state, and the literal form in Python 4.0 times more, the loop 4.0 "
+        "times less."
+    ]
+    assert growth.most_joints_in_words(rows[2:]) == growth.most_joints_in_words(rows[1:2]) == []
+    assert growth.most_joints_in_words([]) == []
+
+
+def test_what_compilation_takes_in_words():
+    rows = [row(1, "straight_line", 10.0, 0.5, 80), row(1, "loop", 110.0, 3.0), row(1, "loop_lanes", 9.0, 4.0)]
+    rows += [row(2, "straight_line", 50.0, 2.0, 500), row(2, "loop", 150.0, 3.0)]
+    start, loops = (
+        "To compile takes, of the processor's time: ",
+        "the loop 3 s, once for all trees; the loop in lanes 4 s, after it.",
+    )
+    assert growth.compilation_in_words(rows) == [
+        f"{start}straight-line code of 2 joints, 500 operations, 2 s (won back in 2.0e+07 states); {loops}"
+    ]
+    rows[-1]["ns_per_state"] = 50.0
+    assert growth.compilation_in_words(rows) == [f"{start}straight-line code of 2 joints, 500 operations, 2 s; {loops}"]
+    assert growth.compilation_in_words(rows[1:3]) == [f"{start}{loops}"]
+    assert growth.compilation_in_words([row(1, "loop", 3.0)]) == []
+
+
+def test_the_figure_draws_the_rows():
+    result = Result("speed")
+    result.tables["growth"] = of_power("loop", 1.0, (1, 2, 8, 16)) + of_power("literal", 2.0, (1, 2), 1e5)
+    result.tables["growth"] += [row(1, "straight_line", 20.0), *(row(n, "straight_line", None) for n in (2, 8, 16))]
+    result.curves["exponents"] = exponents(result.tables["growth"])
+    name, fig, caption = figures_growth.draw_chain(result)
+    lines = {line.get_label(): line for ax in fig.axes for line in ax.get_lines()}
+    assert name == "speed_growth" and list(lines["the loop ($n^{1.00}$)"].get_ydata()) == [100.0, 200.0, 800.0, 1600.0]
+    assert list(lines["straight-line code"].get_xdata()) == [1]
+    assert to_hex(lines["the literal form in Python ($n^{2.00}$)"].get_color()) == "#666666"
+    assert caption == (
+        "Forward dynamics of a chain of 1 to 16 hinges, none of them along a coordinate axis, one state. Powers of n are "
+        "fitted by least squares to the logarithms, over 8 to 16 and 1 to 2 joints."
+    )
+    assert {one.name for one in IMPLEMENTATIONS} <= figures_growth.LOOKS.keys()
+    assert len(set(figures_growth.LOOKS.values())) == len(figures_growth.LOOKS)
+
+
+def test_the_chain_grows_where_it_is_asked_for_and_a_little_in_a_whole_run_of_the_arm():
+    engines = experiment.engines(load(ARM.mjcf, ARM.tree))
+    of_file = robot_of(read(PATHS["arm6"]), "arm6.xml")
+    own = dataclasses.replace(ARM, own=("mass_matrix", "bias"))
+    make, quick, small = experiment.Setup, experiment.Setup.quick, experiment.Setup.small
+    extents = growth.EXTENTS
+    assert growth.extent_of(make(ARM, engines)) is extents["short"]
+    assert growth.extent_of(small(ARM, engines)) is extents["small"]
+    for setup in (quick(ARM, engines), make(of_file, engines), make(own, engines), quick(of_file, engines)):
+        assert growth.extent_of(setup) is None
+    for robot in (ARM, of_file, own):
+        assert growth.extent_of(make(robot, engines, growth=True)) is extents["whole"]
+        assert growth.extent_of(quick(robot, engines, growth=True)) is extents["short"]
+    assert extents["short"].numbers[-1] == 8 and extents["whole"].numbers[-1] == 64
+    assert not extents["short"].cold and extents["whole"].cold and extents["whole"].most == np.inf
+
+
+def test_it_can_be_asked_for_on_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(growth.EXTENTS, "short", Extent((1, 2), 1, most=0.0))
+    assert main(["speed", "--quick", "--growth", "--out", str(tmp_path)]) == 0, capsys.readouterr()
+    table = pd.read_csv(tmp_path / "tables" / "growth.csv")
+    assert list(table.columns) == COLUMNS and set(table["n"]) == {1, 2}
+    assert table[table["implementation"] == "straight_line"]["ns_per_state"].isna().all()
+    assert (tmp_path / "figures" / "speed_growth.png").stat().st_size > 5000
+    assert "straight-line code is not timed with 1, 2 joints" in (tmp_path / "report.md").read_text(encoding="utf-8")
+
+
+def test_nothing_is_added_where_nothing_is_asked():
+    result = Result("speed")
+    growth.add_growth(result, experiment.Setup.quick(ARM, experiment.engines(load(ARM.mjcf, ARM.tree))))
+    assert not result.tables and not result.notes and not result.curves
+
+
+def test_a_small_run_has_the_table_and_its_sentences(small):
+    result = small("speed")
+    assert [*dict.fromkeys(row["n"] for row in result.tables["growth"])] == [1, 2, 3]
+    assert any(note.startswith("Forward dynamics of a chain of n hinges") for note in result.notes)
+    assert result.curves["exponents"]["loop"].first == 1

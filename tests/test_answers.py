@@ -1,0 +1,223 @@
+"""The public functions answer by compiled loops once these are worth getting, with what the literal form returns and raises."""
+
+import json
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from trees import random_state, tree_of_kinds
+
+import tmt
+from tmt import answers, cache, cores, literal
+from tmt.choice import Form, chosen
+
+EPS = np.finfo(float).eps
+OF_Q = "com_positions", "jacobians", "mass_matrix", "gravity_balance", "spring_torque", "potential_energy"
+OF_STATE = "angular_velocities", "convective_terms", "bias", "energy"
+QUANTITIES = *OF_Q, *OF_STATE, "acceleration"
+
+
+def given_to(quantity, q, qd, tau):
+    """The arguments of a function among these."""
+    return (q,) if quantity in OF_Q else (q, qd) if quantity in OF_STATE else (q, qd, tau)
+
+
+def in_parts(found):
+    return found if isinstance(found, tuple) else (found,)
+
+
+@pytest.fixture
+def loops():
+    """The loops answer for a Tree from now on."""
+
+    def got(tree):
+        answers.remembered(tree).get_loops()
+        return tree
+
+    return got
+
+
+def states(seed, count):
+    """A tree with every kind of joint, and its states: q, qd, tau of shape (count, ...)."""
+    rng = np.random.default_rng(seed)
+    tree = tree_of_kinds(rng, bodies=5)
+    return tree, [np.array(rows) for rows in zip(*(random_state(rng, tree) for _ in range(count)))]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_the_loops_answer_is_what_the_literal_form_returns(seed, loops):
+    tree, given = states(seed, 21)
+    loops(tree)
+    condition = np.linalg.cond(literal.mass_matrix(given[0], tree)).max()
+    for quantity in QUANTITIES:
+        expected = in_parts(getattr(literal, quantity)(*given_to(quantity, *given), tree))
+        for batch in ((), (1,), (21,), (3, 7), (0,), (2, 0)):
+            size = int(np.prod(batch))
+            some = [rows[0] if batch == () else rows[:size].reshape(*batch, rows.shape[1]) for rows in given]
+            found = in_parts(getattr(tmt, quantity)(*given_to(quantity, *some), tree))
+            assert len(found) == len(expected)
+            for one, all_of_it in zip(found, expected):
+                other = all_of_it[0] if batch == () else all_of_it[:size].reshape(*batch, *all_of_it.shape[1:])
+                assert type(one) is np.ndarray and one.shape == other.shape and one.dtype == other.dtype
+                assert one.flags.c_contiguous and one.flags.writeable
+                slack = 64 * EPS * (condition if quantity == "acceleration" else 1.0)
+                assert np.abs(one - other).max(initial=0.0) <= slack * np.abs(all_of_it).max()
+
+
+def test_one_row_of_speeds_or_torques_may_stand_for_all(loops):
+    tree, (q, qd, tau) = states(2, 9)
+    loops(tree)
+    repeated = np.broadcast_to(qd[0], qd.shape), np.broadcast_to(tau[0], tau.shape)
+    assert np.array_equal(tmt.acceleration(q, qd[0], tau[0], tree), tmt.acceleration(q, *repeated, tree))
+    assert tmt.acceleration(q[0], qd[:, None], tau, tree).shape == (9, 9, qd.shape[1])
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_a_state_has_the_same_bits_alone_and_among_others(quantity, loops):
+    tree, given = states(3, 19)
+    loops(tree)
+    together = in_parts(getattr(tmt, quantity)(*given_to(quantity, *given), tree))
+    for k in range(19):
+        alone = in_parts(getattr(tmt, quantity)(*given_to(quantity, *(rows[k] for rows in given)), tree))
+        assert all(np.array_equal(rows[k], one) for rows, one in zip(together, alone))
+
+
+def test_threads_change_no_bit(loops, monkeypatch):
+    tree, (q, qd, tau) = states(4, 200)
+    loops(tree)
+    alone = tmt.acceleration(q, qd, tau, tree)
+    used = []
+    monkeypatch.setattr(cores, "cores", lambda: 3)
+    monkeypatch.setattr(cores, "ThreadPoolExecutor", lambda n: used.append(n) or ThreadPoolExecutor(n))
+    monkeypatch.setattr(cores, "APART", 1e-9)
+    assert np.array_equal(tmt.acceleration(q, qd, tau, tree), alone)
+    assert used and {*used} == {3}
+
+
+@pytest.mark.parametrize(
+    "convert", [np.ndarray.tolist, np.asfortranarray, np.float32, lambda a: a[..., ::-1].copy()[..., ::-1]]
+)
+def test_numbers_in_any_form_are_taken(convert, loops):
+    loops(tmt.ARM)
+    q, qd, tau = np.random.default_rng(0).integers(-8, 9, (3, 5, 3)) / 8.0
+    expected = tmt.acceleration(q, qd, tau)
+    assert np.array_equal(tmt.acceleration(convert(q), convert(qd), tau), expected)
+    assert np.array_equal(tmt.acceleration(convert(q[0]), convert(qd[0]), tau[0]), expected[0])
+    for rows in (q, qd, tau):
+        rows.flags.writeable = False
+    assert np.array_equal(tmt.acceleration(q, qd, tau), expected)
+    assert np.array_equal(tmt.acceleration(q[0], qd[0], tau[0]), expected[0])
+
+
+BALL = tmt.Tree(
+    hinge_names=("ball",), parent=(-1,), offset=((0, 0, 0),), axis=np.eye(3), damping=(0, 0, 0), body_names=("body",),
+    body_hinge=(0,), mass=(1,), com=((0, 0, 0.1),), inertia=(np.eye(3),), gravity=(0, 0, -9.81), kind=("ball",),
+)  # fmt: skip
+WRIST = tmt.Tree(  # three hinges through one point: Mbar is singular where the second is at zero
+    hinge_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
+    damping=(0, 0, 0), body_names=("hand",), body_hinge=(2,), mass=(1,), com=((0.1, 0, 0.2),), inertia=(np.eye(3),),
+    gravity=(0, 0, -9.81),
+)  # fmt: skip
+WRONG = {
+    "no numbers": (tmt.ARM, (["a"] * 3, [0.0] * 3, [0.0] * 3)),
+    "truth values": (tmt.ARM, ([True] * 3, [0.0] * 3, [0.0] * 3)),
+    "masked": (tmt.ARM, (np.ma.array([0.0] * 3, mask=[1, 0, 0]), np.zeros(3), np.zeros(3))),
+    "too few": (tmt.ARM, (np.zeros(2), np.zeros(3), np.zeros(3))),
+    "too few speeds": (tmt.ARM, (np.zeros(3), np.zeros(2), np.zeros(3))),
+    "a number": (tmt.ARM, (0.0, np.zeros(3), np.zeros(3))),
+    "not finite": (tmt.ARM, (np.array([0.0, np.nan, 0.0]), np.zeros(3), np.zeros(3))),
+    "a speed that is not finite": (tmt.ARM, (np.zeros(3), np.array([0.0, np.inf, 0.0]), np.zeros(3))),
+    "a torque among many": (tmt.ARM, (np.zeros((40, 3)), np.zeros(3), np.full((40, 3), np.inf))),
+    "batches that do not fit": (tmt.ARM, (np.zeros((4, 3)), np.zeros((5, 3)), np.zeros(3))),
+    "beyond the largest double": (tmt.ARM, (np.zeros(3), np.full(3, 1e200), np.zeros(3))),
+    "no unit quaternion": (BALL, (np.array([1.0, 1.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))),
+    "one of many no unit quaternion": (BALL, (np.array([[1, 0, 0, 0]] * 9 + [[1, 0.01, 0, 0]]), np.zeros(3), np.zeros(3))),
+    "singular": (WRIST, (np.zeros(3), np.zeros(3), np.zeros(3))),
+    "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], np.zeros(3), np.zeros(3))),
+    "no model": ("arm", (np.zeros(3), np.zeros(3), np.zeros(3))),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_said_in_the_same_words(name, loops):
+    model, given = WRONG[name]
+    if isinstance(model, tmt.Tree):
+        loops(model)
+    with pytest.raises(ValueError) as expected:
+        literal.acceleration(*given, model)
+    with pytest.raises(ValueError) as found:
+        tmt.acceleration(*given, model)
+    assert str(found.value) == str(expected.value)
+
+
+def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one(loops):
+    loops(BALL)
+    inside, outside = (np.array([1.0 + off, 0.0, 0.0, 0.0]) for off in (0.99e-6, 1.01e-6))
+    assert np.isfinite(tmt.acceleration(inside, np.zeros(3), np.zeros(3), BALL)).all()
+    with pytest.raises(ValueError, match="quaternion"):
+        tmt.acceleration(outside, np.zeros(3), np.zeros(3), BALL)
+
+
+def test_an_energy_beyond_the_largest_double_is_infinite_for_both(loops):
+    loops(tmt.ARM)
+    assert tmt.energy(np.zeros(3), np.full(3, 1e200)) == literal.energy(np.zeros(3), np.full(3, 1e200)) == np.inf
+
+
+def test_of_two_models_each_has_its_own_answer(loops):
+    for seed in range(answers.REMEMBERED + 5):  # more than are remembered
+        heavy = loops(replace(tmt.ARM, mass=(2.0 + seed, 1.5)))
+        assert np.array_equal(tmt.mass_matrix(np.zeros(3), heavy), tmt.mass_matrix(np.zeros((1, 3)), heavy)[0])
+        assert tmt.mass_matrix(np.zeros(3), heavy) == pytest.approx(literal.mass_matrix(np.zeros(3), heavy), rel=1e-13)
+    assert len(answers._known) <= answers.REMEMBERED
+
+
+ASKED = """
+import json, sys, numpy as np, tmt
+q, many = np.array([0.1, 0.2, 0.3]), int(sys.argv[1])
+found = [tmt.acceleration(q, q, q)]
+light = "numba" not in sys.modules
+found += [tmt.acceleration(q, q, q) for _ in range(many)]
+print(json.dumps([light, "numba" in sys.modules, float(max(abs(found[0] - found[-1])))]))
+"""
+
+
+@pytest.mark.parametrize("calls, compiled", [(20, False), (3000, True)])
+def test_a_short_question_never_waits_for_a_compiler(calls, compiled, loops):
+    loops(tmt.ARM)  # so that their machine code is on disk
+    run = subprocess.run([sys.executable, "-c", ASKED, str(calls)], capture_output=True, text=True, check=True)
+    light, later, off = json.loads(run.stdout)
+    assert light and later is compiled and off <= 1e-12
+
+
+@pytest.mark.parametrize("there, kept", [(True, True), (False, True), (False, False)])
+def test_code_is_got_when_the_literal_form_has_cost_as_much(there, kept, monkeypatch):
+    known = answers.Known(tmt.ARM)
+    monkeypatch.setattr(answers, "loops", lru_cache(lambda: None))
+    monkeypatch.setattr(answers, "getting_loops", lambda: answers.READ if kept else answers.COMPILED)
+    monkeypatch.setattr(answers.Known, "get_loops", lambda self: setattr(self, "parts", ()))
+    if there:
+        answers.loops()
+    getting = (0.0 if there else answers.READ if kept else answers.COMPILED) + answers.WRITTEN * 3
+    calls = getting / (answers.CALL + 1) / (answers.LITERAL * 2 * 9 + answers.LITERAL_JOINT * 3)
+    assert not any(known.has_loops(1) for _ in range(int(calls)))
+    assert known.has_loops(1) and calls > 5
+    many = answers.Known(tmt.ARM)
+    assert many.has_loops(10_000_000)  # at once
+
+
+def test_the_first_of_equals_is_chosen():
+    cheap, dear = Form("literal", 0.0, 1.0), Form("loop", 10.0, 0.0)
+    assert [chosen([cheap, dear], wanted).name for wanted in (9.9, 10.0, 10.1)] == ["literal", "literal", "loop"]
+    assert chosen([cheap, dear], 1.0, before=9.5).name == "loop"
+
+
+def test_kept_machine_code_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMT_CACHE", str(tmp_path))
+    assert not cache.is_kept("loop_answers.many-*")
+    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "__pycache__" / "loop_answers.many-0123.nbi").touch()
+    assert cache.is_kept("loop_answers.many-*") and not cache.is_kept("loop_answers.one-*")

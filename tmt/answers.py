@@ -1,0 +1,241 @@
+"""Who answers the public functions: the literal form, or the compiled loops or straight-line code once they are worth getting.
+
+Compiled code answers where nothing is wrong with what is given; whatever is, the literal form says. Which of them is asked
+depends on how much was asked so far in this process, see choice.py, and never on a clock.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy import ndarray
+
+from . import kernels, literal, singular
+from .arm import ARM
+from .cache import is_kept
+from .calls import refused
+from .choice import LEAST_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
+from .cores import side_by_side
+from .generic import in_parts
+from .source import LANES
+from .tree import Tree
+from .values import real_numbers
+
+# estimates, s: of the literal form an evaluation, for each body and pair of speeds and for each speed, and a call, in
+# evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and for each speed
+# what it takes to write a Tree as they want it
+LITERAL, LITERAL_JOINT, CALL, COMPILED, READ, WRITTEN = 1.2e-8, 4e-7, 220, 9.0, 0.6, 2e-3
+BLOCK = 1024  # states that are laid out for straight-line code at a time, and stay near the processor
+SHAPES = {  # of a result, m bodies and n speeds
+    "com_positions": ("m", 3), "angular_velocities": ("m", 3), "jacobians": (2, "m", 3, "n"), "convective_terms": (2, "m", 3),
+    "potential_energy": (), "energy": (), "spring_torque": ("n",), "acceleration": ("n",), "mass_matrix": ("n", "n"),
+    "bias": ("n",), "gravity_balance": ("n",),
+}  # fmt: skip
+OF_STRAIGHT_LINES = {"acceleration": "forward_dynamics"} | dict.fromkeys(
+    ("mass_matrix", "bias", "gravity_balance"), "mass_matrix_and_bias"
+)
+REMEMBERED = 64  # models
+_known = {}
+
+
+def answered(quantity: str, model: Tree, q, qd=None, tau=None):
+    """The quantity, one of SHAPES, of states of any batch shape: what the function of that name in literal.py returns."""
+    known, found = _known.get(id(model)), None
+    if known is not None and type(q) is ndarray and q.ndim == 1:
+        found = known.of_one(quantity, q, qd, tau)
+    if found is None and isinstance(model, Tree):
+        try:
+            found = remembered(model).of_any(quantity, q, qd, tau)
+        except MemoryError:
+            found = None
+    if found is None:
+        found = getattr(literal, quantity)(*(given for given in (q, qd, tau) if given is not None), model)
+    return found
+
+
+class Known:
+    """A Tree as compiled code takes it, and what was asked of it."""
+
+    def __init__(self, tree):
+        self.tree = tree  # held, so that no other has its id
+        self.rest, self.may_be_singular, self.parts = np.zeros(len(tree.axis)), not tree.never_singular, None
+        self.by_literal = 0.0  # evaluations so far, while there are no loops
+        # of straight-line code: what is there, its lines and whether they are kept on disk, and evaluations so far
+        self.lanes, self.lines, self.asked = {}, {}, {}
+        sizes = {"m": len(tree.mass), "n": len(tree.axis)}
+        self.shapes = {name: tuple(sizes.get(size, size) for size in shape) for name, shape in SHAPES.items()}
+        self.sizes = {name: math.prod(shape) for name, shape in self.shapes.items()}
+
+    def of_one(self, quantity, q, qd, tau):
+        """The quantity of one state; None where there are no loops yet, or they cannot take what is given."""
+        if self.parts is None or (self.may_be_singular and quantity == "acceleration" and self.is_singular(q)):
+            return None
+        qd, tau = self.rest if qd is None else qd, self.rest if tau is None else tau
+        if not type(qd) is type(tau) is ndarray:
+            return None
+        shape, size, number = self.shapes[quantity], self.sizes[quantity], self.numbers[quantity]
+        out = np.empty(size)
+        try:
+            answers = self.loops.one(*self.parts, q, qd, tau, number, out)
+        except refused():  # of another type, not contiguous
+            return None
+        if not answers:
+            return None
+        return out if len(shape) == 1 else as_returned(quantity, out, shape)
+
+    def of_any(self, quantity, *given):
+        """The quantity of states of any batch shape; None where the literal form is to answer."""
+        arrays = [values if values is None or is_plain(values) else real_numbers(values) for values in given]
+        if any(array is None or not array.ndim for array, values in zip(arrays, given) if values is not None):
+            return None
+        sizes, states = (len(self.tree.rest), len(self.rest), len(self.rest)), [a for a in arrays if a is not None]
+        if any(array is not None and array.shape[-1] != size for array, size in zip(arrays, sizes)):
+            return None
+        try:
+            batch = np.broadcast_shapes(*(array.shape[:-1] for array in states))
+        except ValueError:
+            return None
+        count = math.prod(batch)
+        if not count or not self.has_loops(count):
+            return None
+        if not batch:
+            return self.of_one(quantity, *(array if array is None else np.array(array) for array in arrays))
+        q = rows_of(arrays[0], batch)
+        rates = [self.rest[None] if a is None else rows_of(a, batch if a.ndim > 1 else ()) for a in arrays[1:]]
+        if quantity == "acceleration" and self.may_be_singular and self.is_singular(q):
+            return None
+        out = np.empty((count, self.sizes[quantity]))
+        answers = self.by_lines if self.has_lines(quantity, count) else self.by_loops
+        return as_returned(quantity, out, self.shapes[quantity], batch) if answers(quantity, q, *rates, out) else None
+
+    def is_singular(self, q) -> bool:
+        """Whether Mbar may be singular at a position among these, or cannot be told here."""
+        M = self.of_one("mass_matrix", q, None, None) if q.ndim == 1 else self.of_any("mass_matrix", q, None, None)
+        n = len(self.rest)
+        return M is None or bool(singular.first(self.tree, q.reshape(-1, q.shape[-1]), M.reshape(-1, n, n)))
+
+    def has_loops(self, count) -> bool:
+        """Whether the loops are there, or are got now, as the literal form would have taken longer than that for all so far."""
+        if self.parts is None:
+            n, wanted = len(self.rest), CALL + count
+            literally = Form("literal", 0.0, LITERAL * len(self.tree.mass) * n * n + LITERAL_JOINT * n)
+
+            def pay(getting) -> bool:
+                forms = literally, Form("loop", getting + WRITTEN * n, 0.0)
+                return chosen(forms, wanted, self.by_literal) is not literally
+
+            if pay(0.0) and (loops.cache_info().currsize or (pay(READ) and pay(getting_loops()))):
+                self.get_loops()
+            self.by_literal += wanted
+        return self.parts is not None
+
+    def get_loops(self) -> None:
+        """Have the loops answer from now on."""
+        self.loops, self.parts = loops(), in_parts(self.tree)
+        self.numbers = self.loops.QUANTITIES
+
+    def has_lines(self, quantity, count) -> bool:
+        """Whether straight-line code is there for so many states, or is got now as the loops would have taken longer so far."""
+        of = OF_STRAIGHT_LINES.get(quantity)
+        if of is None or count < LANES:
+            return False
+        if of not in self.lanes and self.pays(
+            LEAST_LINES * len(self.rest), LEAST_LINES * len(self.rest), True, of, count
+        ):
+            if of not in self.lines:  # traced only where it could pay
+                straight = kernels.is_evaluated_straight(self.tree)
+                self.lines[of] = straight and (
+                    *kernels.lines_of_evaluator(self.tree),
+                    kernels.is_evaluator_on_disk(self.tree, of),
+                )
+            if self.lines[of] and self.pays(*self.lines[of], of, count):
+                self.lanes[of] = kernels.evaluator(self.tree, of).lanes
+        self.asked[of] = self.asked.get(of, 0) + count
+        return of in self.lanes
+
+    def pays(self, compiled, used, kept, of, count) -> bool:
+        """Whether so many lines of straight-line code are worth getting."""
+        loop = Form("loop_lanes", 0.0, loop_each(len(self.rest), lanes=True))
+        straight = Form(
+            "straight_line_lanes", straight_line_getting(compiled, kept), straight_line_each(used, lanes=True)
+        )
+        return chosen((loop, straight), count, self.asked.get(of, 0)) is straight
+
+    def by_loops(self, quantity, q, qd, tau, out) -> bool:
+        """Fill rows of results; whether they are right."""
+
+        def answers(part):
+            rates = (rows if len(rows) == 1 else rows[part] for rows in (qd, tau))
+            return self.loops.many(*self.parts, q[part], *rates, self.numbers[quantity], out[part])
+
+        return all(side_by_side(answers, len(out), loop_each(len(self.rest), lanes=True)))
+
+    def by_lines(self, quantity, q, qd, tau, out) -> bool:
+        """The same by straight-line code, a block of states after the other."""
+        of, nq, n = OF_STRAIGHT_LINES[quantity], len(self.tree.rest), len(self.rest)
+        lanes, loops, number = self.lanes[of], self.loops, self.numbers[quantity]
+        size = n if of == "forward_dynamics" else n * (n + 3) // 2
+
+        def answers(part):
+            for first in range(part.start, part.stop, BLOCK):
+                count = min(BLOCK, part.stop - first)
+                columns = [np.empty((rows, count)) for rows in (nq, n, n, size)]
+                for rows, to in zip((q, qd, tau), columns):
+                    loops.to_columns(rows, first, to)
+                lanes(*columns)
+                loops.to_rows(columns[-1], number, out, first)
+                block = slice(first, first + count)  # checked while it is near the processor
+                rates = (rows if len(rows) == 1 else rows[block] for rows in (qd, tau))
+                if not loops.right(self.parts[0], q[block], *rates, out[block]):
+                    return False
+            return True
+
+        return all(side_by_side(answers, len(out), straight_line_each(self.lines[of][1], lanes=True)))
+
+
+@lru_cache(maxsize=1)
+def loops():
+    """The compiled loops, read or compiled when they are first asked for."""
+    from . import loop_answers
+
+    # of one state, and of none: compiled for these types and then for no others, which numba would take as they are
+    of, zeros, out = in_parts(ARM), np.zeros(3), np.empty(3)
+    loop_answers.one(*of, zeros, zeros, zeros, loop_answers.BIAS, out)
+    loop_answers.many(*of, *(rows[None] for rows in (zeros, zeros, zeros)), loop_answers.BIAS, out[None])
+    loop_answers.one.disable_compile()
+    loop_answers.many.disable_compile()
+    return loop_answers
+
+
+@lru_cache(maxsize=1)
+def getting_loops() -> float:
+    """What it takes until the loops are there, s."""
+    return READ if is_kept("loop_answers.many-*") else COMPILED
+
+
+def remembered(tree) -> Known:
+    """What is known of a Tree; of the last ones only."""
+    if id(tree) not in _known:
+        if len(_known) >= REMEMBERED:
+            del _known[next(iter(_known))]
+        _known[id(tree)] = Known(tree)
+    return _known[id(tree)]
+
+
+def is_plain(values) -> bool:
+    return type(values) is ndarray and values.dtype == np.float64
+
+
+def rows_of(array, batch) -> ndarray:
+    """States of a batch one after the other, as compiled code takes them."""
+    size = array.shape[-1]
+    whole = array if array.shape[:-1] == batch else np.broadcast_to(array, (*batch, size))
+    return np.require(whole.reshape(-1, size), requirements="CAW")
+
+
+def as_returned(quantity, out, shape, batch=()):
+    """Results as the function returns them."""
+    if quantity not in ("jacobians", "convective_terms"):
+        return out.reshape(batch + shape)
+    first, second = np.moveaxis(out.reshape(batch + shape), len(batch), 0)
+    return first.copy(), second.copy()
