@@ -131,6 +131,7 @@ def test_libraries_are_imported_where_they_belong(path):
     name = dotted(path)
     assert "mujoco" not in outer or name.startswith("compare.engines.mujoco")
     assert "heyoka" not in outer or name == "compare.engines.heyoka"
+    assert "pinocchio" not in outer or name == "compare.engines.pinocchio"
     assert "pandas" not in outer or name.startswith("compare.report")
     assert "matplotlib" not in outer or path.stem.startswith("figures") or name == "compare.report.style"
     assert "rich" not in outer or name == "compare.report.terminal"

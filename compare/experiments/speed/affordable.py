@@ -1,13 +1,17 @@
 """What of an evaluation can be compiled and timed in reasonable time, for a robot of any joints."""
 
+from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
 
 import tmt
 from tmt import kernels, method
+from tmt.trace import Code
 
-from ...case import Coordinates
+from ...case import Case, Coordinates
+from ...engines.tmt import form_of
+from ...judge.words import listed
 
 MOST_RESULTS = 10_000_000  # numbers, the results of many states, of a robot of many joints
 MOST_LITERAL = 3000  # operations of the literal form, up to which its straight-line code is compiled
@@ -31,7 +35,16 @@ def lengths(tree: tmt.Tree) -> list[int] | None:
     """Of the straight-line code of the literal and of the composite form; None: none is made for so many joints."""
     if not kernels.is_evaluated_straight(tree):
         return None
-    return [kernels.slope_source(tree, "rk4", *form).operations for form in ((method.mass_matrix_and_bias,), ())]
+    return [
+        code.operations
+        for code in (kernels.slope_source(tree, "rk4", method.mass_matrix_and_bias), straight_line(tree))
+    ]
+
+
+@lru_cache(maxsize=8)
+def straight_line(tree: tmt.Tree) -> Code:
+    """The forward dynamics of a tree in straight lines, of the composite form."""
+    return kernels.slope_source(tree, "rk4")
 
 
 def literal_is_compiled(tree: tmt.Tree) -> bool:
@@ -52,3 +65,12 @@ def left_out_in_words(tree: tmt.Tree) -> list[str]:
             "composite form with the library's sine."
         ]
     return []
+
+
+def forms_in_words(cases: Iterable[Case], methods: Iterable[str]) -> str:
+    """Which code follows tmt's runs of these cases."""
+    forms = {(form_of(case.tree, method), method) for case in cases for method in methods if not case.controller}
+    straight, loop = ({method for form, method in forms if form == name} for name in ("straight_line", "loop"))
+    parts = [f"straight-line code, traced and compiled for the model ({listed(sorted(straight))})"] * bool(straight)
+    parts += [f"the loop over any tree, compiled once for all models ({listed(sorted(loop))})"] * bool(loop)
+    return f"tmt's runs are followed by {' and by '.join(parts)}." if parts else ""

@@ -1,29 +1,42 @@
-"""What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads."""
+"""What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads, and others."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from types import MappingProxyType
 
 import numpy as np
 
 import tmt
-from tmt import generic, kernels, literal, method
-from tmt.methods import METHODS
+from tmt import kernels
 
 from ...case import SEED, Case
 from ...judge import timing
 from ...setup import Setup
-from .affordable import MOST_RESULTS, left_out_in_words, lengths, literal_is_compiled, most_states, states_of
+from . import operations, processor
+from .affordable import left_out_in_words, lengths, most_states, states_of
+from .peers import FEWER, Peers, peers_in_words
 from .settings import coarsest_steps, regular_of
+from .ways import (
+    CALLED,
+    EACH,
+    FORWARD,
+    IN_LANES,
+    LOOP,
+    LOOP_IN_LANES,
+    MOST_CALLS,
+    RK4_STEP,
+    WAITING,
+    of_many_states,
+    of_one_state,
+)
 
 STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
 TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
-MOST_CALLS = 100_000  # of the same in a call that is timed
-IN_PYTHON = 12  # up to which the literal form is timed in Python
-FORWARD, TERMS, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"
+COLUMNS_OF_COSTS = ("quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
+                    "share_of_peak", "why_not")  # fmt: skip
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
-LOOP = "generic compiled loop"
-WAITING, EACH, IN_LANES = "traced kernel, each waits for the last", "traced kernel", "lanes"
+WHOLE_CALLED = "MuJoCo, mj_forward called from Python"
 
 
 def costs(setup: Setup) -> tuple[list[dict], list[str]]:
@@ -36,21 +49,44 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
     numbers[-1] = min(setup.of(max(STATES), 1000, 1000), most_states(tree))
     states = states_of(setup.robot.coordinates, rng, setup.of(max(numbers), 10_000, 1000))
     first = [np.ascontiguousarray(a[0]) for a in states]
+    peers = None if setup.is_quick else Peers(setup, states)
     repeated, missing = {}, MinimalCalls.unavailable()
     if missing is None:
         minimal = MinimalCalls(setup.engines["mujoco"].of(setup.robot.case()))
         repeated = {(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()}
-    repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in of_one_state(tree, first)}
+    for ways in (of_one_state(tree, first), peers.of_one_state(first) if peers else ()):
+        repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in ways}
     calls = {key: counted(loop) for key, loop in repeated.items()}
+    for name, side_by_side, loop in processor.peaks():
+        run, count = counted(loop)
+        calls[processor.PEAK, name, side_by_side, 1] = run, count * side_by_side
     with ThreadPoolExecutor(2) as pool:
         for count in numbers:
             for key, run in of_many_states(tree, [a[:count] for a in states], pool).items():
                 calls[key] = again(run, CALLS // count, count)
+        for key, run in (peers.of_many_states(states) if peers else {}).items():
+            calls[key] = again(run, key[2] // FEWER, key[2])
         taken = timing.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
     overhead = simulate_overhead(regular_of(setup.robot))
     words = costs_in_words(nanoseconds, overhead, lengths(tree), setup.robot.name, missing)
-    return evaluation_rows(nanoseconds), words + left_out_in_words(tree)
+    known = known_operations(tree)
+    words += processor.near_in_words(nanoseconds, known, operations.OF_SINE)
+    lanes = in_lanes_of(nanoseconds) or in_lanes_of(nanoseconds, LOOP_IN_LANES)
+    words += peers_in_words(nanoseconds, lanes, peers) if peers else []
+    return evaluation_rows(nanoseconds, known, peers.absent if peers else {}), words + left_out_in_words(tree)
+
+
+def known_operations(tree: tmt.Tree) -> dict[tuple[str, str], int]:
+    """Floating-point operations of one state, {(quantity, implementation): so many}, where they are counted."""
+    found = operations.operations_of(tree)
+    ways = {"straight_line": (IN_LANES, EACH, WAITING), "loop": (LOOP_IN_LANES, LOOP)}
+    return {(FORWARD, name): found[form] for form, names in ways.items() if form in found for name in names}
+
+
+def in_lanes_of(ns: Mapping[tuple, float], name: str = IN_LANES) -> dict[int, float]:
+    """Nanoseconds of a state's forward dynamics in lanes, on one thread, by the number of states."""
+    return {key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, name) and key[2] > 1 and key[3] == 1}
 
 
 def per_state(counts: dict, times: list[list[float]]) -> dict:
@@ -58,12 +94,20 @@ def per_state(counts: dict, times: list[list[float]]) -> dict:
     return {key: 1e9 * min(taken) / count for (key, count), taken in zip(counts.items(), times)}
 
 
-def evaluation_rows(nanoseconds: dict) -> list[dict]:
-    """The rows of evaluations.csv, by quantity, the slowest first."""
-    return [
-        dict(zip(("quantity", "implementation", "states", "threads"), key)) | {"ns_per_state": value}
-        for key, value in sorted(nanoseconds.items(), key=lambda item: (item[0][0], -item[1]))
-    ]
+def evaluation_rows(
+    ns: Mapping, operations: Mapping = MappingProxyType({}), absent: Mapping = MappingProxyType({})
+) -> list:
+    """The rows of evaluations.csv, by quantity, the slowest first, then those that do not take part.
+
+    operations: of one state, absent: why it does not, by quantity and implementation.
+    """
+    peak, rows = max(processor.rates(ns).values(), default=None), []
+    for key, value in sorted(ns.items(), key=lambda item: (item[0][0], -item[1])):
+        count = 2 if key[0] == processor.PEAK else operations.get(key[:2])
+        rate = count / value if count else None
+        rows.append((*key, value, count, rate, rate / peak if rate and peak else None, None))
+    rows += [(*key, *[None] * 6, why) for key, why in absent.items()]
+    return [dict(zip(COLUMNS_OF_COSTS, row)) for row in rows]
 
 
 def again(run: Callable, calls: int, count: int) -> tuple[Callable, int]:
@@ -78,77 +122,6 @@ def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
     (once,) = timing.in_turns([lambda: loop(4)], 5)
     count = min(max(1, int(TAKEN / (min(once) / 4))), MOST_CALLS)
     return lambda: loop(count), count
-
-
-def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
-    """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
-    (q, qd, tau), n = state, len(tree.axis)
-    floats = [a.tolist() for a in state]
-    arrays, out, M, h = generic.arrays(tree), np.empty(n), np.empty(n * n), np.empty(n)
-    run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_RESULTS // n)
-    paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
-    paths[0][0, 0], paths[1][0, 0] = q, qd
-
-    def plain(count):
-        for _ in range(count):
-            method.acceleration(tree, *floats)
-
-    def steps(count):
-        count = min(count, most)
-        run(*(path[:, : count + 1].copy() for path in paths), tau[None], 1e-4)
-
-    if n <= IN_PYTHON:
-        yield FORWARD, "literal, Python floats", plain
-    loops = generic.compiled()
-    yield FORWARD, LOOP, lambda count: loops.repeat_forward_dynamics(arrays, q, qd, tau, out, count)
-    yield TERMS, LOOP, lambda count: loops.repeat_mass_matrix_and_bias(arrays, q, qd, M, h, count)
-    if not kernels.is_evaluated_straight(tree):
-        yield RK4_STEP, LOOP, steps
-        return
-    forward, terms = kernels.evaluator(tree, FORWARD), kernels.evaluator(tree, TERMS)
-    if literal_is_compiled(tree):
-        literal = kernels.evaluator(tree, FORWARD, method.mass_matrix_and_bias, "library_sincos")
-        library = kernels.evaluator(tree, FORWARD, sine="library_sincos")
-        yield FORWARD, "literal, traced, library's sine", lambda count: literal.chain(q, qd, tau, count)
-        yield FORWARD, "composite, traced, library's sine", lambda count: library.chain(q, qd, tau, count)
-    yield FORWARD, WAITING, lambda count: forward.chain(q, qd, tau, count)
-    yield TERMS, WAITING, lambda count: terms.chain(q, qd, tau, count)
-    yield RK4_STEP, EACH, steps
-
-
-def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoolExecutor) -> dict:
-    """{(quantity, implementation, states, threads): run} for many states, (N, nq and nv); memory is bounded by them."""
-    q, qd, tau = (np.ascontiguousarray(a) for a in states)
-    count, n = qd.shape
-    runs = {}
-    if not kernels.is_evaluated_straight(tree):
-        return runs
-    for quantity, columns in ((FORWARD, n), (TERMS, n * (n + 3) // 2)):
-        compiled, out = kernels.evaluator(tree, quantity), np.ones((count, columns))
-        wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
-        halves = [[np.ascontiguousarray(part) for part in np.array_split(a, 2, axis=1)] for a in wide]
-
-        def both(compiled=compiled, halves=halves):
-            list(pool.map(compiled.lanes, *halves))
-
-        runs[quantity, IN_LANES, count, 1] = lambda compiled=compiled, wide=wide: compiled.lanes(*wide)
-        if count > 1:
-            runs[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
-            runs[quantity, IN_LANES, count, 2] = both
-    if count == 1:  # a call from Python for one state: what it costs is the call
-        return runs
-    if count <= 1000 and n <= IN_PYTHON:
-        runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: literal.acceleration(q, qd, tau, tree)
-    if not kernels.is_traced(tree, METHODS["rk4"]):
-        return runs
-    in_lanes = count // kernels.LANES * kernels.LANES
-    paths = [np.zeros((in_lanes, 2, part.shape[1])) for part in (q, qd)]
-    for path, part in zip(paths, (q, qd)):
-        path[:, 0] = part[:in_lanes]
-    step, step_lanes = kernels.stepper(tree, "rk4"), kernels.lane_stepper(tree, "rk4")
-    runs[RK4_STEP, EACH, count, 1] = lambda: step(*paths, tau[:in_lanes], 1e-3)
-    runs[RK4_STEP, IN_LANES, count, 1] = lambda: step_lanes(*paths, tau[:in_lanes], 1e-3)
-    return runs
 
 
 def simulate_overhead(case: Case) -> tuple[float, float, int]:
@@ -183,9 +156,7 @@ def costs_in_words(
     name: of the robot; missing: why MuJoCo's calls were not timed, or None.
     """
     sentences = [f"Processor: {timing.vectors()}."]
-    lanes = {
-        key[2]: value for key, value in ns.items() if key[:2] == (FORWARD, IN_LANES) and key[2] > 1 and key[3] == 1
-    }
+    lanes = in_lanes_of(ns)
     if missing:
         sentences.append(f"{missing}: its calls were not timed in compiled loops.")
     else:
@@ -195,6 +166,7 @@ def costs_in_words(
         f"Those are compiled loops. A call of tmt.simulate with {steps} steps takes {1e6 * call:.0f} us, its loop alone "
         f"{1e6 * loop:.0f} us."
     )
+    sentences += called_in_words(ns)
     if operations is None:
         return sentences
     literal, composite = operations
@@ -203,6 +175,20 @@ def costs_in_words(
         f"is made for this one {name}, MuJoCo for any model."
     )
     return sentences
+
+
+def called_in_words(ns: Mapping[tuple, float]) -> list[str]:
+    """What calls from Python take."""
+    calls = {key[2:]: value for key, value in ns.items() if key[:2] == (FORWARD, CALLED)}
+    if (1, 1) not in calls:
+        return []
+    text = f"Called from Python, tmt.acceleration takes {1e-3 * calls.pop((1, 1)):.1f} us for one state"
+    if (whole := ns.get((FORWARD, WHOLE_CALLED, 1, 1))) is not None:
+        text += f" (mj_forward {1e-3 * whole:.1f} us)"
+    text += "".join(
+        f"; of {states:,} states in one call {value:.1f} ns a state" for (states, _), value in sorted(calls.items())
+    )
+    return [f"{text}."]
 
 
 def beside_mujoco_in_words(ns: dict, lanes: dict[int, float], name: str) -> list[str]:

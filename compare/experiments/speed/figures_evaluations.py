@@ -3,19 +3,20 @@
 from matplotlib.figure import Figure
 
 from ...judge.check import Result
-from ...report.style import BLUE, ORANGE, WIDTH
-from .evaluations import WHOLE
+from ...report.style import BLUE, GREY, ORANGE, WIDTH
+from .evaluations import FORWARD, WHOLE
 
 
 def draw_cost(result: Result, name: str) -> tuple[str, Figure, str]:
     """What one evaluation costs, way by way; name: of the robot."""
-    rows = [row for row in result.tables["evaluations"] if row["quantity"] == "forward_dynamics"]
+    rows = [row for row in result.tables["evaluations"] if row["quantity"] == FORWARD and row["ns_per_state"]]
     fig = Figure(figsize=(WIDTH, 0.9 + 0.24 * len(rows)), layout="constrained")
     ax = fig.subplots()
     names = [f"{r['implementation']}, {r['states']:,} state{'s' * (r['states'] > 1)}"
              + (f", {r['threads']} threads" if r["threads"] > 1 else "") for r in rows]  # fmt: skip
     values = [r["ns_per_state"] for r in rows]
-    colours = [ORANGE if r["implementation"].startswith("MuJoCo") else BLUE for r in rows]
+    whose = {"MuJoCo": ORANGE, "heyoka": GREY, "Pinocchio": GREY}
+    colours = [whose.get(r["implementation"].split(",")[0], BLUE) for r in rows]
     ax.barh(range(len(rows)), values, color=colours, height=0.7)
     for k, value in enumerate(values):
         ax.text(value * 1.1, k, spelled(value), va="center", fontsize=8)

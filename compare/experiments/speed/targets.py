@@ -15,7 +15,7 @@ def targets(result: Result, floors: Floors, vectors: str, aims: Mapping[tuple[st
     aims: of the robot, {(scene, rad): MuJoCo's cheapest setting over tmt's}.
     """
     ns = {(row["quantity"], row["implementation"], row["states"], row["threads"]): row["ns_per_state"]
-          for row in result.tables["evaluations"]}  # fmt: skip
+          for row in result.tables["evaluations"] if row["ns_per_state"]}  # fmt: skip
     lanes = {states: value for (quantity, name, states, threads), value in ns.items()
              if (quantity, name, threads) == (FORWARD, IN_LANES, 1) and states > 1}  # fmt: skip
     best = min(lanes, key=lanes.get, default=None)  # as many states as fit into the caches

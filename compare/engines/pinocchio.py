@@ -1,0 +1,134 @@
+"""Pinocchio's algorithms for the same tree, for timing; only where it is installed (the extra `peers`)."""
+
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import numpy as np
+
+from tmt import Tree
+
+from . import rows_of_states
+
+
+class PinocchioCalls:
+    """Quantities of a Tree of hinges and slides by Pinocchio, whose model is built from it joint by joint.
+
+    Its aba has the armature; the forces of dampers and springs are taken off the torque before.
+    """
+
+    def __init__(self, tree: Tree):
+        import pinocchio
+
+        self.tree, self.model = tree, pinocchio.Model()
+        self.model.gravity = pinocchio.Motion(np.array(tree.gravity), np.zeros(3))
+        for i, (parent, offset) in enumerate(zip(tree.parent, tree.offset)):
+            place = pinocchio.SE3(np.eye(3), np.array(offset))
+            self.model.addJoint(parent + 1, joint(tree.kind[i], np.array(tree.axis[i])), place, str(i))
+        for at, mass, com, inertia in zip(tree.body_hinge, tree.mass, tree.com, tree.inertia):
+            body = pinocchio.Inertia(mass, np.array(com), np.array(inertia))
+            self.model.appendBodyToJoint(at + 1, body, pinocchio.SE3.Identity())
+        self.model.armature = np.array(tree.armature)
+        self.data = self.model.createData()
+
+    @staticmethod
+    def unavailable() -> str | None:
+        """Why it cannot take part here, or None."""
+        return None if find_spec("pinocchio") else "Pinocchio is not installed; the extra `peers` brings it"
+
+    @staticmethod
+    def unfit(tree: Tree) -> str | None:
+        """Why a Tree is not built, or None."""
+        if "ball" in tree.kind or tree.has_gains:
+            return "for Pinocchio only trees of hinges and slides are built here, without a controller"
+        return None
+
+    def mass_matrix(self, q) -> np.ndarray:
+        """Mbar, kg m2, (..., nv, nv): crba, which fills its upper triangle."""
+        import pinocchio
+
+        def filled(q):
+            upper = np.triu(pinocchio.crba(self.model, self.data, q))
+            return upper + np.triu(upper, 1).T
+
+        return self.each(filled, q - np.array(self.tree.reference))
+
+    def bias(self, q, v) -> np.ndarray:
+        """h, N m, (..., nv): nonLinearEffects."""
+        import pinocchio
+
+        return self.each(
+            lambda q, v: pinocchio.nonLinearEffects(self.model, self.data, q, v).copy(),
+            q - np.array(self.tree.reference),
+            v,
+        )
+
+    def acceleration(self, q, v, tau) -> np.ndarray:
+        """rad/s2, (..., nv): aba."""
+        import pinocchio
+
+        return self.each(
+            lambda q, v, tau: pinocchio.aba(self.model, self.data, q, v, tau).copy(), *self.given(q, v, tau)
+        )
+
+    def each(self, quantity: Callable, *given) -> np.ndarray:
+        """A quantity at each state."""
+        batch, states = rows_of_states(*given)
+        values = np.array([quantity(*state) for state in zip(*states)])
+        return values.reshape(*batch, *values.shape[1:])
+
+    def given(self, q, v, tau) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The state as Pinocchio takes it."""
+        q, tree = np.asarray(q, float), self.tree
+        left = tau - np.array(tree.damping) * v - np.array(tree.stiffness) * (q - np.array(tree.rest))
+        return q - np.array(tree.reference), np.asarray(v, float), left
+
+    def aba_loop(self, q, v, tau) -> Callable[[int], object]:
+        """run(count): aba of one state again and again, each a call from Python."""
+        return aba_again(self.model, self.data, *self.given(q, v, tau))
+
+    @staticmethod
+    def call_loop() -> Callable[[int], object]:
+        """run(count): the same call for a model without joints, which leaves nothing but the call."""
+        import pinocchio
+
+        model, nothing = pinocchio.Model(), np.empty(0)
+        return aba_again(model, model.createData(), nothing, nothing, nothing)
+
+    def aba_of_many(self, q, v, tau) -> Callable[[], np.ndarray] | None:
+        """run() -> accelerations (N, nv) of states (N, n), one call for all on one thread; None where it was built without it."""
+        import pinocchio
+
+        if not hasattr(pinocchio, "abaInParallel"):
+            return None
+        pool = pinocchio.ModelPool(self.model, 1)
+        columns = [np.asfortranarray(part.T) for part in self.given(q, v, tau)]
+        out = np.empty(columns[2].shape, order="F")
+
+        def run():
+            pinocchio.abaInParallel(1, pool, *columns, out)
+            return out.T
+
+        return run
+
+
+def joint(kind: str, axis: np.ndarray):
+    """Pinocchio's joint, which is a faster one where the axis is one of the coordinates'."""
+    import pinocchio as pin
+
+    along, any_axis = {
+        "hinge": ((pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ), pin.JointModelRevoluteUnaligned),
+        "slide": ((pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ), pin.JointModelPrismaticUnaligned),
+    }[kind]
+    k = int(np.argmax(axis))
+    return along[k]() if axis[k] == 1.0 else any_axis(*axis)
+
+
+def aba_again(model, data, q, v, tau) -> Callable[[int], object]:
+    """run(count) of calls of aba from Python."""
+    from pinocchio import aba
+
+    def run(count):
+        for _ in range(count):
+            aba(model, data, q, v, tau)
+
+    return run
