@@ -5,6 +5,7 @@ The chain is nobody's robot: what is found is of the program and of the machine,
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from ...judge import timing
 from ...judge.check import Result
 from ...setup import Setup
 from .evaluations import MOST_CALLS, less
-from .implementations import IMPLEMENTATIONS, Chain, Implementation, Made, chain_of
+from .implementations import IMPLEMENTATIONS, Implementation, Made, chain_of
 
 ENOUGH = 1e-3  # s: so long a timed call takes, or it is a single evaluation that takes longer
 CALLS_IN_A_PASS = 20  # of timed calls in a pass, at most
@@ -24,15 +25,15 @@ class Extent(NamedTuple):
     """How far a chain grows, and what is compiled for it."""
 
     numbers: tuple[int, ...]  # of joints
-    passes: int  # in each of which all are timed in turns, so that what is busy for a while spoils one alone
+    passes: int  # in each of which all are timed
     most: float = np.inf  # operations of straight-line code that is compiled
     cold: bool = False  # whether it is measured what the loops cost to compile
 
 
 EXTENTS = {
-    "whole": Extent((1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 5, cold=True),
-    "short": Extent((1, 2, 3, 4, 6, 8), 2, most=1100),
-    "small": Extent((1, 2, 3), 1, most=100),
+    "whole": Extent((1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 8, cold=True),
+    "short": Extent((1, 2, 3, 4, 6, 8), 3, most=600),
+    "small": Extent((1, 2, 3), 1, most=200),
 }
 
 
@@ -65,40 +66,53 @@ def add_growth(result: Result, setup: Setup) -> None:
 def costs_of_growth(
     extent: Extent, progress: Callable, known: Sequence[Implementation] = IMPLEMENTATIONS
 ) -> tuple[list[dict], dict[str, str]]:
-    """The rows of growth.csv, of each number of joints and each implementation; and {who has no time, and where: why}."""
+    """The rows of growth.csv, of each number of joints and each implementation; and {who has no time, and where: why}.
+
+    What is not worth it has a row without a time, what cannot take part has none.
+    """
     absent = {one: why for one in known if (why := one.unavailable())}
     taking = [one for one in known if one not in absent]
-    reasons = {f"{one.label} takes no part": why for one, why in absent.items()}
-    rows, left_out = [], {}
+    made, left_out = {}, {}
     for n in extent.numbers:
         progress(f"speed: a chain of {n}")
-        of_chain, why_not = rows_of_chain(chain_of(n, most=extent.most, cold=extent.cold), taking, extent.passes)
-        rows += of_chain
-        for one, why in why_not.items():
-            left_out.setdefault((one, why), []).append(n)
+        of = chain_of(n, most=extent.most, cold=extent.cold)
+        for one in taking:
+            found = one.make(of)
+            if isinstance(found, Made):
+                made[n, one] = found
+            else:
+                left_out.setdefault((one, found), []).append(n)
+    progress("speed: timing chains")
+    times = nanoseconds(made, extent.passes)
+    rows = []
+    for n, one in ((n, one) for n in extent.numbers for one in taking):
+        found = made.get((n, one), Made(None))
+        values = {"ns_per_state": times.get((n, one)), "compile_s": found.compile_s, "operations": found.operations}
+        rows.append({"n": n, "implementation": one.name} | values)
+    reasons = {f"{one.label} takes no part": why for one, why in absent.items()}
     for (one, why), numbers in left_out.items():
-        reasons[f"{one} is not timed with {number_in_words(numbers)}"] = why
+        reasons[f"{one.label} is not timed with {number_in_words(numbers)}"] = why
     return rows, reasons
 
 
-def rows_of_chain(of: Chain, taking: Sequence[Implementation], passes: int) -> tuple[list[dict], dict[str, str]]:
-    """The rows of one chain, all that take part timed in turns; of those that are not worth it empty ones, and why."""
-    found = {one: one.make(of) for one in taking}
-    made = {one: value for one, value in found.items() if isinstance(value, Made)}
-    times = {one: often_enough(value.run) for one, value in made.items()}
-    calls = {one: (lambda run=value.run, count=times[one]: run(count)) for one, value in made.items()}
-    seconds = timing.fastest(calls, CALLS_IN_A_PASS)
-    for _ in range(passes - 1):
-        shorter = {one: call for one, call in calls.items() if seconds[one] < timing.ONCE}
-        seconds |= {one: min(taken, seconds[one]) for one, taken in timing.fastest(shorter, CALLS_IN_A_PASS).items()}
-    rows = []
-    for one in taking:
-        row = {"n": of.n, "implementation": one.name, "ns_per_state": None, "compile_s": None, "operations": None}
-        if one in made:
-            row["ns_per_state"] = 1e9 * seconds[one] / (times[one] * made[one].states)
-            row |= {"compile_s": made[one].compile_s, "operations": made[one].operations}
-        rows.append(row)
-    return rows, {one.label: why for one, why in found.items() if one not in made}
+def nanoseconds(
+    made: Mapping[tuple[int, Implementation], Made], passes: int
+) -> dict[tuple[int, Implementation], float]:
+    """What a state costs at least, by (joints, implementation): those of one number of joints are timed in turns.
+
+    All numbers of joints are gone through in each pass, so that what keeps the machine busy for a while spoils one pass alone.
+    """
+    times = {key: often_enough(one.run) for key, one in made.items()}
+    seconds = dict.fromkeys(made, np.inf)
+    for k, n in ((k, n) for k in range(passes) for n in dict.fromkeys(n for n, _ in made)):
+        calls = {
+            key: partial(one.run, times[key])
+            for key, one in made.items()
+            if key[0] == n and (k == 0 or seconds[key] < timing.ONCE)
+        }
+        for key, taken in timing.fastest(calls, CALLS_IN_A_PASS).items():
+            seconds[key] = min(taken, seconds[key])
+    return {key: 1e9 * taken / (times[key] * made[key].states) for key, taken in seconds.items()}
 
 
 def often_enough(run: Callable[[int], object]) -> int:
@@ -120,16 +134,16 @@ def cost_by_joints(rows: Sequence[dict], name: str) -> dict[int, float]:
 
 
 def exponents(rows: Sequence[dict]) -> dict[str, Exponent]:
-    """Of each implementation that was timed for two numbers of joints: of the straight line through the logarithms.
+    """Of each implementation that was timed for three numbers of joints: of the straight line through the logarithms.
 
-    By least squares, from 8 joints on where more than one number is; else over all.
+    By least squares, from 8 joints on where three numbers are; else over all.
     """
     found = {}
     for name in dict.fromkeys(row["implementation"] for row in rows):
         times = cost_by_joints(rows, name)
         many = {n: value for n, value in times.items() if n >= MANY_JOINTS}
-        times = many if len(many) > 1 else times
-        if len(times) > 1:
+        times = many if len(many) > 2 else times
+        if len(times) > 2:
             power, _ = np.polyfit(np.log(list(times)), np.log(list(times.values())), 1)
             found[name] = Exponent(float(power), min(times), max(times))
     return found

@@ -22,11 +22,17 @@ from tmt.source import LANES, evaluator_source
 from ...case import SEED
 from ...engines.mujoco import engine, read
 from ...engines.mujoco.dynamics import MujocoDynamics
+from ...engines.pinocchio import PinocchioCalls
 from ...robots import Robot
 from ...robots.chain import chain
-from .evaluations import EQUAL, FORWARD, WHOLE
+from . import peers
+from .evaluations import EQUAL, WHOLE
+from .operations import of_source, operations_of
+from .ways import FORWARD
 
-ANGLES_AT_ONCE = 32_768  # angles of the states that one call evaluates: they stay in the caches
+ANGLES_AT_ONCE = 16_384  # angles of the states that one call evaluates: they stay in the caches
+IN_BATCH = 32  # states of a batch of MuJoCo's
+FEW_STATES = 2  # at which accelerations are compared before they are timed
 COLD_START = "from compare.experiments.speed.implementations import compilation; compilation()"
 
 
@@ -78,24 +84,27 @@ def again_and_again(evaluate: Callable, arguments: Sequence, times: int) -> None
 
 def literal(of: Chain) -> Made:
     """The method as it stands, on Python's floats."""
-    state = [array[0].tolist() for array in of.states]
-    operations = traced_operations(of.tree, method.mass_matrix_and_bias)
-    return Made(partial(again_and_again, method.acceleration, (of.tree, *state)), operations=operations)
+    run = partial(again_and_again, method.acceleration, (of.tree, *(array[0].tolist() for array in of.states)))
+    if not kernels.is_evaluated_straight(of.tree):
+        return Made(run)
+    text = kernels.slope_source(of.tree, "rk4", method.mass_matrix_and_bias).text
+    count, _ = of_source(text, "slope", [*of.tree.zero, *[0.1] * (2 * of.n), 0.0])
+    return Made(run, operations=count)
 
 
-def straight_line(of: Chain) -> Made | str:
+def straight_line_of(of: Chain) -> Made | str:
     """Traced code of the composite form, one state at a time, compiled here and now."""
-    operations = traced_operations(of.tree)
-    if operations is None:
+    count = operations_of(of.tree).get("straight_line")
+    if count is None:
         return "it has so many lines that a loop takes its place"
-    if operations > of.most:
+    if count > of.most:
         return f"it has more than {of.most:,.0f} operations; `speed --growth` compiles it, unless it is to be quick"
     begin = time.process_time()
     text = one_at_a_time(evaluator_source(of.tree, FORWARD, composite.mass_matrix_and_bias, "sincos"))
     each = executed(f"chain_of_{of.n}", text.replace("CACHE", "False"), f"chain_of_{of.n}").each
     taken = time.process_time() - begin
     arrays = [*of.states, np.empty_like(of.states[0])]
-    return Made(partial(again_and_again, each, arrays), len(arrays[0]), taken, operations)
+    return Made(partial(again_and_again, each, arrays), len(arrays[0]), taken, count)
 
 
 def one_at_a_time(text: str) -> str:
@@ -105,23 +114,13 @@ def one_at_a_time(text: str) -> str:
     return "\n\n\n".join([head, *(function for function in functions if not others.search(function))])
 
 
-def traced_operations(tree: tmt.Tree, *form: Callable) -> int | None:
-    """Of one evaluation as straight-line code (of another form of the dynamics); None: none is made for so many joints."""
-    return kernels.slope_source(tree, "rk4", *form).operations if kernels.is_evaluated_straight(tree) else None
-
-
-def loop(of: Chain) -> Made:
-    """The loop over any tree, one state at a time."""
-    arrays = [*of.states, np.empty_like(of.states[0])]
-    run = partial(again_and_again, generic.compiled().each, (generic.arrays(of.tree), True, *arrays))
-    return Made(run, len(arrays[0]), cold_start()["loop"] if of.cold else None)
-
-
-def loop_lanes(of: Chain) -> Made:
-    """The same loop, eight states side by side."""
-    arrays = [np.array(array.T, order="C") for array in (*of.states, of.states[0])]
-    run = partial(again_and_again, generic.compiled().lanes, (generic.arrays(of.tree), True, *arrays))
-    return Made(run, arrays[0].shape[1], cold_start()["loop_lanes"] if of.cold else None)
+def loop(of: Chain, lanes: bool = False) -> Made:
+    """The loop over any tree: one state at a time, or eight side by side."""
+    arrays = [np.array(array.T if lanes else array, order="C") for array in (*of.states, of.states[0])]
+    evaluate = generic.compiled().lanes if lanes else generic.compiled().each
+    run = partial(again_and_again, evaluate, (generic.arrays(of.tree), True, *arrays))
+    taken = cold_start()["loop_lanes" if lanes else "loop"] if of.cold else None
+    return Made(run, len(of.states[0]), taken, operations_of(of.tree)["loop"])
 
 
 @cache
@@ -163,6 +162,27 @@ def without_library() -> str | None:
     return MinimalCalls.unavailable()
 
 
+def mujoco_batch(of: Chain) -> Made:
+    """mj_forward of many states by MuJoCo's own batches, on one thread."""
+    from ...engines.mujoco.batch import BatchedCalls
+
+    return Made(BatchedCalls(of.dynamics, *(array[:IN_BATCH] for array in of.states)).forward_loop(), IN_BATCH)
+
+
+def without_batch() -> str | None:
+    """Why MuJoCo has no batches here, or None."""
+    from ...engines.mujoco.batch import BatchedCalls
+
+    return BatchedCalls.unavailable()
+
+
+def pinocchio_aba(of: Chain) -> Made | str:
+    """Pinocchio's aba, if it finds the accelerations of tmt."""
+    calls = PinocchioCalls(of.tree)
+    differs = peers.differs_in_words(peers.difference(calls, [array[:FEW_STATES] for array in of.states]))
+    return differs or Made(calls.aba_loop(*(array[0] for array in of.states)))
+
+
 def always() -> None:
     """Nothing keeps it from taking part."""
 
@@ -171,7 +191,9 @@ IMPLEMENTATIONS = (
     Implementation("literal", "the literal form in Python", always, literal),
     Implementation("mj_forward", "mj_forward", without_library, partial(of_mujoco, WHOLE)),
     Implementation("mujoco_equal_work", "MuJoCo's equal work", without_library, partial(of_mujoco, EQUAL)),
-    Implementation("straight_line", "straight-line code", always, straight_line),
+    Implementation("straight_line", "straight-line code", always, straight_line_of),
     Implementation("loop", "the loop", always, loop),
-    Implementation("loop_lanes", "the loop in lanes", always, loop_lanes),
+    Implementation("loop_lanes", "the loop in lanes", always, partial(loop, lanes=True)),
+    Implementation("mujoco_batch", "MuJoCo's batch", without_batch, mujoco_batch),
+    Implementation("pinocchio_aba", "Pinocchio's aba called from Python", PinocchioCalls.unavailable, pinocchio_aba),
 )

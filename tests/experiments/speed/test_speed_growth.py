@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -39,7 +40,7 @@ def of_power(name, power, numbers, first=100.0):
 @pytest.fixture(scope="module")
 def known():
     """The costs of chains of 1 and 2 joints, of which the code of the first alone is compiled, and reasons."""
-    return costs_of_growth(Extent((1, 2), 2, most=100), nothing)
+    return costs_of_growth(Extent((1, 2), 2, most=200), nothing)
 
 
 def test_there_is_a_row_for_each_number_and_each_implementation(known):
@@ -61,7 +62,7 @@ def test_what_has_no_time_has_an_empty_row_and_a_reason(known):
     rows, reasons = known
     assert dict.fromkeys(COLUMNS) | {"n": 2, "implementation": "straight_line"} in rows
     assert reasons["straight-line code is not timed with 2 joints"] == (
-        "it has more than 100 operations; `speed --growth` compiles it, unless it is to be quick"
+        "it has more than 200 operations; `speed --growth` compiles it, unless it is to be quick"
     )
 
 
@@ -86,25 +87,25 @@ def test_an_implementation_that_is_not_there_has_no_row_but_a_reason():
 def test_a_time_is_that_of_one_state(monkeypatch):
     """The fastest call of all passes, over what it did and how many states that has."""
     monkeypatch.setattr(growth, "often_enough", lambda run: 50)
-    passes = iter([{"a": 2e-3}, {"a": 1e-3}, {"a": 3e-3}])
-    monkeypatch.setattr(growth.timing, "fastest", lambda calls, rounds: {one: next(passes)["a"] for one in calls})
+    passes = iter([2e-3, 1e-3, 3e-3])
+    monkeypatch.setattr(growth.timing, "fastest", lambda calls, rounds: dict.fromkeys(calls, next(passes)))
     one = Implementation("a", "a", nothing, lambda of: Made(nothing, 4, 0.5, 7))
-    (found,), _ = growth.rows_of_chain(chain_of(1), [one], 3)
+    (found,), _ = costs_of_growth(Extent((1,), 3), nothing, [one])
     assert found == row(1, "a", pytest.approx(1e9 * 1e-3 / (50 * 4)), 0.5, 7)
 
 
-def test_what_takes_long_is_timed_in_one_pass_alone(monkeypatch):
+def test_in_each_pass_chains_are_timed_one_after_the_other_and_what_takes_long_in_the_first_alone(monkeypatch):
     asked = []
 
     def fastest(calls, rounds):
-        asked.append([one.name for one in calls])
-        return {one: {"short": 1e-3, "long": growth.timing.ONCE}[one.name] for one in calls}
+        asked.append([(n, one.name) for n, one in calls])
+        return {(n, one): {"short": 1e-3, "long": growth.timing.ONCE}[one.name] for n, one in calls}
 
     monkeypatch.setattr(growth.timing, "fastest", fastest)
-    ones = [Implementation(name, name, nothing, lambda of: Made(lambda times: None)) for name in ("short", "long")]
+    ones = [Implementation(name, name, nothing, lambda of: Made(nothing)) for name in ("short", "long")]
     monkeypatch.setattr(growth, "often_enough", lambda run: 1)
-    growth.rows_of_chain(chain_of(1), ones, 3)
-    assert asked == [["short", "long"], ["short"], ["short"]]
+    costs_of_growth(Extent((1, 2), 3), nothing, ones)
+    assert asked == [[(n, "short"), (n, "long")] for n in (1, 2)] + [[(n, "short")] for n in (1, 2, 1, 2)]
 
 
 @pytest.mark.parametrize(
@@ -124,22 +125,23 @@ def test_what_is_timed_is_right():
     """Each form of tmt gives the accelerations of the states that it is timed with."""
     of = chain_of(2)
     q, qd, tau = of.states
+    lanes = partial(implementations.loop, lanes=True)
     expected = tmt.acceleration(q[:64], qd[:64], tau[:64], of.tree)
     assert len(q) % 32 == 0 and len(q) * of.n <= implementations.ANGLES_AT_ONCE
     for one in (
         implementations.literal,
-        implementations.straight_line,
+        implementations.straight_line_of,
         implementations.loop,
-        implementations.loop_lanes,
+        lanes,
     ):
         made = one(of)
         evaluate, arguments = made.run.args
         result = evaluate(*arguments)
         found = np.array(result)[None] if made.states == 1 else arguments[-1]
-        found = found.T if one is implementations.loop_lanes else found
+        found = found.T if one is lanes else found
         assert len(found) == made.states
         found = found[:64]
-        assert np.abs(found - expected[: len(found)]).max() < 1e4 * EPS * np.abs(expected).max(), one.__name__
+        assert np.abs(found - expected[: len(found)]).max() < 1e4 * EPS * np.abs(expected).max(), one
         made.run(2)
 
 
@@ -154,9 +156,28 @@ def test_code_for_one_state_at_a_time_has_no_other_loops():
 
 
 def test_straight_line_code_of_many_joints_is_not_made():
-    made = implementations.straight_line(chain_of(30))
+    made = implementations.straight_line_of(chain_of(30))
     assert made == "it has so many lines that a loop takes its place"
-    assert implementations.traced_operations(chain_of(30).tree) is None
+    assert implementations.literal(chain_of(30)).operations is None
+
+
+@pytest.mark.parametrize("of_tolerance, counts", [(0.9, True), (1.1, False)])
+def test_pinocchio_is_timed_where_its_accelerations_are_those_of_tmt(of_tolerance, counts, monkeypatch):
+    class Calls:
+        def __init__(self, tree):
+            pass
+
+        def aba_loop(self, *state):
+            return [array.shape for array in state]
+
+    monkeypatch.setattr(implementations, "PinocchioCalls", Calls)
+    monkeypatch.setattr(implementations.peers, "difference", lambda calls, states: of_tolerance)
+    made = implementations.pinocchio_aba(chain_of(2))
+    assert (
+        made == Made([(2,)] * 3)
+        if counts
+        else made.startswith("Pinocchio's accelerations differ from tmt's by 1.1 times")
+    )
 
 
 def test_the_loops_are_compiled_anew_in_a_process_of_their_own(monkeypatch):
@@ -169,7 +190,7 @@ def test_the_loops_are_compiled_anew_in_a_process_of_their_own(monkeypatch):
     monkeypatch.setattr(implementations.subprocess, "run", run)
     implementations.cold_start.cache_clear()
     of = chain_of(1, cold=True)
-    assert (implementations.loop(of).compile_s, implementations.loop_lanes(of).compile_s) == (1.5, 2.5)
+    assert (implementations.loop(of).compile_s, implementations.loop(of, lanes=True).compile_s) == (1.5, 2.5)
     implementations.cold_start.cache_clear()
     ((command, folder),) = asked
     assert command == ["-c", "from compare.experiments.speed.implementations import compilation; compilation()"]
@@ -185,11 +206,11 @@ def test_what_that_process_prints(capsys):
 
 def test_exponents_of_known_series():
     long = (1, 2, 4, 8, 16, 32, 64)
-    rows = of_power("a", 1.25, long) + of_power("b", 2.0, (1, 2, 8)) + of_power("c", 1.0, (4,))
+    rows = of_power("a", 1.25, long) + of_power("b", 2.0, (1, 2, 8, 12)) + of_power("c", 1.0, (4, 8))
     rows += [row(n, "d", 1000.0 if n < 8 else 100.0 * n) for n in long] + [row(2, "e", None)]
     found = exponents(rows)
     assert found == {
-        "a": Exponent(pytest.approx(1.25), 8, 64), "b": Exponent(pytest.approx(2.0), 1, 8),
+        "a": Exponent(pytest.approx(1.25), 8, 64), "b": Exponent(pytest.approx(2.0), 1, 12),
         "d": Exponent(pytest.approx(1.0), 8, 64),
     }  # fmt: skip
 
@@ -255,7 +276,7 @@ def test_what_compilation_takes_in_words():
 
 def test_the_figure_draws_the_rows():
     result = Result("speed")
-    result.tables["growth"] = of_power("loop", 1.0, (1, 2, 8, 16)) + of_power("literal", 2.0, (1, 2), 1e5)
+    result.tables["growth"] = of_power("loop", 1.0, (1, 2, 8, 16)) + of_power("literal", 2.0, (1, 2, 8), 1e5)
     result.tables["growth"] += [row(1, "straight_line", 20.0), *(row(n, "straight_line", None) for n in (2, 8, 16))]
     result.curves["exponents"] = exponents(result.tables["growth"])
     name, fig, caption = figures_growth.draw_chain(result)
@@ -265,7 +286,7 @@ def test_the_figure_draws_the_rows():
     assert to_hex(lines["the literal form in Python ($n^{2.00}$)"].get_color()) == "#666666"
     assert caption == (
         "Forward dynamics of a chain of 1 to 16 hinges, none of them along a coordinate axis, one state. Powers of n are "
-        "fitted by least squares to the logarithms, over 8 to 16 and 1 to 2 joints."
+        "fitted by least squares to the logarithms, over 1 to 16 and 1 to 8 joints."
     )
     assert {one.name for one in IMPLEMENTATIONS} <= figures_growth.LOOKS.keys()
     assert len(set(figures_growth.LOOKS.values())) == len(figures_growth.LOOKS)
