@@ -68,6 +68,42 @@ def test_what_the_loops_answer_is_what_the_literal_form_returns(seed, loops):
                 assert np.abs(one - other).max(initial=0.0) <= slack * np.abs(all_of_it).max()
 
 
+def test_a_controllers_gains_are_those_of_the_model(loops):
+    rng = np.random.default_rng(5)
+    for fields in (("position_gain", "speed_gain"), ("position_gain",), ("speed_gain",)):
+        tree = loops(replace(tmt.ARM, **{field: rng.uniform(-2.0, 2.0, (3, 3)) for field in fields}))
+        q, qd, tau = rng.uniform(-2.0, 2.0, (3, 11, 3))
+        assert tmt.acceleration(q, qd, tau, tree) == pytest.approx(literal.acceleration(q, qd, tau, tree), rel=1e-11)
+        assert tmt.mass_matrix(q, tree) == pytest.approx(literal.mass_matrix(q, tree), rel=1e-13)
+
+
+def test_straight_line_code_answers_many_states_once_it_is_worth_it(loops, monkeypatch):
+    known = answers.remembered(loops(replace(tmt.ARM, mass=(2.25, 1.5))))
+    q, qd, tau = np.random.default_rng(6).uniform(-2.0, 2.0, (3, 1100, 3))
+    by_loops = [
+        tmt.acceleration(q, qd, tau, known.tree),
+        tmt.mass_matrix(q, known.tree),
+        tmt.bias(q, qd[0], known.tree),
+    ]
+    assert not known.lanes
+    known.asked = dict.fromkeys({*answers.OF_STRAIGHT_LINES.values()}, 1e12)
+    by_lines = [
+        tmt.acceleration(q, qd, tau, known.tree),
+        tmt.mass_matrix(q, known.tree),
+        tmt.bias(q, qd[0], known.tree),
+    ]
+    assert len(known.lanes) == 2
+    for one, other in zip(by_loops, by_lines):
+        assert one.shape == other.shape and other == pytest.approx(one, rel=1e-10, abs=1e-12)
+    assert np.array_equal(by_lines[1], by_lines[1].transpose(0, 2, 1))
+    assert tmt.gravity_balance(q, known.tree) == pytest.approx(literal.gravity_balance(q, known.tree), abs=1e-12)
+    few = tmt.acceleration(q[:31], qd[:31], tau[:31], known.tree)  # too few for its lanes
+    assert np.array_equal(few, by_loops[0][:31])
+    tau[700, 1] = np.nan
+    with pytest.raises(ValueError, match="tau has values that are not finite"):
+        tmt.acceleration(q, qd, tau, known.tree)
+
+
 def test_one_row_of_speeds_or_torques_may_stand_for_all(loops):
     tree, (q, qd, tau) = states(2, 9)
     loops(tree)
@@ -137,6 +173,7 @@ WRONG = {
     "no unit quaternion": (BALL, (np.array([1.0, 1.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))),
     "one of many no unit quaternion": (BALL, (np.array([[1, 0, 0, 0]] * 9 + [[1, 0.01, 0, 0]]), np.zeros(3), np.zeros(3))),
     "singular": (WRIST, (np.zeros(3), np.zeros(3), np.zeros(3))),
+    "singular but for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), np.zeros(3), np.zeros(3))),
     "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], np.zeros(3), np.zeros(3))),
     "no model": ("arm", (np.zeros(3), np.zeros(3), np.zeros(3))),
 }  # fmt: skip

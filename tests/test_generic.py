@@ -27,7 +27,7 @@ def test_large_trees_take_the_generic_loop(rng, monkeypatch):
     tree = random_tree(rng, bodies=1)
     q, qd, tau = rng.uniform(-1, 1, (3, 4, len(tree.parent)))
     qd[1] = 1e200  # diverges
-    traced = tmt.simulate(q, qd, tau, 0.01, 20, "explicit_euler", tree)
+    traced = tmt.simulate(q, qd, tau, 0.01, 20, "explicit_euler", tree, form="straight_line")
     monkeypatch.setattr(kernels, "LONGEST", 0)
     looped = tmt.simulate(q, qd, tau, 0.01, 20, "explicit_euler", tree)
     assert looped.ended[1] is not None and [looped.ended[i] for i in (0, 2, 3)] == [None] * 3
@@ -54,7 +54,7 @@ def test_the_generic_loop_takes_its_own_arrays_only(monkeypatch):
 def test_the_loops_follow_every_method(name, rng, monkeypatch):
     q, qd, tau = rng.uniform(-1, 1, (3, 5, 3))
     dt, steps = (0.5, 2) if METHODS[name].adaptive else (0.01, 20)  # some of its own steps are refused
-    traced = tmt.simulate(q, qd, tau, dt, steps, name)
+    traced = tmt.simulate(q, qd, tau, dt, steps, name, form="straight_line")
     monkeypatch.setattr(kernels, "LONGEST", 0)
     looped = tmt.simulate(q, qd, tau, dt, steps, name)
     assert looped.evaluations == traced.evaluations >= 5 * steps * METHODS[name].stages

@@ -108,7 +108,8 @@ ENDS = {
 
 @pytest.mark.parametrize("method, start, more, says", ENDS.values(), ids=ENDS)
 def test_a_run_says_why_it_ended(method, start, more, says):
-    arguments = {"dt": 0.1, "steps": 200, "method": method} | more
+    # the loops take the library's sine far out, so that there a hinge turns where here numbers overflow
+    arguments = {"dt": 0.1, "steps": 200, "method": method, "form": "straight_line"} | more
     dt = arguments["dt"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")

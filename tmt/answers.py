@@ -25,7 +25,7 @@ from .values import real_numbers
 # evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and for each speed
 # what it takes to write a Tree as they want it
 LITERAL, LITERAL_JOINT, CALL, COMPILED, READ, WRITTEN = 1.2e-8, 4e-7, 220, 9.0, 0.6, 2e-3
-BLOCK = 1024  # states that are laid out for straight-line code at a time, and stay near the processor
+BLOCK = 24_000  # numbers of one kind that are laid out for straight-line code at a time, and stay near the processor
 SHAPES = {  # of a result, m bodies and n speeds
     "com_positions": ("m", 3), "angular_velocities": ("m", 3), "jacobians": (2, "m", 3, "n"), "convective_terms": (2, "m", 3),
     "potential_energy": (), "energy": (), "spring_torque": ("n",), "acceleration": ("n",), "mass_matrix": ("n", "n"),
@@ -177,16 +177,17 @@ class Known:
         size = n if of == "forward_dynamics" else n * (n + 3) // 2
 
         def answers(part):
-            for first in range(part.start, part.stop, BLOCK):
-                count = min(BLOCK, part.stop - first)
-                columns = [np.empty((rows, count)) for rows in (nq, n, n, size)]
-                for rows, to in zip((q, qd, tau), columns):
-                    loops.to_columns(rows, first, to)
+            columns, block = None, max(LANES, BLOCK // n // LANES * LANES)
+            for first in range(part.start, part.stop, block):
+                some = slice(first, min(first + block, part.stop))
+                count = some.stop - first
+                if columns is None or columns[0].shape[1] != count:
+                    columns = [np.empty((rows, count)) for rows in (nq, n, n, size)]
+                loops.to_columns(q, qd, tau, first, *columns[:3])
                 lanes(*columns)
-                loops.to_rows(columns[-1], number, out, first)
-                block = slice(first, first + count)  # checked while it is near the processor
-                rates = (rows if len(rows) == 1 else rows[block] for rows in (qd, tau))
-                if not loops.right(self.parts[0], q[block], *rates, out[block]):
+                loops.to_rows(columns[3], number, out, first)
+                rates = (rows if len(rows) == 1 else rows[some] for rows in (qd, tau))
+                if not loops.right(self.parts[0], q[some], *rates, out[some]):  # while they are near the processor
                     return False
             return True
 

@@ -1,6 +1,6 @@
 """Generated code on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
-The name of a generated module is the hash of its text, of the compiled code that it takes from `sine`, and of numba's
+The name of a generated module is the hash of its text, of the code that it takes from `sine` and `written`, and of numba's
 version; numba keeps its machine code beside it, and that of loops.py (see machine_code.py). What lies there is run, so the
 folder must be the user's own: others may neither write to it nor put another in its place. Without such a folder the code is
 compiled anew in each process: it only costs time.
@@ -19,7 +19,9 @@ from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
-SINE = Path(__file__).with_name("sine.py")  # by its path: importing it would load numba
+SINE, WRITTEN = (
+    Path(__file__).with_name(name) for name in ("sine.py", "written.py")
+)  # importing them would load numba
 LEFT_OVER = ("*.new", "__pycache__/*.tmp.*")  # written aside and never moved, by us and by numba
 ABANDONED = 3600.0  # s: a file takes milliseconds to write, but the clocks of a shared disk differ
 complaints = []  # about the folder, of this process
@@ -84,7 +86,7 @@ def private(path, group) -> bool:
 def name_of(text) -> str:
     """The name of the module with this source."""
     # numba versions do not read each other's machine code: each keeps its own
-    key = "\n".join([version("numba"), SINE.read_text(encoding="utf-8"), text])
+    key = "\n".join([version("numba"), SINE.read_text(encoding="utf-8"), WRITTEN.read_text(encoding="utf-8"), text])
     return "kernel_" + hashlib.sha256(key.encode()).hexdigest()[:16]
 
 

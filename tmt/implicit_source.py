@@ -3,9 +3,10 @@
 from .coordinates import FLAT
 from .dual import jacobian
 from .implicit import CLOSE, ITERATIONS, directions
-from .trace import Tape
+from .trace import Code, Tape
 
 STEP = '''
+@njit(error_model="numpy")
 def step({state}, {torque}, dt):
     """The state one dt later and how often Newton's method was applied; NaN where it does not find the stages."""
     {unknown}, = start({state}, {torque}, dt)
@@ -22,8 +23,8 @@ def step({state}, {torque}, dt):
 '''
 
 
-def step_source(tree, stepping, terms) -> str:
-    """Source of the compiled `step` of an implicit method.
+def step_source(tree, stepping, terms) -> list[Code | str]:
+    """Straight-line functions for the compiled `step` of an implicit method, and at last its source.
 
     terms: the form of the dynamics that is traced.
     """
@@ -74,5 +75,4 @@ def step_source(tree, stepping, terms) -> str:
         close=CLOSE,
         nothing=list_of("np.nan", nq + n),
     )
-    texts = [*(function.text for function in functions), step]
-    return "\n\n".join('@njit(error_model="numpy")\n' + text.lstrip("\n") for text in texts)
+    return [*functions, step.lstrip("\n")]

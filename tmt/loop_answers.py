@@ -64,20 +64,17 @@ def many(joints, outer, bodies, before, world, gains, q, qd, tau, quantity, out)
 @part
 def taken(rows, first, states):
     """Eight rows, or one for all, to the columns of states."""
-    step = 1 if len(rows) > 1 else 0
-    for l in range(WIDTH):
-        row = rows[(first + l) * step]
-        for k in range(len(row)):
-            states[k, l] = row[k]
+    for k in range(len(states)):
+        for l in range(WIDTH):
+            states[k, l] = rows[first + l if len(rows) > 1 else 0, k]
 
 
 @part
 def given(results, rows, first):
     """The columns of results to eight rows."""
     for l in range(WIDTH):
-        row = rows[first + l]
-        for k in range(len(row)):
-            row[k] = results[k, l]
+        for k in range(len(results)):
+            rows[first + l, k] = results[k, l]
 
 
 @compiled
@@ -122,10 +119,10 @@ def numbers(tree) -> int:
 
 @part
 def finite(values) -> bool:
-    """Whether all of them are; counted, as that is done for several side by side."""
+    """Whether all of them are; counted, and by unsigned places, so that the compiler does that for several side by side."""
     others = 0
-    for x in values:
-        others += 0 if abs(x) < np.inf else 1
+    for k in range(np.uint64(values.size)):
+        others += not abs(values[k]) < np.inf
     return others == 0
 
 
@@ -142,15 +139,12 @@ def of_length_1(joints, q) -> bool:
 
 
 @compiled
-def to_columns(rows, first, columns):
-    """As many rows as there are columns, from `first` on; one may stand for all."""
-    if len(rows) == 1:
+def to_columns(q, qd, tau, first, columns_q, columns_qd, columns_tau):
+    """As many rows of each as there are columns, from `first` on; of qd and tau one may stand for all."""
+    for rows, columns in ((q, columns_q), (qd, columns_qd), (tau, columns_tau)):
         for k in range(len(columns)):
-            columns[k] = rows[0, k]
-        return
-    for k in range(len(columns)):
-        for i in range(columns.shape[1]):
-            columns[k, i] = rows[first + i, k]
+            for i in range(columns.shape[1]):
+                columns[k, i] = rows[first + i if len(rows) > 1 else 0, k]
 
 
 @compiled

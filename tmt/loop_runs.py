@@ -162,6 +162,6 @@ def estimate(tree, errors, tolerance, h, rates, changes, q, qd, new, new_qd):
                 size = 1.0 if joint.kind == BALL else max(abs(q[joint.at]), abs(new[joint.at]))
                 squares[e] += (h * by_rates / (tolerance * (1.0 + size))) ** 2
                 squares[e] += (h * by_changes / (tolerance * (1.0 + max(abs(qd[v]), abs(new_qd[v]))))) ** 2
-    if squares[0] == 0.0:
+    if not squares[0] > 0.0:  # nor where it is undefined: then the state is not finite
         return 0.0
     return squares[0] / math.sqrt(2 * n * (squares[0] + 0.01 * squares[1]))

@@ -37,7 +37,8 @@ def run_source(tree, stepping) -> str:
     if stepping.solves_stages:
         words = _words(tree) | {"why": f"{NEWTON} if math.isnan({_sum('q', nq)}) else {_why(tree)}"}
         loop = RUN.format(**words, used=", used", cost=f"1 + used * {stepping.stages}")
-        return HEADER + step_source(tree, stepping, composite.mass_matrix_and_bias) + loop
+        *functions, step = step_source(tree, stepping, composite.mass_matrix_and_bias)
+        return "\n\n".join([HEADER, *map(written, functions), step]) + loop
     tape = Tape()
     q, qd, tau, dt = _inputs(tape, tree)
 
@@ -47,14 +48,12 @@ def run_source(tree, stepping) -> str:
     name, joints = "attempt" if stepping.adaptive else "step", tree.coordinates
     results = getattr(stepping, name)(slope, q, qd, dt, *([joints] if joints.balls else []))
     step = tape.function(name, [*q, *qd, *tau, dt], [value for part in results for value in part])
-    inline = '@njit(forceinline=True, error_model="numpy")\n'
-    return "\n\n".join(
-        [
-            HEADER + inline + slope_code(tree, stepping).text,
-            f'@njit(error_model="numpy")\n{step.text}',
-            _loop(stepping, tree),
-        ]
-    )
+    return "\n\n".join([HEADER + written(slope_code(tree, stepping)), written(step), _loop(stepping, tree)])
+
+
+def written(code: Code, inline: bool = False) -> str:
+    """The source of a function for a module, see written.py; inline: in the place of its calls."""
+    return f"@written({code.results}{', inline=True' * inline})\n{code.text}"
 
 
 def _loop(stepping, tree) -> str:
@@ -102,15 +101,15 @@ def lanes_source(tree, stepping) -> str:
         return answers[-1]
 
     results = stepping.step(slope, q, qd, dt, *([joints] if joints.balls else []))
-    functions, stages = [slope_code(tree, stepping).text], []
+    functions, stages = [slope_code(tree, stepping)], []
     own = [_lane("y", i) for i in range(nq + n)] + ["dt"]
     for j in range(len(asked) + 1):
         inputs = [*q, *qd, dt, *(value for answer in answers[:j] for value in answer)]
         known = ", ".join(own + [_lane("k", i) for i in range(j * n)])
         if j == len(asked):
-            functions.append(tape.function("combined", inputs, [*results[0], *results[1]]).text)
+            functions.append(tape.function("combined", inputs, [*results[0], *results[1]]))
         else:
-            functions.append(tape.function(f"stage_{j}", inputs, asked[j]).text)
+            functions.append(tape.function(f"stage_{j}", inputs, asked[j]))
             arguments = ", ".join(_lane("x", i) for i in range(nq + n))
             stages.append(STAGE.format(W=LANES, j=j, arguments=arguments, known=known, offset=j * n * LANES))
     places = [("q", i) for i in range(nq)] + [("qd", i) for i in range(n)]
@@ -132,9 +131,7 @@ def lanes_source(tree, stepping) -> str:
     }
     arguments = ", ".join([_lane("x", i) for i in range(nq + 2 * n)] + ["dt"])
     slopes = SLOPES.format(W=LANES, arguments=arguments, results=_sequence(lambda i: _lane("k", i, "o + "), n))
-    inline = '@njit(forceinline=True, error_model="numpy")\n'
-    return "\n\n".join([HEADER + inline + functions[0], *(inline + text for text in functions[1:]), slopes,
-                        RUN_LANES.format(**words)])  # fmt: skip
+    return "\n\n".join([HEADER, *(written(code, inline=True) for code in functions), slopes, RUN_LANES.format(**words)])
 
 
 def evaluator_source(tree, quantity, terms, sine) -> str:
@@ -154,7 +151,7 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     else:
         outputs = [*(M[i][j] for i in range(n) for j in range(i, n)), *h]
     m = len(outputs)
-    text = tape.function("quantity", [*q, *qd, *tau], outputs).text
+    code = tape.function("quantity", [*q, *qd, *tau], outputs)
     inputs = [(name, i) for name, count in (("q", nq), ("qd", n), ("tau", n)) for i in range(count)]
     places = ", ".join(f"{name}[i, {k}]" for name, k in inputs)
 
@@ -178,10 +175,8 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
         "column_in": ", ".join(f"{name}[{k}, i]" for name, k in inputs),
         "column_out": _sequence(lambda k: f"out[{k}, i]", m),
     }
-    fast = '@njit(forceinline=True, error_model="numpy")\n' + text.replace("sincos(", f"{sine}(")
-    sure = '@njit(error_model="numpy")\n' + text.replace("def quantity(", "def by_library(").replace(
-        "sincos(", "library_sincos("
-    )
+    fast = written(code, inline=True).replace("sincos(", f"{sine}(")
+    sure = written(code).replace("def quantity(", "def by_library(").replace("sincos(", "library_sincos(")
     text = "\n\n".join([HEADER + fast, sure, EVALUATE.format(**words)])
     if quantity != "forward_dynamics":
         return text
@@ -190,8 +185,8 @@ def evaluator_source(tree, quantity, terms, sine) -> str:
     sound = " + ".join(f"abs(result[{nq + k}])" for k in range(n)) + " < np.inf"
     moving = f"result[:{nq}] = y[{nq}:]"
     if tree.coordinates.balls:
-        turns = tape.function("moving", [*q, *qd], tree.coordinates.component_rates(q, qd)).text
-        text += f'\n\n@njit(error_model="numpy")\n{turns}'
+        turns = tape.function("moving", [*q, *qd], tree.coordinates.component_rates(q, qd))
+        text += "\n\n" + written(turns)
         moving = f"{_sequence(lambda k: f'result[{k}]', nq)} = moving({_sequence(lambda k: f'y[{k}]', nq + n)})"
     words = {"n": n, "all": nq + n, "moving": moving, "rates": rates, "given": given, "sound_rates": sound}
     return text + RATE.format(**words)

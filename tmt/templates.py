@@ -14,6 +14,7 @@ import numpy as np
 from numba import carray, njit
 
 from tmt.sine import LIMIT, block, fma, sincos, widest
+from tmt.written import written
 
 
 @njit(cache=CACHE, error_model="numpy")

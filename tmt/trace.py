@@ -33,6 +33,7 @@ class Code(NamedTuple):
 
     text: str
     operations: int  # + - * / and changes of sign; a sine, a cosine, a root count as one each
+    results: int
 
 
 class Tape:
@@ -173,7 +174,7 @@ class Tape:
         names = ", ".join(i.name for i in inputs)
         returns = ", ".join(text[o.i] for o in outputs)
         body = "".join(f"    {line}\n" for line in [*lines, f"return {returns},"])
-        return Code(f"def {name}({names}):\n{body}", operations)
+        return Code(f"def {name}({names}):\n{body}", operations, len(outputs))
 
     def written(self, operation, arguments, product, text) -> str:
         """The right-hand side for one operation; product: the operand that is fused into it, or None."""

@@ -85,8 +85,7 @@ class TmtDynamics:
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         # the same code in every process, but for controllers, of which a robot may have many
-        form = "straight_line" if kernels.is_traced(self.tree, method_named(method)) else "loop"
-        form = None if self.tree.has_gains else form
+        form = None if self.tree.has_gains else form_of(self.tree, method)
         motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance, form=form)
         return Motion(*motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps)
 
@@ -110,6 +109,11 @@ class TmtDynamics:
             return Motion(t, *(path[0, ::every].copy() for path in paths), evaluations, ended, taken)
 
         return run, read
+
+
+def form_of(tree: tmt.Tree, method: str) -> str:
+    """The compiled code that follows runs of a Tree here, one of tmt.simulate's forms."""
+    return "straight_line" if kernels.is_traced(tree, method_named(method)) else "loop"
 
 
 class Compiled:

@@ -14,7 +14,7 @@ from ..engines.tmt import Compiled
 from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import gravity_scale
-from ..judge.words import listed
+from ..judge.words import ROWS_COMPILED, listed
 from ..robots import Robot
 from ..setup import Setup
 from ..truth.conserved import conserved
@@ -131,6 +131,7 @@ def rows(setup: Setup) -> Result:
         result.notes.append(
             f"The rotors of {setup.robot.joints[0]} differ between its axes: the angular momentum is left out."
         )
+    result.notes += [ROWS_COMPILED] * (not setup.robot.own)
     return result
 
 

@@ -14,7 +14,7 @@ from ..engines.tmt import Compiled
 from ..judge.check import Result
 from ..judge.entries import Entries, has_own_scales, per_speed, scales, unit
 from ..judge.scale import gravity_scale, spring_scale
-from ..judge.words import capital
+from ..judge.words import ROWS_COMPILED, capital
 from ..robots import Robot
 from ..setup import Setup
 
@@ -141,6 +141,7 @@ def rows(setup: Setup) -> Result:
         left = theirs.acceleration(q, at_rest, torque)
         allowed = scale.acceleration(scale.holding, 0.0)
         result.agree(sample, f"qdd of MuJoCo under {WHOSE[name]} torque", rates, at_rest, left, allowed)
+    result.notes += [ROWS_COMPILED] * (not setup.robot.own)
     return result
 
 

@@ -11,7 +11,7 @@ from ..engines.tmt import Compiled
 from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR, reaches
-from ..judge.words import listed
+from ..judge.words import ROWS_COMPILED, listed
 from ..robots import Robot
 from ..setup import Setup
 from ..states import Sample
@@ -113,6 +113,7 @@ def rows(setup: Setup) -> Result:
             if quantity in faster:
                 result.agree(sample, f"{quantity}, compiled", of, faster[quantity], theirs, size)
         result.notes += sample.notes
+    result.notes += [ROWS_COMPILED] * (not setup.robot.own)
     return result
 
 

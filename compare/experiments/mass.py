@@ -13,6 +13,7 @@ from ..engines.tmt import Compiled
 from ..judge.check import Result, over
 from ..judge.entries import has_own_scales, scales
 from ..judge.scale import EPS, FACTOR
+from ..judge.words import ROWS_COMPILED
 from ..robots import Robot
 from ..setup import Setup
 
@@ -116,6 +117,7 @@ def rows(setup: Setup) -> Result:
             f"Nothing is stated of where the condition number of Mbar of the {robot.noun} is largest: that is neither checked "
             "nor drawn."
         )
+    result.notes += [ROWS_COMPILED] * (not setup.robot.own)
     return result
 
 

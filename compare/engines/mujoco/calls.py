@@ -96,8 +96,13 @@ class MinimalCalls:
             # what the addresses point to must live as long as the call
             return lambda count, _=self: loop(*arguments, count)
 
+        def called(count):
+            for _ in range(count):
+                mujoco.mj_forward(self.model, self.data)
+
         terms, dynamics = equal_work(library())
         return {
+            "MuJoCo, mj_forward called from Python": ("forward_dynamics", called),
             "MuJoCo, mj_forward": ("forward_dynamics", run(repeated, call["mj_forward"], *self.addresses)),
             "MuJoCo, equal work": ("forward_dynamics", run(dynamics, *self.addresses, force, solution)),
             "MuJoCo, equal work, no solve": ("mass_matrix_and_bias", run(terms, *self.addresses, force)),

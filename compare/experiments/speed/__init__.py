@@ -21,6 +21,7 @@ from ...truth.reference import Reference, has_no_reference, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, growth, targets, tumbling
 from .accuracy import fill_in, reference_in_words, spread_in_words
+from .affordable import forms_in_words
 from .floors import floor
 from .settings import (
     absent_in_words,
@@ -125,6 +126,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)
     result.notes += accuracy.references_in_words(known, floors)
     result.notes += accuracy.floors_in_words(result.rows, floors)
+    followed = forms_in_words(cases, [method.name for method in taking if method.engine == "tmt"])
+    result.notes += [followed] * bool(followed)
     if timed:
         add_times(result, setup, names, of_scenes)
     result.notes += accuracy.first_order_in_words(result.rows, floors)

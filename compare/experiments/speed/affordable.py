@@ -1,5 +1,6 @@
 """What of an evaluation can be compiled and timed in reasonable time, for a robot of any joints."""
 
+from collections.abc import Iterable
 from functools import lru_cache
 
 import numpy as np
@@ -8,7 +9,9 @@ import tmt
 from tmt import kernels, method
 from tmt.trace import Code
 
-from ...case import Coordinates
+from ...case import Case, Coordinates
+from ...engines.tmt import form_of
+from ...judge.words import listed
 
 MOST_RESULTS = 10_000_000  # numbers, the results of many states, of a robot of many joints
 MOST_LITERAL = 3000  # operations of the literal form, up to which its straight-line code is compiled
@@ -62,3 +65,12 @@ def left_out_in_words(tree: tmt.Tree) -> list[str]:
             "composite form with the library's sine."
         ]
     return []
+
+
+def forms_in_words(cases: Iterable[Case], methods: Iterable[str]) -> str:
+    """Which code follows tmt's runs of these cases."""
+    forms = {(form_of(case.tree, method), method) for case in cases for method in methods if not case.controller}
+    straight, loop = ({method for form, method in forms if form == name} for name in ("straight_line", "loop"))
+    parts = [f"straight-line code, traced and compiled for the model ({listed(sorted(straight))})"] * bool(straight)
+    parts += [f"the loop over any tree, compiled once for all models ({listed(sorted(loop))})"] * bool(loop)
+    return f"tmt's runs are followed by {' and by '.join(parts)}." if parts else ""

@@ -17,6 +17,7 @@ from .affordable import left_out_in_words, lengths, most_states, states_of
 from .peers import FEWER, Peers, peers_in_words
 from .settings import coarsest_steps, regular_of
 from .ways import (
+    CALLED,
     EACH,
     FORWARD,
     IN_LANES,
@@ -35,6 +36,7 @@ TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so lo
 COLUMNS_OF_COSTS = ("quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
                     "share_of_peak", "why_not")  # fmt: skip
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
+WHOLE_CALLED = "MuJoCo, mj_forward called from Python"
 
 
 def costs(setup: Setup) -> tuple[list[dict], list[str]]:
@@ -164,6 +166,7 @@ def costs_in_words(
         f"Those are compiled loops. A call of tmt.simulate with {steps} steps takes {1e6 * call:.0f} us, its loop alone "
         f"{1e6 * loop:.0f} us."
     )
+    sentences += called_in_words(ns)
     if operations is None:
         return sentences
     literal, composite = operations
@@ -172,6 +175,20 @@ def costs_in_words(
         f"is made for this one {name}, MuJoCo for any model."
     )
     return sentences
+
+
+def called_in_words(ns: Mapping[tuple, float]) -> list[str]:
+    """What calls from Python take."""
+    calls = {key[2:]: value for key, value in ns.items() if key[:2] == (FORWARD, CALLED)}
+    if (1, 1) not in calls:
+        return []
+    text = f"Called from Python, tmt.acceleration takes {1e-3 * calls.pop((1, 1)):.1f} us for one state"
+    if (whole := ns.get((FORWARD, WHOLE_CALLED, 1, 1))) is not None:
+        text += f" (mj_forward {1e-3 * whole:.1f} us)"
+    text += "".join(
+        f"; of {states:,} states in one call {value:.1f} ns a state" for (states, _), value in sorted(calls.items())
+    )
+    return [f"{text}."]
 
 
 def beside_mujoco_in_words(ns: dict, lanes: dict[int, float], name: str) -> list[str]:

@@ -1,20 +1,23 @@
 """The ways in which tmt evaluates the dynamics, each ready to be timed: from plain Python to lanes in two threads."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 import tmt
-from tmt import generic, kernels, literal, method
+from tmt import answers, generic, kernels, literal, method
+from tmt.cores import cores
 from tmt.methods import METHODS
 
 from .affordable import MOST_RESULTS, literal_is_compiled
 
 MOST_CALLS = 100_000  # of the same in a call that is timed
 IN_PYTHON = 12  # up to which the literal form is timed in Python
-FORWARD, TERMS, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "rk4_step"  # what is evaluated
+# what is evaluated
+FORWARD, TERMS, MASS_MATRIX, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "mass_matrix", "rk4_step"
 LOOP, LOOP_IN_LANES = "generic compiled loop", "generic compiled loop, lanes"
+CALLED, MASS_CALLED = "tmt.acceleration, called from Python", "tmt.mass_matrix, called from Python"
 WAITING, EACH, IN_LANES = "traced kernel, each waits for the last", "traced kernel", "lanes"
 
 
@@ -37,6 +40,9 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
 
     if n <= IN_PYTHON:
         yield FORWARD, "literal, Python floats", plain
+    answers.remembered(tree).get_loops()
+    yield FORWARD, CALLED, calling(tmt.acceleration, q, qd, tau, tree)
+    yield MASS_MATRIX, MASS_CALLED, calling(tmt.mass_matrix, q, tree)
     loops = generic.compiled()
     yield FORWARD, LOOP, lambda count: loops.repeat_forward_dynamics(arrays, q, qd, tau, out, count)
     yield TERMS, LOOP, lambda count: loops.repeat_mass_matrix_and_bias(arrays, q, qd, M, h, count)
@@ -54,11 +60,23 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     yield RK4_STEP, EACH, steps
 
 
+def calling(function: Callable, *given) -> Callable:
+    """loop(count): a function called so many times from Python."""
+
+    def loop(count):
+        for _ in range(count):
+            function(*given)
+
+    return loop
+
+
 def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoolExecutor) -> dict:
     """{(quantity, implementation, states, threads): run} for many states, (N, nq and nv); memory is bounded by them."""
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
     count, n = qd.shape
     runs = {}
+    if count > 1:
+        runs[FORWARD, CALLED, count, cores()] = lambda: tmt.acceleration(q, qd, tau, tree)
     if 1 < count <= 1000:
         loops, numbers, slots = (
             generic.compiled(),

@@ -73,6 +73,15 @@ def test_mujoco_comes_as_near_as_tmt(ours, theirs, passes):
     assert found == {"smallest error of MuJoCo's RK4, beside that of tmt's rk4": passes}
 
 
+@pytest.mark.parametrize(
+    "nearest, found", [(256, {}), (64, {"smallest error of MuJoCo's RK4, beside that of tmt's rk4": False})]
+)
+def test_where_both_diverge_with_all_of_mujocos_steps_nothing_is_compared(nearest, found):
+    rows = [row("mujoco", "RK4", None, steps) for steps in (64, 128)]
+    rows += [row("tmt", "rk4", 1e-9 / steps if steps >= nearest else None, steps) for steps in (64, 128, 256)]
+    assert smallest_errors(rows, {"bent, free": 1e-14}) == found
+
+
 @BOTH
 def test_where_mujocos_steps_end_before_its_errors_stop_tmts_are_no_finer(share, passes):
     errors = [1e-6, 1e-7, 1e-8]

@@ -7,7 +7,19 @@ from speed_rows import NS, row
 
 from compare.experiments import speed
 from compare.experiments.speed import evaluations, targets
-from compare.experiments.speed.evaluations import EACH, EQUAL, FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WAITING, WHOLE
+from compare.experiments.speed.evaluations import (
+    CALLED,
+    EACH,
+    EQUAL,
+    FORWARD,
+    IN_LANES,
+    MJ_STEP,
+    RK4_STEP,
+    WAITING,
+    WHOLE,
+    WHOLE_CALLED,
+    called_in_words,
+)  # fmt: skip
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 
@@ -91,3 +103,13 @@ def test_aims_of_scenes_are_the_robots_own():
     assert not any("bent" in line["what"] for line in targets.targets(result, {}, "", {}))
     (line,) = (line for line in targets.targets(result, {}, "", {("bent, free", 1e-6): 70}) if "bent" in line["what"])
     assert line["aim"] == 70 and line["reached"] == 60.0 and not line["met"]
+
+
+def test_what_calls_from_python_take_is_said_as_it_was_timed():
+    one, many, whole = ((FORWARD, CALLED, 1, 1), (FORWARD, CALLED, 1000, 2), (FORWARD, WHOLE_CALLED, 1, 1))
+    assert called_in_words({}) == called_in_words({whole: 1.0}) == []
+    assert called_in_words({one: 2345.6}) == ["Called from Python, tmt.acceleration takes 2.3 us for one state."]
+    assert called_in_words({one: 3000.0, whole: 1740.0, many: 21.04}) == [
+        "Called from Python, tmt.acceleration takes 3.0 us for one state (mj_forward 1.7 us); of 1,000 states in one call 21.0 "
+        "ns a state."
+    ]

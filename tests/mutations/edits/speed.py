@@ -33,6 +33,8 @@ EDITS = (
     Edit("accuracy", "check_same_schemes", "FACTOR * floors[scene]", "1e6 * floors[scene]",
          "the same scheme's tolerance: 64 -> 1e6"),
     Edit("accuracy", "check_smallest_errors", "FACTOR * left", "100 * FACTOR * left", "tolerance x 100", nth=1),
+    Edit("accuracy", "check_smallest_errors", "np.isfinite([least['RK4'], least['rk4']]).any()",
+         "np.isfinite([least['RK4'], least['rk4']]).all()", "a MuJoCo that diverges where tmt does not is not compared"),
     Edit("accuracy", "error", "row['diverged']", "False", "a run that diverged has an error"),
     Edit("targets", "targets.add", "reached >= aim", "reached <= aim", "a missed aim is met"),
     Edit("targets", "targets.add", "slow / fast", "fast / slow", "ratios are inverted"),
