@@ -37,8 +37,12 @@ def run(x, y, out):
 """
 
 
+def module(decorator, other, factor=0.7):
+    return load(MODULE.format(decorator=decorator, other=other, lines=LINES, factor=factor))
+
+
 def outputs(decorator, other, factor=0.7):
-    run = load(MODULE.format(decorator=decorator, other=other, lines=LINES, factor=factor)).run
+    run = module(decorator, other, factor).run
     x, y = np.random.default_rng(5).uniform(0.1, 2.0, (2, 50))
     out = np.empty((50, 3))
     run(x, y, out)
@@ -55,6 +59,15 @@ def test_they_have_the_bits_of_compiled_lines():
 def test_functions_of_the_same_name_and_size_are_not_taken_for_each_other():
     first, second, again = (outputs("@written(3)", "@written(3)", factor) for factor in (0.7, 0.8, 0.7))
     assert np.array_equal(first, again) and not np.array_equal(first, second)
+
+
+def test_the_machine_code_of_another_process_has_other_names():
+    """By the module, whose name is made from its source: in a process alone they would all be told apart by a count."""
+    made = [module("@written(3)", "@written(3)", factor) for factor in (0.7, 0.8)]
+    for one in made:
+        for function in (one.inner, one.outer):
+            assert one.__name__ in function.py_func.__name__ and function.py_func.__module__ == one.__name__
+    assert made[0].__name__ != made[1].__name__
 
 
 def test_a_tree_is_not_followed_by_the_code_of_another():

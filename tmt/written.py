@@ -4,7 +4,6 @@ Numba takes most of its time to find out the type of each value, and here all ar
 that write their instructions down. They are the same instructions, and give the same bits.
 """
 
-import itertools
 from collections.abc import Callable
 from types import FunctionType
 
@@ -15,7 +14,6 @@ from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import lower_builtin
 
 DOUBLE = types.float64
-COUNT = itertools.count()
 
 
 class Value:
@@ -111,9 +109,11 @@ def written(results: int, inline: bool = False) -> Callable:
             return context.make_tuple(builder, all_of, [writer.lifted(x).value for x in outputs])
 
         infer_global(lines, types.Function(Template))
-        names, scope = ", ".join(code.co_varnames[:count]), {"lines": lines}
-        # a name of its own: numba takes functions for one whose names and instructions are the same
-        name = f"{function.__name__}_{next(COUNT)}"
+        # with the name of its module, which is made from its source: numba takes functions for one whose names and instructions
+        # are the same, also where it reads the machine code of other processes
+        module = function.__globals__["__name__"]
+        name = f"{function.__name__}_of_{module}"
+        names, scope = ", ".join(code.co_varnames[:count]), {"lines": lines, "__name__": module}
         exec(f"def {name}({names}):\n    return lines({names})", scope)
         made = njit(error_model="numpy", forceinline=inline)(scope[name])
         made.results = results
