@@ -37,3 +37,13 @@ def test_what_was_asked_is_counted_for_each_kind():
     assert choice.asked(*key).count == 0.0
     choice.asked(*key).count += 5
     assert choice.asked(*key).count == 5 and choice.asked(key[0], "dopri8").count == 0.0
+
+
+def test_more_lines_and_what_is_not_there_take_longer():
+    assert choice.straight_line_getting(1000, kept=False) > choice.straight_line_getting(100, kept=False)
+    assert choice.straight_line_getting(1000, kept=False, lanes=True) > choice.straight_line_getting(1000, kept=False)
+    assert choice.straight_line_getting(1000, kept=True) < choice.straight_line_getting(1000, kept=True, traced=False)
+    assert choice.loop_getting("run_tableau", kept=True) < choice.loop_getting("run_tableau", kept=False)
+    assert choice.loop_getting("another", kept=False) == max(choice.LOOPS_COMPILED.values())
+    for each in (choice.straight_line_each, choice.loop_each):
+        assert 0.0 < each(7, lanes=True) < each(7) < each(700)

@@ -106,6 +106,14 @@ ENDS = {
 }
 
 
+@pytest.mark.parametrize("form", [*FORMS])
+@pytest.mark.parametrize("name", ["overflow", "diverged", "turned"])
+def test_every_form_says_the_same_of_an_end(name, form):
+    method, start, more, says = ENDS[name]
+    motion = tmt.simulate(*start, **({"dt": 0.1, "steps": 200, "method": method} | more), form=form)
+    assert motion.form == form and says in motion.ended
+
+
 @pytest.mark.parametrize("method, start, more, says", ENDS.values(), ids=ENDS)
 def test_a_run_says_why_it_ended(method, start, more, says):
     # the loops take the library's sine far out, so that there a hinge turns where here numbers overflow

@@ -14,7 +14,7 @@ from . import kernels, literal, singular
 from .arm import ARM
 from .cache import is_kept
 from .calls import refused
-from .choice import LEAST_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
+from .choice import USUAL_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
 from .cores import side_by_side
 from .generic import in_parts
 from .source import LANES
@@ -139,26 +139,20 @@ class Known:
         of = OF_STRAIGHT_LINES.get(quantity)
         if of is None or count < LANES:
             return False
-        if of not in self.lanes and self.pays(
-            LEAST_LINES * len(self.rest), LEAST_LINES * len(self.rest), True, of, count
-        ):
+        if of not in self.lanes and self.pays(USUAL_LINES * len(self.rest), True, False, of, count):
             if of not in self.lines:  # traced only where it could pay
-                straight = kernels.is_evaluated_straight(self.tree)
-                self.lines[of] = straight and (
-                    *kernels.lines_of_evaluator(self.tree),
-                    kernels.is_evaluator_on_disk(self.tree, of),
-                )
-            if self.lines[of] and self.pays(*self.lines[of], of, count):
+                length = kernels.is_evaluated_straight(self.tree) and kernels.lines_of_evaluator(self.tree)
+                self.lines[of] = length and (length, kernels.is_evaluator_on_disk(self.tree, of))
+            if self.lines[of] and self.pays(*self.lines[of], True, of, count):
                 self.lanes[of] = kernels.evaluator(self.tree, of).lanes
         self.asked[of] = self.asked.get(of, 0) + count
         return of in self.lanes
 
-    def pays(self, compiled, used, kept, of, count) -> bool:
+    def pays(self, lines, kept, traced, of, count) -> bool:
         """Whether so many lines of straight-line code are worth getting."""
         loop = Form("loop_lanes", 0.0, loop_each(len(self.rest), lanes=True))
-        straight = Form(
-            "straight_line_lanes", straight_line_getting(compiled, kept), straight_line_each(used, lanes=True)
-        )
+        getting = straight_line_getting(lines, kept, lanes=True, traced=traced)
+        straight = Form("straight_line_lanes", getting, straight_line_each(lines, lanes=True))
         return chosen((loop, straight), count, self.asked.get(of, 0)) is straight
 
     def by_loops(self, quantity, q, qd, tau, out) -> bool:
@@ -191,7 +185,7 @@ class Known:
                     return False
             return True
 
-        return all(side_by_side(answers, len(out), straight_line_each(self.lines[of][1], lanes=True)))
+        return all(side_by_side(answers, len(out), straight_line_each(self.lines[of][0], lanes=True)))
 
 
 @lru_cache(maxsize=1)

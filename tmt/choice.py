@@ -43,13 +43,13 @@ def asked(*kind) -> Asked:
 
 
 # estimates in s, measured once on one machine: of them only ratios matter
-TRACED = 3e-5  # to trace a line of straight-line code
-COMPILED = 1.1e-3  # to compile it
+TRACED = 1e-4  # to trace a line of straight-line code
+COMPILED, COMPILED_IN_LANES = (0.6, 0.55e-3), (1.3, 2e-3)  # to compile what stands around it, and each line
 READ = 0.05  # to read a module from the cache folder
-LEAST_LINES = 30  # for one speed, at least: where so few would not pay nothing is traced
+USUAL_LINES = 100  # for one speed: where so few would not pay nothing is traced
 LOOPS_READ = 0.3
 LOOPS_COMPILED = {  # for the first time on a machine
-    "run_tableau": 2.5, "run_tableau_lanes": 5.0, "run_adaptive": 4.0, "run_semi_implicit": 7.0, "run_implicit": 17.0,
+    "run_tableau": 3.5, "run_tableau_lanes": 5.5, "run_adaptive": 5.0, "run_semi_implicit": 8.0, "run_implicit": 16.0,
 }  # fmt: skip
 
 
@@ -63,9 +63,10 @@ def loop_each(speeds: int, lanes: bool = False) -> float:
     return (17e-9 if lanes else 75e-9) * (1 + speeds)
 
 
-def straight_line_getting(lines: float, kept: bool) -> float:
+def straight_line_getting(lines: float, kept: bool, lanes: bool = False, traced: bool = True) -> float:
     """What it takes until straight-line code is there, s; kept: its machine code is on disk."""
-    return TRACED * lines + (READ if kept else COMPILED * lines)
+    around, line = COMPILED_IN_LANES if lanes else COMPILED
+    return (0.0 if traced else TRACED * lines) + (READ if kept else around + line * lines)
 
 
 def loop_getting(name: str, kept: bool) -> float:

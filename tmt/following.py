@@ -119,12 +119,15 @@ class Runs:
                 getting = 0.0 if generic.is_compiled(name) else choice.loop_getting(name, is_kept(f"*.{name}-*"))
                 each = choice.loop_each(speeds, lanes) * (2 + 4 * speeds if self.stepping.solves_stages else 1)
             else:
-                compiled = used = choice.LEAST_LINES * speeds
-                kept = True
+                used = choice.USUAL_LINES * speeds
+                compiled, kept = used * kernels.least_lines(self.tree, self.stepping), True
                 if self.known:
                     compiled, used = kernels.lines(self.tree, self.stepping)
                     kept = kernels.is_on_disk(self.tree, self.stepping, lanes)
-                getting, each = choice.straight_line_getting(compiled, kept), choice.straight_line_each(used, lanes)
+                getting, each = (
+                    choice.straight_line_getting(compiled, kept, lanes, self.known),
+                    choice.straight_line_each(used, lanes),
+                )
             self.estimates[form] = Form(form, 0.0 if form in self.there else getting, each)
         return self.estimates[form]
 

@@ -20,7 +20,7 @@ from .tree import Tree
 from .values import shown
 
 LONGEST = 14_000  # lines of straight-line code that are compiled, which takes half a minute; beyond, the loops of loops.py are
-INLINED = 0.15  # what a line costs each time it is put in the place of a call, beside 1 where it stands
+INLINED = 0.15  # what a line of a slope counts each time it is called, beside 1 where it stands
 LARGEST = 24  # speeds: larger trees are not even traced
 QUANTITIES, SINES = ("forward_dynamics", "mass_matrix_and_bias"), ("sincos", "library_sincos")
 
@@ -71,7 +71,7 @@ def _cost(tree, stepping):
     if len(tree.axis) > LARGEST:
         return math.inf
     slope = _slope_lines(tree)
-    if slope * _least_lines(tree, stepping) > LONGEST:  # not worth its tracing
+    if slope * least_lines(tree, stepping) > LONGEST:  # not worth its tracing
         return math.inf
     return _run_source(tree, stepping).count("\n") + INLINED * slope * (
         0 if stepping.solves_stages else stepping.stages
@@ -81,7 +81,7 @@ def _cost(tree, stepping):
 def lines(tree: Tree, stepping) -> tuple[float, float]:
     """Of straight-line code that is traced: those that are compiled, and those that one evaluation runs through."""
     length, slope = _run_source(tree, stepping).count("\n"), _slope_lines(tree)
-    return _cost(tree, stepping), length if stepping.solves_stages else slope + (length - slope) / stepping.stages
+    return length, length if stepping.solves_stages else slope + (length - slope) / stepping.stages
 
 
 def is_on_disk(tree: Tree, stepping, lanes: bool) -> bool:
@@ -89,7 +89,7 @@ def is_on_disk(tree: Tree, stepping, lanes: bool) -> bool:
     return is_kept(f"{name_of((_lanes_source if lanes else _run_source)(tree, stepping))}.*")
 
 
-def _least_lines(tree, stepping):
+def least_lines(tree: Tree, stepping) -> int:
     """How many times the lines of the slopes those of a step are at least, about: measured on trees of 3 to 15 speeds."""
     if stepping.solves_stages:
         return (9, 25)["ball" in tree.kind] if stepping.stages > 1 else (7, 9)["ball" in tree.kind]
@@ -168,9 +168,9 @@ def evaluator(
     return _evaluator(tree, quantity, terms, sine)
 
 
-def lines_of_evaluator(tree: Tree) -> tuple[float, float]:
-    """Of straight-line code of `evaluator`: those that are compiled, and those that one evaluation runs through."""
-    return 4.0 * _slope_lines(tree), _slope_lines(tree)
+def lines_of_evaluator(tree: Tree) -> int:
+    """How many lines one evaluation in straight-line code of `evaluator` runs through, about."""
+    return _slope_lines(tree)
 
 
 def is_evaluator_on_disk(tree: Tree, quantity: str) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from .eight import WIDTH
 from .inlined import get, put, zero
 from .loop_joints import BALL
-from .loop_states import check, end, move, put_rates, unsound
+from .loop_states import check, copy, end, move, put_rates, unsound
 from .loops import forward_dynamics, workspace
 from .machine_code import compiled
 from .templates import SMALL
@@ -60,7 +60,8 @@ def run_tableau(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
     rates, changes = np.empty(len(b) * n), np.empty(len(b) * n)
     state, rate = np.empty(tree.nq), np.empty(n)
     for i in range(q.shape[0]):
-        state[:], rate[:] = q[i, 0], qd[i, 0]
+        copy(q[i, 0], state)
+        copy(qd[i, 0], rate)
         for k in range(1, (q.shape[1] - 1) * every + 1):
             stages(tree, A, mean_speed, state, rate, tau[i], dt, w, u, place, speeds, rates, changes)
             combine(tree, b, state, rate, dt, u, rates, changes, state, rate)
@@ -70,7 +71,8 @@ def run_tableau(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
                 end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
             if k % every == 0:
-                q[i, k // every], qd[i, k // every] = state, rate
+                copy(state, q[i, k // every])
+                copy(rate, qd[i, k // every])
     return evaluations
 
 
@@ -87,7 +89,9 @@ def run_tableau_lanes(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
     one, its_rate = np.empty(tree.nq), np.empty(n)
     for first in range(0, len(q), WIDTH):
         for l in range(WIDTH):
-            state[:, l], rate[:, l], torque[:, l] = q[first + l, 0], qd[first + l, 0], tau[first + l]
+            copy(q[first + l, 0], state[:, l])
+            copy(qd[first + l, 0], rate[:, l])
+            copy(tau[first + l], torque[:, l])
         alive[:] = True
         for k in range(1, (q.shape[1] - 1) * every + 1):
             if not alive.any():
@@ -97,14 +101,16 @@ def run_tableau_lanes(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
             for l in range(WIDTH):
                 i = first + l
                 if alive[l]:
-                    one[:], its_rate[:] = state[:, l], rate[:, l]
+                    copy(state[:, l], one)
+                    copy(rate[:, l], its_rate)
                     evaluations += len(b)
                     why = unsound(tree, one, its_rate)
                     if why:
                         end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                         alive[l] = False
                     elif k % every == 0:
-                        q[i, k // every], qd[i, k // every] = one, its_rate
+                        copy(one, q[i, k // every])
+                        copy(its_rate, qd[i, k // every])
     return evaluations
 
 
@@ -117,7 +123,8 @@ def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended, ev
     rates, changes = np.empty(len(b) * n), np.empty(len(b) * n)
     state, speeds, new, new_speeds = np.empty(tree.nq), np.empty(n), np.empty(tree.nq), np.empty(n)
     for i in range(q.shape[0]):
-        state[:], speeds[:] = q[i, 0], qd[i, 0]
+        copy(q[i, 0], state)
+        copy(qd[i, 0], speeds)
         wanted, why = dt / 8.0, 0
         for k in range(1, (q.shape[1] - 1) * every + 1):
             left = dt
@@ -129,7 +136,8 @@ def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended, ev
                 evaluations += len(b)
                 error = estimate(tree, errors, tolerance, h, rates, changes, state, speeds, new, new_speeds)
                 if error < 1.0:
-                    state[:], speeds[:] = new, new_speeds
+                    copy(new, state)
+                    copy(new_speeds, speeds)
                     left = left - h if pieces > 1 else 0.0
                 factor = 6.0 if error == 0.0 else 0.333
                 if error > 0.0:
@@ -142,7 +150,8 @@ def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended, ev
                 end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
             if k % every == 0:
-                q[i, k // every], qd[i, k // every] = state, speeds
+                copy(state, q[i, k // every])
+                copy(speeds, qd[i, k // every])
     return evaluations
 
 

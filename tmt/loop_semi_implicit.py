@@ -8,7 +8,7 @@ import numpy as np
 
 from .generic import Arrays
 from .loop_joints import LEFT, ROW, SPEED
-from .loop_states import check, end, move, unsound
+from .loop_states import check, copy, end, move, unsound
 from .loops import forward_dynamics, mass_matrix_and_bias, put_forces, workspace
 from .machine_code import compiled
 
@@ -31,7 +31,8 @@ def run_semi_implicit(tree, own, springs, position_gain, speed_gain, q, qd, tau,
         for v in range(len(gain)):
             across = across or gain[v, :v].any() or gain[v, v + 1 :].any()
     for i in range(q.shape[0]):
-        place[:], speeds[:] = q[i, 0], qd[i, 0]
+        copy(q[i, 0], place)
+        copy(qd[i, 0], speeds)
         for k in range(1, (q.shape[1] - 1) * every + 1):
             if across:
                 M[:] = 0.0
@@ -64,7 +65,8 @@ def run_semi_implicit(tree, own, springs, position_gain, speed_gain, q, qd, tau,
                 end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
             if k % every == 0:
-                q[i, k // every], qd[i, k // every] = place, speeds
+                copy(place, q[i, k // every])
+                copy(speeds, qd[i, k // every])
     return evaluations
 
 

@@ -1,13 +1,15 @@
 """Implicit Runge-Kutta methods as compiled loops over any tree: implicit.py over arrays."""
 
+import math
+
 import numpy as np
 
 from .implicit import CLOSE, ITERATIONS
 from .loop_joints import BALL
 from .loop_semi_implicit import NUDGE, solve
-from .loop_states import check, end, normalize, put_product, unsound
+from .loop_states import check, copy, end, normalize, put_product, unsound
 from .loops import forward_dynamics, workspace
-from .machine_code import compiled
+from .machine_code import compiled, part
 from .templates import NEWTON
 
 
@@ -17,22 +19,27 @@ def slope_and_jacobian(tree, q, qd, tau, value, by_q, by_qd):
     n = len(qd)
     place, speeds, torque, found = q + 0j, qd + 0j, tau + 0j, np.empty(n, np.complex128)
     w = np.empty(workspace(tree), np.complex128)
-    forward_dynamics(tree, q, qd, tau, w.real.copy(), value)
+    forward_dynamics(tree, q, qd, tau, np.empty(workspace(tree)), value)
     for i in range(len(tree.joints)):
         joint, k = tree.joints[i], tree.joints[i].at
         for j in range(joint.count):
             half, v = 0.5j * NUDGE, joint.by + j
-            if joint.kind == BALL:
-                put_product(q + 0j, 1.0 + 0j, half * (j == 0), half * (j == 1), half * (j == 2), place, k)
-            else:
-                place[k] += NUDGE * 1j
-            forward_dynamics(tree, place, speeds, torque, w, found)
-            by_q[:, v] = found.imag / NUDGE
-            place[:] = q
-            speeds[v] += NUDGE * 1j
-            forward_dynamics(tree, place, speeds, torque, w, found)
-            by_qd[:, v] = found.imag / NUDGE
-            speeds[v] = qd[v]
+            for faster in (False, True):  # the dynamics are called at one place, as each takes its time to compile
+                if faster:
+                    speeds[v] += NUDGE * 1j
+                elif joint.kind == BALL:
+                    put_product(q + 0j, 1.0 + 0j, half * (j == 0), half * (j == 1), half * (j == 2), place, k)
+                else:
+                    place[k] += NUDGE * 1j
+                forward_dynamics(tree, place, speeds, torque, w, found)
+                for u in range(n):
+                    if faster:
+                        by_qd[u, v] = found[u].imag / NUDGE
+                    else:
+                        by_q[u, v] = found[u].imag / NUDGE
+                for u in range(len(q)):
+                    place[u] = q[u]
+                speeds[v] = qd[v]
 
 
 @compiled
@@ -99,8 +106,8 @@ def turns(tree, A, q, qd, dt, a, places):
 
 
 @compiled
-def newton(tree, A, q, qd, tau, dt, a, linear, base, by_q, by_qd, change):
-    """The change of the accelerations a (stages, nv) by one step of Newton's method; linear: about (q, qd) with these rates."""
+def newton(tree, A, q, qd, tau, dt, a, linear, by_q, by_qd, change):
+    """The change of the accelerations a (stages, nv) by one step of Newton's method; linear: of the equations about (q, qd)."""
     count, n = a.shape
     places, speeds = np.empty((count, len(q))), np.empty((count, n))
     stage_states(tree, A, q, qd, dt, a, places, speeds)
@@ -109,9 +116,18 @@ def newton(tree, A, q, qd, tau, dt, a, linear, base, by_q, by_qd, change):
         is_ball[joint.by : joint.by + joint.count] = joint.kind == BALL
     if is_ball.any():
         turn = turns(tree, A, q, qd, dt, a, places)
-    twice = A @ A
-    matrix, right, value, off = np.zeros((count * n, count * n)), np.empty(count * n), base.copy(), np.empty(n)
+    twice = np.zeros((count, count))
     for i in range(count):
+        for j in range(count):
+            for m in range(count):
+                twice[i, j] += A[i, m] * A[m, j]
+    matrix, right, value, off = np.zeros((count * n, count * n)), np.empty(count * n), np.empty(n), np.empty(n)
+    base = np.empty(n)
+    for i in range(count):
+        at, rate = (q, qd) if linear else (places[i], speeds[i])
+        if i == 0 or not linear:
+            slope_and_jacobian(tree, at, rate, tau, base, by_q, by_qd)
+        copy(base, value)
         if linear:
             for joint in tree.joints:
                 k, v = joint.at, joint.by
@@ -123,11 +139,8 @@ def newton(tree, A, q, qd, tau, dt, a, linear, base, by_q, by_qd, change):
                 off[v + 1] = 2.0 * (w * p[2] - y * p[0] - z * p[1] + x * p[3])
                 off[v + 2] = 2.0 * (w * p[3] - z * p[0] - x * p[2] + y * p[1])
             for v in range(n):
-                value[v] = base[v]
                 for w in range(n):
                     value[v] += by_q[v, w] * off[w] + by_qd[v, w] * (speeds[i, w] - qd[w])
-        else:
-            slope_and_jacobian(tree, places[i], speeds[i], tau, value, by_q, by_qd)
         for v in range(n):
             right[i * n + v] = value[v] - a[i, v]
             for j in range(count):
@@ -141,7 +154,7 @@ def newton(tree, A, q, qd, tau, dt, a, linear, base, by_q, by_qd, change):
                     matrix[i * n + v, j * n + w] = (1.0 if i == j and v == w else 0.0) - entry
     solve(matrix, right)
     for i in range(count):
-        change[i] = right[i * n : (i + 1) * n]
+        copy(right[i * n : (i + 1) * n], change[i])
 
 
 @compiled
@@ -150,7 +163,8 @@ def finish(tree, A, b, q, qd, dt, a, new_q, new_qd):
     count, n = a.shape
     places, speeds, rates = np.empty((count, len(q))), np.empty((count, n)), np.empty(len(q))
     stage_states(tree, A, q, qd, dt, a, places, speeds)
-    new_q[:], new_qd[:] = q, qd
+    copy(q, new_q)
+    copy(qd, new_qd)
     for i in range(count):
         for v in range(n):
             new_qd[v] += dt * b[i] * a[i, v]
@@ -167,31 +181,39 @@ def finish(tree, A, b, q, qd, dt, a, new_q, new_qd):
             normalize(new_q, joint.at)
 
 
+@part
+def larger(size, value):
+    """The size, or that of the value; NaN if one of them is."""
+    return size if size >= abs(value) or math.isnan(size) else abs(value)
+
+
 @compiled
 def run_implicit(tree, A, b, q, qd, tau, dt, ended, every):
     """Fill q and qd (runs, records, nq or nv) by an implicit Runge-Kutta method; evaluations of the dynamics."""
     check(tree, q, qd, tau, ended, every)
     evaluations, n, count = 0, len(tree.before), len(b)
-    a, change, base = np.empty((count, n)), np.empty((count, n)), np.empty(n)
+    a, change = np.empty((count, n)), np.empty((count, n))
     by_q, by_qd, state, speeds = np.empty((n, n)), np.empty((n, n)), np.empty(tree.nq), np.empty(n)
     for i in range(q.shape[0]):
-        state[:], speeds[:] = q[i, 0], qd[i, 0]
+        copy(q[i, 0], state)
+        copy(qd[i, 0], speeds)
         for k in range(1, (q.shape[1] - 1) * every + 1):
-            slope_and_jacobian(tree, state, speeds, tau[i], base, by_q, by_qd)
             a[:] = 0.0
-            newton(tree, A, state, speeds, tau[i], dt, a, True, base, by_q, by_qd, change)
-            a[:] = change
-            evaluations += 1
             why = NEWTON
-            for _ in range(ITERATIONS):
-                newton(tree, A, state, speeds, tau[i], dt, a, False, base, by_q, by_qd, change)
-                evaluations += count
-                a += change
-                size = np.abs(a).max()
-                if np.abs(change).max() <= CLOSE * (1.0 + size):
+            for iteration in range(1 + ITERATIONS):
+                newton(tree, A, state, speeds, tau[i], dt, a, iteration == 0, by_q, by_qd, change)
+                evaluations += count if iteration else 1
+                size = most = 0.0
+                for s in range(count):
+                    for v in range(n):
+                        a[s, v] += change[s, v]
+                        size, most = larger(size, a[s, v]), larger(most, change[s, v])
+                if iteration == 0:
+                    continue
+                if most <= CLOSE * (1.0 + size):
                     why = 0
                     break
-                if not np.isfinite(size):
+                if not math.isfinite(size):
                     break
             if why == 0:
                 finish(tree, A, b, state, speeds, dt, a, state, speeds)
@@ -200,5 +222,6 @@ def run_implicit(tree, A, b, q, qd, tau, dt, ended, every):
                 end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
                 break
             if k % every == 0:
-                q[i, k // every], qd[i, k // every] = state, speeds
+                copy(state, q[i, k // every])
+                copy(speeds, qd[i, k // every])
     return evaluations

@@ -7,7 +7,7 @@ import numpy as np
 from .coordinates import exponential, inverse_derivative, normalized, product
 from .inlined import get, inlined, put
 from .loop_joints import BALL, HINGE, put_all
-from .machine_code import compiled
+from .machine_code import compiled, part
 from .sine import LIMIT
 from .templates import OVERFLOW, TURNED
 
@@ -97,6 +97,13 @@ def check(tree, q, qd, tau, ended, every):
             "q of shape (runs, records, nq), qd (runs, records, nv), tau (runs, nv), ended (runs, 2) and every of at least 1 "
             "are expected"
         )
+
+
+@part
+def copy(given, to):
+    """The numbers of one array to another: of slices numba would also compile what is said of wrong shapes."""
+    for k in range(len(given)):
+        to[k] = given[k]
 
 
 @compiled

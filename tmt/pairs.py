@@ -1,12 +1,17 @@
 """Numbers of about 32 digits for compiled code: the sum of a pair of doubles (high, low), low at most half an ulp of high.
 
-Sums and products after Knuth and Dekker, exact where they must be by `fma`; the compiler may regroup nothing.
+Sums and products after Knuth and Dekker, exact where they must be by `fma`; the compiler may regroup nothing. They are written in
+the place of their calls (inlined.py): typed one by one, they would take as long to compile as the series that they are for.
 """
+
+from fractions import Fraction
 
 import mpmath
 import numpy as np
 from numba import njit
 
+from .eight import Number
+from .inlined import inlined
 from .sine import fma
 
 TERMS = 16  # of the series of sine and cosine up to pi/4: the next is below 1e-36
@@ -24,7 +29,7 @@ with mpmath.workdps(80):
     QUARTER = (*QUARTER, float(mpmath.pi / 2 - QUARTER[0] - QUARTER[1]))  # a quarter turn in three doubles
 
 
-@njit(forceinline=True, error_model="numpy")
+@inlined
 def two_sum(a, b):
     """a + b and what it is rounded by."""
     s = a + b
@@ -32,14 +37,14 @@ def two_sum(a, b):
     return s, (a - (s - t)) + (b - t)
 
 
-@njit(forceinline=True, error_model="numpy")
+@inlined
 def joined(a, b):
     """The same for |a| >= |b|: the pair that is a + b."""
     s = a + b
     return s, b - (s - a)
 
 
-@njit(forceinline=True, error_model="numpy")
+@inlined
 def add(ah, al, bh, bl):
     s, e = two_sum(ah, bh)
     t, f = two_sum(al, bl)
@@ -47,22 +52,38 @@ def add(ah, al, bh, bl):
     return joined(s, e + f)
 
 
-@njit(forceinline=True, error_model="numpy")
+@inlined
 def multiply(ah, al, bh, bl):
-    p = ah * bh
-    return joined(p, fma(ah, bh, -p) + fma(ah, bl, al * bh))
+    p = rounded(ah * bh)
+    return joined(p, fused(ah, bh, -p) + fused(ah, bl, al * bh))
 
 
-@njit(forceinline=True, error_model="numpy")
+@inlined
 def divide(ah, al, bh, bl):
     first = ah / bh
-    ph, pl = multiply(bh, bl, first, 0.0)
-    rh, rl = add(ah, al, -ph, -pl)
+    rh, rl = less(ah, al, bh, bl, first)
     second = rh / bh
-    ph, pl = multiply(bh, bl, second, 0.0)
-    rh, rl = add(rh, rl, -ph, -pl)
+    rh, rl = less(rh, rl, bh, bl, second)
     qh, ql = joined(first, second)
     return add(qh, ql, rh / bh, 0.0)
+
+
+def less(ah, al, bh, bl, times):
+    """The pair a - times b."""
+    ph, pl = multiply(bh, bl, times, 0.0)
+    return add(ah, al, -ph, -pl)
+
+
+def rounded(product):
+    """A product as a number of its own, which no sum takes up."""
+    return product.made(product.of, lambda: product.value) if isinstance(product, Number) else product
+
+
+def fused(a, b, c):
+    """a b + c, rounded once."""
+    if not isinstance(a, Number):
+        return float(Fraction(a) * Fraction(b) + Fraction(c))
+    return a.fma(*(x if isinstance(x, Number) else a.plain(x) for x in (b, c)))
 
 
 @njit(error_model="numpy")

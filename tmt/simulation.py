@@ -165,6 +165,8 @@ def reasons(
         reach = max((max(abs(path[last, at][0]), dt * abs(speeds[last, by][0])) for _, at, by in hinges), default=0.0)
         if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages
+        elif code == TURNED and not reach > 2.0**48:
+            code = OVERFLOW  # within the step: where the loops take the library's sine, numbers stay finite
         why[run] = f"at t = {steps[run] * dt:g} s: {why[run] or words[code]}"
     return why
 

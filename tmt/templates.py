@@ -198,23 +198,21 @@ def lanes(q, qd, tau, out):
         raise ValueError("q of shape ({nq}, N), qd and tau ({n}, N) and out ({m}, N) are expected")
     apart(q, qd, tau, out)
     widest()
-    y = carray(block({size_y}), {size_y})
+    y, off = carray(block({size_y}), {size_y}), carray(block({W}), {W})
+    off[:] = 0.0
     flat_q, flat_qd, flat_tau, flat_out = q.ravel(), qd.ravel(), tau.ravel(), out.ravel()
     count = q.shape[1]
     for b in range(0, count - {W} + 1, {W}):
         {begins}
         for l in range(np.uint64({W})):
             {results} = quantity({arguments})
-        beyond = np.uint64(0)
         for l in range(np.uint64({W})):
             {scatter}
-            beyond += np.uint64(0) if {sound_lane} else np.uint64(1)
-        if beyond:
-            for l in range({W}):
-                if not {sound_place}:
-                    {lane_out} = by_library({lane_in})
-    for i in range(count // {W} * {W}, count):
+            off[l] += 0.0 * ({lane_sizes})  # no longer 0 from a number on that is not finite
+    rest = count // {W} * {W}
+    for i in range(rest, count):
         {column_out} = quantity({column_in})
+    for i in range(rest if off.sum() == 0.0 else 0, count):
         if not {sound_column}:
             {column_out} = by_library({column_in})
 '''
