@@ -32,7 +32,7 @@ class Extent(NamedTuple):
 
 EXTENTS = {
     "whole": Extent((1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 8, cold=True),
-    "short": Extent((1, 2, 3, 4, 6, 8), 3, most=600),
+    "short": Extent((1, 2, 3, 4, 6, 8), 3, most=1200),
     "small": Extent((1, 2, 3), 1, most=200),
 }
 
