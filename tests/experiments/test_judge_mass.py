@@ -12,6 +12,7 @@ from compare.engines.mujoco import load
 from compare.experiment import Setup, engines
 from compare.experiments import mass
 from compare.judge.check import Result
+from compare.judge.words import ROWS_COMPILED
 from compare.robots.arm import ARM
 
 EPS = 2.0**-52
@@ -53,7 +54,7 @@ def test_the_worst_posture_and_its_condition_number_are_those_of_the_stated_arm(
 
 def test_every_rule_of_the_mass_matrix_is_applied_to_both_engines(small):
     found = {check.quantity for check in small("mass").checks}
-    assert found == {"Mbar", "Mbar, TMT to exact", "Mbar, MuJoCo to exact", "TMT: Mbar - Mbar' over its largest entry"} | {
+    assert found == {"Mbar", "Mbar, compiled", "Mbar, TMT to exact", "Mbar, MuJoCo to exact", "TMT: Mbar - Mbar' over its largest entry"} | {
         f"{name}: {what}" for name in ("TMT", "MuJoCo")
         for what in ("least eigenvalue of Mbar over the largest", "condition number - 126.83", "distance from (+-90, 90) deg")
     }  # fmt: skip
@@ -79,7 +80,8 @@ def test_a_robot_of_which_no_worst_posture_is_stated_is_judged_without_it(tmp_pa
     assert not any("condition" in check.quantity for check in result.checks) and "condition" not in result.curves
     assert "condition" not in mass.claim(robot) + mass.tolerance(robot).replace("Definite", "")
     assert result.notes == [
-        "Nothing is stated of where the condition number of Mbar of the crane is largest: that is neither checked nor drawn."
+        "Nothing is stated of where the condition number of Mbar of the crane is largest: that is neither checked nor drawn.",
+        ROWS_COMPILED,
     ]
     assert [figure()[0] for figure in mass.figures(result, robot)] == ["mass_distances"]
     stated = ARM.conditioning._replace(worst=(45.0, 30.0))

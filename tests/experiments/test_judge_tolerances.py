@@ -36,7 +36,7 @@ def tolerances(module, setup) -> dict:
 def test_tolerances_are_64_eps_of_the_sums_that_are_added_up():
     found = tolerances(gravity, one_state([0.0, 0.0, 0.0]))
     torques = [found[name] for name in found if "torque" in name and "qdd" not in name]
-    assert len(torques) == 5 and torques == pytest.approx([WEIGHT] * 5)
+    assert len(torques) == 6 and torques == pytest.approx([WEIGHT] * 6)
     least, most = np.linalg.eigvalsh(tmt.mass_matrix(np.zeros(3)))[[0, -1]]
     assert found["qdd of MuJoCo under TMT's torque"] == pytest.approx((most / least + 1.0) / least * WEIGHT)
     found = tolerances(kinematics, one_state([1.0, -2.0, 3.0]))

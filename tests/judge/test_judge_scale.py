@@ -7,6 +7,7 @@ import pytest
 
 import tmt
 from compare.judge import scale
+from tmt import literal
 
 TREE = tmt.ARM
 Q = np.random.default_rng(3).uniform(-3, 3, (20, 3))
@@ -36,7 +37,7 @@ def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
 
 
 def test_the_scales_of_mass_and_acceleration():
-    M = tmt.mass_matrix(Q)
+    M = literal.mass_matrix(Q)
     assert np.array_equal(scale.mass_scale(TREE, Q), [abs(m).max() for m in M])
     assert np.allclose(
         scale.condition(TREE, Q), [np.linalg.norm(m, 2) * np.linalg.norm(np.linalg.inv(m), 2) for m in M]
