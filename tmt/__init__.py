@@ -59,7 +59,7 @@ def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
 def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """v_conv = d(T_b qd)/dq qd, m/s2, inertial frame, and w_conv = d(B_b qd)/dq qd, rad/s2, body axes.
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. both results are (..., m, 3).
+    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Both results are (..., m, 3).
     h_b and g_b in the assignment, part e.
     """
     return _answered("convective_terms", model, q, qd)
@@ -116,8 +116,9 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
 
 def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Total energy, kinetic and potential, of no controller, J, shape (...); infinite where it is beyond the largest double.
+    """Total energy, kinetic and potential, J, shape (...); infinite where it is beyond the largest double.
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Its zero is that of `potential_energy`.
+    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Its zero is that of `potential_energy`; the model's
+    position_gain adds nothing to it.
     """
     return _answered("energy", model, q, qd)
