@@ -2,9 +2,12 @@
 
 from matplotlib.figure import Figure
 
+from tmt.source import LANES
+
 from ...judge.check import Result
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from .evaluations import FORWARD, WHOLE
+from .ways import EACH
 
 
 def draw_cost(result: Result, name: str) -> tuple[str, Figure, str]:
@@ -35,6 +38,8 @@ def draw_cost(result: Result, name: str) -> tuple[str, Figure, str]:
     whole = next((r["ns_per_state"] for r in rows if r["implementation"] == WHOLE), None)
     caption += f" MuJoCo's mj_forward takes {spelled(whole)} ns." if whole else ""
     caption += " Blue is tmt, orange MuJoCo, grey are others."
+    if EACH in {r["implementation"] for r in rows}:
+        caption += f" The kernel is code made for this one {name}, the lanes are {LANES} states of it side by side."
     return "speed_evaluation_cost", fig, caption
 
 
