@@ -148,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if (options.dt, options.integrator) != (None, None) and options.experiment != ANSWERING_STEPS:
         parser.error(f"--dt and --integrator are for {ANSWERING_STEPS}; {options.experiment} answers for no other step")
     if options.growth and options.experiment != GROWING:
-        parser.error(f"--growth is for {GROWING}; {options.experiment} times no chain that grows")
+        parser.error(f"--growth is for {GROWING}; it does not go with {options.experiment}")
     command = "python -m compare " + shlex.join(sys.argv[1:] if arguments is None else arguments)
     try:
         return carry_out(options, command)

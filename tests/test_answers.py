@@ -149,6 +149,17 @@ def test_numbers_in_any_form_are_taken(convert, loops):
     assert np.array_equal(tmt.acceleration(q[0], qd[0], tau[0]), expected[0])
 
 
+def test_what_the_loops_do_not_take_is_shown_to_them_once(loops, monkeypatch):
+    tree = loops(replace(tmt.ARM, mass=(2.5, 1.5)))
+    known, z, shown = answers.remembered(tree), np.zeros(3), []
+    one = known.loops.one
+    monkeypatch.setattr(known.loops, "one", lambda *given: shown.append(given[-5].flags.c_contiguous) or one(*given))
+    every_second = np.arange(6.0)[::2]
+    found = [tmt.acceleration(every_second, z, z, tree) for _ in range(5)]
+    assert shown == [False] + [True] * 5  # of the copies
+    assert all(np.array_equal(values, tmt.acceleration(np.array([0.0, 2.0, 4.0]), z, z, tree)) for values in found)
+
+
 BALL = tmt.Tree(
     hinge_names=("ball",), parent=(-1,), offset=((0, 0, 0),), axis=np.eye(3), damping=(0, 0, 0), body_names=("body",),
     body_hinge=(0,), mass=(1,), com=((0, 0, 0.1),), inertia=(np.eye(3),), gravity=(0, 0, -9.81), kind=("ball",),
@@ -162,6 +173,8 @@ WRONG = {
     "no numbers": (tmt.ARM, (["a"] * 3, [0.0] * 3, [0.0] * 3)),
     "truth values": (tmt.ARM, ([True] * 3, [0.0] * 3, [0.0] * 3)),
     "masked": (tmt.ARM, (np.ma.array([0.0] * 3, mask=[1, 0, 0]), np.zeros(3), np.zeros(3))),
+    "nothing": (tmt.ARM, (np.zeros(3), np.zeros(3), None)),
+    "no position": (tmt.ARM, (None, np.zeros(3), np.zeros(3))),
     "too few": (tmt.ARM, (np.zeros(2), np.zeros(3), np.zeros(3))),
     "too few speeds": (tmt.ARM, (np.zeros(3), np.zeros(2), np.zeros(3))),
     "a number": (tmt.ARM, (0.0, np.zeros(3), np.zeros(3))),
@@ -244,6 +257,13 @@ def test_code_is_got_when_the_literal_form_has_cost_as_much(there, kept, monkeyp
     assert known.has_loops(1) and calls > 5
     many = answers.Known(tmt.ARM)
     assert many.has_loops(10_000_000)  # at once
+
+
+def test_who_cannot_wait_has_the_loops_got_beforehand():
+    tree = replace(tmt.ARM, mass=(2.75, 1.5))
+    assert tmt.prepare(tree) is None and answers.remembered(tree).parts is not None
+    with pytest.raises(ValueError, match="model is 'arm'; a tmt.Tree is expected"):
+        tmt.prepare("arm")
 
 
 def test_the_first_of_equals_is_chosen():

@@ -13,14 +13,15 @@ are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd, with
 qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that holds the arm at rest
 where no springs act.
 
-The functions of states answer with NumPy (literal.py) until compiled code is worth getting, and then with that, see answers.py:
-results differ in the last bits, and what is wrong is said in the same words.
+The functions of states answer with NumPy (literal.py) until compiled code is worth getting, and then with that, see answers.py;
+`prepare` gets it at once. Results differ in the last bits, and what is wrong is said in the same words.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .answers import answered as _answered
+from .answers import prepare
 from .arm import ARM
 from .methods import METHODS
 from .simulation import Motion, simulate
@@ -28,7 +29,7 @@ from .tree import Tree
 
 __all__ = [
     "ARM", "METHODS", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions", "convective_terms",
-    "energy", "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "simulate", "spring_torque",
+    "energy", "gravity_balance", "jacobians", "mass_matrix", "potential_energy", "prepare", "simulate", "spring_torque",
 ]  # fmt: skip
 
 
@@ -59,7 +60,7 @@ def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
 def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """v_conv = d(T_b qd)/dq qd, m/s2, inertial frame, and w_conv = d(B_b qd)/dq qd, rad/s2, body axes.
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. both results are (..., m, 3).
+    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Both results are (..., m, 3).
     h_b and g_b in the assignment, part e.
     """
     return _answered("convective_terms", model, q, qd)
@@ -116,8 +117,9 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
 
 def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Total energy, kinetic and potential, of no controller, J, shape (...); infinite where it is beyond the largest double.
+    """Total energy, kinetic and potential, J, shape (...); infinite where it is beyond the largest double.
 
-    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Its zero is that of `potential_energy`.
+    q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Its zero is that of `potential_energy`; the model's
+    position_gain adds nothing to it.
     """
     return _answered("energy", model, q, qd)

@@ -17,6 +17,7 @@ from .calls import refused
 from .choice import USUAL_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
 from .cores import side_by_side
 from .generic import in_parts
+from .given import checked_model
 from .source import LANES
 from .tree import Tree
 from .values import real_numbers
@@ -38,19 +39,29 @@ REMEMBERED = 64  # models
 _known = {}
 
 
-def answered(quantity: str, model: Tree, q, qd=None, tau=None):
-    """The quantity, one of SHAPES, of states of any batch shape: what the function of that name in literal.py returns."""
-    known, found = _known.get(id(model)), None
+def answered(quantity: str, model: Tree, *given):
+    """The quantity, one of SHAPES, of states of any batch shape: what the function of that name in literal.py returns.
+
+    given: q, or q and qd, or q, qd and tau, as that function takes them.
+    """
+    known, found, q = _known.get(id(model)), None, given[0]
     if known is not None and type(q) is ndarray and q.ndim == 1:
-        found = known.of_one(quantity, q, qd, tau)
+        found = known.of_one(quantity, *given)
     if found is None and isinstance(model, Tree):
         try:
-            found = remembered(model).of_any(quantity, q, qd, tau)
+            found = remembered(model).of_any(quantity, *given)
         except MemoryError:
             found = None
-    if found is None:
-        found = getattr(literal, quantity)(*(given for given in (q, qd, tau) if given is not None), model)
-    return found
+    return getattr(literal, quantity)(*given, model) if found is None else found
+
+
+def prepare(model: Tree = ARM) -> None:
+    """Have compiled loops answer for a model from now on, so that no later call waits for them: in a controller, say.
+
+    It takes a second or so, the first time on a machine some ten. ValueError if it is no Tree.
+    """
+    checked_model(model)
+    remembered(model).get_loops()
 
 
 class Known:
@@ -60,24 +71,26 @@ class Known:
         self.tree = tree  # held, so that no other has its id
         self.rest, self.may_be_singular, self.parts = np.zeros(len(tree.axis)), not tree.never_singular, None
         self.by_literal = 0.0  # evaluations so far, while there are no loops
+        self.was_refused = False  # whether the loops were given what they do not take, which they say in milliseconds
         # of straight-line code: what is there, its lines and whether they are kept on disk, and evaluations so far
         self.lanes, self.lines, self.asked = {}, {}, {}
         sizes = {"m": len(tree.mass), "n": len(tree.axis)}
         self.shapes = {name: tuple(sizes.get(size, size) for size in shape) for name, shape in SHAPES.items()}
         self.sizes = {name: math.prod(shape) for name, shape in self.shapes.items()}
 
-    def of_one(self, quantity, q, qd, tau):
+    def of_one(self, quantity, *given):
         """The quantity of one state; None where there are no loops yet, or they cannot take what is given."""
+        q, qd, tau = (*given, self.rest, self.rest)[:3]
         if self.parts is None or (self.may_be_singular and quantity == "acceleration" and self.is_singular(q)):
             return None
-        qd, tau = self.rest if qd is None else qd, self.rest if tau is None else tau
-        if not type(qd) is type(tau) is ndarray:
+        if not type(qd) is type(tau) is ndarray or (self.was_refused and not all(map(is_taken, given))):
             return None
         shape, size, number = self.shapes[quantity], self.sizes[quantity], self.numbers[quantity]
         out = np.empty(size)
         try:
             answers = self.loops.one(*self.parts, q, qd, tau, number, out)
         except refused():  # of another type, not contiguous
+            self.was_refused = True
             return None
         if not answers:
             return None
@@ -85,23 +98,21 @@ class Known:
 
     def of_any(self, quantity, *given):
         """The quantity of states of any batch shape; None where the literal form is to answer."""
-        arrays = [values if values is None or is_plain(values) else real_numbers(values) for values in given]
-        if any(array is None or not array.ndim for array, values in zip(arrays, given) if values is not None):
-            return None
-        sizes, states = (len(self.tree.rest), len(self.rest), len(self.rest)), [a for a in arrays if a is not None]
-        if any(array is not None and array.shape[-1] != size for array, size in zip(arrays, sizes)):
+        arrays = [values if is_plain(values) else real_numbers(values) for values in given]
+        sizes = len(self.tree.rest), len(self.rest), len(self.rest)
+        if any(array is None or not array.ndim or array.shape[-1] != size for array, size in zip(arrays, sizes)):
             return None
         try:
-            batch = np.broadcast_shapes(*(array.shape[:-1] for array in states))
+            batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
         except ValueError:
             return None
         count = math.prod(batch)
         if not count or not self.has_loops(count):
             return None
         if not batch:
-            return self.of_one(quantity, *(array if array is None else np.array(array) for array in arrays))
-        q = rows_of(arrays[0], batch)
-        rates = [self.rest[None] if a is None else rows_of(a, batch if a.ndim > 1 else ()) for a in arrays[1:]]
+            return self.of_one(quantity, *map(np.array, arrays))
+        q, *rates = arrays[0], *arrays[1:], self.rest, self.rest
+        q, rates = rows_of(q, batch), [rows_of(rows, batch if rows.ndim > 1 else ()) for rows in rates[:2]]
         if quantity == "acceleration" and self.may_be_singular and self.is_singular(q):
             return None
         out = np.empty((count, self.sizes[quantity]))
@@ -110,7 +121,7 @@ class Known:
 
     def is_singular(self, q) -> bool:
         """Whether Mbar may be singular at a position among these, or cannot be told here."""
-        M = self.of_one("mass_matrix", q, None, None) if q.ndim == 1 else self.of_any("mass_matrix", q, None, None)
+        M = self.of_one("mass_matrix", q) if q.ndim == 1 else self.of_any("mass_matrix", q)
         n = len(self.rest)
         return M is None or bool(singular.first(self.tree, q.reshape(-1, q.shape[-1]), M.reshape(-1, n, n)))
 
@@ -219,6 +230,11 @@ def remembered(tree) -> Known:
 
 def is_plain(values) -> bool:
     return type(values) is ndarray and values.dtype == np.float64
+
+
+def is_taken(array) -> bool:
+    """Whether the loops take this array as the q, qd or tau of one state."""
+    return array.ndim == 1 and array.dtype == np.float64 and array.flags.carray
 
 
 def rows_of(array, batch) -> ndarray:

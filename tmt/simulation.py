@@ -56,11 +56,13 @@ def simulate(
     only the states after each so many steps are kept, a divisor of steps: records = steps / every + 1. method: a key of METHODS,
     or "taylor". An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units of
     1 + |value|. "taylor" is the true motion, rounded once (default tolerance 1e-33): a Taylor series in pairs of doubles, whose
-    evaluations are its steps. form: of the compiled code, one of FORMS; None: that which answers soonest, which with much to do
-    is another than with little, and differs in the last bits. A run ends early, with NaN from there on, where the numbers
-    overflow, a hinge has turned by 2^49 rad, Mbar is singular, Newton's method does not find the stages of an implicit method,
-    an adaptive method would need steps below 1e-9 dt, or series take too many: `ended` of the result says which. Assignment,
-    part i.
+    evaluations are its steps. form: of the compiled code, "straight_line", "loop", or for many runs side by side
+    "straight_line_lanes", "loop_lanes"; None: that which answers soonest, which with much to do is another than with little, and
+    differs in the last bits.
+
+    A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar is singular,
+    Newton's method does not find the stages of an implicit method, an adaptive method would need steps below 1e-9 dt, or series
+    take too many: `ended` of the result says which. Assignment, part i.
     """
     taylor = isinstance(method, str) and method == "taylor"
     follower = following.runs_of(model, "dopri8_adaptive" if taylor else method)
@@ -72,8 +74,10 @@ def simulate(
         )
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
-    if form is not None and (not isinstance(form, str) or form not in FORMS or taylor):
-        raise ValueError(f"form is {shown(form)}; known are {', '.join(FORMS)}" + ", and none for taylor" * taylor)
+    if form is not None and taylor:
+        raise ValueError("method 'taylor' is not compiled and takes no form")
+    if form is not None and (not isinstance(form, str) or form not in FORMS):
+        raise ValueError(f"form is {shown(form)}; known are {', '.join(FORMS)}")
     usual = 1e-33 if taylor else 1e-9
     tolerance = usual if tolerance is None else given.positive("tolerance", tolerance, "a number")
     batch, *start = starts(model, q, qd, tau)

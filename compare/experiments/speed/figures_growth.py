@@ -24,9 +24,8 @@ def draw_chain(result: Result) -> tuple[str, Figure, str]:
     """Nanoseconds of a state against joints, a line for each implementation, with its exponent."""
     rows, powers = result.tables["growth"], result.curves["exponents"]
     fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
-    upper, lower = fig.subplots(
-        2, 1, sharex=True, height_ratios=(1, 2.5)
-    )  # what is in Python is far above what is compiled
+    # what is in Python is far above what is compiled
+    upper, lower = fig.subplots(2, 1, sharex=True, height_ratios=(1, 2.5))
     for name in dict.fromkeys(row["implementation"] for row in rows):
         times = cost_by_joints(rows, name)
         colour, dash, mark = LOOKS.get(name, (GREY, "-", "x"))
@@ -45,7 +44,8 @@ def draw_chain(result: Result) -> tuple[str, Figure, str]:
     fitted = {(power.first, power.last) for power in powers.values()}
     ranges = " and ".join(f"{first} to {last}" for first, last in sorted(fitted, reverse=True))
     caption = (
-        f"Forward dynamics of a chain of 1 to {max(numbers)} hinges, none of them along a coordinate axis, one state."
+        f"What a state takes, forward dynamics of a chain of 1 to {max(numbers)} hinges, none of them along a coordinate axis; "
+        "above the literal form in Python, below what is compiled, one state after the other but in lanes and in MuJoCo's batch."
     )
     caption += f" Powers of n are fitted by least squares to the logarithms, over {ranges} joints." if fitted else ""
     return "speed_growth", fig, caption

@@ -1,6 +1,7 @@
 """What an evaluation costs, times of rows, and which aims are met."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from speed_rows import NS, row
@@ -20,8 +21,11 @@ from compare.experiments.speed.evaluations import (
     WHOLE_CALLED,
     called_in_words,
 )  # fmt: skip
+from compare.experiments.speed.ways import of_many_states
 from compare.judge.check import Result
 from compare.robots.arm import ARM
+from tmt import answers
+from tmt.cores import cores
 
 
 def test_a_row_gets_the_least_of_its_times():
@@ -108,8 +112,19 @@ def test_aims_of_scenes_are_the_robots_own():
 def test_what_calls_from_python_take_is_said_as_it_was_timed():
     one, many, whole = ((FORWARD, CALLED, 1, 1), (FORWARD, CALLED, 1000, 2), (FORWARD, WHOLE_CALLED, 1, 1))
     assert called_in_words({}) == called_in_words({whole: 1.0}) == []
-    assert called_in_words({one: 2345.6}) == ["Called from Python, tmt.acceleration takes 2.3 us for one state."]
+    start = "Called from Python, tmt.acceleration, once compiled code answers, takes"
+    assert called_in_words({one: 2345.6}) == [f"{start} 2.3 us for one state."]
     assert called_in_words({one: 3000.0, whole: 1740.0, many: 21.04}) == [
-        "Called from Python, tmt.acceleration takes 3.0 us for one state (mj_forward 1.7 us); of 1,000 states in one call 21.0 "
-        "ns a state."
+        f"{start} 3.0 us for one state (mj_forward 1.7 us); of 1,000 states in one call 21.0 ns a state."
     ]
+
+
+def test_of_many_states_that_code_is_timed_which_answers_in_the_end(rng, monkeypatch):
+    monkeypatch.setattr(answers, "_known", {})
+    known = answers.remembered(ARM.tree)
+    known.get_loops()
+    with ThreadPoolExecutor(1) as pool:
+        runs = of_many_states(ARM.tree, rng.uniform(-2.0, 2.0, (3, 40, 3)), pool)
+        assert not known.lanes
+        runs[FORWARD, CALLED, 40, cores()]()
+    assert FORWARD in known.lanes

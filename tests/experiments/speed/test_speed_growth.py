@@ -285,8 +285,9 @@ def test_the_figure_draws_the_rows():
     assert list(lines["straight-line code"].get_xdata()) == [1]
     assert to_hex(lines["the literal form in Python ($n^{2.00}$)"].get_color()) == "#666666"
     assert caption == (
-        "Forward dynamics of a chain of 1 to 16 hinges, none of them along a coordinate axis, one state. Powers of n are "
-        "fitted by least squares to the logarithms, over 1 to 16 and 1 to 8 joints."
+        "What a state takes, forward dynamics of a chain of 1 to 16 hinges, none of them along a coordinate axis; above the "
+        "literal form in Python, below what is compiled, one state after the other but in lanes and in MuJoCo's batch. Powers "
+        "of n are fitted by least squares to the logarithms, over 1 to 16 and 1 to 8 joints."
     )
     assert {one.name for one in IMPLEMENTATIONS} <= figures_growth.LOOKS.keys()
     assert len(set(figures_growth.LOOKS.values())) == len(figures_growth.LOOKS)
