@@ -262,7 +262,7 @@ def test_code_is_got_when_the_literal_form_has_cost_as_much(there, kept, monkeyp
 def test_who_cannot_wait_has_the_loops_got_beforehand():
     tree = replace(tmt.ARM, mass=(2.75, 1.5))
     assert tmt.prepare(tree) is None and answers.remembered(tree).parts is not None
-    with pytest.raises(ValueError, match="model is 'arm'; a tmt.Tree is expected"):
+    with pytest.raises(ValueError, match=r"model is 'arm'; a tmt\.Tree is expected"):
         tmt.prepare("arm")
 
 
