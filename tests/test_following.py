@@ -166,6 +166,19 @@ def test_a_singular_state_between_those_that_are_kept_is_found():
     assert third == each and np.isfinite(kept[0][0, :, 0]).tolist() == [True, True, False]
 
 
+@pytest.mark.parametrize("name", ["implicit_midpoint", "gauss_legendre_4"])
+def test_a_stage_that_divides_by_zero_ends_its_run_alone(name, rng):
+    """In the loop over complex numbers, for which numba has an error."""
+    singular = tmt.simulate(np.zeros(3), [0.1, 0.2, 0.3], [1.0, 0.0, 0.0], 0.01, 2, name, wrist(), form="loop")
+    assert singular.ended.startswith("at t = 0 s: Mbar is singular: hinges 'a', 'c'")
+    tree = tree_of_kinds(rng, bodies=2)
+    q, qd, tau = random_state(rng, tree)
+    fast = np.array([qd, qd])
+    fast[1, tree.coordinates.balls[0].qd] = 1e50
+    both = tmt.simulate(q, fast, tau, 0.01, 2, name, tree, form="loop")
+    assert both.ended[0] is None and both.ended[1].startswith("at t = 0 s: Newton's method")
+
+
 @pytest.mark.parametrize(
     "every, says",
     [

@@ -5,6 +5,7 @@ depends on how much was asked so far in this process, see choice.py, and never o
 """
 
 import math
+from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
@@ -35,10 +36,11 @@ OF_STRAIGHT_LINES = {"acceleration": "forward_dynamics"} | dict.fromkeys(
     ("mass_matrix", "bias", "gravity_balance"), "mass_matrix_and_bias"
 )
 REMEMBERED = 64  # models
+ABSENT = object()  # in the place of what a function does not take: None may be given, and is wrong
 _known = {}
 
 
-def answered(quantity: str, model: Tree, q, qd=None, tau=None):
+def answered(quantity: str, model: Tree, q, qd=ABSENT, tau=ABSENT):
     """The quantity, one of SHAPES, of states of any batch shape: what the function of that name in literal.py returns."""
     known, found = _known.get(id(model)), None
     if known is not None and type(q) is ndarray and q.ndim == 1:
@@ -49,7 +51,7 @@ def answered(quantity: str, model: Tree, q, qd=None, tau=None):
         except MemoryError:
             found = None
     if found is None:
-        found = getattr(literal, quantity)(*(given for given in (q, qd, tau) if given is not None), model)
+        found = getattr(literal, quantity)(*(given for given in (q, qd, tau) if given is not ABSENT), model)
     return found
 
 
@@ -70,7 +72,7 @@ class Known:
         """The quantity of one state; None where there are no loops yet, or they cannot take what is given."""
         if self.parts is None or (self.may_be_singular and quantity == "acceleration" and self.is_singular(q)):
             return None
-        qd, tau = self.rest if qd is None else qd, self.rest if tau is None else tau
+        qd, tau = self.rest if qd is ABSENT else qd, self.rest if tau is ABSENT else tau
         if not type(qd) is type(tau) is ndarray:
             return None
         shape, size, number = self.shapes[quantity], self.sizes[quantity], self.numbers[quantity]
@@ -85,11 +87,10 @@ class Known:
 
     def of_any(self, quantity, *given):
         """The quantity of states of any batch shape; None where the literal form is to answer."""
-        arrays = [values if values is None or is_plain(values) else real_numbers(values) for values in given]
-        if any(array is None or not array.ndim for array, values in zip(arrays, given) if values is not None):
-            return None
-        sizes, states = (len(self.tree.rest), len(self.rest), len(self.rest)), [a for a in arrays if a is not None]
-        if any(array is not None and array.shape[-1] != size for array, size in zip(arrays, sizes)):
+        with np.errstate(all="ignore"):  # of numbers beyond the largest double, which the literal form refuses
+            states = [values if is_plain(values) else real_numbers(values) for values in given if values is not ABSENT]
+        sizes = len(self.tree.rest), len(self.rest), len(self.rest)
+        if any(array is None or array.shape[-1:] != (size,) for array, size in zip(states, sizes)):
             return None
         try:
             batch = np.broadcast_shapes(*(array.shape[:-1] for array in states))
@@ -99,9 +100,10 @@ class Known:
         if not count or not self.has_loops(count):
             return None
         if not batch:
-            return self.of_one(quantity, *(array if array is None else np.array(array) for array in arrays))
-        q = rows_of(arrays[0], batch)
-        rates = [self.rest[None] if a is None else rows_of(a, batch if a.ndim > 1 else ()) for a in arrays[1:]]
+            return self.of_one(quantity, *map(np.array, states), *[ABSENT] * (3 - len(states)))
+        q = rows_of(states[0], batch)
+        rates = [rows_of(a, batch if a.ndim > 1 else ()) for a in states[1:]]
+        rates += [self.rest[None]] * (2 - len(rates))
         if quantity == "acceleration" and self.may_be_singular and self.is_singular(q):
             return None
         out = np.empty((count, self.sizes[quantity]))
@@ -110,7 +112,7 @@ class Known:
 
     def is_singular(self, q) -> bool:
         """Whether Mbar may be singular at a position among these, or cannot be told here."""
-        M = self.of_one("mass_matrix", q, None, None) if q.ndim == 1 else self.of_any("mass_matrix", q, None, None)
+        M = self.of_one("mass_matrix", q, ABSENT, ABSENT) if q.ndim == 1 else self.of_any("mass_matrix", q)
         n = len(self.rest)
         return M is None or bool(singular.first(self.tree, q.reshape(-1, q.shape[-1]), M.reshape(-1, n, n)))
 
@@ -131,8 +133,9 @@ class Known:
 
     def get_loops(self) -> None:
         """Have the loops answer from now on."""
-        self.loops, self.parts = loops(), in_parts(self.tree)
-        self.numbers = self.loops.QUANTITIES
+        self.loops = loops()
+        self.numbers, parts = self.loops.QUANTITIES, in_parts(self.tree)
+        self.parts = parts  # last: from here on other threads ask them
 
     def has_lines(self, quantity, count) -> bool:
         """Whether straight-line code is there for so many states, or is got now as the loops would have taken longer so far."""
@@ -191,14 +194,17 @@ class Known:
 @lru_cache(maxsize=1)
 def loops():
     """The compiled loops, read or compiled when they are first asked for."""
+    from numba.core.compiler_lock import global_compiler_lock
+
     from . import loop_answers
 
     # of one state, and of none: compiled for these types and then for no others, which numba would take as they are
     of, zeros, out = in_parts(ARM), np.zeros(3), np.empty(3)
-    loop_answers.one(*of, zeros, zeros, zeros, loop_answers.BIAS, out)
-    loop_answers.many(*of, *(rows[None] for rows in (zeros, zeros, zeros)), loop_answers.BIAS, out[None])
-    loop_answers.one.disable_compile()
-    loop_answers.many.disable_compile()
+    with global_compiler_lock:  # until nothing is to be compiled another thread does not ask
+        loop_answers.one(*of, zeros, zeros, zeros, loop_answers.BIAS, out)
+        loop_answers.many(*of, *(rows[None] for rows in (zeros, zeros, zeros)), loop_answers.BIAS, out[None])
+        loop_answers.one.disable_compile()
+        loop_answers.many.disable_compile()
     return loop_answers
 
 
@@ -210,11 +216,14 @@ def getting_loops() -> float:
 
 def remembered(tree) -> Known:
     """What is known of a Tree; of the last ones only."""
-    if id(tree) not in _known:
-        if len(_known) >= REMEMBERED:
-            del _known[next(iter(_known))]
-        _known[id(tree)] = Known(tree)
-    return _known[id(tree)]
+    known = _known.get(id(tree))
+    if known is None:
+        known = Known(tree)
+        while len(_known) >= REMEMBERED:
+            with suppress(KeyError, RuntimeError):  # another thread was sooner
+                del _known[next(iter(_known))]
+        known = _known.setdefault(id(tree), known)
+    return known
 
 
 def is_plain(values) -> bool:
