@@ -99,6 +99,8 @@ def test_straight_line_code_answers_many_states_once_it_is_worth_it(loops, monke
     assert tmt.gravity_balance(q, known.tree) == pytest.approx(literal.gravity_balance(q, known.tree), abs=1e-12)
     few = tmt.acceleration(q[:31], qd[:31], tau[:31], known.tree)  # too few for its lanes
     assert np.array_equal(few, by_loops[0][:31])
+    enough = tmt.acceleration(q[:32], qd[:32], tau[:32], known.tree)
+    assert np.array_equal(enough, by_lines[0][:32]) and not np.array_equal(enough, by_loops[0][:32])
     tau[700, 1] = np.nan
     with pytest.raises(ValueError, match="tau has values that are not finite"):
         tmt.acceleration(q, qd, tau, known.tree)
@@ -211,7 +213,7 @@ def test_threads_ask_of_models_that_come_and_go(loops, monkeypatch):
 
     def masses(seed):
         models = [replace(tmt.ARM, mass=(1.0 + seed + k, 1.0)) for k in range(2)]
-        return [(tmt.mass_matrix(np.zeros((1, 3)), model), model) for _ in range(300) for model in models]
+        return [(tmt.mass_matrix(np.zeros((1, 3)), model), model) for _ in range(100) for model in models]
 
     try:
         with ThreadPoolExecutor(8) as pool:

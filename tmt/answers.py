@@ -220,7 +220,7 @@ def remembered(tree) -> Known:
     if known is None:
         known = Known(tree)
         while len(_known) >= REMEMBERED:
-            with suppress(KeyError, RuntimeError):  # another thread was sooner
+            with suppress(KeyError, RuntimeError, StopIteration):  # another thread was sooner
                 del _known[next(iter(_known))]
         known = _known.setdefault(id(tree), known)
     return known
