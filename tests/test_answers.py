@@ -99,6 +99,8 @@ def test_straight_line_code_answers_many_states_once_it_is_worth_it(loops, monke
     assert tmt.gravity_balance(q, known.tree) == pytest.approx(literal.gravity_balance(q, known.tree), abs=1e-12)
     few = tmt.acceleration(q[:31], qd[:31], tau[:31], known.tree)  # too few for its lanes
     assert np.array_equal(few, by_loops[0][:31])
+    enough = tmt.acceleration(q[:32], qd[:32], tau[:32], known.tree)
+    assert np.array_equal(enough, by_lines[0][:32]) and not np.array_equal(enough, by_loops[0][:32])
     tau[700, 1] = np.nan
     with pytest.raises(ValueError, match="tau has values that are not finite"):
         tmt.acceleration(q, qd, tau, known.tree)
@@ -173,7 +175,9 @@ WRONG = {
     "no numbers": (tmt.ARM, (["a"] * 3, [0.0] * 3, [0.0] * 3)),
     "truth values": (tmt.ARM, ([True] * 3, [0.0] * 3, [0.0] * 3)),
     "masked": (tmt.ARM, (np.ma.array([0.0] * 3, mask=[1, 0, 0]), np.zeros(3), np.zeros(3))),
-    "nothing": (tmt.ARM, (np.zeros(3), np.zeros(3), None)),
+    "nothing": (tmt.ARM, (None, None, None)),
+    "no speeds": (tmt.ARM, (np.zeros(3), None, np.zeros(3))),
+    "no torques of many": (tmt.ARM, (np.zeros((40, 3)), np.zeros(3), None)),
     "no position": (tmt.ARM, (None, np.zeros(3), np.zeros(3))),
     "too few": (tmt.ARM, (np.zeros(2), np.zeros(3), np.zeros(3))),
     "too few speeds": (tmt.ARM, (np.zeros(3), np.zeros(2), np.zeros(3))),
@@ -202,6 +206,55 @@ def test_what_is_wrong_is_said_in_the_same_words(name, loops):
     with pytest.raises(ValueError) as found:
         tmt.acceleration(*given, model)
     assert str(found.value) == str(expected.value)
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_beyond_the_largest_double_are_refused_without_a_warning(loops):
+    loops(tmt.ARM)
+    for q in (np.full(3, 1e300, np.longdouble) ** 10, np.full((2, 3), 1e300, np.longdouble) ** 10):
+        with pytest.raises(ValueError, match="q has values that are not finite"):
+            tmt.mass_matrix(q)
+
+
+def test_threads_ask_of_models_that_come_and_go(loops, monkeypatch):
+    loops(tmt.ARM)
+    monkeypatch.setattr(answers, "REMEMBERED", 1)
+    monkeypatch.setattr(answers, "_known", {})
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+
+    def masses(seed):
+        models = [replace(tmt.ARM, mass=(1.0 + seed + k, 1.0)) for k in range(2)]
+        return [(tmt.mass_matrix(np.zeros((1, 3)), model), model) for _ in range(100) for model in models]
+
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            found = [one for of_thread in pool.map(masses, range(8)) for one in of_thread]
+    finally:
+        sys.setswitchinterval(before)
+    expected = {model: literal.mass_matrix(np.zeros((1, 3)), model) for _, model in found}
+    assert all(np.abs(M - expected[model]).max() <= 1e-12 * np.abs(M).max() for M, model in found)
+
+
+AT_THE_END = """
+import atexit, numpy as np, tmt
+from tmt import answers, cores, following
+answers.remembered(tmt.ARM).get_loops()
+cores.cores = following.cores = lambda: 3
+following.SPREAD = 0.0
+q = np.random.default_rng(0).uniform(-1, 1, (50_000, 3))
+before = tmt.acceleration(q, q, q), tmt.simulate(q[:40], q[:40], q[:40], 0.01, 5, form="loop").q
+def late():
+    after = tmt.acceleration(q, q, q), tmt.simulate(q[:40], q[:40], q[:40], 0.01, 5, form="loop").q
+    print(all(map(np.array_equal, before, after)))
+atexit.register(late)
+"""
+
+
+def test_many_states_are_answered_where_no_thread_can_be_started(loops):
+    loops(tmt.ARM)
+    run = subprocess.run([sys.executable, "-c", AT_THE_END], capture_output=True, text=True, check=True)
+    assert run.stdout == "True\n"
 
 
 def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one(loops):

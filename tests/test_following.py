@@ -54,6 +54,32 @@ def test_what_is_there_and_best_is_not_asked_about_again(runs):
     assert runs.form(1, 1.0) == "straight_line" and runs.settled == {1: "straight_line"}
 
 
+def test_eight_runs_are_enough_for_the_lanes_of_the_loop(runs):
+    runs.there |= {"loop": None, "loop_lanes": None}
+    assert runs.form(7, 1.0) == "loop" and runs.form(8, 1.0) == "loop_lanes"
+
+
+def test_what_few_runs_asked_for_counts_for_no_lanes(runs):
+    for count, asked in ((1, (12, 0, 0)), (7, (96, 0, 0)), (9, (204, 108, 0)), (33, (600, 504, 396))):
+        paths = np.zeros((2, count, 4, 3))
+        runs.follow(*paths, np.zeros((count, 3)), (0.01,), np.zeros((count, 2), np.int64), 1, "loop")
+        assert tuple(runs.asked.values()) == asked  # RK4 has four stages, and there are three steps
+
+
+def test_an_implicit_method_has_its_jacobians_in_the_estimate_of_the_loop(runs):
+    implicit = Runs(tmt.ARM, method_named("implicit_midpoint"), "implicit_midpoint")
+    assert implicit.costs("loop").each == (2 + 4 * 3) * runs.costs("loop").each
+
+
+@pytest.mark.parametrize("form", ["straight_line_lanes", "loop_lanes"])
+def test_fewer_runs_than_lanes_are_followed_one_at_a_time(form, rng):
+    for count in (1, 5):
+        q, qd, tau = rng.uniform(-1, 1, (3, count, 3))
+        few = tmt.simulate(q, qd, tau, 0.01, 5, form=form)
+        alone = tmt.simulate(q, qd, tau, 0.01, 5, form=form.removesuffix("_lanes"))
+        assert np.array_equal(few.q, alone.q) and np.array_equal(few.qd, alone.qd) and not few.ended.any()
+
+
 def test_large_trees_are_not_traced(monkeypatch):
     monkeypatch.setattr(kernels, "LONGEST", 0)
     runs = following.runs_of(tmt.ARM, "rk4")
@@ -164,6 +190,19 @@ def test_a_singular_state_between_those_that_are_kept_is_found():
     (third,) = reasons(tree, *kept, none, 0.1, 1e-9, 3, lambda run, k: [x[run, 3 * k : 3 * k + 4] for x in (q, qd)])
     # 8 is no multiple of 3: the records are those after 0, 3 and 6 steps
     assert third == each and np.isfinite(kept[0][0, :, 0]).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("name", ["implicit_midpoint", "gauss_legendre_4"])
+def test_a_stage_that_divides_by_zero_ends_its_run_alone(name, rng):
+    """In the loop over complex numbers, for which numba has an error."""
+    singular = tmt.simulate(np.zeros(3), [0.1, 0.2, 0.3], [1.0, 0.0, 0.0], 0.01, 2, name, wrist(), form="loop")
+    assert singular.ended.startswith("at t = 0 s: Mbar is singular: hinges 'a', 'c'")
+    tree = tree_of_kinds(rng, bodies=2)
+    q, qd, tau = random_state(rng, tree)
+    fast = np.array([qd, qd])
+    fast[1, tree.coordinates.balls[0].qd] = 1e50
+    both = tmt.simulate(q, fast, tau, 0.01, 2, name, tree, form="loop")
+    assert both.ended[0] is None and both.ended[1].startswith("at t = 0 s: Newton's method")
 
 
 @pytest.mark.parametrize(

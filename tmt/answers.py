@@ -5,6 +5,7 @@ depends on how much was asked so far in this process, see choice.py, and never o
 """
 
 import math
+from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
@@ -98,7 +99,8 @@ class Known:
 
     def of_any(self, quantity, *given):
         """The quantity of states of any batch shape; None where the literal form is to answer."""
-        arrays = [values if is_plain(values) else real_numbers(values) for values in given]
+        with np.errstate(all="ignore"):  # of numbers beyond the largest double, which the literal form refuses
+            arrays = [values if is_plain(values) else real_numbers(values) for values in given]
         sizes = len(self.tree.rest), len(self.rest), len(self.rest)
         if any(array is None or not array.ndim or array.shape[-1] != size for array, size in zip(arrays, sizes)):
             return None
@@ -142,8 +144,9 @@ class Known:
 
     def get_loops(self) -> None:
         """Have the loops answer from now on."""
-        self.loops, self.parts = loops(), in_parts(self.tree)
-        self.numbers = self.loops.QUANTITIES
+        self.loops = loops()
+        self.numbers, parts = self.loops.QUANTITIES, in_parts(self.tree)
+        self.parts = parts  # last: from here on other threads ask them
 
     def has_lines(self, quantity, count) -> bool:
         """Whether straight-line code is there for so many states, or is got now as the loops would have taken longer so far."""
@@ -202,14 +205,17 @@ class Known:
 @lru_cache(maxsize=1)
 def loops():
     """The compiled loops, read or compiled when they are first asked for."""
+    from numba.core.compiler_lock import global_compiler_lock
+
     from . import loop_answers
 
     # of one state, and of none: compiled for these types and then for no others, which numba would take as they are
     of, zeros, out = in_parts(ARM), np.zeros(3), np.empty(3)
-    loop_answers.one(*of, zeros, zeros, zeros, loop_answers.BIAS, out)
-    loop_answers.many(*of, *(rows[None] for rows in (zeros, zeros, zeros)), loop_answers.BIAS, out[None])
-    loop_answers.one.disable_compile()
-    loop_answers.many.disable_compile()
+    with global_compiler_lock:  # until nothing is to be compiled another thread does not ask
+        loop_answers.one(*of, zeros, zeros, zeros, loop_answers.BIAS, out)
+        loop_answers.many(*of, *(rows[None] for rows in (zeros, zeros, zeros)), loop_answers.BIAS, out[None])
+        loop_answers.one.disable_compile()
+        loop_answers.many.disable_compile()
     return loop_answers
 
 
@@ -221,11 +227,14 @@ def getting_loops() -> float:
 
 def remembered(tree) -> Known:
     """What is known of a Tree; of the last ones only."""
-    if id(tree) not in _known:
-        if len(_known) >= REMEMBERED:
-            del _known[next(iter(_known))]
-        _known[id(tree)] = Known(tree)
-    return _known[id(tree)]
+    known = _known.get(id(tree))
+    if known is None:
+        known = Known(tree)
+        while len(_known) >= REMEMBERED:
+            with suppress(KeyError, RuntimeError, StopIteration):  # another thread was sooner
+                del _known[next(iter(_known))]
+        known = _known.setdefault(id(tree), known)
+    return known
 
 
 def is_plain(values) -> bool:

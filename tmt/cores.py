@@ -19,7 +19,14 @@ def side_by_side(work: Callable, count: int, each: float) -> list:
     threads = max(1, min(cores(), int(count * each / APART)))
     ends = [count * k // threads // TOGETHER * TOGETHER for k in range(threads)] + [count]
     slices = [slice(*pair) for pair in pairwise(ends)]
-    if threads == 1:
-        return [work(slices[0])]
+    return [work(slices[0])] if threads == 1 else in_threads(work, [(part,) for part in slices], threads)
+
+
+def in_threads(work: Callable, parts: list[tuple], threads: int) -> list:
+    """work(*part) of all parts, in so many threads; one after the other where none can be started any more."""
     with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(work, slices))
+        try:
+            found = [pool.submit(work, *part) for part in parts]
+        except RuntimeError:  # the interpreter ends, or there are too many
+            found = None
+    return [work(*part) for part in parts] if found is None else [one.result() for one in found]

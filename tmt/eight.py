@@ -125,10 +125,18 @@ class Number:
         return self.made(self.of, lambda: self.builder.fmul(self.value, other.value), [self, other])
 
     def quotient(self, other) -> "Number":
+        if self.of is COMPLEX:
+            kind, values = signature(COMPLEX, COMPLEX, COMPLEX), [self.value, other.value]
+            return self.made(COMPLEX, lambda: self.context.compile_internal(self.builder, divided, kind, values))
         return self.made(self.of, lambda: self.builder.fdiv(self.value, other.value))
 
     def __neg__(self):
         return self * -1.0
+
+
+def divided(a, b):
+    """a / b of complex numbers; NaN where b is zero, for which numba has an error."""
+    return a / b if b != 0.0 else complex(math.nan, math.nan)
 
 
 def alike(a, b) -> list[Number]:
@@ -148,7 +156,8 @@ def operation(symbol, of_doubles, neutral):
         if b.__class__ is float and b == neutral:
             return a
         a, b = alike(a, b)
-        return a.by_numba(symbol, b) if a.of in (COMPLEX, INDEX) else of_doubles(a, b)
+        by_numba = a.of is INDEX or (a.of is COMPLEX and symbol is not operator.truediv)
+        return a.by_numba(symbol, b) if by_numba else of_doubles(a, b)
 
     name = symbol.__name__
     setattr(Number, f"__{name}__", operate)

@@ -10,7 +10,7 @@ from itertools import pairwise
 from . import choice, generic, given, kernels
 from .cache import is_kept
 from .choice import Form, chosen
-from .cores import cores
+from .cores import cores, in_threads
 from .methods import METHODS, method_named
 from .source import LANES
 from .stepping import Method
@@ -54,10 +54,7 @@ class Runs:
         def piece(of_piece, part):
             return self.run(of_piece)(q[part], qd[part], tau[part], *settings, ended[part], every)
 
-        from concurrent.futures import ThreadPoolExecutor  # here, as few runs need it
-
-        with ThreadPoolExecutor(cores()) as pool:
-            return form, sum(pool.map(piece, *zip(*pieces)))
+        return form, sum(in_threads(piece, pieces, cores()))
 
     def pieces(self, form: str, runs: int, wanted: float) -> list[tuple[str, slice]]:
         """Which runs are followed together and by which form: those that are left over of lanes one at a time."""

@@ -141,6 +141,8 @@ def stepper(tree, stepping, lanes=False) -> Callable:
 
     lanes: of runs that are a multiple of eight, eight side by side where the method has such a loop.
     """
+    from numba.core.compiler_lock import global_compiler_lock
+
     known = loops()
     loop = known[stepping.loop]
     if lanes:
@@ -152,27 +154,31 @@ def stepper(tree, stepping, lanes=False) -> Callable:
         np.empty((0, 1, tree.coordinates.nv)),
         np.empty((0, len(tree.axis))),
     )
-    run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty((0, 2), np.int64), 1)
-    loop.disable_compile()
+    with global_compiler_lock:  # until nothing is to be compiled another thread does not ask
+        run(*nothing, 0.0, *([1.0] if stepping.adaptive else []), np.empty((0, 2), np.int64), 1)
+        loop.disable_compile()
     return run
 
 
 def evaluator(tree, dynamics: bool) -> SimpleNamespace:
     """each, lanes, chain and rate of a Tree, as in kernels.evaluator; dynamics: of qdd, else of Mbar and h."""
+    from numba.core.compiler_lock import global_compiler_lock
+
     loops, numbers = compiled(), arrays(tree)
     nq, nv = tree.coordinates.nq, tree.coordinates.nv
     m = nv if dynamics else nv * (nv + 3) // 2
     sizes = nq, nv, nv, m
-    loops.each(numbers, dynamics, *(np.empty((0, size)) for size in sizes))
-    loops.lanes(numbers, dynamics, *(np.empty((size, 0)) for size in sizes))
-    loops.chain(numbers, dynamics, m, np.array(tree.zero), np.zeros(nv), np.zeros(nv), 0)
     found = {name: partial(getattr(loops, name), numbers, dynamics) for name in ("each", "lanes")}
     found["chain"] = partial(loops.chain, numbers, dynamics, m)
     used = [loops.each, loops.lanes, loops.chain]
-    if dynamics:
-        loops.rate(numbers, np.array([*tree.zero, *[0.0] * nv]), np.zeros(nv))
-        found["rate"] = partial(loops.rate, numbers)
-        used.append(loops.rate)
-    for loop in used:
-        loop.disable_compile()
+    with global_compiler_lock:  # as above
+        loops.each(numbers, dynamics, *(np.empty((0, size)) for size in sizes))
+        loops.lanes(numbers, dynamics, *(np.empty((size, 0)) for size in sizes))
+        loops.chain(numbers, dynamics, m, np.array(tree.zero), np.zeros(nv), np.zeros(nv), 0)
+        if dynamics:
+            loops.rate(numbers, np.array([*tree.zero, *[0.0] * nv]), np.zeros(nv))
+            found["rate"] = partial(loops.rate, numbers)
+            used.append(loops.rate)
+        for loop in used:
+            loop.disable_compile()
     return SimpleNamespace(**found)

@@ -7,6 +7,7 @@ along an imaginary part of 1e-100, which is exact but for rounding.
 import numpy as np
 
 from .generic import Arrays
+from .inlined import inlined
 from .loop_joints import LEFT, ROW, SPEED
 from .loop_states import check, copy, end, move, unsound
 from .loops import forward_dynamics, mass_matrix_and_bias, put_forces, workspace
@@ -111,7 +112,7 @@ def solve(matrix, right):
     n = len(right)
     for k in range(n):
         for i in range(k + 1, n):
-            factor = matrix[i, k] / matrix[k, k]
+            factor = quotient(matrix[i, k], matrix[k, k])
             if factor != 0.0:
                 for j in range(k + 1, n):
                     matrix[i, j] -= factor * matrix[k, j]
@@ -119,4 +120,9 @@ def solve(matrix, right):
     for i in range(n - 1, -1, -1):
         for k in range(i + 1, n):
             right[i] -= matrix[i, k] * right[k]
-        right[i] /= matrix[i, i]
+        right[i] = quotient(right[i], matrix[i, i])
+
+
+@inlined
+def quotient(a, b):
+    return a / b
