@@ -169,5 +169,5 @@ def test_equations_that_allow_few_steps_are_given_up_after_these(monkeypatch):
     start = np.zeros(3), np.full(3, 10.0), np.zeros(3)
     code = reference_run.equations(tmt.ARM, start[2], "composite").code
     monkeypatch.setattr(reference_run, "MOST_OPERATIONS", 5 * (reference_run.BESIDE + len(code)))
-    path, count, error = reference_run.followed(tmt.ARM, *start, 1.0, 100)
+    _, count, error = reference_run.followed(tmt.ARM, *start, 1.0, 100)
     assert count == 5 and isinstance(error, reference_run.TooManySteps)
