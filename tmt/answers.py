@@ -33,9 +33,8 @@ SHAPES = {  # of a result, m bodies and n speeds
     "potential_energy": (), "energy": (), "spring_torque": ("n",), "acceleration": ("n",), "mass_matrix": ("n", "n"),
     "bias": ("n",), "gravity_balance": ("n",),
 }  # fmt: skip
-OF_STRAIGHT_LINES = {"acceleration": "forward_dynamics"} | dict.fromkeys(
-    ("mass_matrix", "bias", "gravity_balance"), "mass_matrix_and_bias"
-)
+OF_MASS = dict.fromkeys(("mass_matrix", "bias", "gravity_balance"), "mass_matrix_and_bias")
+OF_STRAIGHT_LINES = {"acceleration": "forward_dynamics"} | OF_MASS
 REMEMBERED = 64  # models
 _known = {}
 
@@ -243,7 +242,7 @@ def is_plain(values) -> bool:
 
 def is_taken(array) -> bool:
     """Whether the loops take this array as the q, qd or tau of one state."""
-    return array.ndim == 1 and array.dtype == np.float64 and array.flags.carray
+    return array.ndim == 1 and is_plain(array) and array.flags.carray
 
 
 def rows_of(array, batch) -> ndarray:
