@@ -32,7 +32,7 @@ class Off:
         self.by, self.tree = by, ARM.tree
 
     def acceleration(self, q, v, tau):
-        found = tmt.acceleration(q, v, tau)
+        found = tmt.literal.acceleration(q, v, tau)
         found[-1] *= 1.0 + self.by
         return found
 
