@@ -62,16 +62,16 @@ def looped(tree: Tree, method_name: str, lanes: bool = False) -> Callable:
 
 def is_traced(tree: Tree, stepping) -> bool:
     """Whether a method follows a tree in straight-line code: that of moderate length."""
-    return _cost(tree, stepping) <= LONGEST
+    return _cost(tree, stepping, LONGEST) <= LONGEST
 
 
 @lru_cache(maxsize=256)
-def _cost(tree, stepping):
+def _cost(tree, stepping, longest):
     """The lines of straight-line code, those that are put in the place of a call with what that costs."""
     if len(tree.axis) > LARGEST:
         return math.inf
     slope = _slope_lines(tree)
-    if slope * least_lines(tree, stepping) > LONGEST:  # not worth its tracing
+    if slope * least_lines(tree, stepping) > longest:  # not worth its tracing
         return math.inf
     return _run_source(tree, stepping).count("\n") + INLINED * slope * (
         0 if stepping.solves_stages else stepping.stages
