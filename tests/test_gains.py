@@ -9,7 +9,7 @@ import sympy
 from trees import random_state, tree_of_kinds
 
 import tmt
-from tmt import composite, generic, kernels, method
+from tmt import composite, kernels, loop_trees, method
 from tmt.derivatives import amplification, linear_system, one_step
 from tmt.methods import METHODS, method_named
 from tmt.reference import distance, exact
@@ -176,7 +176,7 @@ def test_the_code_of_a_tree_without_gains_is_what_it_was():
     """No operation more: of a controller nothing is traced where there is none."""
     for name in ("semi_implicit_euler", "implicit", "rk4"):
         assert run_source(FORK, METHODS[name]).count("\n") < run_source(DRIVEN, METHODS[name]).count("\n")
-    assert generic.arrays(FORK).position_gain.shape == generic.arrays(FORK).speed_gain.shape == (0, 0)
+    assert loop_trees.arrays(FORK).position_gain.shape == loop_trees.arrays(FORK).speed_gain.shape == (0, 0)
 
 
 def test_a_servo_settles_where_its_torque_balances_the_weight():

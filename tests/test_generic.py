@@ -5,7 +5,7 @@ import pytest
 from trees import random_state, random_tree, tree_of_kinds
 
 import tmt
-from tmt import generic, kernels, method
+from tmt import generic, kernels, loop_trees, method
 from tmt.methods import METHODS
 
 
@@ -15,11 +15,11 @@ def test_generic_loop_is_the_method(rng, bodies):
     n = len(tree.parent)
     for q, qd, tau in rng.uniform(-3, 3, (5, 3, n)):
         M, h, qdd = np.zeros((n, n)), np.empty(n), np.empty(n)
-        generic.compiled().repeat_mass_matrix_and_bias(generic.arrays(tree), q, qd, M.ravel(), h, 1)
+        generic.compiled().repeat_mass_matrix_and_bias(loop_trees.arrays(tree), q, qd, M.ravel(), h, 1)
         expected = tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree)
         assert np.allclose(M, np.tril(expected[0]), rtol=0, atol=1e-13 * np.abs(expected[0]).max())
         assert np.allclose(h, expected[1], rtol=0, atol=1e-12 * np.abs(expected[1]).max())
-        generic.compiled().repeat_forward_dynamics(generic.arrays(tree), q, qd, tau, qdd, 1)
+        generic.compiled().repeat_forward_dynamics(loop_trees.arrays(tree), q, qd, tau, qdd, 1)
         assert np.allclose(qdd, tmt.acceleration(q, qd, tau, tree), rtol=1e-9, atol=1e-9)
 
 

@@ -14,7 +14,7 @@ import sys
 from collections import namedtuple
 import mpmath, numpy as np
 from trees import random_state, tree_of_kinds
-from tmt import generic, loop_bodies, loops, method
+from tmt import loop_bodies, loop_trees, loops, method
 from tmt.exact import exact_tree
 
 mpmath.mp.dps, seed = 50, int(sys.argv[1])
@@ -23,8 +23,9 @@ tree = tree_of_kinds(rng, bodies=5, along_axes=True)  # of length 1 in any numbe
 q, qd, tau = ([mpmath.mpf(x) for x in values.tolist()] for values in random_state(rng, tree))
 exact, nv = exact_tree(tree, mpmath.mpf), len(tree.axis)
 exact.rest, exact.coordinates = [mpmath.mpf(x) for x in tree.rest], tree.coordinates  # as their doubles are, in all digits
-Joint = namedtuple("Joint", generic.JOINT.names)
-numbers = generic.arrays(tree)._replace(joints=[Joint(*row) for row in generic.rows(tree, mpmath.mpf)], gravity=exact.gravity)
+Joint = namedtuple("Joint", loop_trees.JOINT.names)
+joints = [Joint(*row) for row in loop_trees.rows(tree, mpmath.mpf)]
+numbers = loop_trees.arrays(tree)._replace(joints=joints, gravity=exact.gravity)
 w, M, h, qdd = [None] * loops.workspace(numbers), [0] * (nv * nv), [None] * nv, [None] * nv
 loops.mass_matrix_and_bias(numbers, q, qd, w, M, h)
 Mbar, bias = method.mass_matrix_and_bias(exact, q, qd)
@@ -35,9 +36,9 @@ loops.forward_dynamics(numbers, q, qd, tau, w, qdd)
 force = method.reduced_force(exact, bias, q, qd, tau)
 left = [sum(m * x for m, x in zip(row, qdd)) - f for row, f in zip(Mbar, force)]
 print(max(map(abs, force)) > 1, mpmath.nstr(max(map(abs, left))))
-Body = namedtuple("Body", generic.BODY.names)
-joints = [Joint(*row) for row in generic.rows(tree, mpmath.mpf, about_world=True)]
-own = zip(generic.bodies(tree), exact.mass, exact.com, exact.inertia)
+Body = namedtuple("Body", loop_trees.BODY.names)
+joints = [Joint(*row) for row in loop_trees.rows(tree, mpmath.mpf, about_world=True)]
+own = zip(loop_trees.bodies(tree), exact.mass, exact.com, exact.inertia)
 bodies = [Body(int(row["joint"]), m, com, [x for line in I for x in line]) for row, m, com, I in own]
 outer, parts, m = numbers._replace(joints=joints), method.bodies(exact, q, qd), len(bodies)
 w = [None] * loop_bodies.workspace(outer)

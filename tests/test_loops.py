@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from trees import random_state, tree_of_kinds
 
-from tmt import composite, generic, loop_runs, loop_stages, loop_states, loops, method, templates
+from tmt import composite, generic, loop_runs, loop_stages, loop_states, loop_trees, loops, method, templates
 from tmt.eight import WIDTH
 from tmt.methods import METHODS, lone_speeds, one_step
 from tmt.sine import LIMIT
@@ -43,7 +43,7 @@ def stretched(rng, tree):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_loops_have_the_numbers_of_the_composite_form(seed):
     tree, rng = branched(seed)
-    numbers, n = generic.arrays(tree), len(tree.axis)
+    numbers, n = loop_trees.arrays(tree), len(tree.axis)
     for _ in range(3):
         q, qd, tau = stretched(rng, tree)
         M, h, qdd, w = np.zeros((n, n)), np.empty(n), np.empty(n), np.full(loops.workspace(numbers), np.nan)
@@ -61,7 +61,7 @@ def test_the_loops_have_the_numbers_of_the_composite_form(seed):
 def test_eight_states_side_by_side_have_the_bits_of_one(seed):
     """Mbar, h and qdd; hinges so far out that the library's sine is asked, in some lanes alone."""
     tree, rng = branched(seed)
-    numbers, n = generic.arrays(tree), len(tree.axis)
+    numbers, n = loop_trees.arrays(tree), len(tree.axis)
     states = [np.array(values).T.copy() for values in zip(*(stretched(rng, tree) for _ in range(WIDTH)))]
     hinge = next(joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge")
     states[0][hinge, 3] = 4.0 * LIMIT
@@ -83,7 +83,7 @@ def test_eight_states_side_by_side_have_the_bits_of_one(seed):
 def test_far_from_the_world_no_digits_are_lost(seed):
     """A free body, and what it carries, 10 km away along its slides: its motion is the same to the bit."""
     tree, rng = branched(seed)
-    numbers, n = generic.arrays(replace(tree, stiffness=())), len(tree.axis)
+    numbers, n = loop_trees.arrays(replace(tree, stiffness=())), len(tree.axis)
     q, qd, tau = random_state(rng, tree)
     near, far, w = np.empty(n), np.empty(n), np.empty(loops.workspace(numbers))
     loops.forward_dynamics(numbers, q, qd, tau, w, near)
@@ -96,7 +96,7 @@ def test_far_from_the_world_no_digits_are_lost(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_positions_move_in_the_loops_as_they_do_elsewhere(seed):
     tree, rng = branched(seed)
-    numbers = generic.arrays(tree)
+    numbers = loop_trees.arrays(tree)
     for size in (1e-9, 1.0):
         q, qd, u = stretched(rng, tree)
         u *= size
@@ -109,7 +109,7 @@ def test_positions_move_in_the_loops_as_they_do_elsewhere(seed):
 
 def test_a_state_that_cannot_be_gone_on_from_has_its_reason():
     tree, rng = branched(1)
-    numbers, (q, qd, _) = generic.arrays(tree), stretched(rng, tree)
+    numbers, (q, qd, _) = loop_trees.arrays(tree), stretched(rng, tree)
     places = {joint.kind: joint for joint in tree.coordinates.joints}
     cases = [
         ("hinge", 0.9 * LIMIT, 0), ("hinge", -1.1 * LIMIT, templates.TURNED), ("slide", 1.1 * LIMIT, 0),
@@ -165,7 +165,7 @@ def test_the_error_of_a_step_is_estimated_as_stated():
     ]
     expected = squares[0] / math.sqrt(len(sizes) * (squares[0] + 0.01 * squares[1]))
     found = loop_runs.estimate(
-        generic.arrays(tree), np.array(stepping.errors), tolerance, dt, np.ravel(rates), np.ravel(changes), q, qd,
+        loop_trees.arrays(tree), np.array(stepping.errors), tolerance, dt, np.ravel(rates), np.ravel(changes), q, qd,
         np.array(new_q), np.array(new_qd),
     )  # fmt: skip
     assert found == pytest.approx(expected, rel=1e-9) and expected > 0.0
@@ -186,7 +186,7 @@ def test_the_adaptive_loop_comes_as_near_as_its_tolerance_says():
 
 def test_the_slope_of_an_implicit_stage_has_its_exact_derivatives():
     tree, rng = branched(3, bodies=3)
-    numbers, n = generic.arrays(tree), len(tree.axis)
+    numbers, n = loop_trees.arrays(tree), len(tree.axis)
     q, qd, tau = random_state(rng, tree)
     value, by_q, by_qd = np.empty(n), np.empty((n, n)), np.empty((n, n))
     loop_stages.slope_and_jacobian(numbers, q, qd, tau, value, by_q, by_qd)

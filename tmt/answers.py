@@ -17,8 +17,8 @@ from .cache import is_kept
 from .calls import refused
 from .choice import USUAL_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
 from .cores import side_by_side
-from .generic import in_parts
 from .given import checked_model
+from .loop_trees import in_parts
 from .source import LANES
 from .tree import Tree
 from .values import real_numbers

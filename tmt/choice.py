@@ -46,7 +46,7 @@ def asked(*kind) -> Asked:
 TRACED = 1e-4  # to trace a line of straight-line code
 COMPILED, COMPILED_IN_LANES = (0.6, 0.55e-3), (1.3, 2e-3)  # to compile what stands around it, and each line
 READ = 0.05  # to read a module from the cache folder
-LEAST_LINES, USUAL_LINES = 30, 100  # for one speed: where so few would not pay nothing is traced
+USUAL_LINES = 100  # for one speed: where so few would not pay nothing is traced
 LOOPS_READ = 0.3
 LOOPS_COMPILED = {  # for the first time on a machine
     "run_tableau": 3.5, "run_tableau_lanes": 5.5, "run_adaptive": 5.0, "run_semi_implicit": 8.0, "run_implicit": 16.0,

@@ -63,9 +63,14 @@ class Coordinates(NamedTuple):
             value
             for kind, at, _ in self.joints
             for value in (
-                logarithm(product(conjugate(q0[at]), q1[at])) if kind == "ball" else [q1[at.start] - q0[at.start]]
+                self.logarithm(product(conjugate(q0[at]), q1[at])) if kind == "ball" else [q1[at.start] - q0[at.start]]
             )
         ]
+
+    @staticmethod
+    def logarithm(p) -> list:
+        """Of a quaternion, see below."""
+        return logarithm(p)
 
     def tangent(self, q, dq) -> list:
         """The movement that changes q by small dq, linear in dq."""

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import mpmath
 
-from .coordinates import Coordinates, conjugate, normalized, product
+from .coordinates import Coordinates, normalized
 from .space import Vector, sqrt
 from .tree import Tree
 
@@ -63,19 +63,6 @@ def of_length_1(coordinates: Coordinates, q) -> list:
     return q
 
 
-class Analytic(Coordinates):
-    """Coordinates whose `difference` of two quaternions of length 1 has derivatives where it is zero too."""
-
-    def difference(self, q1, q0) -> list:
-        return [
-            value
-            for kind, at, _ in self.joints
-            for value in (
-                logarithm(product(conjugate(q0[at]), q1[at])) if kind == "ball" else [q1[at.start] - q0[at.start]]
-            )
-        ]
-
-
 def logarithm(p) -> list:
     """coordinates.logarithm without a root of what vanishes: the turn is halved until a series of the arc sine takes it."""
     w, *v = p
@@ -89,3 +76,11 @@ def logarithm(p) -> list:
     for factor in ARC_SINE:
         share = share * square + factor
     return list(v * (share * 2.0 ** (HALVINGS + 1)))
+
+
+class Analytic(Coordinates):
+    """Coordinates whose `difference` of two quaternions of length 1 has derivatives where it is zero too."""
+
+    @staticmethod
+    def logarithm(p) -> list:
+        return logarithm(p)

@@ -19,7 +19,7 @@ from .trace import Code
 from .tree import Tree
 from .values import shown
 
-LONGEST = 14_000  # lines of straight-line code that are compiled, which takes half a minute; beyond, the loops of loops.py are
+LONGEST = 14_000  # lines of straight-line code that are compiled; beyond, the loops of loops.py are
 INLINED = 0.15  # what a line of a slope counts each time it is called, beside 1 where it stands
 LARGEST = 24  # speeds: larger trees are not even traced
 QUANTITIES, SINES = ("forward_dynamics", "mass_matrix_and_bias"), ("sincos", "library_sincos")

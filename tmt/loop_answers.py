@@ -1,16 +1,16 @@
 """What the public functions ask of the loops: a quantity of one state, or of many, eight side by side; whether it was answered.
 
 It is not where sizes are wrong, numbers not finite or quaternions not of length 1, or where a result is beyond the largest
-double: then the literal form answers, or says what is wrong. `joints` and more: the parts of a generic.Arrays; `outer`: the
+double: then the literal form answers, or says what is wrong. `joints` and more: the parts of a loop_trees.Arrays; `outer`: the
 joints of one about the world's origin.
 """
 
 import numpy as np
 
 from .eight import WIDTH
-from .generic import Arrays
 from .inlined import get, put
 from .lock import CLOSE_TO_ONE
+from .loop_trees import Arrays
 
 from .loop_bodies import (  # isort: skip
     ANGULAR_VELOCITIES, CONVECTIVE_TERMS, ENERGY, JACOBIANS, POSITIONS, POTENTIAL_ENERGY, SPRING_TORQUE, of_bodies,

@@ -4,8 +4,8 @@ As method.py has them: frames are walked outward, and what is fixed in one is ca
 (R, r, v, omega, conv, omegad): its axes, its origin and that one's velocity, its angular velocity, and the accelerations of
 both at qdd = 0; all in the axes of the world.
 
-`tree` is a generic.Arrays about the origin of the world, `bodies` an array of generic.BODY, w a workspace; one state, or eight
-side by side, with the same bits.
+`tree` is a loop_trees.Arrays about the origin of the world, `bodies` an array of loop_trees.BODY, w a workspace; one state, or
+eight side by side, with the same bits.
 """
 
 from .inlined import get, inlined, put, put_sines, zero

@@ -6,10 +6,10 @@ along an imaginary part of 1e-100, which is exact but for rounding.
 
 import numpy as np
 
-from .generic import Arrays
 from .inlined import inlined
 from .loop_joints import LEFT, ROW, SPEED
 from .loop_states import check, copy, end, move, unsound
+from .loop_trees import Arrays
 from .loops import forward_dynamics, mass_matrix_and_bias, put_forces, workspace
 from .machine_code import compiled
 

@@ -12,7 +12,7 @@ speed has the direction S = (axis, r x axis), of a slide (0, axis). It gives way
 I - U U'/D and p + U u/D, where I = [J H; H' M] and p = (n, f) are those of all that is carried, U = I S,
 D = S'U + armature, u = Q - S'p. Mbar, of composite bodies: a row is the moment and force of S along the directions inward.
 
-`tree` is a generic.Arrays, w a workspace, numbers are those of inlined.py; complex ones carry an exact derivative along.
+`tree` is a loop_trees.Arrays, w a workspace, numbers are those of inlined.py; complex ones carry an exact derivative along.
 """
 
 # isort: off

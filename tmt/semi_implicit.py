@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from . import generic
+from . import loop_trees
 from .coordinates import FLAT
 from .method import bias_rates, mass_matrix_and_bias, reduced_force
 from .space import solve_any
@@ -37,7 +37,7 @@ class SemiImplicitEuler(Method):
         """For the compiled loop: whose bias is implicit, (nv,), whether springs are, and which gains, of position and speed."""
         lone = lone_speeds(tree) if self.lone_bodies else set()
         own = np.array([self.implicit_bias or v in lone for v in range(len(tree.axis))])
-        return own, self.implicit_springs and tree.has_springs, *map(generic.matrix, self.gains_held(tree))
+        return own, self.implicit_springs and tree.has_springs, *map(loop_trees.matrix, self.gains_held(tree))
 
     def gains_held(self, tree) -> tuple:
         """The implicit entries of a controller's gains, of position and of speed: (nv, nv) each, () where there are none."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import composite, generic, kernels, method
+from tmt import composite, generic, kernels, loop_trees, method
 from tmt.cache import executed
 from tmt.source import LANES, evaluator_source
 
@@ -118,7 +118,7 @@ def loop(of: Chain, lanes: bool = False) -> Made:
     """The loop over any tree: one state at a time, or eight side by side."""
     arrays = [np.array(array.T if lanes else array, order="C") for array in (*of.states, of.states[0])]
     evaluate = generic.compiled().lanes if lanes else generic.compiled().each
-    run = partial(again_and_again, evaluate, (generic.arrays(of.tree), True, *arrays))
+    run = partial(again_and_again, evaluate, (loop_trees.arrays(of.tree), True, *arrays))
     taken = cold_start()["loop_lanes" if lanes else "loop"] if of.cold else None
     return Made(run, len(of.states[0]), taken, operations_of(of.tree)["loop"])
 
@@ -139,7 +139,7 @@ def compilation() -> None:
     from numba import njit
 
     njit("f8(f8)")(lambda x: x)  # what numba itself takes to begin
-    loops, numbers, taken = generic.compiled(), generic.arrays(tmt.ARM), {}
+    loops, numbers, taken = generic.compiled(), loop_trees.arrays(tmt.ARM), {}
     for name, function, shape in (("loop", loops.each, (0, 3)), ("loop_lanes", loops.lanes, (3, 0))):
         begin = time.process_time()
         function(numbers, True, *(np.empty(shape) for _ in range(4)))

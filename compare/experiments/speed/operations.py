@@ -13,7 +13,7 @@ from types import FunctionType
 import numpy as np
 
 import tmt
-from tmt import generic, inlined, kernels, loop_joints, loops, sine
+from tmt import inlined, kernels, loop_joints, loop_trees, loops, sine
 from tmt.inlined import zero
 from tmt.space import arctan, sqrt
 
@@ -102,8 +102,8 @@ def of_loop(tree: tmt.Tree, q, qd, tau) -> tuple[int, list[float]]:
             if isinstance(function, FunctionType) and function.__module__.startswith("tmt.loop"):
                 known[name] = FunctionType(function.__code__, known, name, function.__defaults__)
             known.setdefault(name, value)
-    numbers = generic.arrays(tree)
-    joints = [Row(zip(generic.JOINT.names, counted(row))) for row in generic.rows(tree)]
+    numbers = loop_trees.arrays(tree)
+    joints = [Row(zip(loop_trees.JOINT.names, counted(row))) for row in loop_trees.rows(tree)]
     gains = {name: np.array(counted(getattr(numbers, name)), object) for name in ("position_gain", "speed_gain")}
     numbers = numbers._replace(joints=joints, gravity=counted(numbers.gravity), **gains)
     w, qdd = [None] * known["workspace"](numbers), [None] * len(tree.axis)

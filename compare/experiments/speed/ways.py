@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 import tmt
-from tmt import answers, generic, kernels, literal, method
+from tmt import answers, generic, kernels, literal, loop_trees, method
 from tmt.cores import cores
 from tmt.methods import METHODS
 
@@ -26,7 +26,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     """(quantity, implementation, loop(count)) of tmt at one state, each loop compiled but for the plain floats."""
     (q, qd, tau), n = state, len(tree.axis)
     floats = [a.tolist() for a in state]
-    arrays, out, M, h = generic.arrays(tree), np.empty(n), np.empty(n * n), np.empty(n)
+    arrays, out, M, h = loop_trees.arrays(tree), np.empty(n), np.empty(n * n), np.empty(n)
     run, most = kernels.stepper(tree, "rk4"), min(MOST_CALLS, MOST_RESULTS // n)
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
@@ -82,7 +82,7 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoo
     if 1 < count <= 1000:
         loops, numbers, slots = (
             generic.compiled(),
-            generic.arrays(tree),
+            loop_trees.arrays(tree),
             [np.ascontiguousarray(a.T) for a in (q, qd, tau)],
         )
         found = np.empty((n, count))

@@ -24,6 +24,6 @@ EDITS = (
     Edit("answers", "Known.of_one", "self.may_be_singular", "False", "compiled code answers where Mbar is singular"),
     Edit("answers", "Known.has_loops", "CALL + count", "count", "a call of the literal form costs nothing", nth=0),
     Edit("choice", "chosen", "wanted + before", "wanted", "what was asked before does not count"),
-    Edit("generic", "in_parts", "(inner.position_gain, inner.speed_gain)", "(inner.speed_gain, inner.position_gain)",
+    Edit("loop_trees", "in_parts", "(inner.position_gain, inner.speed_gain)", "(inner.speed_gain, inner.position_gain)",
          "gains of positions act on speeds"),
 )  # fmt: skip
