@@ -7,7 +7,7 @@ import numpy as np
 from .eight import WIDTH
 from .inlined import get, put, zero
 from .loop_joints import BALL
-from .loop_states import check, copy, end, move, put_rates, unsound
+from .loop_states import check, copy, kept, move, put_rates, unsound
 from .loops import forward_dynamics, workspace
 from .machine_code import compiled
 from .templates import SMALL
@@ -66,13 +66,8 @@ def run_tableau(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
             stages(tree, A, mean_speed, state, rate, tau[i], dt, w, u, place, speeds, rates, changes)
             combine(tree, b, state, rate, dt, u, rates, changes, state, rate)
             evaluations += len(b)
-            why = unsound(tree, state, rate)
-            if why:
-                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
+            if not kept(q, qd, i, k, every, state, rate, unsound(tree, state, rate), ended):
                 break
-            if k % every == 0:
-                copy(state, q[i, k // every])
-                copy(rate, qd[i, k // every])
     return evaluations
 
 
@@ -104,13 +99,7 @@ def run_tableau_lanes(tree, A, b, mean_speed, q, qd, tau, dt, ended, every):
                     copy(state[:, l], one)
                     copy(rate[:, l], its_rate)
                     evaluations += len(b)
-                    why = unsound(tree, one, its_rate)
-                    if why:
-                        end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
-                        alive[l] = False
-                    elif k % every == 0:
-                        copy(one, q[i, k // every])
-                        copy(its_rate, qd[i, k // every])
+                    alive[l] = kept(q, qd, i, k, every, one, its_rate, unsound(tree, one, its_rate), ended)
     return evaluations
 
 
@@ -146,12 +135,8 @@ def run_adaptive(tree, A, b, errors, order, q, qd, tau, dt, tolerance, ended, ev
                 why = unsound(tree, state, speeds)
                 if why == 0 and not h > 1e-9 * dt:
                     why = SMALL
-            if why:
-                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
+            if not kept(q, qd, i, k, every, state, speeds, why, ended):
                 break
-            if k % every == 0:
-                copy(state, q[i, k // every])
-                copy(speeds, qd[i, k // every])
     return evaluations
 
 

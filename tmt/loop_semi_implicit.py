@@ -8,7 +8,7 @@ import numpy as np
 
 from .inlined import inlined
 from .loop_joints import LEFT, ROW, SPEED
-from .loop_states import check, copy, end, move, unsound
+from .loop_states import check, copy, kept, move, unsound
 from .loop_trees import Arrays
 from .loops import forward_dynamics, mass_matrix_and_bias, put_forces, workspace
 from .machine_code import compiled
@@ -61,13 +61,8 @@ def run_semi_implicit(tree, own, springs, position_gain, speed_gain, q, qd, tau,
                 u[v] = dt * speeds[v]
             move(tree, place, u, place)
             evaluations += 1
-            why = unsound(tree, place, speeds)
-            if why:
-                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
+            if not kept(q, qd, i, k, every, place, speeds, unsound(tree, place, speeds), ended):
                 break
-            if k % every == 0:
-                copy(place, q[i, k // every])
-                copy(speeds, qd[i, k // every])
     return evaluations
 
 

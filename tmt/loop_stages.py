@@ -7,7 +7,7 @@ import numpy as np
 from .implicit import CLOSE, ITERATIONS
 from .loop_joints import BALL
 from .loop_semi_implicit import NUDGE, solve
-from .loop_states import check, copy, end, normalize, put_product, unsound
+from .loop_states import check, copy, kept, normalize, put_product, unsound
 from .loops import forward_dynamics, workspace
 from .machine_code import compiled, part
 from .templates import NEWTON
@@ -218,10 +218,6 @@ def run_implicit(tree, A, b, q, qd, tau, dt, ended, every):
             if why == 0:
                 finish(tree, A, b, state, speeds, dt, a, state, speeds)
                 why = unsound(tree, state, speeds)
-            if why:
-                end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
+            if not kept(q, qd, i, k, every, state, speeds, why, ended):
                 break
-            if k % every == 0:
-                copy(state, q[i, k // every])
-                copy(speeds, qd[i, k // every])
     return evaluations

@@ -112,3 +112,14 @@ def end(q, qd, k, ended, i, why, steps):
     q[i, k:], qd[i, k:] = np.nan, np.nan
     if len(ended):
         ended[i, 0], ended[i, 1] = why, steps
+
+
+@compiled
+def kept(q, qd, i, k, every, state, speeds, why, ended) -> bool:
+    """Whether run i goes on after step k, of which the state is kept where it is a record; else why it does not is."""
+    if why:
+        end(q, qd, (k - 1) // every + 1, ended, i, why, k - 1)
+    elif k % every == 0:
+        copy(state, q[i, k // every])
+        copy(speeds, qd[i, k // every])
+    return why == 0
