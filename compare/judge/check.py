@@ -89,6 +89,7 @@ class Result:
     notes: list = field(default_factory=list)  # sentences for the report
     shown: list | None = None  # columns of the table in the report, if not all; none: only in its file
     tables: dict = field(default_factory=dict)  # further tables by name: lists of rows
+    filed: tuple = ()  # further tables, by name, that stand in their files alone
     top: list = field(default_factory=list)  # sentences for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that MuJoCo is compared with
 
