@@ -29,6 +29,7 @@ ASKED_BY = {
     "gravity": ("gravity", "bias", "energy"),
 }
 DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
+TIMED = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
@@ -50,7 +51,8 @@ def examine(
         for name, experiment in modules.items()
         if hasattr(experiment, "begin")
     }
-    for name, experiment in modules.items():
+    for name in sorted(modules, key=TIMED.__contains__):
+        experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(modules) > 1 and not asked_for:
             reasons[name] = NOTHING_FAILED
@@ -64,15 +66,18 @@ def examine(
             add_problems(crash or result, own.equations.problems, said)
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
-        drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
+        drawings.append(None if crash else partial(workers.submit, draw, name, result, setup.robot, folder / "figures"))
+        if not crash and name not in TIMED:  # no drawing delays a timing
+            drawings[-1] = drawings[-1]()
         new = new_causes(setup, sections, causes)
         causes = new + causes
         say_outcome(terminal, sections[-1], time.perf_counter() - started, new)
     setup.progress("figures")
+    drawings = [drawing() if callable(drawing) else drawing for drawing in drawings]
     for section, drawing in zip(sections, drawings):
         if drawing is not None:
             take_figures(terminal, section, drawing)
-    return sections, causes, reasons
+    return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
 
 
 def add_problems(result: Result, problems: Sequence, said: set) -> None:
