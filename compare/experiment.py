@@ -205,7 +205,7 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
                     file += "_"  # names that differ in signs alone may give one file
                 path = folder / f"{file}.png"
                 with writing(path), quiet(robot):
-                    figure.savefig(path)
+                    laid_out(figure).savefig(path)
                 drawn.append((file, caption))
             except OSError:
                 raise
@@ -218,6 +218,16 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
     except Exception as error:
         failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
     return drawn, failed
+
+
+def laid_out(figure):
+    """A figure whose parts have their places: saved as it is made, it would be drawn once more to find them."""
+    engine = getattr(figure, "get_layout_engine", lambda: None)()
+    if engine is not None:
+        figure.set_dpi(importlib.import_module("matplotlib").rcParams["savefig.dpi"])
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    return figure
 
 
 def called(call: Callable) -> str:
