@@ -29,7 +29,7 @@ ASKED_BY = {
     "gravity": ("gravity", "bias", "energy"),
 }
 DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
-TIMED = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
+TIMED_LAST = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
@@ -51,7 +51,7 @@ def examine(
         for name, experiment in modules.items()
         if hasattr(experiment, "begin")
     }
-    for name in sorted(modules, key=TIMED.__contains__):
+    for name in sorted(modules, key=TIMED_LAST.__contains__):
         experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(modules) > 1 and not asked_for:
@@ -67,7 +67,7 @@ def examine(
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
         drawings.append(None if crash else partial(workers.submit, draw, name, result, setup.robot, folder / "figures"))
-        if not crash and name not in TIMED:  # no drawing delays a timing
+        if not crash and name not in TIMED_LAST:  # no drawing delays a timing
             drawings[-1] = drawings[-1]()
         new = new_causes(setup, sections, causes)
         causes = new + causes

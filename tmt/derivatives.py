@@ -8,7 +8,7 @@ import numpy as np
 
 from . import composite
 from .dual import Dual, seeded
-from .stepping import stepped
+from .stepping import Completed, stepped
 
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
@@ -16,8 +16,14 @@ PART = 4096  # states times speeds that are taken at once: more do not stay in t
 
 def one_step(stepping, tree, q, qd, tau, dt):
     """The state (q, qd) of a tree one dt later by a method, over any scalar."""
-    terms = composite.mass_matrix_and_bias
-    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt, terms), q, qd, dt)
+    regrouped = [composite.mass_matrix_and_bias] * takes_terms(stepping)
+    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt, *regrouped), q, qd, dt)
+
+
+def takes_terms(stepping) -> bool:
+    """Whether a method's slope is one of tmt's own, which takes another form of the dynamics."""
+    kind = next((kind for kind in type(stepping).__mro__ if "slope" in vars(kind)), None)
+    return kind is not None and kind.__module__.split(".")[0] == __package__ and kind is not Completed
 
 
 def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:

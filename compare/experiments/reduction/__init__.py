@@ -80,9 +80,7 @@ def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) 
     return result
 
 
-def untimed(
-    setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True
-) -> tuple[Result, list[tuple] | None]:
+def untimed(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> tuple[Result, list[tuple] | None]:
     """What of `rows` is no timing, and the models whose steps are to be timed; None: nothing can be locked."""
     result = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}})
     if left_out := [case.name for case in setup.robot.cases if case.controller]:

@@ -145,7 +145,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
 
 def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Sequence[list[dict]]) -> None:
     """The seconds of all rows, what one evaluation costs, and what follows: what to use, and which aims are met."""
-    chains, ways = growth.ready(setup), evaluations.ready(setup)
+    chains, ways = growth.chains_of(setup), evaluations.made_ways(setup)
     runs = [prepared(of_scene, setup) for of_scene in of_scenes]
     setup.quiet()  # nothing else may run beside a timing
     spread = []

@@ -40,7 +40,7 @@ WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_
 WHOLE_CALLED = "MuJoCo, mj_forward called from Python"
 
 
-class Ready(NamedTuple):
+class Ways(NamedTuple):
     """The ways of one evaluation, made and not yet timed."""
 
     repeated: Mapping[tuple, Callable]  # {(quantity, implementation, 1, 1): loop(count)}
@@ -50,7 +50,7 @@ class Ready(NamedTuple):
     missing: str | None  # why MuJoCo's calls are not timed
 
 
-def ready(setup: Setup) -> Ready:
+def made_ways(setup: Setup) -> Ways:
     """All that is compiled for `costs`."""
     from ...engines.mujoco.calls import MinimalCalls  # here, for numba takes its time
 
@@ -69,10 +69,10 @@ def ready(setup: Setup) -> Ready:
         repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in ways}
     for loop in repeated.values():
         loop(1)  # what it does only once
-    return Ready(repeated, states, numbers, peers, missing)
+    return Ways(repeated, states, numbers, peers, missing)
 
 
-def costs(setup: Setup, made: Ready) -> tuple[list[dict], list[str]]:
+def costs(setup: Setup, made: Ways) -> tuple[list[dict], list[str]]:
     """The rows of evaluations.csv, and sentences about them."""
     repeated, states, numbers, peers, missing = made
     tree, calls = setup.robot.tree, {key: counted(loop) for key, loop in repeated.items()}
