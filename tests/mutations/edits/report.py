@@ -44,7 +44,7 @@ EDITS = (
     Edit("figures_runs", "draw_held", "curve['left']['tmt']", "curve['left']['mujoco']", "MuJoCo's departure is told of TMT"),
     Edit("figures_runs", "draw_held", "(ours, theirs)", "(theirs, ours)", "the caption exchanges the engines"),
     Edit("figures_runs", "run_caption", "max(used)", "min(used)", "the least use of the band is told as the most"),
-    Edit("figures_runs", "drift_caption", "theirs / ours if ours else np.nan", "ours / theirs if ours else np.nan",
+    Edit("figures_drift", "drift_caption", "theirs / ours if ours else np.nan", "ours / theirs if ours else np.nan",
          "the ratio of the drifts is inverted"),
     Edit("figures_runs", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
     Edit("figures_times", "fewest", "min(good, default=None)", "max(good, default=None)",
