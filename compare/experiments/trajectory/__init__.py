@@ -146,11 +146,12 @@ def rows(setup: Setup) -> Result:
     result.curves["errors"] = errors.errors_when_held(result, setup.robot) | errors.errors_when_free(
         result, setup.robot
     )
-    names, numbers = {name for name, *_ in result.curves["runs"]}, robot.claims.figures if robot.claims else {}
+    robot, ran = setup.robot, {name for name, *_ in result.curves["runs"]}
+    numbers = robot.claims.figures if robot.claims else {}
     result.curves["leaving"] = {
         case.name: leaving.leaving(case, setup.engines)
         for case in robot.cases
-        if case.is_held and case.name in names and case.name in numbers
+        if case.is_held and case.name in ran and case.name in numbers
     }
     said = sentences.notes(result, setup.robot, setup.engines, work["finer"], entries(setup))
     result.notes = said + work["left_out"] + result.notes

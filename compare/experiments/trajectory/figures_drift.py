@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ...engines import LABELS
 from ...judge.check import Result
-from ...report.style import GREY, LINES, WIDTH, plain, spread, text_width
+from ...report.style import GREY, LINES, WIDTH, in_letters, plain, spread, text_width
 from .drift import DRIFT_DURATION, found_order
 from .horizon import CARRIED, early, power
 
@@ -92,7 +92,9 @@ def draw_growth(result: Result) -> tuple[str, Figure, str]:
         ax.plot(t, grown, color=colour, linestyle=dash, linewidth=1.2)
         beside = {"xytext": ((1.0 + NAMES_BEGIN) * t[-1], places[name]), "va": "center", "annotation_clip": False}
         line = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0}
-        ax.annotate(plain(name), (t[-1], last[name]), **beside, color=colour, arrowprops=line | {"relpos": (0, 0.5)})
+        ax.annotate(
+            plain(name), (t[-1], last[name]), **beside, color=in_letters(colour), arrowprops=line | {"relpos": (0, 0.5)}
+        )
     for digits, text in CARRIED.items():
         if digits < high:
             ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")

@@ -22,7 +22,7 @@ from .sentences import agreement, rad
 
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEGEND_COLUMNS = 4  # of a legend; with names longer than LONG three
-LETTERS = 100  # of a line above a panel as wide as the page
+LETTERS = 85  # of a line above a panel as wide as the page
 LONG = 14  # letters of a joint's name
 NOT_JUDGED = {"color": (GREY, 0.2), "linewidth": 0}
 

@@ -1,6 +1,7 @@
 """Figures of runs: whose number stands where, and which figures there are."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -118,7 +119,7 @@ def test_names_of_the_growth_stand_beside_the_ends_of_their_curves_in_their_orde
     for name, text in names.items():
         assert text.xy == (60.0, curves[name][-1]) and abs(text.get_position()[1] - text.xy[1]) < 0.1 * (high - low)
     boxes = sorted(heights.values(), key=lambda box: box.y0)
-    assert all(below.y1 <= above.y0 for below, above in zip(boxes, boxes[1:])) and len(boxes) == len(ends)
+    assert all(below.y1 <= above.y0 for below, above in pairwise(boxes)) and len(boxes) == len(ends)
     assert sorted(names, key=lambda name: heights[name].y0) == sorted(curves, key=lambda name: curves[name][-1])
     assert max(box.x1 for box in boxes) < fig.bbox.x1 and "scene 52.0: 10^" in caption
 
