@@ -154,7 +154,7 @@ def inside(boxes: np.ndarray, frame: np.ndarray) -> np.ndarray:
 def in_letters(colour: str) -> tuple[float, float, float]:
     """A colour as letters on white have it: so dark that they are read."""
     rgb = np.array(to_rgb(colour))
-    return tuple(rgb * min(1.0, BRIGHTEST_LETTERS / float(rgb @ BRIGHTNESS)))
+    return tuple(rgb * BRIGHTEST_LETTERS / max(BRIGHTEST_LETTERS, float(rgb @ BRIGHTNESS)))
 
 
 def text_width(text: str, size: float) -> float:

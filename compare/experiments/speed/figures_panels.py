@@ -11,7 +11,6 @@ from ...judge.units import value
 from ...report.style import WIDTH, name_ends, plain
 from .figures_times import (
     COARSE_END,
-    FINE_END,
     colour_of,
     curves,
     in_full,
@@ -21,16 +20,21 @@ from .figures_times import (
     motion,
     rows_of_runs,
     scenes,
+    seen,
+    unseen_in_words,
+    visible,
     written,
 )
+
+MOST_ENERGY, LEAST_ENERGY = 10.0, 1e-15  # J, where the axis of errors begins and ends
 
 
 def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
     """Worst error against evaluations of the right-hand side: independent of the machine and of who wrote the kernel."""
 
     def numbers(rows: list[dict]) -> tuple:
-        good = [r for r in rows if not r["diverged"] and r["evaluations"]]
-        return np.clip([value(r, "worst_error") for r in good], FINE_END, COARSE_END), [r["evaluations"] for r in good]
+        good = [r for r in seen(rows) if r["evaluations"]]
+        return visible(good), [r["evaluations"] for r in good]
 
     fig, named = panels(result, numbers, (COARSE_END * 2, 1e-19), f"worst error on the way, {result.curves.get('unit', 'rad')}",
                         "evaluations of the right-hand side")  # fmt: skip
@@ -38,6 +42,9 @@ def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
         "The same errors against evaluations of the equations of motion, which do not depend on the machine. "
         f"{agreeing(result.checks)}{fewest(result, result.curves.get('regular'), 1e-9)}Of an implicit method an evaluation with "
         f"its derivatives counts once; a method without evaluations, as heyoka's Taylor, is not drawn.{named}"
+        + unseen_in_words(
+            result, [row for row in rows_of_runs(result) if row["scene"] in scenes(result) and row["evaluations"]]
+        )
     )
     return "speed_evaluations", fig, caption
 
@@ -69,8 +76,8 @@ def draw_energy(result: Result) -> tuple[str, Figure, str]:
     """Energy error against time."""
 
     def numbers(rows: list[dict]) -> tuple:
-        good = [r for r in rows if not r["diverged"]]
-        return np.clip([r["energy_error_J"] for r in good], 1e-15, 10), [1e3 * r["seconds"] for r in good]
+        good = [r for r in rows if not r["diverged"] and r["energy_error_J"] <= MOST_ENERGY]
+        return np.maximum([r["energy_error_J"] for r in good], LEAST_ENERGY), [1e3 * r["seconds"] for r in good]
 
     fig, named = panels(result, numbers, (20, 1e-19), "largest energy error on the grid, J",
                         f"time for {motion(rows_of_runs(result))} of motion, ms")  # fmt: skip
@@ -79,7 +86,13 @@ def draw_energy(result: Result) -> tuple[str, Figure, str]:
         rows = [r for s in scenes(result) for r in curves(result, s).get((engine, method), []) if not r["diverged"]]
         if rows:
             least.append(f"{written(engine)} {method} {min(r['energy_error_J'] for r in rows):.1e} J")
+    beyond = sum(
+        not r["diverged"] and r["energy_error_J"] > MOST_ENERGY
+        for r in rows_of_runs(result)
+        if r["scene"] in scenes(result)
+    )
     caption = "Largest error of the energy against time."
+    caption += f" {beyond} above {MOST_ENERGY:g} J {'are' if beyond > 1 else 'is'} not drawn." if beyond else ""
     caption += f" The least in any scene: {'; '.join(least)}." if least else ""
     caption += named
     return "speed_energy", fig, caption

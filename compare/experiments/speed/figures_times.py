@@ -85,7 +85,7 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple[str, Fi
     by_method = curves(result, scene)
     ends = []
     for (engine, method), rows in by_method.items():
-        good = [r for r in rows if not r["diverged"]]
+        good = seen(rows)
         errors, spent = visible(good), [1e3 * r["seconds"] for r in good]
         ax.plot(errors, spent, marker=marker(method), markersize=3.5, **line_of(engine))
         if good and not is_twice(engine, method):
@@ -116,7 +116,7 @@ def draw_times(result: Result, scene: str, beginning: str = "") -> tuple[str, Fi
     if lost:
         count, whose = sum(lost.values()), ", ".join(f"{name} {number}" for name, number in lost.items())
         caption += f" {count} {'settings diverge' if count > 1 else 'setting diverges'} (at the left): {whose}."
-    return file_name("speed", scene), fig, caption
+    return file_name("speed", scene), fig, caption + unseen_in_words(result, runs_of(result, scene))
 
 
 def draw_diverged(ax: Axes, by_method: dict) -> tuple[dict[str, int], float]:
@@ -157,6 +157,21 @@ def line_of(engine: str) -> dict:
     """How an engine's lines look."""
     dash, wide = LINES_OF_ENGINES.get(engine, ("-", 1.0))
     return {"color": colour_of(engine), "linestyle": dash, "linewidth": wide}
+
+
+def seen(rows: list[dict]) -> list[dict]:
+    """The rows that are drawn at their errors: what is farther off than the axis goes, has no error that says anything."""
+    return [r for r in rows if not r["diverged"] and value(r, "worst_error") <= COARSE_END]
+
+
+def unseen_in_words(result: Result, rows: list[dict]) -> str:
+    """How many of some rows are not drawn, as a sentence; nothing where all are."""
+    count = sum(not r["diverged"] for r in rows) - len(seen(rows))
+    unit = result.curves.get("unit", "rad")
+    one = (
+        f"{count} setting{'s' if count > 1 else ''} more than {COARSE_END:g} {unit} off {'are' if count > 1 else 'is'}"
+    )
+    return f" {one} not drawn." if count else ""
 
 
 def visible(rows: list[dict]) -> np.ndarray:
