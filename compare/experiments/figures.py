@@ -50,8 +50,11 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
         ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
     for ax in axes.flat[len(quantities) :]:
         ax.set_visible(False)
-    largest = max([FACTOR, *(line.get_xdata()[-1] for ax in axes.flat for line in ax.lines)])
-    zero_at_the_end(axes[0, 0].xaxis, ZERO_AT, largest if np.isfinite(largest) else FACTOR, most=4 + 2 * (columns < 3))
+    of_all = [line.get_xdata() for ax in axes.flat for line in ax.lines]
+    largest = max((values[-1] for values in of_all if np.isfinite(values[-1])), default=FACTOR)
+    zeros = min(values[0] for values in of_all) <= ZERO_AT
+    if zeros:
+        zero_at_the_end(axes[0, 0].xaxis, ZERO_AT, largest, most=4 + 2 * (columns < 3))
     for ax in axes[:, 0]:
         ax.set_ylabel("share of states")
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
@@ -69,7 +72,7 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
         )
     caption = (
         f"Share of the {sample} whose difference is at most so many eps. The engines are {eps_in_words(worst)} apart "
-        f"({of_worst}).{against} Differences below {ZERO_AT:g} eps are drawn at 0."
+        f"({of_worst}).{against}{f' Differences below {ZERO_AT:g} eps are drawn at 0.' if zeros else ''}"
     )
     return f"{result.experiment}_distances", fig, caption
 

@@ -55,7 +55,7 @@ def symbol(case: Case, i: int) -> str:
 
 
 def drawn(case: Case, q: np.ndarray) -> np.ndarray:
-    """Positions as they are drawn, (times, nv): of a ball the movement from the start."""
+    """Positions as they are drawn, (times, nv): of a ball the movement from the start, broken where it passes half a turn."""
     coordinates = case.coordinates
     if not coordinates.has_balls:
         return q
@@ -63,6 +63,9 @@ def drawn(case: Case, q: np.ndarray) -> np.ndarray:
     for kind, at, by in coordinates.places.joints:
         if kind != "ball":
             values[:, by] = q[:, at]
+            continue
+        jumps = np.linalg.norm(np.diff(values[:, by], axis=0), axis=1) > np.pi
+        values[1:, by][jumps] = np.nan
     return values
 
 

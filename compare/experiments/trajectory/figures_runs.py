@@ -143,7 +143,11 @@ def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int,
             if shown < count
             else ""
         )
-        + ("Of a ball the turn from its start is drawn, in its own axes. " if case.coordinates.has_balls else "")
+        + (
+            "Of a ball the turn from its start is drawn, in its own axes, beyond half a turn from the other side. "
+            if case.coordinates.has_balls
+            else ""
+        )
         + f"Blue: {label} beside itself, its start moved by {EPS:.1e}."
         + f" Differences below {DRAWN_ZERO:g} are drawn at 0." * zeros
     )
