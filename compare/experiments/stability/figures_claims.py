@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ...engines import LABELS
 from ...judge.check import Result
@@ -47,22 +48,27 @@ def draw_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         ticks = np.arange(0.0, 10.0, 0.2 if last - first < 1.5 else 1.0)
         ticks = [t for t in ticks if first - 2 * claims.dt < t < last + claims.dt]
         ax.set_xticks([*ticks, never], [*(f"{t:g}" for t in ticks), "never"])
+        ax.yaxis.set_major_locator(MaxNLocator(4, integer=True))
         if k == 0:
             ax.tick_params(labelbottom=False)
         else:
             ax.set_xlabel(f"time until a hinge is {LEFT:g} rad away, s")
     ax = fig.add_subplot(grid[:, 1])
+    largest = max((abs(row["push_rad_per_s2"]) for row in rows if row["push_rad_per_s2"]), default=1.0)
+    factor = 10.0 ** np.floor(np.log10(largest))
     for engine, fill in (("tmt", "full"), ("mujoco", "none")):
         for row in (row for row in rows if row["engine"] == engine and row["observed_s"] is not None):
             colour, mark, _ = sides[row["direction"]]
-            ax.plot(row["push_rad_per_s2"] * 1e15, row["observed_s"], mark, color=colour, fillstyle=fill, markersize=5)
+            ax.plot(
+                row["push_rad_per_s2"] / factor, row["observed_s"], mark, color=colour, fillstyle=fill, markersize=5
+            )
     known = sorted(
-        {(row["push_rad_per_s2"] * 1e15, row["predicted_s"]) for row in rows if row["predicted_s"] is not None}
+        {(row["push_rad_per_s2"] / factor, row["predicted_s"]) for row in rows if row["predicted_s"] is not None}
     )
     known_x, known_y = zip(*known) if known else ((), ())
     ax.plot(known_x, known_y, drawstyle="steps-mid", color="black", linewidth=0.8, label="predicted by the linear map")
     ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set(xlabel="push on the unstable mode, 1e-15 rad/s2", ylabel="time, s")
+    ax.set(xlabel=f"push on the unstable mode, {factor:.0e} rad/s2", ylabel="time, s")
     for colour, mark, text in sides.values():
         ax.plot([], [], mark, color=colour, label=text)
     ax.plot([], [], "^", color="black", fillstyle="none", label="open: MuJoCo")

@@ -48,6 +48,12 @@ def named_with_its_factor(ax: Axes, name: str, unit: str) -> None:
     ax.set_ylabel(f"{name}, {unit}" if factor == 1.0 else f"{name}, {factor:.0e} {unit}")
 
 
+def while_it_lasts(c: dict, name: str, values: np.ndarray) -> np.ndarray:
+    """Values of a run of an engine, (times, n), without what comes after it has diverged."""
+    ended = c["ended"][name]
+    return values if ended is None else np.where((c["t"] < ended)[:, None], values, np.nan)
+
+
 def symbol(case: Case, i: int) -> str:
     """How the joint of a movement is written."""
     name = case.coordinates.speeds[i]

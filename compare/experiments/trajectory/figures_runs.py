@@ -16,7 +16,7 @@ from ...judge.run import moved_from, movement_unit, step_in_words
 from ...judge.scale import EPS
 from ...judge.words import capital, scene_begins
 from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name, zero_at_the_end
-from .figures_lines import differing_most, drawn, named_with_its_factor, over_time
+from .figures_lines import differing_most, drawn, named_with_its_factor, over_time, while_it_lasts
 from .leaving import left_in_words, why_in_words
 from .sentences import agreement, rad
 
@@ -32,7 +32,8 @@ def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str
     curve = result.curves["runs"][(case.name, "rk4", case.steps)]
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
-    over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]), case)
+    paths = (np.degrees(while_it_lasts(curve, name, curve[name][0])) for name in ("tmt", "mujoco"))
+    over_time(ax, curve["t"], *paths, case)
     for (name, left), dash in zip(curve["left"].items(), ("--", ":")):
         if left is not None:
             ax.axvline(left, color="black", linestyle=dash, label=f"{LABELS[name]} {left_in_words(left)}")
@@ -63,8 +64,9 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     axes = fig.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
     for column, c in zip(axes.T, columns):
         for row, ax in enumerate(column[:2]):
-            paths = [c[name][row] for name in case.robot.compared]
-            over_time(ax, c["t"], *(paths if row else (drawn(case, q) for q in paths)), case, shown, 64 // len(columns))
+            paths = [(name, c[name][row] if row else drawn(case, c[name][0])) for name in case.robot.compared]
+            paths = [while_it_lasts(c, name, path) for name, path in paths]
+            over_time(ax, c["t"], *paths, case, shown, 64 // len(columns))
         step = step_in_words(case, steps)
         column[0].set_title(f"{c['integrator']}, {step}" if len(columns) < 4 else f"{c['integrator']}\n{step}")
         draw_difference(column[2], c, case, result.label)
@@ -82,7 +84,7 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
 
 def draw_difference(ax: Axes, c: dict, case: Case, label: str) -> None:
     """How far the engines are apart in a run, under its band; beside it what rounding of the start makes of itself."""
-    ours, theirs = (c[name][0] for name in case.robot.compared)
+    ours, theirs = (while_it_lasts(c, name, c[name][0]) for name in case.robot.compared)
     difference = moved_from(ours, theirs, case.coordinates).max(axis=1)
     of_itself = moved_from(ours, c["nudged"], case.coordinates).max(axis=1)
     band = np.where(c["band"] < 1e3, c["band"], np.nan)
@@ -150,4 +152,6 @@ def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int,
         )
         + f"Blue: {label} beside itself, its start moved by {EPS:.1e}."
         + f" Differences below {DRAWN_ZERO:g} are drawn at 0." * zeros
+        + " Lines and marks end where a run has diverged."
+        * any(at is not None for c in columns for at in c["ended"].values())
     )

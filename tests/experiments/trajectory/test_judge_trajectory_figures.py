@@ -76,6 +76,22 @@ def test_a_factor_of_an_axis_stands_in_its_name_and_nowhere_else():
         assert len(set(written)) == len(written) > 2 and max(map(len, written)) <= 5
 
 
+def test_what_comes_after_a_run_has_diverged_is_not_drawn():
+    curve = run_of(HELD, 1.0, 1e135, ended=(None, 2.5))
+    curves = {"runs": {(HELD.name, "rk4", 64): curve}, "errors": {HELD.name: (0.1, None)}}
+    (_, fig, caption), (_, of_held, _) = (
+        draw(Result("trajectory", curves=curves), HELD, *more)
+        for draw, more in ((figures_runs.draw_run, ()), (figures_runs.draw_held, (2,)))
+    )
+    for ax in (fig.axes[0], of_held.axes[0]):
+        ours, theirs = ax.lines[:2]
+        assert np.isfinite(ours.get_ydata()).all()
+        assert np.array_equal(np.isfinite(theirs.get_ydata()), curve["t"] < 2.5)
+    (apart,) = (line for line in fig.axes[2].lines if line.get_label() == "TMT to MuJoCo")
+    assert np.array_equal(np.isfinite(apart.get_ydata()), curve["t"][1:] < 2.5)
+    assert caption.endswith("Lines and marks end where a run has diverged.") and "diverged" not in drawn_run()[1]
+
+
 def test_differences_that_are_none_are_drawn_at_a_mark_that_says_0():
     assert "are drawn at 0" not in drawn_run()[1]
     fig, caption = drawn_run(ours=0.0)

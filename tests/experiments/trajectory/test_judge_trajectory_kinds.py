@@ -107,6 +107,11 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
             assert values[:, by] == pytest.approx(of_case["tmt"][0][:, at])
     result = Result("trajectory", curves={"runs": {("c", "rk4", 4): of_case}, "errors": {}})
     _, fig, caption = figures_runs.draw_run(result, case)
+    for k, turn in ((2, 1.75), (3, 1.85)):  # times the root of 3: on this side of half a turn and beyond it
+        of_case["tmt"][0][k] = case.coordinates.move(case.q, np.full(case.coordinates.nv, turn))
+    beyond = figures_lines.drawn(case, of_case["tmt"][0])
+    balls = [by for kind, _, by in case.coordinates.places.joints if kind == "ball"]
+    assert all(np.isnan(beyond[3, by]).all() and np.isfinite(beyond[:3, by]).all() for by in balls) and balls
     assert fig.axes[0].get_ylabel() == "position, rad or m" and "Of a ball the turn from its start is drawn" in caption
     assert values.shape == (5, count)
 
