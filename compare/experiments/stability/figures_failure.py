@@ -83,10 +83,15 @@ def draw_silent(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     if reset["caught_in_it_s"] is not None:
         left.axvline(reset["caught_in_it_s"], color=RED, linestyle="--", label="caught here")
     left.axhline(gain["range"], color="black", linewidth=0.8, linestyle=":", label="range of the potential")
-    left.set(xlabel="time, s", ylabel="energy gained, J", xlim=(0, reset["t"][-1]), title="Euler, automatic reset on")
+    left.set(
+        xlabel="time, s",
+        ylabel="energy gained, J",
+        xlim=(0, reset["t"][-1]),
+        title="MuJoCo's Euler, automatic reset on",
+    )
     right.plot(gain["t"], gain["energy"] - gain["energy"][0], ".-", color=BLUE, markersize=4, linewidth=0.8)
     right.axhline(gain["range"], color="black", linewidth=0.8, linestyle=":")
-    right.set(ylabel="energy gained, J", title="implicit")
+    right.set(ylabel="energy gained, J", title="MuJoCo's implicit")
     right.tick_params(labelbottom=False)
     under.plot(gain["t"], gain["smallest"], ".-", color=GREEN, markersize=3, linewidth=0.8)
     under.axhline(0.0, color="black", linewidth=0.6)
