@@ -12,6 +12,7 @@ import numpy as np
 from .verdict import Section
 
 MOST_BYTES = 280_000  # of the motion in the page
+STICK_BYTES = 48  # of a stick in the picture without script
 FEWEST = 8  # one of so many pictures of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
 WIDE, HIGH, BORDER = 1000, 480, 45  # of what is drawn, in its own units
@@ -66,7 +67,7 @@ def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dic
         scenes = [inlined_scene(one, stride) for one in drawn[:count]]
         text = json.dumps({"engines": engines, "scenes": scenes}, separators=(",", ":"), allow_nan=False)
         text = text.replace("<", "\\u003c")
-        if len(text.encode()) <= MOST_BYTES:
+        if len(text.encode()) + STICK_BYTES * len(scenes[0]["links"]) <= MOST_BYTES:
             return text, stride, scenes
         if stride < FEWEST or count == 1:
             stride *= 2

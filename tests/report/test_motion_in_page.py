@@ -126,7 +126,7 @@ def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes_and_both_are_sai
     largest = page_of(*(drawn(f"scene {k}", points=400, rng=rng) for k in range(6)))
     assert "One of 8 pictures of each scene is in this page. Not in this page: scene " in largest
     assert len(data_of(largest)["scenes"]) < 6
-    beyond = page_of(drawn(points=4000, rng=rng))
+    beyond = page_of(drawn(points=3000, rng=rng))
     assert re.search(r"One of (16|32|64) pictures of each scene", beyond)
     for text in (small, larger, largest, beyond):
         assert len(text.encode()) <= 300_000
