@@ -127,7 +127,7 @@ def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes_and_both_are_sai
     assert "One of 8 pictures of each scene is in this page. Not in this page: scene " in largest
     assert len(data_of(largest)["scenes"]) < 6
     beyond = page_of(drawn(points=3000, rng=rng))
-    assert re.search(r"One of (16|32|64) pictures of each scene", beyond)
+    assert re.search(r"One of \d\d+ pictures of each scene", beyond)
     for text in (small, larger, largest, beyond):
         assert len(text.encode()) <= 300_000
     scene = data_of(larger)["scenes"][0]
