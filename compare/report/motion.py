@@ -35,7 +35,7 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     data, stride, scenes = inlined(drawn, engines)
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
     first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
-    note = f"The {robot.noun} is seen from where its sketch is. "
+    note = f"The {robot.noun} is seen as in its sketch. "
     if stride > 1:
         note += f"One of {stride} pictures of each scene is in this page. "
     if len(scenes) < len(drawn):
@@ -50,6 +50,7 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
         height=HIGH,
         wide=20 if few else 9,
         ring=16 if few else 7,
+        base=scenes[0]["base"],
         first=first,
         second=second,
         options="".join(f"<option>{html.escape(scene['name'])}</option>" for scene in scenes),
@@ -93,6 +94,7 @@ def inlined_scene(one: object, stride: int) -> dict:
         "pause": max(1, round(1000.0 * dt * slow)),
         "unit": one.unit,
         "still": alive[-1],
+        "base": "M{} {}m-18-18h36v36h-36z".format(*ours[0][:2]) if one.fixed else "",
         "links": [list(link) for link in one.links],
         "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in one.apart[::stride]],
         "paths": [shorter(ours, [()] * len(ours)), shorter(theirs, ours)],

@@ -26,7 +26,7 @@ def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None)
         ways[1], off = (np.where((t >= ended).reshape(-1, *[1] * (v.ndim - 1)), np.nan, v) for v in (ways[1], off))
     links = [(k, k + 1) for k in range(points - 1)]
     return Drawn(scene, "RK4, dt = 5/128 s", t, dict(zip(("tmt", "mujoco"), ways)), links, off, "rad",
-                 {"tmt": None, "mujoco": ended}, dict.fromkeys(("tmt", "mujoco")), "What is seen.")  # fmt: skip
+                 {"tmt": None, "mujoco": ended}, dict.fromkeys(("tmt", "mujoco")), "What is seen.", True)  # fmt: skip
 
 
 def page_of(*scenes, label="TMT") -> str:
@@ -109,6 +109,13 @@ def test_a_picture_is_there_without_script_and_in_print():
         x, y, *_ = pictures[-1]
         assert f'<path class="{name}" d="M{x} {y}L' in text
     assert '<div class="controls" hidden>' in text
+
+
+def test_where_a_robot_is_fixed_there_is_a_frame():
+    scene = data_of(page_of(drawn()))["scenes"][0]
+    x, y = pictures_of(scene)[0][0][:2]
+    assert scene["base"] == f"M{x} {y}m-18-18h36v36h-36z" and scene["base"] in page_of(drawn())
+    assert data_of(page_of(drawn()._replace(fixed=False)))["scenes"][0]["base"] == ""
 
 
 def test_names_cannot_break_the_page():

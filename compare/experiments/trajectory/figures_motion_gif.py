@@ -114,9 +114,8 @@ def text_of_scene(scene: Drawn, label: str, place: tuple) -> Image.Image:
     pen.text((SIZE[0] - 16, 50), f"{scene.run}{slower(scene)}", fill=255, font=font(14), anchor="ra")
     for at, name in zip(NAMES_AT, (label, LABELS["mujoco"])):
         pen.text((at + 48, 62), name, fill=255, font=font(16), anchor="lm")
-    base = np.concatenate([path[:, 0] for path in scene.points.values()])
-    if np.nanmax(np.abs(base - base[0])) < 1e-9:
-        x, y = place[1] + place[0] * base[0] * [1.0, -1.0]
+    if scene.fixed:
+        x, y = place[1] + place[0] * next(iter(scene.points.values()))[0, 0] * [1.0, -1.0]
         pen.rectangle([x - 11, y - 11, x + 11, y + 11], outline=255, width=2)
     return text
 
