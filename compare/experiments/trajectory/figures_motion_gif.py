@@ -77,6 +77,9 @@ def picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image.Ima
     words = [f"{capital(LABELS[name])} has diverged" for name in gone]
     words = words or [f"apart in any joint by at most {scene.apart[k]:.2g} {scene.unit}"]
     write((16, SIZE[1] - 28), "; ".join(words))
+    left = [(time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]]
+    words = [f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left)]
+    write((SIZE[0] - 16, 68), "; ".join(words), anchor="ra", font=font(14))
     shades = []
     for which, path in enumerate(scene.points.values()):
         mask = Image.new("L", (FINE * SIZE[0], FINE * (SIZE[1] - BOTTOM)))
