@@ -65,7 +65,7 @@ def examine(
             add_problems(crash or result, own.equations.problems, said)
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
-        others = overview.needed(name, names, {section.name: section.result for section in sections})
+        others = overview.results_needed(name, names, {section.name: section.result for section in sections})
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures", others))
         new = new_causes(setup, sections, causes)
         causes = new + causes
@@ -205,7 +205,7 @@ def draw(
                     file += "_"  # names that differ in signs alone may give one file
                 path = folder / f"{file}.png"
                 with writing(path), quiet(robot):
-                    images.save(figure, path)
+                    images.save_figure(figure, path)
                 drawn.append((file, caption))
             except OSError:
                 raise

@@ -11,16 +11,16 @@ from matplotlib.patheffects import withStroke
 
 from ..judge.check import Result
 from ..judge.scale import FACTOR
-from . import overview
+from . import engines_apart, methods_compared, overview
 from .style import BLUE, GREEN, GREY, ORANGE, PINK, RED, plain
 
 SIZE = (4.2, 2.75)  # inches: about 400 px wide on the first screen
-LEAST, MOST = 1e-3, 1e6  # eps: where what is zero, and what is farther, is drawn
+LEAST_EPS, MOST_EPS = 1e-3, 1e6  # eps: where what is zero, and what is farther, is drawn
 LEAST_SHARE, MOST_SHARE = 1e-4, 1e3  # of a band
-ROWS = 9  # scenes or methods in one picture
-COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
-MARKS = {"mujoco": "s", "tmt": "o", "scipy": "^", "heyoka": "D"}
-SCHEMES = {
+MOST_IN_A_PICTURE = 9  # scenes or methods in one picture
+COLOUR_OF_ENGINE = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
+MARK_OF_ENGINE = {"mujoco": "s", "tmt": "o", "scipy": "^", "heyoka": "D"}
+NAMES_OF_SCHEMES = {
     "rk4": "RK4",
     "semi_implicit_euler": "semi-implicit\nEuler",
     "explicit_euler": "explicit Euler",
@@ -32,7 +32,12 @@ SCHEMES = {
 
 def pictures(experiment: str, results: Mapping[str, Result], robot: object) -> Iterator[partial]:
     """Calls that draw what can be drawn once this experiment is done, each returning (file name, figure, caption)."""
-    draw = {"agreement": draw_agreement, "scenes": draw_scenes, "times": draw_times, "limits": draw_limits}
+    draw = {
+        "agreement": picture_of_agreement,
+        "scenes": picture_of_scenes,
+        "times": picture_of_times,
+        "limits": picture_of_limits,
+    }
     for name in overview.drawn_with(experiment, results):
         if has_data(name, results):
             yield partial(draw[name], results, robot)
@@ -41,11 +46,11 @@ def pictures(experiment: str, results: Mapping[str, Result], robot: object) -> I
 def has_data(name: str, results: Mapping[str, Result]) -> bool:
     """Whether there is something to draw."""
     if name == "agreement":
-        return bool(overview.agreements(results))
+        return bool(engines_apart.agreements(results))
     (result,) = (results[need] for need in overview.PICTURES[name])
     if name == "times":
-        return bool(overview.best_curves(result))
-    return bool(result.rows if name == "scenes" else overview.limits_found(result))
+        return bool(methods_compared.best_curves(result))
+    return bool(result.rows if name == "scenes" else methods_compared.limits_found(result))
 
 
 def empty(height: float = SIZE[1]) -> tuple[Figure, Axes]:
@@ -64,9 +69,9 @@ def named_rows(ax: Axes, names: list[str], passed: list[bool]) -> None:
     ax.tick_params(axis="y", length=0)
 
 
-def draw_agreement(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
+def picture_of_agreement(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
     """M, h and accelerations: how far the engines are apart, and each from exact, in eps, beside the tolerance."""
-    found, label = overview.agreements(results), next(iter(results.values())).label
+    found, label = engines_apart.agreements(results), next(iter(results.values())).label
     fig, ax = empty()
     looks = (
         ("apart", f"{label} to MuJoCo", "D", "black", -0.22),
@@ -77,22 +82,26 @@ def draw_agreement(results: Mapping[str, Result], robot: object) -> tuple[str, F
         values = [(place, getattr(one, part)) for place, one in enumerate(found)]
         known = [(place, value) for place, value in values if value is not None]
         if known:
-            at = [min(max(value, LEAST), MOST) for _, value in known]
+            at = [min(max(value, LEAST_EPS), MOST_EPS) for _, value in known]
             rows = [place + shift for place, _ in known]
-            ax.hlines(rows, LEAST, at, color=colour, linewidth=1.2)
+            ax.hlines(rows, LEAST_EPS, at, color=colour, linewidth=1.2)
             ax.plot(at, rows, mark, color=colour, markersize=5, label=text)
     for place, one in enumerate(found):
         if one.apart is not None:
             text = f"{one.apart:.2g}" if math.isfinite(one.apart) else "no number"
             far = one.apart > 1e4
-            ax.annotate(text, (min(max(one.apart, LEAST), MOST), place - 0.22), (-6 if far else 6, 5 if far else 0),
+            ax.annotate(text, (min(max(one.apart, LEAST_EPS), MOST_EPS), place - 0.22), (-6 if far else 6, 5 if far else 0),
                         textcoords="offset points", fontsize=8, va="bottom" if far else "center",
                         ha="right" if far else "left", color="black" if one.passed else RED)  # fmt: skip
     beyond_tolerance(ax, FACTOR, f"{FACTOR:g} eps")
-    ax.set(xscale="log", xlim=(LEAST, MOST if any(not one.passed for one in found) else 2e3), xlabel="eps of the scale")
+    ax.set(
+        xscale="log",
+        xlim=(LEAST_EPS, MOST_EPS if any(not one.passed for one in found) else 2e3),
+        xlabel="eps of the scale",
+    )
     named_rows(ax, [one.name.replace(" ", "\n", len(one.name) > 12) for one in found], [one.passed for one in found])
     fig.legend(loc="outside upper center", ncols=3, fontsize=7.5, handletextpad=0.1, columnspacing=0.8)
-    return f"{overview.BEGINNING}agreement", fig, overview.agreement_in_words(found, label)
+    return f"{overview.BEGINNING}agreement", fig, engines_apart.agreement_in_words(found, label)
 
 
 def beyond_tolerance(ax: Axes, tolerance: float, text: str) -> None:
@@ -104,11 +113,11 @@ def beyond_tolerance(ax: Axes, tolerance: float, text: str) -> None:
                 path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
 
 
-def draw_scenes(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
+def picture_of_scenes(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
     """Scene by scene: the difference over its band at the left; at the right for how long it is judged, and what ends it."""
     result = results["trajectory"]
-    found = overview.scene_runs(result, robot)
-    wrong_first = sorted(found, key=lambda one: one.passed)[:ROWS]
+    found = engines_apart.scene_runs(result, robot)
+    wrong_first = sorted(found, key=lambda one: one.passed)[:MOST_IN_A_PICTURE]
     shown = [one for one in found if one in wrong_first]
     fig = Figure(figsize=SIZE, layout="constrained")
     fig.get_layout_engine().set(w_pad=0.03, h_pad=0.03)
@@ -151,19 +160,19 @@ def draw_scenes(results: Mapping[str, Result], robot: object) -> tuple[str, Figu
     left.set_ylim(len(shown) - 0.4, -0.6)
     fig.legend(handles=handles, loc="outside upper center", ncols=5, fontsize=7, handletextpad=0.3, columnspacing=0.7,
                handlelength=1.0)  # fmt: skip
-    return f"{overview.BEGINNING}scenes", fig, overview.scenes_in_words(found, result.label)
+    return f"{overview.BEGINNING}scenes", fig, engines_apart.scenes_in_words(found, result.label)
 
 
-def draw_times(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
+def picture_of_times(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
     """Time against error: the best settings of each engine in one scene, the cheapest within the target ringed."""
     result = results["speed"]
     unit = result.curves.get("unit", "rad")
     fig, ax = empty()
-    for curve in overview.best_curves(result):
-        colour = COLOURS.get(curve.engine, GREY)
+    for curve in methods_compared.best_curves(result):
+        colour = COLOUR_OF_ENGINE.get(curve.engine, GREY)
         errors = np.maximum(curve.errors, 1e-16)
-        ax.plot(errors, curve.milliseconds, marker=MARKS.get(curve.engine, "v"), markersize=3.5, linewidth=1.2,
-                color=colour, label=overview.named(curve.engine))  # fmt: skip
+        ax.plot(errors, curve.milliseconds, marker=MARK_OF_ENGINE.get(curve.engine, "v"), markersize=3.5, linewidth=1.2,
+                color=colour, label=methods_compared.engine_in_print(curve.engine))  # fmt: skip
         if curve.cheapest:
             method, time = curve.cheapest
             at = curve.milliseconds.index(time)
@@ -173,36 +182,42 @@ def draw_times(results: Mapping[str, Result], robot: object) -> tuple[str, Figur
                 ax.annotate(f"{method} {time:.2g} ms", (errors[at], time), (-3, 8 if above else -9), fontsize=8, color=colour,
                             textcoords="offset points", ha="right" if above else "left",
                             va="bottom" if above else "top")  # fmt: skip
-    ax.axvline(overview.TARGET, color=GREY, linestyle=":", linewidth=1.2)
+    ax.axvline(methods_compared.ERROR_ASKED, color=GREY, linestyle=":", linewidth=1.2)
     ax.set(xscale="log", yscale="log", xlabel=f"worst error, {unit} (finer to the right)", ylabel="time, ms")
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
-    return f"{overview.BEGINNING}times", fig, overview.times_in_words(result)
+    return f"{overview.BEGINNING}times", fig, methods_compared.times_in_words(result)
 
 
-def draw_limits(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
+def picture_of_limits(results: Mapping[str, Result], robot: object) -> tuple[str, Figure, str]:
     """The largest stable step, method by method: as predicted (line) and as observed (mark), at every posture."""
-    found = overview.limits_found(results["stability"])
-    schemes = list(dict.fromkeys(one.scheme for one in found))[:ROWS]
+    found = methods_compared.limits_found(results["stability"])
+    schemes = list(dict.fromkeys(one.scheme for one in found))[:MOST_IN_A_PICTURE]
     fig, ax = empty()
-    known = overview.both(found)
+    known = methods_compared.known_limits(found)
     ends = [dt for one in known for dt in (one.predicted, one.observed)] or [1e-3, 1.0]
     low, high = min(ends) / 2, max(ends) * 2
     for place, scheme in enumerate(schemes):
         of = [one for one in found if one.scheme == scheme]
-        for one in overview.both(of):
+        for one in methods_compared.known_limits(of):
             ax.vlines(one.predicted, place - 0.38, place + 0.38, color=GREY, linewidth=1.0)
             shift = 0.17 if one.engine == "mujoco" else -0.17
             mark = ("s" if one.engine == "mujoco" else "o") if one.passed else "X"
-            colour = COLOURS.get(one.engine, GREY) if one.passed else RED
-            ax.plot(one.observed, place + shift, mark, color=colour, markersize=4.5, alpha=0.85)
+            colour = COLOUR_OF_ENGINE.get(one.engine, GREY) if one.passed else RED
+            ax.plot(one.observed, place + shift, mark, color=(colour, 0.85), markersize=4.5)
         kinds = {one.kind for one in of}
         if "finite" not in kinds:
             count = sum(one.kind == "never_fails" for one in of)
-            text = "no limit" if count == len(of) else f"no limit at {count} of {len(of)}" if count else "fails at every step"
+            text = (
+                "no limit"
+                if count == len(of)
+                else f"no limit at {count} of {len(of)}"
+                if count
+                else "fails at every step"
+            )
             ax.text(low * 1.15, place, text, va="center", fontsize=8, color=GREY)
-    names = [SCHEMES.get(scheme, scheme.replace("_", " ")) for scheme in schemes]
+    names = [NAMES_OF_SCHEMES.get(scheme, scheme.replace("_", " ")) for scheme in schemes]
     named_rows(ax, names, [all(one.passed for one in found if one.scheme == scheme) for scheme in schemes])
     ax.tick_params(axis="y", labelsize=8)
     ax.set(xscale="log", xlim=(low, high), xlabel="largest stable dt, s")
@@ -215,4 +230,4 @@ def draw_limits(results: Mapping[str, Result], robot: object) -> tuple[str, Figu
         *ax.plot([], [], "s", color=ORANGE, markersize=4.5, label="observed, MuJoCo"),
     ]
     fig.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=7.5, handletextpad=0.1, columnspacing=0.8)
-    return f"{overview.BEGINNING}limits", fig, overview.limits_in_words(found)
+    return f"{overview.BEGINNING}limits", fig, methods_compared.limits_at_a_glance(found)

@@ -35,7 +35,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     save(folder / "report.md", markdown.joined([*parts.lines, *paragraphs]) if text is None else text)
     if html is not None:
         save(folder / "index.html", html)
-    images.clear(folder / "figures")
+    images.clear_webp(folder / "figures")
     reference = report.reference
     results = {
         "passed": passed(report.sections) and not parts.broken,

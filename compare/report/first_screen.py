@@ -7,13 +7,13 @@ from pathlib import Path
 import pandas as pd
 
 from .markup import html_table, image, of_section, words
-from .one_number import number_in_words
+from .one_number import one_number
 from .overview import BEGINNING, PICTURES
 from .parts import Parts
 from .tables import failing, of_causes
 from .verdict import Report, Section, failures, passed, standing
 
-SHOWN_CAUSES = 4  # on the first screen; all of them stand below it
+FIRST_CAUSES = 4  # on the first screen; all of them stand below it
 TITLES = {
     "agreement": "The same equations?",
     "scenes": "The same motion?",
@@ -21,7 +21,7 @@ TITLES = {
     "limits": "Limits of the step",
 }
 ALTERNATIVES = {  # what stands for a picture that is not seen
-    "agreement": "Chart: for M, h and accelerations how far the engines are apart, and each from exact, in eps beside the tolerance",
+    "agreement": "Chart: how far the engines are apart in M, h and accelerations, and from exact, in eps beside the tolerance",
     "scenes": "Chart: for each scene the difference of the engines over its band of rounding, and for how long it is judged",
     "times": "Chart: time against worst error, a curve of the cheapest settings of each engine",
     "limits": "Chart: for each method the largest stable step, predicted and observed",
@@ -35,7 +35,9 @@ def verdict_in_html(report: Report, parts: Parts) -> str:
     good = passed(report.sections) and not parts.broken
     lines = [rest] * bool(rest) + [*parts.lines, *report.top]
     small = "".join(f'<p class="small">{words(line)}</p>' for line in lines)
-    return f'<div class="verdict {"good" if good else "bad"}"><p class="big">{mark(good)} {words(first)}</p>{small}</div>'
+    return (
+        f'<div class="verdict {"good" if good else "bad"}"><p class="big">{mark(good)} {words(first)}</p>{small}</div>'
+    )
 
 
 def mark(good: bool | None) -> str:
@@ -57,7 +59,7 @@ def list_in_html(report: Report, parts: Parts) -> str:
 def line_in_html(section: Section) -> str:
     """The line of one experiment, with a link to its section."""
     good, said = standing(section)
-    number = number_in_words(section)
+    number = one_number(section)
     return (
         f'<li class="{"good" if good else "none" if good is None else "bad"}">{mark(good)}<div>'
         f'<a href="#{section.name}">{html.escape(section.title)}</a> <b>{html.escape(said)}</b>'
@@ -69,7 +71,7 @@ def line_in_html(section: Section) -> str:
 def causes_in_html(report: Report) -> str:
     """What explains that checks fail, stated beside found; the first failing checks where no cause is known; '' if none fails."""
     if report.causes:
-        few, more = report.causes[:SHOWN_CAUSES], len(report.causes) - SHOWN_CAUSES
+        few, more = report.causes[:FIRST_CAUSES], len(report.causes) - FIRST_CAUSES
         table, title = of_causes(few).drop(columns="rank"), "Cause" if len(report.causes) == 1 else "Causes"
         rest = f'<p class="small"><a href="#causes">and {more} more</a></p>' if more > 0 else ""
     else:
@@ -77,8 +79,11 @@ def causes_in_html(report: Report) -> str:
         if not failed:
             return ""
         table = pd.concat([failing(section) for section in report.sections], ignore_index=True)
-        table, title = table.head(SHOWN_CAUSES)[["experiment", "scene", "quantity", "value", "tolerance", "note"]], "Fails"
-        more = len(failed) - SHOWN_CAUSES
+        table, title = (
+            table.head(FIRST_CAUSES)[["experiment", "scene", "quantity", "value", "tolerance", "note"]],
+            "Fails",
+        )
+        more = len(failed) - FIRST_CAUSES
         rest = f'<p class="small">and {more} more, in their sections</p>' if more > 0 else ""
     return f'<div class="causes"><h2>{title}</h2>{html_table(table, title, "text")}{rest}</div>'
 
@@ -109,8 +114,9 @@ def picture(folder: Path, name: str, caption: str, sections: Sequence[Section], 
     """One picture of the first screen; fails: checks of what it shows do."""
     link = linked_figure(sections)
     title = f"{mark(False)} {TITLES[name]}" if fails else TITLES[name]
+    drawn = image(folder, BEGINNING + name, ALTERNATIVES[name])
     return (
-        f'<figure class="{"bad" if fails else "good"}"><a href="#{link}">{image(folder, BEGINNING + name, ALTERNATIVES[name])}</a>'
+        f'<figure class="{"bad" if fails else "good"}"><a href="#{link}">{drawn}</a>'
         f"<figcaption><b>{title}</b> {words(caption)}</figcaption></figure>"
     )
 

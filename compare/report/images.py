@@ -6,16 +6,16 @@ from pathlib import Path
 
 from PIL import Image
 
-COLOURS = 256  # of a palette: a chart has fewer that the eye tells apart
-KINDS = {".png": "image/png", ".webp": "image/webp", ".gif": "image/gif"}
+PALETTE = 256  # of a palette: a chart has fewer that the eye tells apart
+MEDIA = {".png": "image/png", ".webp": "image/webp", ".gif": "image/gif"}
 
 
-def save(figure: object, path: Path) -> None:
+def save_figure(figure: object, path: Path) -> None:
     """A figure of matplotlib as a PNG with a palette; beside it, until the page is written, as a WebP without loss."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
     with Image.open(drawn) as image:
-        few = image.convert("RGB").quantize(COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few = image.convert("RGB").quantize(PALETTE, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     few.save(path)
     few.convert("RGB").save(path.with_suffix(".webp"), lossless=True, method=1)
 
@@ -29,10 +29,10 @@ def embedded(path: Path) -> tuple[str, int, int]:
     least = min([path, *([beside] if beside.exists() else [])], key=lambda file: file.stat().st_size)
     with Image.open(path) as image:
         width, height = image.size
-    return f"data:{KINDS[least.suffix]};base64,{base64.b64encode(least.read_bytes()).decode()}", width, height
+    return f"data:{MEDIA[least.suffix]};base64,{base64.b64encode(least.read_bytes()).decode()}", width, height
 
 
-def clear(folder: Path) -> None:
+def clear_webp(folder: Path) -> None:
     """Take away the files that were for the page alone."""
     for path in folder.glob("*.webp"):
         path.unlink()

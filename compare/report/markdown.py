@@ -8,27 +8,27 @@ import pandas as pd
 
 from .introduction import first_lines, introduction, title
 from .markup import of_section
-from .one_number import number_in_words
+from .one_number import one_number
 from .overview import BEGINNING
 from .parts import Parts
 from .shortened import shortened
 from .tables import asked_by, failing, heading, of_causes, origins, questions, shown
 from .verdict import Report, Section, outcome, standing
 
-LINES = 300  # of the whole report, at most
+REPORT_LINES = 300  # of the whole report, at most
 
 
 class Size(NamedTuple):
     """How much of each section is written."""
 
-    rows: int  # of a table
+    rows: int  # of a table; 0: no tables
     runs: int  # of a table that has a row for each scene and integrator
     notes: int
     failing: int  # checks that fail
 
 
-SIZES = (Size(40, 60, 99, 40), Size(16, 48, 99, 20), Size(12, 48, 8, 12), Size(12, 48, 5, 8), Size(10, 48, 3, 6),
-         Size(8, 48, 2, 5), Size(6, 24, 2, 4), Size(4, 8, 1, 3))  # fmt: skip
+SECTION_SIZES = (Size(40, 60, 99, 40), Size(16, 48, 99, 20), Size(12, 48, 8, 12), Size(12, 48, 5, 8), Size(10, 48, 3, 6),
+         Size(8, 48, 2, 5), Size(6, 24, 2, 4), Size(4, 8, 1, 3), Size(2, 6, 1, 1), Size(0, 0, 1, 1))  # fmt: skip
 MAIN = ("what_should_i_use",)  # tables that stand beside a section's own
 
 
@@ -47,12 +47,16 @@ def joined(paragraphs: Sequence[str]) -> str:
 
 
 def markdown_body(report: Report, parts: Parts) -> list[str]:
-    """The paragraphs below the verdict; a part that breaks is left out. As much of each section as LINES has room for."""
-    for size in SIZES:
-        body = body_of_size(report, parts, size)
-        if joined(body).count("\n") + 2 * len(report.top) + 2 * len(parts.lines) + 6 <= LINES:
-            break
-    return body
+    """The paragraphs below the verdict; a part that breaks is left out. As much of each section as REPORT_LINES has room for."""
+    fewest, most, bodies = 0, len(SECTION_SIZES) - 1, {}
+    while fewest < most:  # the first size that fits
+        middle = (fewest + most) // 2
+        bodies[middle] = body_of_size(report, parts, SECTION_SIZES[middle])
+        if joined(bodies[middle]).count("\n") + 2 * len(report.top) + 2 * len(parts.lines) + 6 <= REPORT_LINES:
+            most = middle
+        else:
+            fewest = middle + 1
+    return bodies.get(most) or body_of_size(report, parts, SECTION_SIZES[most])
 
 
 def body_of_size(report: Report, parts: Parts, size: Size) -> list[str]:
@@ -70,9 +74,7 @@ def body_of_size(report: Report, parts: Parts, size: Size) -> list[str]:
 
 def experiments_in_markdown(report: Report) -> list[str]:
     """A line for each experiment, and the pictures that matter."""
-    rows = [
-        (section.name, section.title, standing(section)[1], number_in_words(section)) for section in report.sections
-    ]
+    rows = [(section.name, section.title, standing(section)[1], one_number(section)) for section in report.sections]
     rows += [(name, "", "skipped", reason) for name, reason in report.skipped]
     table = pd.DataFrame(rows, columns=["experiment", "asked", "outcome", "found"])
     pictures = [one for section in report.sections for one in section.figures if one[0].startswith(BEGINNING)]
@@ -90,10 +92,10 @@ def answers_in_markdown(sections: Sequence[Section], robot: object) -> list[str]
     return [f"## {asked_by(robot)}", md_table(asked)] if len(asked) else []
 
 
-def section_in_markdown(section: Section, size: Size = SIZES[0]) -> list[str]:
+def section_in_markdown(section: Section, size: Size = SECTION_SIZES[0]) -> list[str]:
     """The paragraphs of one experiment: what was found, the tolerance, the worst rows, figures, and where the rest is."""
     failed, notes = failing(section), section.result.notes
-    number = number_in_words(section)
+    number = one_number(section)
     lines = [f"## {section.title}", f"**{outcome(section)}** {number}{'.' if number else ''}"]
     lines += [f"- *Claim:* {section.claim}", f"- *Tolerance:* {section.tolerance}"]
     lines += [f"- {note}" for note in notes[: size.notes]]
@@ -113,7 +115,7 @@ def section_in_markdown(section: Section, size: Size = SIZES[0]) -> list[str]:
 def table_in_markdown(section: Section, name: str, rows: Sequence[dict], size: Size) -> list[str]:
     """The worst rows of a table, and which these are."""
     columns = section.result.shown if name == section.name else None
-    if columns == [] or name in section.result.filed:
+    if columns == [] or name in section.result.filed or not size.rows:
         return []
     few, which = shortened(rows, size.rows, size.runs)
     if not few:

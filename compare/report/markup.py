@@ -18,11 +18,18 @@ def words(text: str) -> str:
 
 def html_table(table: pd.DataFrame, label: str, kind: str = "data") -> str:
     """A table that scrolls sideways where it is too wide, by keyboard too. label: what it is, for who does not see it."""
-    text = table.to_html(index=False, border=0, classes=kind, na_rep="").replace("<th>", '<th scope="col">')
-    return f'<div class="scroll" role="region" tabindex="0" aria-label="{html.escape(label)}">{text}</div>'
+    head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in table.columns)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
+        for row in table.astype(str).to_numpy()
+    )
+    return (
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{html.escape(label)}"><table class="{kind}">'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+    )
 
 
-def folded(summary: str, text: str) -> str:
+def details(summary: str, text: str) -> str:
     """What is shown to who asks for it."""
     return f"<details><summary>{html.escape(summary)}</summary>{text}</details>"
 
@@ -35,10 +42,7 @@ def of_section(section: Section) -> list[tuple[str, str]]:
 def image(folder: Path, file: str, alternative: str) -> str:
     """A figure inside the page. alternative: what it shows, in words."""
     address, width, height = embedded(folder / "figures" / f"{file}.png")
-    return (
-        f'<img alt="{html.escape(alternative)}" width="{width}" height="{height}" decoding="async" '
-        f'src="{address}">'
-    )
+    return f'<img alt="{html.escape(alternative)}" width="{width}" height="{height}" src="{address}">'
 
 
 def figure(folder: Path, file: str, caption: str) -> str:

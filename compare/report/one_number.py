@@ -1,15 +1,17 @@
-"""The one number of each experiment, for its line on the first screen: computed from its result, and it can come out either way."""
+"""The one number of each experiment, for its line on the first screen, computed from its result."""
 
 from collections.abc import Callable
 
 from ..judge.check import Result
-from .overview import best_curves, both, cheapest_in_words, fold, largest, limits_found
+from .engines_apart import largest_known
+from .methods_compared import best_curves, cheapest_of_curves, known_limits, limits_found
+from .overview import times_in_print
 from .verdict import Section
 
 
-def number_in_words(section: Section) -> str:
+def one_number(section: Section) -> str:
     """The number of a section, with its unit; how many checks pass where its result has no such number."""
-    find = NUMBERS.get(section.name)
+    find = FINDERS.get(section.name)
     return (find(section.result) if find and section.result.rows else "") or of_checks(section.result)
 
 
@@ -19,13 +21,13 @@ def of_checks(result: Result) -> str:
     passing = sum(check.passed for check in result.checks)
     if not result.checks:
         return ""
-    most = f", at most {percent(max(used))} of a tolerance" if used else ""
+    most = f", at most {share_in_words(max(used))} of a tolerance" if used else ""
     return f"{passing} of {len(result.checks)} checks pass{most}"
 
 
-def percent(share: float) -> str:
-    """A share of a tolerance: in percent, or as a multiple where it is more."""
-    return f"{fold(share)} times" if share > 1.0 else f"{100 * share:.2g} %"
+def share_in_words(share: float) -> str:
+    """A share of a tolerance: in share_in_words, or as a multiple where it is more."""
+    return f"{times_in_print(share)} times" if share > 1.0 else f"{100 * share:.2g} %"
 
 
 def of_parameters(result: Result) -> str:
@@ -61,17 +63,19 @@ def of_agreement(result: Result) -> str:
     top = max(known, key=lambda row: row["difference_over_bar"])
     share = top["difference_over_bar"]
     apart = f"{top['worst_difference']:.2g} {top['unit']}".rstrip()
-    return f"{apart} apart in {top['quantity']}: {percent(share)}{' of' if share <= 1.0 else ''} the tolerance"
+    return f"{apart} apart in {top['quantity']}: {share_in_words(share)}{' of' if share <= 1.0 else ''} the tolerance"
 
 
 def of_trajectory(result: Result) -> str:
     """How much of the band of rounding the runs use, of how many scenes."""
-    share = largest([row["difference_over_band"] for row in result.rows])
+    share = largest_known([row["difference_over_band"] for row in result.rows])
     scenes = len({row["scene"] for row in result.rows})
     if share is None:
         return ""
     of = "" if share > 1.0 else "of "
-    return f"{scenes} {'scenes' if scenes > 1 else 'scene'}, {percent(share)} {of}the rounding band apart at most"
+    return (
+        f"{scenes} {'scenes' if scenes > 1 else 'scene'}, {share_in_words(share)} {of}the rounding band apart at most"
+    )
 
 
 def of_diagnosis(result: Result) -> str:
@@ -86,13 +90,13 @@ def of_diagnosis(result: Result) -> str:
 
 def of_speed(result: Result) -> str:
     """What is cheapest within the error asked for."""
-    return cheapest_in_words(best_curves(result), result.curves.get("unit", "rad"))
+    return cheapest_of_curves(best_curves(result), result.curves.get("unit", "rad"))
 
 
 def of_stability(result: Result) -> str:
     """How many limits of the step are as predicted, and how nearly."""
     found = limits_found(result)
-    known, wrong = both(found), [one for one in found if not one.passed]
+    known, wrong = known_limits(found), [one for one in found if not one.passed]
     if wrong:
         return f"{len(wrong)} of {len(found)} step limits not as predicted"
     off = max((abs(one.observed / one.predicted - 1.0) for one in known), default=0.0)
@@ -108,7 +112,7 @@ def of_reduction(result: Result) -> str:
     return f"a step is up to {top['speedup']:.2g} times as fast with {top['hinges']} alone ({top['scene']})"
 
 
-NUMBERS: dict[str, Callable[[Result], str]] = {
+FINDERS: dict[str, Callable[[Result], str]] = {
     "parameters": of_parameters,
     "published": of_published,
     "kinematics": of_agreement,

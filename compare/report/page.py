@@ -9,16 +9,16 @@ import pandas as pd
 
 from .first_screen import causes_in_html, list_in_html, mark, pictures_in_html, verdict_in_html
 from .introduction import first_lines, introduction, title
-from .markup import figure, folded, html_table, of_section, words
+from .markup import details, figure, html_table, of_section, words
 from .motion import motion_in_html
-from .one_number import number_in_words
+from .one_number import one_number
 from .parts import Parts
 from .shortened import shortened
 from .tables import asked_by, closest_checks, failing, heading, of_causes, origins, questions, shown
 from .verdict import Report, Section, outcome, passed, standing
 
 MOST_ROWS, MOST_OF_RUNS = 40, 60  # of a table in the page; its file has all
-FIRST_NOTES = 3  # that stand open, the others are folded
+FIRST_NOTES = 3  # that stand open, the others are details
 
 
 def page(report: Report, body: Sequence[str], parts: Parts) -> str:
@@ -47,7 +47,9 @@ def page_body(folder: Path, report: Report, parts: Parts) -> list[str]:
     texts += [f'<p class="wide">{words(parts.made("the introduction", "", introduction, robot))}</p>']
     if causes:
         table = html_table(of_causes(causes), "Causes", "text")
-        texts.append(f'<section id="causes"><h2>Causes (1: an option or a convention, 2: a number)</h2>{table}</section>')
+        texts.append(
+            f'<section id="causes"><h2>Causes (1: an option or a convention, 2: a number)</h2>{table}</section>'
+        )
     texts += parts.made("the questions", [], answers_in_html, sections, robot)
     for section in sections:
         missing = [top(section), "<p>This section could not be made.</p>"]
@@ -75,10 +77,10 @@ def top(section: Section) -> str:
 
 
 def section_in_html(folder: Path, section: Section) -> list[str]:
-    """What stands in the page of one experiment: what was found, figures, the tolerance, and the details folded."""
+    """What stands in the page of one experiment: what was found, figures, the tolerance, and the details details."""
     good, _ = standing(section)
     kind = "good" if good else "none" if good is None else "bad"
-    number, notes = number_in_words(section), section.result.notes
+    number, notes = one_number(section), section.result.notes
     texts = [
         top(section),
         f'<p class="outcome {kind}">{mark(good)} <strong>{html.escape(outcome(section))}</strong> {words(number)}.</p>',
@@ -88,12 +90,12 @@ def section_in_html(folder: Path, section: Section) -> list[str]:
     if len(failed):
         many = f"{len(failed)} checks that fail"
         table = html_table(failed.head(MOST_ROWS), many)
-        texts += ["<p><strong>Checks that fail:</strong></p>", table if len(failed) <= 8 else folded(many, table)]
+        texts += ["<p><strong>Checks that fail:</strong></p>", table if len(failed) <= 8 else details(many, table)]
     texts += [listed_in_html(notes[:FIRST_NOTES])] if notes else []
     texts += [figure(folder, file, caption) for file, caption in of_section(section)]
     texts += [f"<h3>What the tolerance is, and why</h3><p>{words(section.tolerance)}</p>"] if section.tolerance else []
     more = notes[FIRST_NOTES:]
-    texts += [folded(f"Further findings ({len(more)})", listed_in_html(more))] if more else []
+    texts += [details(f"Further findings ({len(more)})", listed_in_html(more))] if more else []
     texts += [table_in_html(section, name, rows) for name, rows in section.tables.items()]
     return [*texts, checks_in_html(section)]
 
@@ -103,7 +105,7 @@ def listed_in_html(notes: Sequence[str]) -> str:
 
 
 def table_in_html(section: Section, name: str, rows: Sequence[dict]) -> str:
-    """A table, folded, with the rows that a reader needs; or where it stands, if its file alone has it."""
+    """A table, details, with the rows that a reader needs; or where it stands, if its file alone has it."""
     file = f"tables/{name}.csv"
     link = f'<a href="{file}">{file}</a>'
     columns = section.result.shown if name == section.name else None
@@ -112,15 +114,15 @@ def table_in_html(section: Section, name: str, rows: Sequence[dict]) -> str:
     few, which = shortened(rows, MOST_ROWS, MOST_OF_RUNS)
     title = f"{heading(name)}: {which or f'{len(rows)} rows'}"
     table = html_table(shown(pd.DataFrame(few), columns), heading(name)) if few else ""
-    return folded(title, f"{table}<p>All columns, {len(rows)} rows: {link}, beside this page.</p>")
+    return details(title, f"{table}<p>All columns, {len(rows)} rows: {link}, beside this page.</p>")
 
 
 def checks_in_html(section: Section) -> str:
-    """The checks that come closest to their tolerance, folded."""
+    """The checks that come closest to their tolerance, details."""
     checks = section.result.checks
     if not checks:
         return "<p>Nothing was checked.</p>"
     table = closest_checks(section, MOST_ROWS)
     which = f"All {len(checks)} checks" if len(table) == len(checks) else f"{len(checks)} checks: {len(table)} of them"
     more = "" if len(table) == len(checks) else "<p>All of them: results.json, beside this page.</p>"
-    return folded(which, html_table(table, "Checks") + more)
+    return details(which, html_table(table, "Checks") + more)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from ..judge.words import listed
 
-GROUPS = (  # the columns that tell groups apart: the first whose columns a table has, and which gives few enough
+TOLD_APART_BY = (  # the columns that tell groups apart: the first whose columns a table has, and which gives few enough
     ("scene", "engine_integrator"),
     ("scene", "target_rad"),
     ("scene", "target"),
@@ -17,8 +17,12 @@ GROUPS = (  # the columns that tell groups apart: the first whose columns a tabl
     ("scene",),
 )
 SHARES = ("difference_over_band", "difference_over_bar")
-PREDICTED = (("predicted_dt_s", "observed_dt_s"), ("predicted_growth", "observed_growth"), ("predicted_s", "observed_s"))
-RUNS = GROUPS[0]  # a row for each of these groups is shown even where other tables are cut shorter
+PREDICTED = (
+    ("predicted_dt_s", "observed_dt_s"),
+    ("predicted_growth", "observed_growth"),
+    ("predicted_s", "observed_s"),
+)
+RUNS = TOLD_APART_BY[0]  # a row for each of these groups is shown even where other tables are cut shorter
 FEWEST = 4  # groups: fewer say too little
 
 
@@ -33,9 +37,10 @@ def shortened(rows: Sequence[dict], most: int, most_of_runs: int | None = None) 
         return rows, ""
     if "stated" in rows[0] and "compiled" in rows[0]:
         off = [row for row in rows if row.get("difference")]
-        return off[:most], f"{min(len(off), most)} of {len(off)} rows that differ, of {len(rows)}"
+        words = f"{len(off)} of {len(rows)} rows differ" if off else f"none of {len(rows)} rows differs"
+        return off[:most], words + (f", the first {most}" if len(off) > most else "")
     size = next((size for size in MEASURES if size(rows[0]) is not None), None)
-    for columns in GROUPS:
+    for columns in TOLD_APART_BY:
         if set(columns) <= set(rows[0]):
             kept = worst_of_groups(rows, columns, size)
             words = f"{'the worst' if size else 'the first'} of each {listed([c.replace('_', ' ') for c in columns])}"
