@@ -62,7 +62,7 @@ def line_in_html(section: Section) -> str:
     number = one_number(section)
     return (
         f'<li class="{"good" if good else "none" if good is None else "bad"}">{mark(good)}<div>'
-        f'<a href="#{section.name}">{html.escape(section.title)}</a> <b>{html.escape(said)}</b>'
+        f'<a href="#{section.name}">{html.escape(section.title)}</a> <strong>{html.escape(said)}</strong>'
         + (f"<small>{words(number)}</small>" if number else "")
         + "</div></li>"
     )
@@ -117,7 +117,7 @@ def picture(folder: Path, name: str, caption: str, sections: Sequence[Section], 
     drawn = image(folder, BEGINNING + name, ALTERNATIVES[name])
     return (
         f'<figure class="{"bad" if fails else "good"}"><a href="#{link}">{drawn}</a>'
-        f"<figcaption><b>{title}</b> {words(caption)}</figcaption></figure>"
+        f"<figcaption><strong>{title}</strong> {words(caption)}</figcaption></figure>"
     )
 
 
@@ -136,5 +136,5 @@ def first_figure(folder: Path, section: Section) -> str:
     file, caption = next((one for one in figures if one[0].endswith("_distances")), figures[0])
     return (
         f'<figure class="bad"><a href="#figure-{file}">{image(folder, file, caption)}</a>'
-        f"<figcaption><b>{mark(False)} {html.escape(section.title)}</b></figcaption></figure>"
+        f"<figcaption><strong>{mark(False)} {html.escape(section.title)}</strong></figcaption></figure>"
     )

@@ -1,6 +1,7 @@
 """The one number of each experiment, for its line on the first screen, computed from its result."""
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..judge.check import Result
 from .engines_apart import largest_known
@@ -11,8 +12,11 @@ from .verdict import Section
 
 def one_number(section: Section) -> str:
     """The number of a section, with its unit; how many checks pass where its result has no such number."""
-    find = FINDERS.get(section.name)
-    return (find(section.result) if find and section.result.rows else "") or of_checks(section.result)
+    find, found = FINDERS.get(section.name), ""
+    if find and section.result.rows:
+        with suppress(KeyError, TypeError):  # rows without the columns of which that number is
+            found = find(section.result)
+    return found or of_checks(section.result)
 
 
 def of_checks(result: Result) -> str:
