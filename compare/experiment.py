@@ -2,7 +2,7 @@
 
 import importlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -15,6 +15,7 @@ from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
 from .process.crash import described
 from .process.workers import WorkerEnded, Workers
+from .report import images, overview
 from .report.folder import writing
 from .report.terminal import Terminal
 from .report.verdict import Section, failures
@@ -64,7 +65,8 @@ def examine(
             add_problems(crash or result, own.equations.problems, said)
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
-        drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
+        others = overview.results_needed(name, names, {section.name: section.result for section in sections})
+        drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures", others))
         new = new_causes(setup, sections, causes)
         causes = new + causes
         say_outcome(terminal, sections[-1], time.perf_counter() - started, new)
@@ -183,25 +185,27 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
 # in the process that draws
 
 
-def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[list, list]:
+def draw(
+    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping[str, Result] | None = None
+) -> tuple[list, list]:
     """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. An error of the disk is raised.
+    the later ones alone. others: what pictures of the first screen need that can be drawn now, see report.overview. An error of
+    the disk is raised.
     """
     drawn, failed = [], []
     try:
-        for call in module(experiment).figures(result, robot):
+        for call in calls_that_draw(experiment, result, robot, others or {}):
             name, path = called(call), None
             try:
                 with quiet(robot):
                     file, figure, caption = call()
                 while file.casefold() in {other.casefold() for other, _ in drawn}:
                     file += "_"  # names that differ in signs alone may give one file
-                suffix = getattr(figure, "suffix", ".png")
-                path = folder / f"{file}{suffix}"
+                path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
                 with writing(path), quiet(robot):
-                    figure.savefig(path)
+                    images.save_figure(figure, path)
                 drawn.append((path.name.removesuffix(".png"), caption))
             except OSError:
                 raise
@@ -214,6 +218,14 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
     except Exception as error:
         failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
     return drawn, failed
+
+
+def calls_that_draw(experiment: str, result: Result, robot: Robot, others: Mapping[str, Result]) -> Iterator[Callable]:
+    """Those of the experiment's own figures, then of the pictures of the first screen."""
+    yield from module(experiment).figures(result, robot)
+    if others:
+        pictures = importlib.import_module(".report.figures_overview", __package__).pictures
+        yield from pictures(experiment, {**others, experiment: result}, robot)
 
 
 def called(call: Callable) -> str:

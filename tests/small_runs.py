@@ -18,7 +18,7 @@ from runs import in_shell, on_terminal
 from compare import experiment
 from compare.engines.mujoco import load, parse
 from compare.experiments import EXPERIMENTS, module, skipped
-from compare.report import files, verdict
+from compare.report import files, overview, verdict
 from compare.robots.arm import ARM
 
 
@@ -78,8 +78,10 @@ def report_of_arm():
         for name in EXPERIMENTS:
             of = module(name)
             section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
-            section.figures, failed = experiment.draw(name, section.result, ARM, folder / "figures")
-            sections, lost = [*sections, section], lost + failed
+            sections.append(section)
+            others = overview.results_needed(name, list(EXPERIMENTS), {one.name: one.result for one in sections})
+            section.figures, failed = experiment.draw(name, section.result, ARM, folder / "figures", others)
+            lost += failed
         words = verdict.verdict(sections, len(EXPERIMENTS))
         files.write(folder, verdict.Report(sections, ARM, {"command": "a small run"}, words))
         text = (folder / "report.md").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from .verdict import Section
 
 MOST_BYTES = 280_000  # of the motion in the page
 STICK_BYTES = 48  # of a stick in the picture without script
-FEWEST = 8  # one of so many pictures of each scene is shown before scenes are left out
+ONE_OF_MANY = 8  # one of so many pictures of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
 WIDE, HIGH, BORDER = 1000, 480, 45  # of what is drawn, in its own units
 FEW_STICKS = 6  # up to which they are drawn wide
@@ -70,7 +70,7 @@ def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dic
         text = text.replace("<", "\\u003c")
         if len(text.encode()) + STICK_BYTES * len(scenes[0]["links"]) <= MOST_BYTES:
             return text, stride, scenes
-        if stride < FEWEST or count == 1:
+        if stride < ONE_OF_MANY or count == 1:
             stride *= 2
         else:
             count -= 1

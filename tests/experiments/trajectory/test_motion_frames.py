@@ -129,7 +129,7 @@ def test_the_gif_shows_both_engines_in_every_picture_and_is_small(drawn, tmp_pat
     figure.savefig(tmp_path / "motion.gif")
     assert (tmp_path / "motion.gif").stat().st_size < 600_000
     with Image.open(tmp_path / "motion.gif") as image:
-        assert image.size == gif.SIZE and image.info["loop"] == 0 and image.n_frames > 200
+        assert image.size == gif.PIXELS and image.info["loop"] == 0 and image.n_frames > 200
         seconds = 0.0
         for k in range(image.n_frames):
             image.seek(k)
