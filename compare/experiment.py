@@ -188,7 +188,7 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
 def draw(
     experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping[str, Result] | None = None
 ) -> tuple[list, list]:
-    """The figures of an experiment on disk: names and captions; and of those that could not be drawn: names and why.
+    """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
     the later ones alone. others: what pictures of the first screen need that can be drawn now, see report.overview. An error of
@@ -203,10 +203,10 @@ def draw(
                     file, figure, caption = call()
                 while file.casefold() in {other.casefold() for other, _ in drawn}:
                     file += "_"  # names that differ in signs alone may give one file
-                path = folder / f"{file}.png"
+                path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
                 with writing(path), quiet(robot):
                     images.save_figure(figure, path)
-                drawn.append((file, caption))
+                drawn.append((path.name.removesuffix(".png"), caption))
             except OSError:
                 raise
             except Exception as error:

@@ -43,7 +43,7 @@ def test_a_report_of_all_experiments_has_every_figure(small, beside):
     checks = sum(len(small(name).checks) for name in EXPERIMENTS)
     assert made.words.startswith(f"The two models agree: all {checks} checks pass.")
     of_more_scenes = {"speed_ball_catch_free", "speed_bent_damped"}
-    pictures = {overview.BEGINNING + name for name in overview.PICTURES}
+    pictures = {overview.BEGINNING + name for name in overview.PICTURES} | {"motion"}
     assert made.drawn >= pictures
     assert made.drawn | of_more_scenes == pictures | {
         path.stem for path in (ROOT / "reports/example/figures").iterdir()

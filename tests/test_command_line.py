@@ -98,8 +98,8 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
     linked = set(re.findall(r'(?:src|href)="(?!data:|#)([^"]+)"', page))
     assert linked == {str(path.relative_to(report)) for path in (report / "tables").iterdir()}
     figures = list((report / "figures").iterdir())
-    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == len(figures)
-    assert {path.suffix for path in figures} == {".png"}
+    assert {path.suffix for path in figures} == {".png", ".gif"} and 'id="motion"' in page
+    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == len(figures) - 1  # but for what moves
     text = (report / "report.md").read_text()
     linked = set(re.findall(r"\((figures/[^)]+|tables/[^)]+)\)", text))
     assert linked == {str(p.relative_to(report)) for p in report.glob("*/*")}

@@ -12,6 +12,9 @@ MEDIA = {".png": "image/png", ".webp": "image/webp", ".gif": "image/gif"}
 
 def save_figure(figure: object, path: Path) -> None:
     """A figure of matplotlib as a PNG with a palette; beside it, until the page is written, as a WebP without loss."""
+    if path.suffix != ".png":  # a figure that writes its own files
+        figure.savefig(path)
+        return
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
     with Image.open(drawn) as image:
@@ -31,6 +34,11 @@ def embedded(path: Path) -> tuple[str, int, int]:
     with Image.open(path) as image:
         width, height = image.size
     return f"data:{MEDIA[least.suffix]};base64,{base64.b64encode(least.read_bytes()).decode()}", width, height
+
+
+def moves(file: str) -> bool:
+    """Whether a figure is a GIF, by its name: the page has what moves in another way."""
+    return file.endswith(".gif")
 
 
 def clear_webp(folder: Path) -> None:

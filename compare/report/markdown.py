@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from .images import moves
 from .introduction import first_lines, introduction, title
 from .markup import of_section
 from .one_number import one_number
@@ -83,7 +84,8 @@ def experiments_in_markdown(report: Report) -> list[str]:
 
 def in_one_paragraph(figures: Sequence[tuple[str, str]]) -> str:
     """Figures with their captions, one after the other."""
-    return " ".join(f"![{name}](figures/{name}.png) {caption}" for name, caption in figures)
+    files = {name: name if moves(name) else f"{name}.png" for name, _ in figures}
+    return " ".join(f"![{name}](figures/{files[name]}) {caption}" for name, caption in figures)
 
 
 def answers_in_markdown(sections: Sequence[Section], robot: object) -> list[str]:

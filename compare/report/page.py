@@ -8,6 +8,7 @@ from string import Template
 import pandas as pd
 
 from .first_screen import causes_in_html, list_in_html, mark, pictures_in_html, verdict_in_html
+from .images import moves
 from .introduction import first_lines, introduction, title
 from .markup import details, figure, html_table, of_section, words
 from .motion import motion_in_html
@@ -92,7 +93,7 @@ def section_in_html(folder: Path, section: Section) -> list[str]:
         table = html_table(failed.head(MOST_ROWS), many)
         texts += ["<p><strong>Checks that fail:</strong></p>", table if len(failed) <= 8 else details(many, table)]
     texts += [listed_in_html(notes[:FIRST_NOTES])] if notes else []
-    texts += [figure(folder, file, caption) for file, caption in of_section(section)]
+    texts += [figure(folder, file, caption) for file, caption in of_section(section) if not moves(file)]
     texts += [f"<h3>What the tolerance is, and why</h3><p>{words(section.tolerance)}</p>"] if section.tolerance else []
     more = notes[FIRST_NOTES:]
     texts += [details(f"Further findings ({len(more)})", listed_in_html(more))] if more else []
