@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from .images import moves
 from .markup import html_table, image, of_section, words
 from .one_number import one_number
 from .overview import BEGINNING, PICTURES
@@ -123,14 +124,14 @@ def picture(folder: Path, name: str, caption: str, sections: Sequence[Section], 
 
 def linked_figure(sections: Sequence[Section]) -> str:
     """The anchor of the whole figure behind a picture: of distances or limits, else the first of the last section."""
-    files = [file for section in sections for file, _ in of_section(section)]
+    files = [file for section in sections for file, _ in of_section(section) if not moves(file)]
     best = [file for file in files if file.endswith(("_distances", "_limits"))] or files
     return f"figure-{best[0]}" if best else sections[-1].name
 
 
 def first_figure(folder: Path, section: Section) -> str:
     """The first figure of a failing experiment, small; '' if it has none."""
-    figures = of_section(section)
+    figures = [one for one in of_section(section) if not moves(one[0])]
     if not figures:
         return ""
     file, caption = next((one for one in figures if one[0].endswith("_distances")), figures[0])
