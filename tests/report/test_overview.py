@@ -10,6 +10,7 @@ from compare.judge.check import Result
 from compare.report import engines_apart, figures_overview, methods_compared, overview
 from compare.report.engines_apart import Agreement, SceneRun
 from compare.report.methods_compared import Curve, Limit
+from compare.report.verdict import Section
 from compare.robots.arm import ARM
 
 
@@ -23,7 +24,7 @@ def test_every_picture_is_drawn_once_with_the_last_of_its_experiments_that_run()
     ):  # fmt: skip
         found = {}
         for k, name in enumerate(names):
-            done = {one: results[one] for one in names[: k + 1]}
+            done = [Section(one, "", "", "", results[one]) for one in names[: k + 1]]
             needs = overview.results_needed(name, names, done)
             assert all(one.rows == [{"a": 1}] and one.label == "yours" and not one.checks for one in needs.values())
             if needs:
