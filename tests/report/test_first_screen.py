@@ -8,6 +8,7 @@ from sections import BAD, GOOD, section
 
 from compare.report import images, page
 from compare.report.files import write
+from compare.report.first_screen import in_two
 from compare.report.overview import BEGINNING
 from compare.report.parts import Parts
 from compare.report.verdict import Report, standing, verdict
@@ -122,6 +123,19 @@ def test_the_page_and_report_name_what_is_no_markup(tmp_path):
     of.result.notes = ["a <b> & c"]
     html = written(tmp_path, [of], skipped=[("<i>", "<u>")])
     assert "a &lt;b&gt; &amp; c" in html and "<i>" not in html and "<u>" not in html
+
+
+@pytest.mark.parametrize("verdict, big, small", [
+    ("The two models agree: all 9 checks pass. The rest.", "The two models agree: all 9 checks pass.", "The rest."),
+    ("A and B agree in mass (1 of 9 experiments): all 2 checks pass.",
+     "A and B agree in mass (1 of 9 experiments): all 2 checks pass.", ""),
+    ("A and B agree in mass, gravity, kinematics, acceleration (4 of 9 experiments): all 2 checks pass. More.",
+     "A and B agree: all 2 checks pass.", "4 of 9 experiments: mass, gravity, kinematics, acceleration. More."),
+    ("A and B do not agree in mass, gravity, kinematics, acceleration (4 of 9 experiments ran): 1 of 2 checks fail.",
+     "A and B do not agree: 1 of 2 checks fail.", "4 of 9 experiments: mass, gravity, kinematics, acceleration."),
+])  # fmt: skip
+def test_the_large_sentence_is_short(verdict, big, small):
+    assert in_two(verdict) == (big, small)
 
 
 def test_how_a_section_stands():
