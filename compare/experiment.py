@@ -2,10 +2,11 @@
 
 import importlib
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 
@@ -65,7 +66,7 @@ def examine(
             add_problems(crash or result, own.equations.problems, said)
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
-        others = overview.results_needed(name, names, {section.name: section.result for section in sections})
+        others = overview.results_needed(name, names, sections)
         drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures", others))
         new = new_causes(setup, sections, causes)
         causes = new + causes
@@ -191,12 +192,12 @@ def draw(
     """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. others: what pictures of the first screen need that can be drawn now, see report.overview. An error of
-    the disk is raised.
+    the later ones alone. others: for the pictures of the first screen, see report.overview. An error of the disk is raised.
     """
     drawn, failed = [], []
     try:
-        for call in calls_that_draw(experiment, result, robot, others or {}):
+        figures = module(experiment).figures(result, robot)
+        for call in chain(figures, overview.pictures_due(experiment, result, robot, others)):
             name, path = called(call), None
             try:
                 with quiet(robot):
@@ -218,14 +219,6 @@ def draw(
     except Exception as error:
         failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
     return drawn, failed
-
-
-def calls_that_draw(experiment: str, result: Result, robot: Robot, others: Mapping[str, Result]) -> Iterator[Callable]:
-    """Those of the experiment's own figures, then of the pictures of the first screen."""
-    yield from module(experiment).figures(result, robot)
-    if others:
-        pictures = importlib.import_module(".report.figures_overview", __package__).pictures
-        yield from pictures(experiment, {**others, experiment: result}, robot)
 
 
 def called(call: Callable) -> str:
