@@ -2,10 +2,11 @@
 
 import importlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 
@@ -15,6 +16,7 @@ from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
 from .process.crash import described
 from .process.workers import WorkerEnded, Workers
+from .report import images, overview
 from .report.folder import writing
 from .report.terminal import Terminal
 from .report.verdict import Section, failures
@@ -51,7 +53,8 @@ def examine(
         for name, experiment in modules.items()
         if hasattr(experiment, "begin")
     }
-    for name in sorted(modules, key=TIMED_LAST.__contains__):
+    in_turn = sorted(names, key=TIMED_LAST.__contains__)
+    for name in in_turn:
         experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(modules) > 1 and not asked_for:
@@ -66,9 +69,10 @@ def examine(
             add_problems(crash or result, own.equations.problems, said)
         sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
         sections[-1].result.checks += unsaid.checks if unsaid else []
-        drawings.append(None if crash else partial(workers.submit, draw, name, result, setup.robot, folder / "figures"))
-        if not crash and name not in TIMED_LAST:  # no drawing delays a timing
-            drawings[-1] = drawings[-1]()
+        others = overview.results_needed(name, in_turn, sections)
+        job = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
+        # no drawing delays a timing
+        drawings.append(None if crash else job if name in TIMED_LAST else job())
         new = new_causes(setup, sections, causes)
         causes = new + causes
         say_outcome(terminal, sections[-1], time.perf_counter() - started, new)
@@ -188,25 +192,28 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
 # in the process that draws
 
 
-def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[list, list]:
-    """The figures of an experiment on disk: names and captions; and of those that could not be drawn: names and why.
+def draw(
+    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping[str, Result] | None = None
+) -> tuple[list, list]:
+    """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. An error of the disk is raised.
+    the later ones alone. others: for the pictures of the first screen, see report.overview. An error of the disk is raised.
     """
     drawn, failed = [], []
     try:
-        for call in module(experiment).figures(result, robot):
+        figures = module(experiment).figures(result, robot)
+        for call in chain(figures, overview.pictures_due(experiment, result, robot, others)):
             name, path = called(call), None
             try:
                 with quiet(robot):
                     file, figure, caption = call()
                 while file.casefold() in {other.casefold() for other, _ in drawn}:
                     file += "_"  # names that differ in signs alone may give one file
-                path = folder / f"{file}.png"
+                path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
                 with writing(path), quiet(robot):
-                    laid_out(figure).savefig(path)
-                drawn.append((file, caption))
+                    images.save_figure(figure, path)
+                drawn.append((path.name.removesuffix(".png"), caption))
             except OSError:
                 raise
             except Exception as error:
@@ -218,16 +225,6 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
     except Exception as error:
         failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
     return drawn, failed
-
-
-def laid_out(figure):
-    """A figure whose parts have their places: saved as it is made, it would be drawn once more to find them."""
-    engine = getattr(figure, "get_layout_engine", lambda: None)()
-    if engine is not None:
-        figure.set_dpi(importlib.import_module("matplotlib").rcParams["savefig.dpi"])
-        engine.execute(figure)
-        figure.set_layout_engine("none")
-    return figure
 
 
 def called(call: Callable) -> str:

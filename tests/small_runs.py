@@ -19,7 +19,7 @@ from runs import in_shell, on_terminal
 from compare import experiment
 from compare.engines.mujoco import load, parse
 from compare.experiments import EXPERIMENTS, module, skipped
-from compare.report import files, verdict
+from compare.report import files, overview, verdict
 from compare.robots.arm import ARM
 
 
@@ -65,7 +65,7 @@ def of_crane():
         report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
         files.write(folder, report)
         texts = {name: (folder / name).read_text(encoding="utf-8") for name in ("report.md", "results.json")}
-        sizes = {path.stem: path.stat().st_size for path in (folder / "figures").iterdir()}
+        sizes = {path.name.removesuffix(".png"): path.stat().st_size for path in (folder / "figures").iterdir()}
     for section in sections:
         section.result.curves = {}  # which need not be sent
     return SimpleNamespace(sections=sections, reasons=reasons, lines=lines, texts=texts, sizes=sizes)
@@ -79,8 +79,10 @@ def report_of_arm():
         for name in EXPERIMENTS:
             of = module(name)
             section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
-            section.figures, failed = experiment.draw(name, section.result, ARM, folder / "figures")
-            sections, lost = [*sections, section], lost + failed
+            sections.append(section)
+            others = overview.results_needed(name, list(EXPERIMENTS), sections)
+            section.figures, failed = experiment.draw(name, section.result, ARM, folder / "figures", others)
+            lost += failed
         words = verdict.verdict(sections, len(EXPERIMENTS))
         files.write(folder, verdict.Report(sections, ARM, {"command": "a small run"}, words))
         text = (folder / "report.md").read_text(encoding="utf-8")
@@ -90,9 +92,9 @@ def report_of_arm():
 
 
 def flaws_of_arm():
-    """What is wrong with each figure of all experiments on the arm, as it is drawn: {its name: in words}."""
+    """What is wrong with each figure of matplotlib of all experiments on the arm, as it is drawn: {its name: in words}."""
     calls = (call for name in EXPERIMENTS for call in module(name).figures(of_arm(name), ARM))
-    return {name: flaws(figure) for name, figure, _ in (call() for call in calls)}
+    return {name: flaws(figure) for name, figure, _ in (call() for call in calls) if hasattr(figure, "axes")}
 
 
 def quick_run(folder):
