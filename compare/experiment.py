@@ -1,7 +1,6 @@
 """How the experiments are run: one after the other, long work and drawing beside it."""
 
 import importlib
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
@@ -13,9 +12,11 @@ import numpy as np
 
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
+from .process.clock import Clock
 from .process.crash import described
 from .process.workers import WorkerEnded, Workers
 from .report.folder import writing
+from .report.remaining import END, START
 from .report.terminal import Terminal
 from .report.verdict import Section, failures
 from .robots import Robot
@@ -34,45 +35,56 @@ SHOWN = 5  # checks of an experiment that fail, on the terminal
 
 
 def examine(
-    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers
+    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers, clock: Clock | None = None
 ) -> tuple[list[Section], list[dict], dict[str, str]]:
     """The section of each experiment, its figures drawn, the causes of what fails, and what is skipped with its reason.
 
     An experiment that raises is one failed check; the others go on. A diagnosis beside other experiments is made where one of
-    these fails.
+    these fails. clock: of the workers, which gets to know what each experiment takes.
     """
+    clock = clock or Clock()
     (folder / "figures").mkdir()
     sections, drawings, causes, reasons = [], [], [], {}
     own, said = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
-    crashed = {
-        name: attempt(name, experiment.begin, setup)[1]
-        for name, experiment in modules.items()
-        if hasattr(experiment, "begin")
-    }
+    crashed = {name: begun(name, experiment, setup, clock) for name, experiment in modules.items()}
+    clock.ends(START)
     for name, experiment in modules.items():
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(modules) > 1 and not asked_for:
             reasons[name] = NOTHING_FAILED
             terminal.say(f"{name:<13} skipped: {NOTHING_FAILED}")
+            clock.ends(name)
             continue
-        setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
-        started = time.perf_counter()
-        result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        asked, unsaid = attempt(name, partial(own_words, experiment), setup)
-        if own:
-            add_problems(crash or result, own.equations.problems, said)
-        sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
-        sections[-1].result.checks += unsaid.checks if unsaid else []
-        drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
-        new = new_causes(setup, sections, causes)
-        causes = new + causes
-        say_outcome(terminal, sections[-1], time.perf_counter() - started, new)
-    setup.progress("figures")
-    for section, drawing in zip(sections, drawings):
-        if drawing is not None:
-            take_figures(terminal, section, drawing)
+        with clock.of(name):
+            setup.progress(EXPERIMENTS[name])
+            result, crash = (None, crashed[name]) if crashed[name] else attempt(name, experiment.rows, setup)
+            asked, unsaid = attempt(name, partial(own_words, experiment), setup)
+            if own:
+                add_problems(crash or result, own.equations.problems, said)
+            sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
+            sections[-1].result.checks += unsaid.checks if unsaid else []
+            new = new_causes(setup, sections, causes)
+            causes = new + causes
+        clock.ends(name)
+        with clock.of(END):
+            drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
+        say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
+    with clock.of(END):
+        setup.progress("figures")
+        for section, drawing in zip(sections, drawings):
+            if drawing is not None:
+                take_figures(terminal, section, drawing)
+    clock.ends(END)
     return sections, causes, reasons
+
+
+def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:
+    """Set an experiment's long work going, if it has any; a failed check if that breaks off."""
+    if not hasattr(experiment, "begin"):
+        return None
+    with clock.of(name):
+        return attempt(name, experiment.begin, setup)[1]
 
 
 def add_problems(result: Result, problems: Sequence, said: set) -> None:
@@ -163,7 +175,10 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
 
 
 def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Sequence[dict]) -> None:
-    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks."""
+    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks.
+
+    seconds: of the processor, for the experiment itself.
+    """
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]

@@ -60,8 +60,10 @@ DIRECTIONS = {
         "setup",
     },
     "experiment": {"robots", "setup", "judge", "process", "report", "experiments"},
+    "command_line": {"experiments", "process"},
     "__main__": {
         "case",
+        "command_line",
         "engines",
         "own_file",
         "reference",

@@ -61,4 +61,9 @@ def heading(name: str) -> str:
 
 
 def origins(origin: dict) -> pd.DataFrame:
-    return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
+    return pd.DataFrame([(name, in_one_cell(value)) for name, value in origin.items()], columns=["what", "value"])
+
+
+def in_one_cell(value) -> str:
+    """A value of the provenance, of several things one after the other."""
+    return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)

@@ -1,0 +1,104 @@
+"""How far a run is, and how long still: an estimate that corrects itself.
+
+What it begins with is the last run of the same kind, if its report is the one that is replaced; otherwise what such a run took on
+some other machine. Either is then scaled by what the ended tasks took on this one.
+"""
+
+import json
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..process.clock import Clock
+
+START, END = "start", "figures"  # what comes before the first experiment and after the last
+# s by a watch from the start until each ends, of the assignment's arm on two cores: where an estimate begins, no more
+AFTER_FULL = {
+    START: 5.0, "parameters": 5.5, "published": 6.0, "kinematics": 7.0, "mass": 8.0, "gravity": 9.0, "acceleration": 10.0,
+    "trajectory": 25.0, "diagnosis": 25.0, "speed": 85.0, "stability": 86.0, "reduction": 95.0, END: 100.0,
+}  # fmt: skip
+AFTER_QUICK = {
+    START: 3.0, "parameters": 3.2, "published": 3.5, "kinematics": 3.8, "mass": 4.2, "gravity": 4.6, "acceleration": 5.0,
+    "trajectory": 7.0, "diagnosis": 7.0, "speed": 11.0, "stability": 11.2, "reduction": 13.0, END: 15.0,
+}  # fmt: skip
+TRUST = 0.1  # of the whole: what is planned weighs as much as so much of it that has been seen
+OUTSIDE = ("--out",)  # options that change nothing of what is computed
+
+
+class Remaining:
+    """How long a run takes still. names: its experiments in their order; plan: seconds until each of these and START, END end."""
+
+    def __init__(self, clock: Clock, names: Sequence[str], plan: dict[str, float]):
+        self.clock, self.names = clock, names
+        self.plan = [(name, plan[name]) for name in (START, *names, END) if name in plan]
+
+    @property
+    def seconds(self) -> float | None:
+        """An estimate of the seconds that are left; None: there is none, because the last task takes longer than it should."""
+        ended = [(at, self.clock.ended[name]) for name, at in self.plan if name in self.clock.ended]
+        planned, really = ended[-1] if ended else (0.0, 0.0)
+        whole = self.plan[-1][1]
+        coming = [at for name, at in self.plan if name not in self.clock.ended]
+        if not coming:
+            return None
+        pace = (really + TRUST * whole) / (planned + TRUST * whole)
+        left = (whole - planned) * pace - (self.clock.elapsed - really)
+        least = (whole - coming[0]) * pace  # what comes after the task that is under way
+        return max(left, least) or None
+
+    def words(self) -> list[str]:
+        """How far and how long still: "4 of 11", "acceleration", "about 35 s left"; what is not known is left out."""
+        now, seconds = [], self.seconds
+        if START in self.clock.ended:
+            now = [name for name in self.names if name not in self.clock.ended][:1]
+        parts = [f"{self.names.index(name) + 1} of {len(self.names)}" for name in now] + now
+        return parts + ([f"about {in_words(seconds)} left"] if seconds else [])
+
+
+def in_words(seconds: float) -> str:
+    """A duration as rough as an estimate is."""
+    if seconds < 10.0:
+        return f"{max(round(seconds), 1)} s"
+    return f"{5 * round(seconds / 5)} s" if seconds < 117.5 else f"{round(seconds / 60)} min"
+
+
+def plan(names: Sequence[str], quick: bool, command: str, out: str | Path) -> dict[str, float]:
+    """What a run may take: seconds until each of its tasks ends, START and END among them.
+
+    command: of this run; out: the folder of the report that it replaces, which says what the last run took.
+    """
+    try:
+        origin = json.loads((Path(out) / "results.json").read_text(encoding="utf-8"))["provenance"]
+        found = {str(name): float(at) for name, at in origin["ended_after_s"].items()}
+        if same_kind(command, origin["command"]) and 0.0 < found[END] < float("inf"):
+            return found
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        pass
+    return without_others(AFTER_QUICK if quick else AFTER_FULL, names)
+
+
+def without_others(whole: dict[str, float], names: Sequence[str]) -> dict[str, float]:
+    """What a run of some experiments may take, from what one of all takes."""
+    taken, at, before = {}, 0.0, 0.0
+    for name, ended in whole.items():
+        if name in (START, *names, END):
+            at += ended - before
+            taken[name] = at
+        before = ended
+    return taken
+
+
+def same_kind(one: str, other: str) -> bool:
+    """Whether two commands ask for the same, wherever it is written."""
+    return asked(one) == asked(other)
+
+
+def asked(command: str) -> list[str]:
+    """The words of a command but for those that change nothing of what is computed, in one order."""
+    words = shlex.split(command)
+    for name in OUTSIDE:
+        words = [word for word in words if not word.startswith(f"{name}=")]
+        while name in words:
+            k = words.index(name)
+            del words[k : k + 2]
+    return sorted(words)
