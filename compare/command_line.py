@@ -89,7 +89,7 @@ def stated_reference(text: str) -> str:
 
 
 # every option with the experiments that take it; None: all of them do
-OPTIONS = {
+OPTIONS_OF_ALL = {
     "--out": (None, {
         "type": not_empty, "default": "reports/latest", "metavar": "DIR",
         "help": "where the report goes (default: %(default)s)",
@@ -138,7 +138,7 @@ def parser(experiment: str | None = None) -> Parser:
     if experiment is None:
         made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
     made.add_argument("-h", "--help", action="store_true", help="this text; after an experiment: what it asks")
-    for name, (takers, how) in OPTIONS.items():
+    for name, (takers, how) in OPTIONS_OF_ALL.items():
         if takers is None or experiment is None or experiment in takers:
             made.add_argument(name, **how)
     return made
@@ -148,7 +148,8 @@ def help_of(experiment: str) -> str:
     """What an experiment asks, compares and writes: the docstring of its module, which is not imported for that."""
     file = FOLDER / f"{experiment}.py"
     file = file if file.exists() else FOLDER / experiment / "__init__.py"
-    return ast.get_docstring(ast.parse(file.read_text(encoding="utf-8")))
+    first, *rest = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))).split("\n")
+    return "\n".join([fill(first, LINE_WIDTH, break_on_hyphens=False), *rest])
 
 
 def what_can_be_asked() -> str:
@@ -185,10 +186,12 @@ def with_minus(arguments: Sequence[str]) -> list[str]:
 def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
     """End with the first word that is not known, or where no experiment is asked for. given: all words."""
     words = {name: name for name in (*EXPERIMENTS, "all")}
-    names = {name.strip("-"): name for name in OPTIONS}
+    names = {name.strip("-"): name for name in OPTIONS_OF_ALL}
     for word in unknown:
         if word.startswith("-"):
-            whole.error(f"{word!r} is no option; {expected(word.strip('-').split('=')[0], names, ' '.join(OPTIONS))}")
+            whole.error(
+                f"{word!r} is no option; {expected(word.strip('-').split('=')[0], names, ' '.join(OPTIONS_OF_ALL))}"
+            )
     name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
     if name is None and not options.help:
         whole.error(f"no experiment is named; one of {choices} is expected, as in {PROGRAM} all {given}")

@@ -8,7 +8,7 @@ import pytest
 from runs import ENVIRONMENT, compare
 
 from compare.__main__ import main
-from compare.command_line import OPTIONS
+from compare.command_line import OPTIONS_OF_ALL
 from compare.engines.mujoco.flags import integrator_by_name
 from compare.experiments import EXPERIMENTS
 
@@ -45,7 +45,7 @@ def test_who_asks_nothing_is_told_what_can_be_asked_in_ten_lines(tmp_path, capsy
     (["mass", "-quick"], "'-quick' is no option; did you mean --quick?"),
     (["--mjfc", "robot.xml", "mass"], "'--mjfc' is no option; did you mean --mjcf?"),
     (["mass", "--mjfc=robot.xml"], "'--mjfc=robot.xml' is no option; did you mean --mjcf?"),
-    (["mass", "--xyz"], f"'--xyz' is no option; one of {' '.join(OPTIONS)} is expected"),
+    (["mass", "--xyz"], f"'--xyz' is no option; one of {' '.join(OPTIONS_OF_ALL)} is expected"),
     (["mass", "gravity"], "'gravity' is one word too many; one experiment, or all, is expected"),
     (["--quick"], "no experiment is named; one of parameters, "),
     (["--mjcf", "my robot.xml"], "or all is expected, as in python -m compare all --mjcf 'my robot.xml'"),
@@ -74,7 +74,7 @@ def test_help_has_examples_and_every_option(capsys):
         status, text, err = answered(arguments, capsys)
         assert (status, err) == (0, "")
         assert "python -m compare all --quick" in text and "exit status" in text
-        assert all(f"  {name} " in text for name in (*EXPERIMENTS, *OPTIONS))
+        assert all(f"  {name} " in text for name in (*EXPERIMENTS, *OPTIONS_OF_ALL))
 
 
 TAKEN = {"--scenes": {"trajectory", "speed", "reduction"}, "--dt": {"stability"}, "--growth": {"speed"},
@@ -87,7 +87,7 @@ def test_the_help_of_an_experiment_has_the_options_that_it_takes_and_no_others(n
     status, text, _ = answered([name, "--help"], capsys)
     assert status == 0 and text.startswith(f"usage: python -m compare {name} [options]\n")
     options = text[text.index("\noptions:") :]
-    for option in OPTIONS:
+    for option in OPTIONS_OF_ALL:
         assert (f"  {option} " in options) == (name in TAKEN.get(option, EXPERIMENTS)), option
 
 
