@@ -185,6 +185,20 @@ class Case:
         """Of one value for each speed of all joints, (nv,), those of the free ones."""
         return values[self._free("qd")]
 
+    def whole_positions(self, q: np.ndarray) -> np.ndarray:
+        """Positions of all joints, (..., nq), where the free ones are at q, (..., their nq)."""
+        return self._whole(self.posture, q, "q")
+
+    def whole_speeds(self, v: np.ndarray) -> np.ndarray:
+        """Speeds of all joints, (..., nv), where the free ones have v, (..., their nv)."""
+        return self._whole(np.zeros(self.robot.coordinates.nv), v, "qd")
+
+    def _whole(self, locked, values, which):
+        """Values of the free joints among those of the locked ones."""
+        whole = np.tile(locked, (*np.shape(values)[:-1], 1))
+        whole[..., self._free(which)] = values
+        return whole
+
     def _free(self, which):
         """The places of the free joints in q or qd of all."""
         whole = self.robot.coordinates.places

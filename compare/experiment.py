@@ -199,7 +199,7 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
 
 
 def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[list, list]:
-    """The figures of an experiment on disk: names and captions; and of those that could not be drawn: names and why.
+    """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
     the later ones alone. An error of the disk is raised.
@@ -213,10 +213,11 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
                     file, figure, caption = call()
                 while file.casefold() in {other.casefold() for other, _ in drawn}:
                     file += "_"  # names that differ in signs alone may give one file
-                path = folder / f"{file}.png"
+                suffix = getattr(figure, "suffix", ".png")
+                path = folder / f"{file}{suffix}"
                 with writing(path), quiet(robot):
                     figure.savefig(path)
-                drawn.append((file, caption))
+                drawn.append((path.name.removesuffix(".png"), caption))
             except OSError:
                 raise
             except Exception as error:

@@ -36,7 +36,7 @@ def with_more(line, more):
 def follow(setup) -> Result:
     result = Result("trajectory")
     for case in FOLLOWED:
-        result.checks += trajectory.follow(case, setup.engines, setup.finer, KNOWN).checks
+        result.checks += trajectory.runs.follow(case, setup.engines, setup.finer, KNOWN).checks
     return result
 
 

@@ -138,6 +138,7 @@ def test_libraries_are_imported_where_they_belong(path):
     assert "pinocchio" not in outer or name == "compare.engines.pinocchio"
     assert "pandas" not in outer or name.startswith("compare.report")
     assert "matplotlib" not in outer or path.stem.startswith("figures") or name == "compare.report.style"
+    assert "PIL" not in outer or path.stem.startswith("figures")
     assert "rich" not in outer or name == "compare.report.terminal"
 
 

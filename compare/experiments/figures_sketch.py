@@ -6,20 +6,16 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-import tmt
 from tmt import literal, method
 
 from ..judge.words import listed
 from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines, plain
 from ..robots import Robot
+from ..robots.stick import AZIMUTH, ELEVATION, RIGHTWARD, UPWARD, free_parts, stick_figure
 
 SKETCHED_BY_NAME = 6  # joints at most, and bodies, that are named in a sketch
 KIND_COLOURS = {"hinge": BLUE, "slide": RED, "ball": GREEN}
-ELEVATION, AZIMUTH = 20.0, -70.0  # deg, from where the sketch is seen
 CENTRED = {"ha": "center", "va": "center"}
-_E, _A = np.radians([ELEVATION, AZIMUTH])
-RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
-UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
 def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
@@ -122,38 +118,13 @@ def sketch_in_words(robot: Robot, few: bool) -> str:
     )
 
 
-def free_parts(tree: tmt.Tree) -> list[bool]:
-    """Of each joint whether it is one of the four of a free joint."""
-    found = [False] * len(tree.kind)
-    for i in range(3, len(tree.kind)):
-        row = range(i - 2, i + 1)
-        if tree.kind[i - 3 : i + 1] == ("slide", "slide", "slide", "ball") and all(
-            tree.parent[k] == k - 1 and not any(tree.offset[k]) for k in row
-        ):
-            found[i - 3 : i + 1] = [True] * 4
-    return found
-
-
 def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
     """The lines of a robot at joint positions q, (nq,): points in m, (k, 3) each.
 
     Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move.
     """
-    if robot.landmarks:
-        return [np.array(list(robot.landmarks(q).values()))]
-    tree, free = robot.tree, free_parts(robot.tree)
-    origins = np.array([list(frame.origin) for frame in method.joint_frames(tree, q.tolist())], dtype=float)
-    links = [
-        np.stack([origins[parent], origins[joint]])
-        for joint, parent in enumerate(tree.parent)
-        if parent >= 0 and not (free[joint] and free[parent])
-    ]
-    ends = [
-        np.stack([origins[joint], com])
-        for joint, com in zip(tree.body_hinge, literal.com_positions(q, tree))
-        if joint >= 0 and joint not in tree.parent
-    ]
-    return links + ends
+    (points,), links = stick_figure(robot, q[None])
+    return [points] if robot.landmarks else [points[list(link)] for link in links]
 
 
 def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:

@@ -61,7 +61,7 @@ def section_in_markdown(section: Section) -> list[str]:
         lines += [f"All columns, {len(rows)} rows: {link(name)}"]
     lines += [f"- {note}" for note in section.result.notes]
     for name, caption in section.figures:
-        lines += [f"![{name}](figures/{name}.png)", caption]
+        lines += [f"![{name}](figures/{name if name.endswith('.gif') else f'{name}.png'})", caption]
     return lines
 
 

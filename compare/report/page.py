@@ -76,6 +76,8 @@ def section_in_html(folder: Path, section: Section) -> list[str]:
     if len(failed):
         texts += ["<p><strong>Checks that fail:</strong></p>", foldable(failed, f"{len(failed)} checks")]
     for name, caption in section.figures:
+        if name.endswith(".gif"):  # it is in the page as what moves
+            continue
         data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
         image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
         texts.append(f"<figure>{image}<figcaption>{words(caption)}</figcaption></figure>")

@@ -14,6 +14,7 @@ from compare.engines.mujoco.accelerations import convective_accelerations
 from compare.experiments import acceleration, figures, figures_sketch, gravity, kinematics, mass
 from compare.judge.check import Result
 from compare.judge.entries import scales
+from compare.robots import stick
 from compare.robots.file import robot_of
 from compare.setup import Setup
 
@@ -177,10 +178,10 @@ def test_the_slides_of_a_free_joint_are_drawn_where_its_ball_is():
     q = one.posture("stand") + np.eye(len(one.posture("stand")))[0] * 0.3
     places = figures_sketch.axes(one, q, 0.1)
     assert np.allclose(places[:6, 0], q[:3]) and np.allclose(places[:3, 1], 0.1 * np.eye(3))
-    assert figures_sketch.free_parts(one.tree) == [True] * 4 + [False] * 12
+    assert stick.free_parts(one.tree) == [True] * 4 + [False] * 12
     lines = figures_sketch.chains(one, q)
     assert all(np.linalg.norm(line[1] - line[0]) < 0.6 for line in lines)  # none from the world to the trunk
-    assert figures_sketch.free_parts(robot(CART).tree) == [False] * 4
+    assert stick.free_parts(robot(CART).tree) == [False] * 4
 
 
 def test_the_figure_of_holding_torques_shows_the_six_joints_that_need_most():

@@ -61,10 +61,11 @@ from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
 from ...setup import Setup
-from . import drift, errors, horizon, sentences
+from . import drift, errors, horizon, motion, sentences
 from .derivative import compare_derivatives
+from .motion_frames import follow_and_draw, in_order
 from .own_runs import within_time
-from .runs import FEW_ENTRIES, MOST_ENTRIES, follow
+from .runs import FEW_ENTRIES, MOST_ENTRIES
 
 TITLE = "Trajectories: the same scheme for every integrator of MuJoCo"
 TITLE_OF_OWN = "Trajectories: your equations and MuJoCo, both by RK4"
@@ -155,7 +156,7 @@ def begin(setup: Setup) -> None:
     duration, steps = horizon.growth_run(setup.robot, grown, setup.size == "small")
     of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
-        "runs": spread(partial(follow, engines=setup.engines, finer=finer, entries=entries(setup)), cases),
+        "runs": spread(partial(follow_and_draw, engines=setup.engines, finer=finer, entries=entries(setup)), cases),
         "finer": finer,
         "left_out": left_out,
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
@@ -182,12 +183,15 @@ def rows(setup: Setup) -> Result:
     drift.measure_drift(
         result, setup.robot, setup.engines, setup.of(drift.DRIFT_STEPS, drift.DRIFT_STEPS, drift.FEW_DRIFT_STEPS)
     )
-    result.curves["runs"] = {}
-    for part in work["runs"]:
+    result.curves |= {"runs": {}, "drawn": []}
+    for part, drawn in work["runs"]:
         result.rows += part.rows
         result.checks += part.checks
         result.notes += part.notes
         result.curves["runs"] |= part.curves
+        result.curves["drawn"] += [drawn] if drawn else []
+    result.curves["drawn"] = in_order(result.curves["drawn"], setup.robot)
+    motion.tabulate_motion(result, setup.robot)
     horizon.many_digits(result, *work["exact"])
     if not (work["exact"][0] or setup.is_quick or setup.robot.own):
         result.notes.append(
@@ -205,7 +209,7 @@ def rows(setup: Setup) -> Result:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Those of the assignment that show a held posture, one for each scene, drift, and the growth of errors."""
-    from . import figures_runs  # matplotlib is for the process that draws
+    from . import figures_motion_gif, figures_runs  # matplotlib is for the process that draws
 
     names = {name for name, *_ in result.curves["runs"]}
     cases = [case for case in robot.cases if case.name in names]
@@ -221,3 +225,5 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(figures_runs.draw_drift, result)
     if grown:
         yield partial(figures_runs.draw_growth, result)
+    if result.curves["drawn"]:
+        yield partial(figures_motion_gif.draw_motion, result)

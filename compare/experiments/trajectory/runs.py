@@ -21,6 +21,7 @@ from ...judge.run import (
     step_in_words,
 )
 from ...truth.smallest import reduced
+from .motion import at_equal_times
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
 STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
@@ -159,9 +160,11 @@ def compare_runs(
     angle_band = mine.width[:, : coordinates.nv].max(axis=1)
     turning = [i for i, unit in enumerate(coordinates.units) if unit == "rad"]
     accelerations = dynamics.acceleration(*mine.states, tau)
+    records = {(name, methods[0].scheme): at_equal_times(case, t, mine.q, mine.v, mine.ended)}
     for method in methods:
         _, *theirs = dynamics.run(*case.start, tau, dt, steps, method.name)[:3]
         ends = {name: mine.ended, "mujoco": diverged_at(case, t, *theirs)}
+        records["mujoco", method.name] = at_equal_times(case, t, *theirs, ends["mujoco"])
         count = judged(times, angle_band, ends)
         where = f"{case.name}, {method.name}, {step_in_words(case, steps)}"
         until, required = float(times[count - 1]), required_time(case, method.scheme, dt)
@@ -197,6 +200,7 @@ def compare_runs(
                 "integrator": method.name, "t": t, "every": every, name: [mine.q, mine.v], "mujoco": theirs,
                 "band": angle_band, "ulp": mine.ulp, "judged_until_s": until, "ended": ends,
                 "left": {name: departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
+                "records": records,
             }  # fmt: skip
         else:
             check_same_bits(result, where, first[0].name, first[1], theirs)

@@ -44,7 +44,7 @@ def test_the_scene_of_the_readme_runs(engines, tmp_path):
     result = reduction.rows(experiment.Setup.small(ARM, engines), [case], timed=False)
     assert all(check.passed for check in result.checks), [str(check) for check in result.checks if not check.passed]
     assert result.notes[0].startswith("my swing: alpha and gamma. Beta never moves")
-    result = trajectory.follow(case, engines, (1, 2))
+    result = trajectory.runs.follow(case, engines, (1, 2))
     assert all(check.passed for check in result.checks), [str(check) for check in result.checks if not check.passed]
     assert {row["dt_s"] for row in result.rows} == {1 / 32, 1 / 64}
     assert {row["scene"] for row in result.rows} == {"my swing", "my swing, beta locked"}

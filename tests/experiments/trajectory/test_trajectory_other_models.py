@@ -30,7 +30,7 @@ def other(request, known, engines):
     engines = engines | {"mujoco": parse(text, tmt.ARM)}
     result = Result("trajectory", curves={"runs": {}})
     for case in ARM.cases:
-        part = trajectory.follow(case, engines, (1,), known[0])
+        part = trajectory.runs.follow(case, engines, (1,), known[0])
         result.rows += part.rows
         result.curves["runs"] |= part.curves
     drift.measure_drift(result, ARM, engines, STEPS)

@@ -1,0 +1,155 @@
+"""The motion as a GIF: the stick figures of both engines over each other, held and let go.
+
+Drawn without matplotlib, which takes seconds for some hundred pictures: two masks, one for each engine, and one of text, in the
+colours of one small palette. What is drawn is wide and filled for the first engine, narrow and with rings for MuJoCo.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from PIL import Image, ImageChops, ImageDraw, ImageFont
+
+from ...engines import LABELS
+from ...judge.check import Result
+from ...judge.words import capital
+from ...report.style import BLUE, ORANGE
+from .motion_frames import Drawn
+
+SIZE, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and what is left to text above and below
+FINE = 2  # masks are drawn so many times as large
+LEVELS = 5  # of the shades of each colour
+CENTISECONDS, PAUSE = 4, 120  # for which a picture stands, and the last of a scene
+NAMES_AT = 16, 150  # pixels from the left: the engines' names
+MOST_WIDE = 6  # sticks that are drawn wide
+
+
+class Animation:
+    """A figure that is saved as a GIF."""
+
+    suffix = ".gif"
+
+    def __init__(self, scenes: Sequence[Drawn], label: str):
+        self.scenes, self.label = scenes, label
+
+    def savefig(self, path: Path) -> None:
+        """Write the GIF, which is played again and again."""
+        pictures, times, place = [], [], place_of(self.scenes)
+        for scene in self.scenes:
+            still = text_of_scene(scene, self.label, place)
+            pictures += [picture(scene, k, still, place) for k in range(len(scene.t))]
+            times += [10 * CENTISECONDS] * (len(scene.t) - 1) + [10 * PAUSE]
+        first, *others = pictures
+        first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=False)
+
+
+def draw_motion(result: Result) -> tuple[str, Animation, str]:
+    """The first scenes of those that are drawn in motion, of which one is held and one let go."""
+    scenes = result.curves["drawn"][:2]
+    engines = " and ".join(LABELS[name] for name in scenes[0].points)
+    caption = f"The motion in {engines}, over each other. " + " ".join(
+        f"{capital(scene.scene)}, {scene.run}: {scene.seen}" for scene in scenes
+    )
+    return "motion", Animation(scenes, result.label), caption
+
+
+def place_of(scenes: Sequence[Drawn]) -> tuple[float, np.ndarray]:
+    """Pixels per m, and the pixels of the origin, (2,), so that all points of all scenes are seen."""
+    points = np.concatenate([path.reshape(-1, 2) for scene in scenes for path in scene.points.values()])
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = np.array([SIZE[0], SIZE[1] - TOP - BOTTOM]) - 36.0
+    scale = float((room / np.maximum(high - low, 1e-3)).min())
+    middle = np.array([SIZE[0], SIZE[1] + TOP - BOTTOM]) / 2
+    return scale, middle - scale * (low + high) / 2 * [1.0, -1.0]
+
+
+def picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image.Image:
+    """The k-th picture of a scene in the colours of the palette; still: the text that stands in all of them."""
+    scale, origin = place
+    text = still.copy()
+    write = partial(ImageDraw.Draw(text).text, fill=255, font=font(17))
+    write((SIZE[0] - 16, SIZE[1] - 28), f"t = {scene.t[k]:.2f} s", anchor="ra")
+    gone = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
+    words = [f"{capital(LABELS[name])} has diverged" for name in gone]
+    words = words or [f"apart in any joint by at most {scene.apart[k]:.2g} {scene.unit}"]
+    write((16, SIZE[1] - 28), "; ".join(words))
+    shades = []
+    for which, path in enumerate(scene.points.values()):
+        mask = Image.new("L", (FINE * SIZE[0], FINE * (SIZE[1] - BOTTOM)))
+        if np.isfinite(path[k]).all():
+            points = [tuple(FINE * (origin + scale * point * [1.0, -1.0])) for point in path[k]]
+            draw_sticks(ImageDraw.Draw(mask), points, scene.links, which)
+        draw_sticks(ImageDraw.Draw(mask), [(FINE * (NAMES_AT[which] + x), FINE * 62) for x in (4, 36)], [(0, 1)], which)
+        small = Image.new("L", SIZE)
+        small.paste(mask.reduce(FINE), (0, 0))
+        shades.append(small.point(SHADES[which]))
+    image = ImageChops.lighter(ImageChops.add(*shades), text.point(SHADES[2]))
+    image.putpalette(PALETTE)
+    return image
+
+
+def draw_sticks(pen: ImageDraw.ImageDraw, points: Sequence[tuple], links: Sequence[tuple], which: int) -> None:
+    """The sticks of an engine: of the first (0) wide with discs, of the other narrow with rings."""
+    few = len(links) <= MOST_WIDE
+    width = FINE * ((14 if few else 8), (4 if few else 3))[which]
+    disc = FINE * ((7 if few else 4), (6 if few else 3))[which]
+    for one, other in links:
+        pen.line([points[one], points[other]], fill=255, width=width)
+    for x, y in points:
+        pen.ellipse([x - disc, y - disc, x + disc, y + disc], fill=255)
+        if which:
+            inner = disc - 3 * FINE / 2
+            pen.ellipse([x - inner, y - inner, x + inner, y + inner], fill=0)
+
+
+def text_of_scene(scene: Drawn, label: str, place: tuple) -> Image.Image:
+    """What stands in all pictures of a scene: its name, its run, the engines' names, a frame where the robot is fixed."""
+    text = Image.new("L", SIZE)
+    pen = ImageDraw.Draw(text)
+    pen.text((16, 10), scene.scene, fill=255, font=font(20))
+    pen.text((SIZE[0] - 16, 50), f"{scene.run}{slower(scene)}", fill=255, font=font(14), anchor="ra")
+    for at, name in zip(NAMES_AT, (label, LABELS["mujoco"])):
+        pen.text((at + 48, 62), name, fill=255, font=font(16), anchor="lm")
+    base = np.concatenate([path[:, 0] for path in scene.points.values()])
+    if np.nanmax(np.abs(base - base[0])) < 1e-9:
+        x, y = place[1] + place[0] * base[0] * [1.0, -1.0]
+        pen.rectangle([x - 11, y - 11, x + 11, y + 11], outline=255, width=2)
+    return text
+
+
+def slower(scene: Drawn) -> str:
+    """How much slower than it is a scene is shown, in words; nothing where that is hardly seen."""
+    times = CENTISECONDS / 100.0 / float(scene.t[1] - scene.t[0])
+    if 0.9 < times < 1.1:
+        return ""
+    return f", shown {times:.2g} times slower" if times > 1.0 else f", shown {1.0 / times:.2g} times faster"
+
+
+def font(size: int) -> ImageFont.FreeTypeFont:
+    """The font of all figures, size in pixels."""
+    if size not in FONTS:
+        FONTS[size] = ImageFont.truetype(
+            str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), size
+        )
+    return FONTS[size]
+
+
+def palette() -> bytes:
+    """The colours: shades of both figures over each other on white, then of the text."""
+    white, black = np.full(3, 255.0), np.full(3, 26.0)
+    blue, orange = (np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], float) for colour in (BLUE, ORANGE))
+    share = np.linspace(0.0, 1.0, LEVELS)[:, None, None]
+    under = white + share * (blue - white)
+    both = under + share.reshape(1, LEVELS, 1) * (orange - under)
+    dark = white + share[:, 0] * (black - white)
+    return np.concatenate([both.reshape(-1, 3), dark]).round().astype(np.uint8).tobytes()
+
+
+FONTS: dict[int, ImageFont.FreeTypeFont] = {}
+SHADE = [round(level * (LEVELS - 1) / 255.0) for level in range(256)]
+# of a mask's level, its part of the palette's index: of the first engine, of MuJoCo, which lies over it, of text
+SHADES = [LEVELS * shade for shade in SHADE], SHADE, [shade and LEVELS**2 + shade for shade in SHADE]
+PALETTE = palette()

@@ -1,0 +1,118 @@
+"""The motion in the page: both engines' stick figures over each other, with a slider, and nothing to fetch."""
+
+import html
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from .verdict import Section
+
+MOST_BYTES = 280_000  # of the motion in the page
+DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
+WIDE, HIGH, BORDER = 1000, 480, 45  # of what is drawn, in its own units
+FEW_STICKS = 6  # up to which they are drawn wide
+SHOWN_FOR = 5.0  # s, at least about: a shorter scene is shown slower
+UNDER = 0.9  # of what is shown at its own speed
+
+
+def motion_in_html(sections: Sequence[Section], robot: object) -> str:
+    """A <figure> with its style, script and data, at most 300 kB; "" where no scene is drawn. robot: whose motion it is.
+
+    Where all pictures would take more, every second, fourth ... is left out, and then the last scenes: that is said.
+    """
+    section = next((section for section in sections if section.name == DRAWN_IN), None)
+    drawn = section.result.curves.get("drawn") if section else None
+    if not drawn:
+        return ""
+    label = section.result.label
+    engines = [label[:1].upper() + label[1:], "MuJoCo"]
+    data, stride, scenes = inlined(drawn, engines)
+    links, still = scenes[0]["links"], stride * scenes[0]["still"]
+    first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
+    note = f"The {robot.noun} is seen from where its sketch is. "
+    if stride > 1:
+        note += f"One of {stride} pictures of each scene is in this page. "
+    if len(scenes) < len(drawn):
+        left = "; ".join(one.scene for one in drawn[len(scenes) :])
+        note += f"Not in this page: {left}. "
+    few = len(links) <= FEW_STICKS
+    here = Path(__file__).parent
+    return Template((here / "motion.html").read_text(encoding="utf-8")).substitute(
+        ours=html.escape(engines[0]),
+        theirs=engines[1],
+        width=WIDE,
+        height=HIGH,
+        wide=20 if few else 9,
+        ring=16 if few else 7,
+        first=first,
+        second=second,
+        options="".join(f"<option>{html.escape(scene['name'])}</option>" for scene in scenes),
+        seen=html.escape(scenes[0]["seen"]),
+        note=html.escape(note.strip()),
+        data=data,
+        script=(here / "motion.js").read_text(encoding="utf-8"),
+    )
+
+
+def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dict]]:
+    """The scenes as JSON that may stand in a page; every how many pictures are in it, and the scenes as they are in it."""
+    stride, count = 1, len(drawn)
+    while True:
+        scenes = [inlined_scene(one, stride) for one in drawn[:count]]
+        text = json.dumps({"engines": engines, "scenes": scenes}, separators=(",", ":"), allow_nan=False)
+        text = text.replace("<", "\\u003c")
+        if len(text) <= MOST_BYTES or (stride >= 8 and count == 1):
+            return text, stride, scenes
+        stride, count = (2 * stride, count) if stride < 8 else (stride, count - 1)
+
+
+def inlined_scene(one: object, stride: int) -> dict:
+    """One scene as the script has it: of each engine a list of pictures, x and y of each point.
+
+    A picture is 0 where it is the one before, 1 where it is that of the first engine, None where the run has diverged.
+    """
+    ours, theirs = (on_page(one, path[::stride]) for path in one.points.values())
+    dt = stride * float(one.t[1] - one.t[0])
+    slow = max(1.0, SHOWN_FOR / float(one.t[-1]))
+    slow = slow if slow > 1.0 / UNDER else 1.0
+    shown = f" It is shown {slow:.2g} times slower." if slow > 1.0 else ""
+    alive = [k for k in range(len(ours)) if ours[k] is not None and theirs[k] is not None]
+    return {
+        "name": one.scene,
+        "seen": f"{one.scene[:1].upper()}{one.scene[1:]}, {one.run}. {one.seen}{shown}",
+        "dt": dt,
+        "pause": max(1, round(1000.0 * dt * slow)),
+        "unit": one.unit,
+        "still": alive[-1],
+        "links": [list(link) for link in one.links],
+        "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in one.apart[::stride]],
+        "paths": [shorter(ours, [()] * len(ours)), shorter(theirs, ours)],
+    }
+
+
+def on_page(one: object, path: np.ndarray) -> list:
+    """Points of an engine, (pictures, points, 2) m, as whole numbers in the drawing, a list each; None where they are NaN."""
+    points = np.concatenate([of.reshape(-1, 2) for of in one.points.values()])
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = points.min(axis=0), points.max(axis=0)
+    scale = ((np.array([WIDE, HIGH]) - 2 * BORDER) / np.maximum(high - low, 1e-3)).min()
+    at = np.array([WIDE, HIGH]) / 2 + scale * (path - (low + high) / 2) * [1.0, -1.0]
+    return [picture.round().astype(int).ravel().tolist() if np.isfinite(picture).all() else None for picture in at]
+
+
+def shorter(pictures: Sequence, others: Sequence) -> list:
+    """Pictures with 0 for one that is as the one before, and 1 for one that is as the other engine's."""
+    found = []
+    for k, picture in enumerate(pictures):
+        same = k > 0 and picture == pictures[k - 1]
+        found.append(0 if same else 1 if picture is not None and picture == others[k] else picture)
+    return found
+
+
+def outline(picture: Sequence[int], links: Sequence) -> str:
+    """The sticks of a picture as the outline of an SVG."""
+    return "".join(f"M{picture[2 * i]} {picture[2 * i + 1]}L{picture[2 * j]} {picture[2 * j + 1]}" for i, j in links)

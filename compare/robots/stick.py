@@ -1,0 +1,47 @@
+"""The stick figure of a robot: its points in the world at any positions, the sticks between them, and how they are seen."""
+
+import numpy as np
+
+import tmt
+from tmt import literal, method
+
+from . import Robot
+
+ELEVATION, AZIMUTH = 20.0, -70.0  # deg, from where it is seen
+_E, _A = np.radians([ELEVATION, AZIMUTH])
+RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
+UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
+
+
+def stick_figure(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Its points, (times, points, 3) m in the world, at positions q (times, nq), and the pairs of points that a stick joins.
+
+    Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move.
+    """
+    if robot.landmarks:
+        points = np.array([list(robot.landmarks(one).values()) for one in q])
+        return points, [(k, k + 1) for k in range(points.shape[1] - 1)]
+    tree, free = robot.tree, free_parts(robot.tree)
+    origins = [list(frame.origin) for frame in method.joint_frames(tree, list(q.T))]
+    links = [(up, j) for j, up in enumerate(tree.parent) if up >= 0 and not (free[j] and free[up])]
+    ends = [body for body, joint in enumerate(tree.body_hinge) if joint >= 0 and joint not in tree.parent]
+    links += [(tree.body_hinge[body], len(origins) + k) for k, body in enumerate(ends)]
+    joints = np.stack([np.stack([np.broadcast_to(part, len(q)) for part in one], axis=-1) for one in origins], axis=1)
+    return np.concatenate([joints, literal.com_positions(q, tree)[:, ends]], axis=1).astype(float), links
+
+
+def on_paper(points: np.ndarray) -> np.ndarray:
+    """Points in the world, (..., 3) m, as they are seen: to the right and up, (..., 2) m."""
+    return points @ np.stack([RIGHTWARD, UPWARD], axis=1)
+
+
+def free_parts(tree: tmt.Tree) -> list[bool]:
+    """Of each joint whether it is one of the four of a free joint."""
+    found = [False] * len(tree.kind)
+    for i in range(3, len(tree.kind)):
+        row = range(i - 2, i + 1)
+        if tree.kind[i - 3 : i + 1] == ("slide", "slide", "slide", "ball") and all(
+            tree.parent[k] == k - 1 and not any(tree.offset[k]) for k in row
+        ):
+            found[i - 3 : i + 1] = [True] * 4
+    return found
