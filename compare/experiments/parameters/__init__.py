@@ -21,6 +21,13 @@ output names them, and the open tree is compared. Refused in one line, with exit
 status 2: tendon armature, flexes, plugins in the passive force, callbacks, and
 whatever the reader does not know.
 
+The first line of the output and of the report says what is compared with what:
+
+    reference: model; robot.xml compared with tmt's equations for the model as compiled
+
+It is `arm`, the stated numbers, by default where a file has exactly the hinges
+of the assignment's arm, else `model`, itself; --reference says otherwise.
+
 Postures of a file are its keyframes by their names (`key 0` without one),
 `qpos0` and `middle`, that of the joints' ranges.
 
