@@ -12,6 +12,7 @@ import numpy as np
 from .verdict import Section
 
 MOST_BYTES = 280_000  # of the motion in the page
+FEWEST = 8  # one of so many pictures of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
 WIDE, HIGH, BORDER = 1000, 480, 45  # of what is drawn, in its own units
 FEW_STICKS = 6  # up to which they are drawn wide
@@ -65,9 +66,12 @@ def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dic
         scenes = [inlined_scene(one, stride) for one in drawn[:count]]
         text = json.dumps({"engines": engines, "scenes": scenes}, separators=(",", ":"), allow_nan=False)
         text = text.replace("<", "\\u003c")
-        if len(text) <= MOST_BYTES or (stride >= 8 and count == 1):
+        if len(text.encode()) <= MOST_BYTES:
             return text, stride, scenes
-        stride, count = (2 * stride, count) if stride < 8 else (stride, count - 1)
+        if stride < FEWEST or count == 1:
+            stride *= 2
+        else:
+            count -= 1
 
 
 def inlined_scene(one: object, stride: int) -> dict:

@@ -16,7 +16,8 @@ UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E
 def stick_figure(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Its points, (times, points, 3) m in the world, at positions q (times, nq), and the pairs of points that a stick joins.
 
-    Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move.
+    Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move: the
+    slides of a free joint are no points.
     """
     if robot.landmarks:
         points = np.array([list(robot.landmarks(one).values()) for one in q])
@@ -27,7 +28,9 @@ def stick_figure(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, list[tuple[in
     ends = [body for body, joint in enumerate(tree.body_hinge) if joint >= 0 and joint not in tree.parent]
     links += [(tree.body_hinge[body], len(origins) + k) for k, body in enumerate(ends)]
     joints = np.stack([np.stack([np.broadcast_to(part, len(q)) for part in one], axis=-1) for one in origins], axis=1)
-    return np.concatenate([joints, literal.com_positions(q, tree)[:, ends]], axis=1).astype(float), links
+    points = np.concatenate([joints, literal.com_positions(q, tree)[:, ends]], axis=1).astype(float)
+    joined = sorted({point for link in links for point in link})
+    return points[:, joined], [(joined.index(one), joined.index(other)) for one, other in links]
 
 
 def on_paper(points: np.ndarray) -> np.ndarray:

@@ -225,5 +225,5 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(figures_runs.draw_drift, result)
     if grown:
         yield partial(figures_runs.draw_growth, result)
-    if result.curves["drawn"]:
+    if result.curves.get("drawn"):
         yield partial(figures_motion_gif.draw_motion, result)

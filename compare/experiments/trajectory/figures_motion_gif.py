@@ -36,8 +36,9 @@ class Animation:
 
     def savefig(self, path: Path) -> None:
         """Write the GIF, which is played again and again."""
-        pictures, times, place = [], [], place_of(self.scenes)
+        pictures, times = [], []
         for scene in self.scenes:
+            place = place_of(scene)
             still = text_of_scene(scene, self.label, place)
             pictures += [picture(scene, k, still, place) for k in range(len(scene.t))]
             times += [10 * CENTISECONDS] * (len(scene.t) - 1) + [10 * PAUSE]
@@ -55,9 +56,9 @@ def draw_motion(result: Result) -> tuple[str, Animation, str]:
     return "motion", Animation(scenes, result.label), caption
 
 
-def place_of(scenes: Sequence[Drawn]) -> tuple[float, np.ndarray]:
-    """Pixels per m, and the pixels of the origin, (2,), so that all points of all scenes are seen."""
-    points = np.concatenate([path.reshape(-1, 2) for scene in scenes for path in scene.points.values()])
+def place_of(scene: Drawn) -> tuple[float, np.ndarray]:
+    """Pixels per m, and the pixels of the origin, (2,), so that all points of a scene are seen."""
+    points = np.concatenate([path.reshape(-1, 2) for path in scene.points.values()])
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
     room = np.array([SIZE[0], SIZE[1] - TOP - BOTTOM]) - 36.0

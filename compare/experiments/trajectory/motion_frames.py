@@ -142,7 +142,7 @@ def what_is_seen(
             said.append(f"Both are followed beyond the scene's {case.duration:g} s until both have left.")
     elif np.isfinite(apart).any():
         stay = f"Both stay within {LEFT} {unit} of the posture; they" if case.is_held else "The engines"
-        said.append(f"{stay} are at most {np.nanmax(apart):.1e} {unit} apart in {end:g} s.")
+        said.append(f"{stay} are at most {np.nanmax(apart):.2g} {unit} apart in {end:g} s.")
     for name, time in ended.items():
         if time is not None:
             said.append(f"{capital(LABELS[name])} has diverged at {time:.2f} s and is drawn no longer.")

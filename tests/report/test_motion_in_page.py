@@ -1,0 +1,154 @@
+"""The motion in the page: small, whole, with nothing to fetch, and what is drawn is what was computed."""
+
+import json
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from sections import section
+
+from compare.experiments.trajectory.motion_frames import Drawn
+from compare.report import motion
+from compare.robots.arm import ARM
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None) -> Drawn:
+    """A scene in which the points of the first engine go round, those of MuJoCo beside them; or any way that rng chooses."""
+    turn = np.linspace(0.0, 1.0, pictures)[:, None] * 3.0 + np.arange(points)
+    path = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * np.arange(1, points + 1)[None, :, None]
+    ways = [path, path + apart] if rng is None else [rng.normal(size=path.shape) for _ in range(2)]
+    t, off = np.linspace(0.0, 5.0, pictures), np.full(pictures, apart)
+    if ended is not None:
+        ways[1], off = (np.where((t >= ended).reshape(-1, *[1] * (v.ndim - 1)), np.nan, v) for v in (ways[1], off))
+    links = [(k, k + 1) for k in range(points - 1)]
+    return Drawn(scene, "RK4, dt = 5/128 s", t, dict(zip(("tmt", "mujoco"), ways)), links, off, "rad",
+                 {"tmt": None, "mujoco": ended}, dict.fromkeys(("tmt", "mujoco")), "What is seen.")  # fmt: skip
+
+
+def page_of(*scenes, label="TMT") -> str:
+    of = section("trajectory")
+    of.result.curves, of.result.label = {"drawn": list(scenes)}, label
+    return motion.motion_in_html([section("mass"), of], ARM)
+
+
+def data_of(text) -> dict:
+    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', text, re.DOTALL)[1])
+
+
+def pictures_of(scene) -> list:
+    """As the script unfolds them."""
+    found = []
+    for path in scene["paths"]:
+        found.append([])
+        for k, picture in enumerate(path):
+            found[-1].append(found[-1][k - 1] if picture == 0 else found[0][k] if picture == 1 else picture)
+    return found
+
+
+def test_there_is_no_figure_where_nothing_moves():
+    assert motion.motion_in_html([], ARM) == motion.motion_in_html([section("mass")], ARM) == page_of() == ""
+    broken = section("trajectory")  # one that broke off has no curves
+    assert motion.motion_in_html([broken], ARM) == ""
+
+
+def test_the_figure_is_whole_and_fetches_nothing():
+    text = page_of(drawn(), drawn("let go"))
+    assert text.startswith('<figure id="motion">') and text.rstrip().endswith("</figure>")
+    assert not re.search(r"https?:|src=|href=|@import|fetch\(|import\(|url\((?!#motion-ring\))", text)
+    assert text.count("<option>") == 2 and text.index("<option>held") < text.index("<option>let go")
+    for needed in (
+        'type="range"',
+        'type="button"',
+        "<select",
+        "prefers-color-scheme: dark",
+        "prefers-reduced-motion",
+        "print",
+    ):
+        assert needed in text, needed
+    assert "What is seen." in text and "Held, RK4, dt = 5/128 s." in text
+    assert "$" not in re.sub(r"<script>.*</script>", "", text, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-9, 0.3])
+@pytest.mark.parametrize("ended", [None, 2.0])
+def test_the_pictures_are_those_that_were_computed(apart, ended):
+    one = drawn(apart=apart, ended=ended)
+    scene = data_of(page_of(one))["scenes"][0]
+    found = pictures_of(scene)
+    low, high = (of(np.concatenate([*one.points.values()]).reshape(-1, 2), axis=0) for of in (np.nanmin, np.nanmax))
+    scale = min(
+        (motion.WIDE - 2 * motion.BORDER) / (high - low)[0], (motion.HIGH - 2 * motion.BORDER) / (high - low)[1]
+    )
+    for picture, path in zip(found, one.points.values()):
+        for values, points in zip(picture, path):
+            assert (values is None) == np.isnan(points).any()
+            if values is not None:
+                x, y = np.reshape(values, (-1, 2)).T
+                np.testing.assert_allclose(x, motion.WIDE / 2 + scale * (points[:, 0] - (low + high)[0] / 2), atol=0.51)
+                np.testing.assert_allclose(y, motion.HIGH / 2 - scale * (points[:, 1] - (low + high)[1] / 2), atol=0.51)
+    assert (scene["dt"], scene["links"]) == (5.0 / 128, [[0, 1], [1, 2]])
+    assert scene["apart"][0] == apart and (scene["apart"][-1] is None) == (ended is not None)
+    assert found[1][scene["still"]] is not None and (scene["still"] == 128) == (ended is None)
+
+
+def test_what_does_not_move_takes_no_place():
+    still = drawn()
+    still = still._replace(points={name: path[:1] + 0.0 * path for name, path in still.points.items()})
+    scene = data_of(page_of(still))["scenes"][0]
+    assert scene["paths"][0][1:] == [0] * 128 and scene["paths"][1] == [1] + [0] * 128
+
+
+def test_a_picture_is_there_without_script_and_in_print():
+    text = page_of(drawn(apart=0.3))
+    found = pictures_of(data_of(text)["scenes"][0])
+    for name, pictures in zip(("ours", "theirs"), found):
+        x, y, *_ = pictures[-1]
+        assert f'<path class="{name}" d="M{x} {y}L' in text
+    assert '<div class="controls" hidden>' in text
+
+
+def test_names_cannot_break_the_page():
+    text = page_of(drawn("</script><b>&amp;\u2028"), label="yours")
+    assert "<b>" not in text and text.count("</script>") == 2 and "&lt;/script&gt;&lt;b&gt;" in text
+    assert data_of(text)["scenes"][0]["name"] == "</script><b>&amp;\u2028"
+    assert data_of(text)["engines"] == ["Yours", "MuJoCo"] and "</svg> Yours" in text
+
+
+def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes_and_both_are_said(rng):
+    small = page_of(*(drawn(f"scene {k}", rng=rng) for k in range(6)))
+    assert "pictures of each scene" not in small and "Not in this page" not in small
+    larger = page_of(*(drawn(f"scene {k}", points=40, rng=rng) for k in range(6)))
+    assert "One of 2 pictures of each scene is in this page." in larger and "Not in this page" not in larger
+    largest = page_of(*(drawn(f"scene {k}", points=400, rng=rng) for k in range(6)))
+    assert "One of 8 pictures of each scene is in this page. Not in this page: scene " in largest
+    assert len(data_of(largest)["scenes"]) < 6
+    beyond = page_of(drawn(points=4000, rng=rng))
+    assert "One of 16 pictures of each scene" in beyond
+    for text in (small, larger, largest, beyond):
+        assert len(text.encode()) <= 300_000
+    scene = data_of(larger)["scenes"][0]
+    assert len(scene["paths"][0]) == len(scene["apart"]) == 65 and scene["dt"] == 5.0 / 64
+
+
+@pytest.mark.parametrize(
+    "seconds, words, pause", [(5.0, "", 39), (1.0, "It is shown 5 times slower.", 39), (10.0, "", 78)]
+)
+def test_a_short_scene_is_shown_slower_and_says_so(seconds, words, pause):
+    scene = data_of(page_of(drawn()._replace(t=np.linspace(0.0, seconds, 129))))["scenes"][0]
+    assert scene["seen"].endswith(words or "What is seen.") and scene["pause"] == pause
+
+
+def test_the_script_is_short_and_packed():
+    assert len((ROOT / "compare" / "report" / "motion.js").read_text(encoding="utf-8").splitlines()) <= 80
+    assert '"compare.report" = ["*.html", "*.js"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+
+def test_any_robot_is_named():
+    assert "The robot is seen" in motion.motion_in_html(
+        [SimpleNamespace(name="trajectory", result=SimpleNamespace(curves={"drawn": [drawn()]}, label="TMT"))],
+        SimpleNamespace(noun="robot"),
+    )
