@@ -1,7 +1,8 @@
 """Generated code on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
 The name of a generated module is the hash of its text, of the code that it takes from `sine` and `written`, and of numba's
-version; numba keeps its machine code beside it, and that of loops.py (see machine_code.py). What lies there is run, so the
+version; numba keeps its machine code beside it, and that of loops.py (see machine_code.py); the text too is kept (see kept.py).
+What lies there is run, so the
 folder must be the user's own: others may neither write to it nor put another in its place. Without such a folder the code is
 compiled anew in each process: it only costs time.
 """
@@ -131,16 +132,20 @@ def from_disk(name, text, folder):
         check_own(path)
     if not path.exists() or path.read_bytes() != text.encode():
         clear(folder)
-        # written aside and moved, so that a process that reads meanwhile sees all of it or nothing
-        with tempfile.NamedTemporaryFile("wb", dir=folder, suffix=".new", delete=False) as file:
-            file.write(text.encode())
-        os.replace(file.name, path)
+        write_aside(path, text.encode())
     try:
         return executed(name, text, str(path))
     except Exception:
         for file in inside.glob(f"{name}.*"):
             file.unlink()
         raise
+
+
+def write_aside(path, content) -> None:
+    """Write a file aside and move it, so that a process that reads meanwhile sees all of it or nothing."""
+    with tempfile.NamedTemporaryFile("wb", dir=path.parent, suffix=".new", delete=False) as file:
+        file.write(content)
+    os.replace(file.name, path)
 
 
 def own_machine_code(folder, name) -> Path:

@@ -16,7 +16,8 @@ PART = 4096  # states times speeds that are taken at once: more do not stay in t
 
 def one_step(stepping, tree, q, qd, tau, dt):
     """The state (q, qd) of a tree one dt later by a method, over any scalar."""
-    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt), q, qd, dt)
+    terms = composite.mass_matrix_and_bias
+    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt, terms), q, qd, dt)
 
 
 def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from . import composite
 from .implicit_source import step_source
+from .kept import kept
 from .method import acceleration
 from .templates import (
     ADAPTIVE,
@@ -31,6 +32,7 @@ def slope_code(tree, stepping, terms=composite.mass_matrix_and_bias) -> Code:
     return tape.function("slope", [*q, *qd, *tau, dt], stepping.slope(tree, q, qd, tau, dt, terms))
 
 
+@kept
 def run_source(tree, stepping) -> str:
     """The module that follows one state at a time: slope, step, and the loop over both."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
@@ -88,6 +90,7 @@ def _loop(stepping, tree) -> str:
     )
 
 
+@kept
 def lanes_source(tree, stepping) -> str:
     """The module that follows LANES states side by side, stage by stage."""
     nq, n, joints = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates
@@ -134,6 +137,7 @@ def lanes_source(tree, stepping) -> str:
     return "\n\n".join([HEADER, *(written(code, inline=True) for code in functions), slopes, RUN_LANES.format(**words)])
 
 
+@kept
 def evaluator_source(tree, quantity, terms, sine) -> str:
     """The module of kernels.evaluator."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv

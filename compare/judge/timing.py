@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-TIMED_ENOUGH = 0.02  # s: what has taken so long in all is timed no more than twice
-ONCE = 0.1  # s: what takes so long is timed once, without a call to warm up: both weigh little beside it
+TIMED_ENOUGH = 0.01  # s: what has taken so long in all is timed no more than twice
+ONCE = 0.02  # s: what takes so long is timed once, without a call to warm up: both weigh little beside it
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
 

@@ -91,6 +91,7 @@ PARTS = (
 )
 # who follows the smaller model of a scene too, where there is one
 SMALLER, SMALLER_STEPS = (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")), 1024
+TIMED_STEPS = 4096  # of a run of MuJoCo that has more
 COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluations", "seconds", "error_rad", "worst_error_rad",
            "energy_error_J", "diverged", "why_not"]  # fmt: skip
 
@@ -201,7 +202,7 @@ def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Seq
     result.notes += advice.step_response_in_words(result.tables["what_should_i_use"], driven)
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup)
-    result.notes += [*sentences, *spread_in_words(spread), PARTS]
+    result.notes += [*sentences, *spread_in_words(spread, TIMED_STEPS), PARTS]
     growth.add_growth(result, setup)
     if not setup.robot.is_read:  # of a file nothing was aimed at
         aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
@@ -283,11 +284,20 @@ def row_of_run(
 
 def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
     """Seconds of the runs of one scene's rows, all settings in turns."""
-    runs = []
+    runs, times_longer = [], []
     for case, method, setting in (row["run"] for row in rows):
-        dynamics = setup.engines[method.engine].of(case)
-        runs.append(dynamics.prepare(*case.start, case.tau, setting, method.name)[0])
-    return timing.in_turns(runs, rounds=setup.of(5, 2, 2))
+        dynamics, part = setup.engines[method.engine].of(case), timed_part(method, setting)
+        runs.append(dynamics.prepare(*case.start, case.tau, part, method.name)[0])
+        times_longer.append(setting.duration / part.duration)
+    times = timing.in_turns(runs, rounds=setup.of(5, 2, 2))
+    return [[longer * seconds for seconds in taken] for longer, taken in zip(times_longer, times)]
+
+
+def timed_part(method: Method, setting: Setting) -> Setting:
+    """What of a run is timed: of many steps of MuJoCo, each of which costs the same, the first TIMED_STEPS; else all."""
+    if method.engine != "mujoco" or setting.steps <= TIMED_STEPS:
+        return setting
+    return Setting(setting.duration * TIMED_STEPS / setting.steps, TIMED_STEPS)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

@@ -228,12 +228,13 @@ def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
     return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]
 
 
-def spread_in_words(spread: Sequence[float]) -> list[str]:
-    """How the times of one setting differ, in words."""
+def spread_in_words(spread: Sequence[float], steps: int) -> list[str]:
+    """How the times of one setting differ, in words. steps: of MuJoCo's runs, over which longer ones are timed."""
+    first = f" A run of MuJoCo with more than {steps} steps is timed over the first {steps}: each costs the same."
     if not spread:
-        return ["Each time is that of one run."]
+        return [f"Each time is that of one run.{first}"]
     return [
         f"Each time is the least of several runs (one, if it takes longer than {timing.ONCE:g} s), in turns with all of its "
         f"scene; where there are more than one, their median is {np.median(spread) - 1:.1%} above the least, for one setting "
-        f"in ten more than {np.quantile(spread, 0.9) - 1:.0%}. Errors come from runs of their own."
+        f"in ten more than {np.quantile(spread, 0.9) - 1:.0%}.{first} Errors come from runs of their own."
     ]

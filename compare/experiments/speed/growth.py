@@ -27,7 +27,7 @@ class Extent(NamedTuple):
     numbers: tuple[int, ...]  # of joints
     passes: int  # in each of which all are timed
     most: float = np.inf  # operations of straight-line code that is compiled
-    cold: bool = False  # whether it is measured what the loops cost to compile
+    cold: bool = False  # whether it is measured what compilation takes
 
 
 EXTENTS = {

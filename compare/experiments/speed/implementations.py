@@ -16,7 +16,7 @@ import numpy as np
 
 import tmt
 from tmt import composite, generic, kernels, loop_trees, method
-from tmt.cache import executed
+from tmt.cache import executed, load
 from tmt.source import LANES, evaluator_source
 
 from ...case import SEED
@@ -45,7 +45,7 @@ class Chain(NamedTuple):
     dynamics: MujocoDynamics  # of the same text
     states: tuple[np.ndarray, ...]  # q, qd, tau, (states, n) each; rad, rad/s, N m
     most: float = np.inf  # operations of straight-line code that is compiled
-    cold: bool = False  # whether it is measured what the loops cost to compile
+    cold: bool = False  # whether it is measured what compilation takes
 
 
 class Made(NamedTuple):
@@ -93,7 +93,7 @@ def literal(of: Chain) -> Made:
 
 
 def straight_line_of(of: Chain) -> Made | str:
-    """Traced code of the composite form, one state at a time, compiled here and now."""
+    """Traced code of the composite form, one state at a time: from the cache folder, or compiled here and now."""
     count = operations_of(of.tree).get("straight_line")
     if count is None:
         return "it has so many lines that a loop takes its place"
@@ -101,8 +101,9 @@ def straight_line_of(of: Chain) -> Made | str:
         return f"it has more than {of.most:,.0f} operations; `speed --growth` compiles it, unless it is to be quick"
     begin = time.process_time()
     text = one_at_a_time(evaluator_source(of.tree, FORWARD, composite.mass_matrix_and_bias, "sincos"))
-    each = executed(f"chain_of_{of.n}", text.replace("CACHE", "False"), f"chain_of_{of.n}").each
-    taken = time.process_time() - begin
+    name, in_memory = f"chain_of_{of.n}", text.replace("CACHE", "False")
+    each = (executed(name, in_memory, name) if of.cold else load(text)).each
+    taken = time.process_time() - begin if of.cold else None
     arrays = [*of.states, np.empty_like(of.states[0])]
     return Made(partial(again_and_again, each, arrays), len(arrays[0]), taken, count)
 
