@@ -28,29 +28,35 @@ SHORT = f"""\
 
 """
 EXAMPLES = """examples:
-  python -m compare all                          every experiment, report in reports/latest
-  python -m compare all --quick                  the same with fewer states, in seconds
-  python -m compare mass --out /tmp/mass         one experiment, report elsewhere
-  python -m compare all --mjcf my_arm.xml        your MJCF of the arm compared with the stated numbers
-  python -m compare all --mjcf robot.xml         any robot compared with tmt's equations for its compiled model
+  python -m compare all                       everything, for the arm
+  python -m compare all --quick               the same in seconds: fewer states
+  python -m compare mass --out /tmp/mass      one experiment, report elsewhere
+  python -m compare all --mjcf my_arm.xml     your arm and the stated numbers
+  python -m compare all --mjcf robot.xml      any robot
   python -m compare all --mjcf robot.xml --reference my_equations.py:
-                                                 your own equations of it compared with MuJoCo
+                                              your own equations of that robot
   python -m compare stability --mjcf robot.xml --integrator Euler --dt 0.001
-                                                 whether that step is stable under the robot's own servos
-  python -m compare speed --growth               what a chain costs as it grows from 1 joint to 64
-  python -m compare speed --scenes my.toml       your own scenes beside those of the arm
-  python -m compare speed --help                 what speed asks, what it compares, its tables and its figures
+                                              whether that step is stable
+  python -m compare speed --scenes my.toml    scenes of your own
+  python -m compare speed --growth            a chain of 1 to 64 joints
+  python -m compare speed --help              what one experiment asks and finds
 
-exit status: 0 all checks pass; 1 a check failed; 2 the request could not be carried out
+exit status: 0 all checks pass; 1 a check failed; 2 the request could not be
+carried out, for the reason in one line
 """
 
-FOR_ALL = (
-    "Compare equations of motion with MuJoCo, on the assignment's arm or on your robot, and write a report.\n\n"
-    + (
-        "experiments (`all`: every one of them):\n"
-        + "\n".join(f"  {name:<13} {what}" for name, what in EXPERIMENTS.items())
-    )
-)
+
+def folded(text: str, indent: str = "") -> str:
+    """A text in lines that an ordinary terminal has room for; indent: of all lines but the first."""
+    return fill(text, LINE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+FOR_ALL = "\n".join([
+    folded("Compare equations of motion with MuJoCo, on the assignment's arm or on your robot, and write a report."),
+    "",
+    "experiments (`all`: every one of them):",
+    *(folded(f"  {name:<13} {what}", " " * 16) for name, what in EXPERIMENTS.items()),
+])  # fmt: skip
 
 
 class Parser(argparse.ArgumentParser):
@@ -149,14 +155,12 @@ def help_of(experiment: str) -> str:
     file = FOLDER / f"{experiment}.py"
     file = file if file.exists() else FOLDER / experiment / "__init__.py"
     first, *rest = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))).split("\n")
-    return "\n".join([fill(first, LINE_WIDTH, break_on_hyphens=False), *rest])
+    return "\n".join([folded(first), *rest])
 
 
 def what_can_be_asked() -> str:
     """Ten lines for who asks nothing."""
-    return SHORT + fill(
-        f"Experiments: {', '.join(EXPERIMENTS)}.", LINE_WIDTH, break_long_words=False, break_on_hyphens=False
-    )
+    return SHORT + folded(f"Experiments: {', '.join(EXPERIMENTS)}.")
 
 
 def request(arguments: Sequence[str]) -> argparse.Namespace:

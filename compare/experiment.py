@@ -56,6 +56,7 @@ def examine(
             terminal.say(f"{name:<13} skipped: {NOTHING_FAILED}")
             clock.ends(name)
             continue
+        clock.begins(name)
         with clock.of(name):
             setup.progress(EXPERIMENTS[name])
             result, crash = (None, crashed[name]) if crashed[name] else attempt(name, experiment.rows, setup)

@@ -75,6 +75,7 @@ def test_help_has_examples_and_every_option(capsys):
         assert (status, err) == (0, "")
         assert "python -m compare all --quick" in text and "exit status" in text
         assert all(f"  {name} " in text for name in (*EXPERIMENTS, *OPTIONS_OF_ALL))
+        assert max(map(len, text.splitlines())) <= 80
 
 
 TAKEN = {"--scenes": {"trajectory", "speed", "reduction"}, "--dt": {"stability"}, "--growth": {"speed"},

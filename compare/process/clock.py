@@ -14,7 +14,8 @@ class Clock:
 
     def __init__(self):
         self.started = time.perf_counter()
-        self.task = ""  # under way
+        self.task = ""  # for which something is done
+        self.under_way = ""
         self.ended = {}  # s from the start, of each task that has ended
         self.taken = []  # (task, seconds of the processor)
 
@@ -38,8 +39,13 @@ class Clock:
         """A task has taken so many seconds of the processor."""
         self.taken.append((task, seconds))
 
+    def begins(self, task: str) -> None:
+        """A task is under way."""
+        self.under_way = task
+
     def ends(self, task: str) -> None:
         """A task has come to its end."""
+        self.under_way = ""
         self.ended[task] = self.elapsed
 
     def seconds_of(self, task: str) -> float:

@@ -15,43 +15,42 @@ START, END = "start", "figures"  # what comes before the first experiment and af
 # s by a watch from the start until each ends, of the assignment's arm on two cores: where an estimate begins, no more
 AFTER_FULL = {
     START: 5.0, "parameters": 5.5, "published": 6.0, "kinematics": 7.0, "mass": 8.0, "gravity": 9.0, "acceleration": 10.0,
-    "trajectory": 25.0, "diagnosis": 25.0, "speed": 85.0, "stability": 86.0, "reduction": 95.0, END: 100.0,
+    "trajectory": 22.0, "diagnosis": 22.0, "stability": 30.0, "speed": 70.0, "reduction": 76.0, END: 80.0,
 }  # fmt: skip
 AFTER_QUICK = {
-    START: 3.0, "parameters": 3.2, "published": 3.5, "kinematics": 3.8, "mass": 4.2, "gravity": 4.6, "acceleration": 5.0,
-    "trajectory": 7.0, "diagnosis": 7.0, "speed": 11.0, "stability": 11.2, "reduction": 13.0, END: 15.0,
+    START: 2.0, "parameters": 2.2, "published": 2.4, "kinematics": 2.7, "mass": 3.0, "gravity": 3.3, "acceleration": 3.6,
+    "trajectory": 5.0, "diagnosis": 5.0, "stability": 6.0, "speed": 8.0, "reduction": 9.0, END: 10.0,
 }  # fmt: skip
 TRUST = 0.1  # of the whole: what is planned weighs as much as so much of it that has been seen
 OUTSIDE = ("--out",)  # options that change nothing of what is computed
 
 
 class Remaining:
-    """How long a run takes still. names: its experiments in their order; plan: seconds until each of these and START, END end."""
+    """How long a run takes still. names: its experiments; plan: seconds until each of these and START and END end."""
 
     def __init__(self, clock: Clock, names: Sequence[str], plan: dict[str, float]):
-        self.clock, self.names = clock, names
-        self.plan = [(name, plan[name]) for name in (START, *names, END) if name in plan]
+        self.clock, self.names, self.plan = clock, names, plan
 
     @property
     def seconds(self) -> float | None:
         """An estimate of the seconds that are left; None: there is none, because the last task takes longer than it should."""
-        ended = [(at, self.clock.ended[name]) for name, at in self.plan if name in self.clock.ended]
-        planned, really = ended[-1] if ended else (0.0, 0.0)
-        whole = self.plan[-1][1]
-        coming = [at for name, at in self.plan if name not in self.clock.ended]
+        ended = [name for name in self.clock.ended if name in self.plan]
+        planned = max((self.plan[name] for name in ended), default=0.0)
+        really = max((self.clock.ended[name] for name in ended), default=0.0)
+        coming = [at for name, at in self.plan.items() if name not in ended]
         if not coming:
             return None
+        whole = max(self.plan.values())
         pace = (really + TRUST * whole) / (planned + TRUST * whole)
         left = (whole - planned) * pace - (self.clock.elapsed - really)
-        least = (whole - coming[0]) * pace  # what comes after the task that is under way
+        least = (whole - min(coming)) * pace  # what comes after the task that is under way
         return max(left, least) or None
 
     def words(self) -> list[str]:
         """How far and how long still: "4 of 11", "acceleration", "about 35 s left"; what is not known is left out."""
-        now, seconds = [], self.seconds
-        if START in self.clock.ended:
-            now = [name for name in self.names if name not in self.clock.ended][:1]
-        parts = [f"{self.names.index(name) + 1} of {len(self.names)}" for name in now] + now
+        now, seconds = self.clock.under_way, self.seconds
+        number = 1 + sum(name in self.clock.ended for name in self.names)
+        parts = [f"{number} of {len(self.names)}", now] if now in self.names else []
         return parts + ([f"about {in_words(seconds)} left"] if seconds else [])
 
 
@@ -80,7 +79,7 @@ def plan(names: Sequence[str], quick: bool, command: str, out: str | Path) -> di
 def without_others(whole: dict[str, float], names: Sequence[str]) -> dict[str, float]:
     """What a run of some experiments may take, from what one of all takes."""
     taken, at, before = {}, 0.0, 0.0
-    for name, ended in whole.items():
+    for name, ended in sorted(whole.items(), key=lambda item: item[1]):
         if name in (START, *names, END):
             at += ended - before
             taken[name] = at

@@ -138,7 +138,8 @@ def test_a_model_of_any_name_can_be_locked(tmp_path):
 
 @pytest.mark.parametrize("line, status", [
     ("compare --help >/dev/full", 0), ("compare --help >&-", 0), ("compare --help | head -1; exit ${PIPESTATUS[0]}", 0),
-    ("compare mass --fast >&- 2>&-", 2), ("compare nothing 2>/dev/full", 2),
+    ("compare >/dev/full", 0), ("compare >&-", 0), ("compare speed --help | head -1; exit ${PIPESTATUS[0]}", 0),
+    ("compare --quick >&- 2>&-", 2), ("compare mass --fast >&- 2>&-", 2), ("compare nothing 2>/dev/full", 2),
     ("compare mass --mjcf none.xml 2>&-", 2), ("compare mass --mjcf none.xml >&- 2>/dev/full", 2),
 ])  # fmt: skip
 def test_nor_does_it_for_what_is_answered_at_once(tmp_path, line, status):
