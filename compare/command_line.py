@@ -4,6 +4,7 @@ import argparse
 import ast
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from textwrap import fill
@@ -167,7 +168,8 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
     """What is asked for. SystemExit: with 0 where help is asked for, or nothing; with 2 and one line for what is mistyped."""
     whole = parser()
     if not arguments:
-        print(what_can_be_asked())
+        with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
+            print(what_can_be_asked(), flush=True)
         raise SystemExit(0)
     options, unknown = whole.parse_known_args(with_minus(arguments))
     refuse_unknown(whole, options, unknown, shlex.join(arguments))
