@@ -1,6 +1,8 @@
 """Every code block of the README and of the experiments' help: Python runs in a fresh folder, commands are parsed, what is shown
 is what is printed."""
 
+import csv
+import json
 import os
 import re
 import shlex
@@ -48,6 +50,79 @@ def test_it_is_short_and_what_it_shows_is_there():
     assert len([name for name in linked if name.endswith((".png", ".gif"))]) == 5
     of_a_report = {f"reports/example/figures/{name}" for name in ("motion.gif", "overview_times.png")}
     assert all((ROOT / name).exists() for name in linked if name not in of_a_report)
+
+
+EXAMPLE = ROOT / "reports" / "example"
+
+
+def table(name):
+    with open(EXAMPLE / "tables" / f"{name}.csv", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def largest(rows, **where):
+    """The largest difference in the rows of a table with these values."""
+    return max(float(row["largest_difference"]) for row in rows if where.items() <= row.items())
+
+
+def test_its_results_are_those_of_the_example():
+    """Of the command that stands beside them."""
+    results = json.loads((EXAMPLE / "results.json").read_text(encoding="utf-8"))
+    assert results["provenance"]["command"].endswith("-m compare all --out reports/example") and results["passed"]
+    at_random = {"scene": "random states"}
+    limits = [
+        float(row["observed_dt_s"]) / float(row["predicted_dt_s"]) - 1.0
+        for row in table("stability")
+        if row["predicted_dt_s"] and row["observed_dt_s"]
+    ]
+    worst = re.search(r"(\d+ %) of it", (EXAMPLE / "report.md").read_text(encoding="utf-8"))[1]
+    runs = [row for row in table("trajectory") if row["scene"].endswith(", free") and row["level"] == "open loop"]
+    runs = [
+        row for row in runs if row["engine_integrator"] == "RK4" and row["dt_s"] == "0.078125" and row["unit"] == "rad"
+    ]
+    followed = [
+        row for row in table("speed") if (row["engine"], row["method"], row["dt_s"]) == ("mujoco", "RK4", "0.078125")
+    ]
+    (error,) = [float(row["worst_error_rad"]) for row in followed if row["scene"] == "ball catch, free"]
+    for text in (
+        f"All {len(results['checks'])} checks pass:",
+        f"at most {largest(table('mass'), quantity='Mbar', **at_random):.1e} kg m2 apart",
+        f"accelerations {largest(table('acceleration'), quantity='qdd', **at_random):.1e} rad/s2",
+        f"no difference exceeds {worst} of its rounding tolerance",
+        f"agree within {largest(runs):.1e} rad in the scenes that are let go",
+        f"both are {error:.2g} rad from the true motion after ball catch",
+        f"All {len(limits)} step limits,",
+    ):
+        assert text in " ".join(README.split()), text
+    assert max(map(abs, limits)) <= 1e-4 and "agree with runs within 0.01 %" in README
+    for row in table("what_should_i_use"):
+        said = f"| {row['scene']}: {float(row['target_rad']):.0e} rad |"
+        if said in README:
+            assert f"{said} {cheapest(row)} |" in README
+
+
+def cheapest(row):
+    """A row of what_should_i_use.csv as the README has it."""
+    mujoco, by_tmt = row["mujoco"].removeprefix("mujoco "), row["tmt"].removeprefix("tmt ")
+    ratio = f"{float(row['ratio']):.0f}"
+    milliseconds = [f"{float(row[name]):.2g}" for name in ("mujoco_ms", "tmt_ms")]
+    milliseconds = [f"{float(text):.0f}" if float(text) >= 100.0 else text for text in milliseconds]
+    return (
+        f"{mujoco} (dt {float(row['mujoco_dt_s']):.2g} s) | {milliseconds[0]} | {by_tmt} | {milliseconds[1]} | {ratio}"
+    )
+
+
+def test_a_submitted_arm_is_judged_as_it_says(tmp_path, monkeypatch, capsys):
+    (line,) = [shlex.split(line)[3:] for line in commands() if "reports/student" in line]
+    monkeypatch.chdir(tmp_path)
+    text = ARM.mjcf.read_text(encoding="utf-8")
+    Path("my_arm.xml").write_text(text.replace('pos="0.15 0 0"', 'pos="0.151 0 0"'), encoding="utf-8")
+    assert line[0] == "all"
+    assert main(["parameters", *line[1:]]) == 1
+    said = capsys.readouterr().out
+    cause = "com x of forearm: stated 0.15 m, compiled 0.151 m"
+    assert f"CAUSE {cause}" in said and cause in " ".join(README.split())
+    assert Path("reports/student/index.html").exists()
 
 
 def test_a_help_has_blocks_of_every_kind():
