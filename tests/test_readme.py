@@ -104,12 +104,11 @@ def test_its_results_are_those_of_the_example():
 def cheapest(row):
     """A row of what_should_i_use.csv as the README has it."""
     mujoco, by_tmt = row["mujoco"].removeprefix("mujoco "), row["tmt"].removeprefix("tmt ")
-    ratio = f"{float(row['ratio']):.0f}"
-    milliseconds = [f"{float(row[name]):.2g}" for name in ("mujoco_ms", "tmt_ms")]
-    milliseconds = [f"{float(text):.0f}" if float(text) >= 100.0 else text for text in milliseconds]
-    return (
-        f"{mujoco} (dt {float(row['mujoco_dt_s']):.2g} s) | {milliseconds[0]} | {by_tmt} | {milliseconds[1]} | {ratio}"
+    slow, fast = (
+        f"{time:.0f}" if time >= 100.0 else f"{time:.2g}" for time in map(float, (row["mujoco_ms"], row["tmt_ms"]))
     )
+    ratio = f"{float(row['ratio']):.0f}"
+    return f"{mujoco} (dt {float(row['mujoco_dt_s']):.2g} s) | {slow} | {by_tmt} | {fast} | {ratio}"
 
 
 def test_a_submitted_arm_is_judged_as_it_says(tmp_path, monkeypatch, capsys):
