@@ -42,6 +42,9 @@ EXAMPLES = """examples:
   python -m compare speed --growth            a chain of 1 to 64 joints
   python -m compare speed --help              what one experiment asks and finds
 
+output: a line for each experiment; its seconds are those of the processor for
+this experiment alone, and what it waited is not in them
+
 exit status: 0 all checks pass; 1 a check failed; 2 the request could not be
 carried out, for the reason in one line
 """

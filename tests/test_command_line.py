@@ -47,6 +47,16 @@ def test_all_passes_and_says_so_at_a_glance(ran):
     assert re.match(r"The two models agree: all \d+ checks pass\..*Report: reports/latest/index\.html \(", text)
 
 
+def test_a_terminal_shows_how_far_and_how_long_still(ran):
+    run, _ = ran
+    shown = re.findall(
+        r"(\d+) of 11, (\w+), about \d+ (?:s|min) left", re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", run.output)
+    )
+    numbers = [int(number) for number, _ in shown]
+    assert len(set(numbers)) > 3 and numbers == sorted(numbers) and {name for _, name in shown} <= set(RAN)
+    assert len(set(shown)) == len(set(numbers))
+
+
 def test_all_writes_the_files_that_are_promised_and_nothing_else(ran):
     _, folder = ran
     assert [p.name for p in folder.iterdir()] == ["reports"]

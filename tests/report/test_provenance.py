@@ -38,4 +38,5 @@ def test_what_each_task_took_itself_is_written():
     found = durations(clock)
     assert found == {"seconds_of": {"a": 0.5, "b": 1.0}, "ended_after_s": {"start": 0.5, "a": 1.5, "b": 9.0}}
     table = origins(found)
+    assert table["what"].tolist()[0].startswith("seconds of the processor")
     assert table["value"].tolist() == ["a 0.5, b 1.0", "start 0.5, a 1.5, b 9.0"]
