@@ -5,6 +5,7 @@ some other machine. Either is then scaled by what the ended tasks took on this o
 """
 
 import json
+import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -69,7 +70,8 @@ def plan(names: Sequence[str], quick: bool, command: str, out: str | Path) -> di
     try:
         origin = json.loads((Path(out) / "results.json").read_text(encoding="utf-8"))["provenance"]
         found = {str(name): float(at) for name, at in origin["ended_after_s"].items()}
-        if same_kind(command, origin["command"]) and 0.0 < found[END] < float("inf"):
+        are_times = all(0.0 <= at <= found[END] < math.inf for at in found.values()) and found[END] > 0.0
+        if are_times and same_kind(command, str(origin["command"])):
             return found
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         pass

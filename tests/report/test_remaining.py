@@ -84,10 +84,28 @@ def test_the_last_run_of_the_same_kind_is_what_is_planned(tmp_path):
     assert plan([*EXPERIMENTS], False, command, tmp_path / "none") == AFTER_FULL
 
 
-@pytest.mark.parametrize("ended", [None, [], {}, {"a": 1.0}, {END: "x"}, {END: 0.0}, {END: float("nan")}])
+@pytest.mark.parametrize(
+    "ended",
+    [
+        None,
+        [],
+        {},
+        {"a": 1.0},
+        {END: "x"},
+        {END: 0.0},
+        {END: float("nan")},
+        {"a": float("nan"), END: 1.0},
+        {"a": 2.0, END: 1.0},
+        {"a": -1.0, END: 1.0},
+        {END: float("inf")},
+    ],
+)
 def test_a_report_that_cannot_be_read_plans_nothing(tmp_path, ended):
     out = report(tmp_path, command="python -m compare all", ended_after_s=ended)
     assert plan([*EXPERIMENTS], False, "python -m compare all", out) == AFTER_FULL
+    for command in (None, 1, "an 'open quote"):
+        report(tmp_path, command=command, ended_after_s=PLAN)
+        assert plan([*EXPERIMENTS], False, "python -m compare all", tmp_path) == AFTER_FULL
     (tmp_path / "results.json").write_text("{")
     assert plan([*EXPERIMENTS], False, "python -m compare all", tmp_path) == AFTER_FULL
 

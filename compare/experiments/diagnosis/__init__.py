@@ -8,7 +8,7 @@ one coefficient of the equations, or the convention of a joint (its order, sign,
 zero or unit). What explains all of the difference is named, with the stated and
 the found value: "h[0], coefficient of qd1^2: yours is -1 times the right one".
 In `all` it is made where mass, gravity, acceleration or trajectory has failed.
-Alone and without a file it tries itself: some hundred made faults, each of
+Alone and without a file it tries itself: hundreds of made faults, each of
 which must be found.
 
 Equations of your own are a file or a module with functions mass_matrix(q) and

@@ -16,7 +16,7 @@ MuJoCo that do the same work, tmt's compiled code for independent states, for
 states where each waits for the last, and for many side by side; heyoka's and
 Pinocchio's where they are installed; and how near that is to what the processor
 can multiply and add. Timed are compiled loops: a call of tmt.simulate from
-Python adds some 20 us. Aims that were set beforehand stand in
+Python adds some microseconds. Aims that were set beforehand stand in
 speed_targets.csv, the missed ones too.
 
 How cost grows with the joints: a chain of hinges, none along a coordinate axis,
