@@ -9,6 +9,8 @@ if __name__ == "__main__":
     streams.prepare()
     interrupt.listen()  # before anything that takes its time
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is rendered: no further process looks for a display
+    # the matrices are small: threads of a product would only wait for each other, beside processes that compute too
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
 import shlex

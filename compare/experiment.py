@@ -30,6 +30,7 @@ ASKED_BY = {
     "gravity": ("gravity", "bias", "energy"),
 }
 DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
+TIMED = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
@@ -49,7 +50,8 @@ def examine(
     modules = {name: module(name) for name in names}
     crashed = {name: begun(name, experiment, setup, clock) for name, experiment in modules.items()}
     clock.ends(START)
-    for name, experiment in modules.items():
+    for name in sorted(modules, key=TIMED.__contains__):
+        experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(modules) > 1 and not asked_for:
             reasons[name] = NOTHING_FAILED
@@ -69,15 +71,17 @@ def examine(
             causes = new + causes
         clock.ends(name)
         with clock.of(END):
-            drawings.append(None if crash else workers.submit(draw, name, result, setup.robot, folder / "figures"))
+            drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures")
+            drawings.append(None if crash else drawing if name in TIMED else drawing())  # none delays a timing
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
     with clock.of(END):
         setup.progress("figures")
+        drawings = [drawing() if callable(drawing) else drawing for drawing in drawings]
         for section, drawing in zip(sections, drawings):
             if drawing is not None:
                 take_figures(terminal, section, drawing)
     clock.ends(END)
-    return sections, causes, reasons
+    return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
 
 
 def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:
@@ -217,7 +221,7 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
                 suffix = getattr(figure, "suffix", ".png")
                 path = folder / f"{file}{suffix}"
                 with writing(path), quiet(robot):
-                    figure.savefig(path)
+                    laid_out(figure).savefig(path)
                 drawn.append((path.name.removesuffix(".png"), caption))
             except OSError:
                 raise
@@ -230,6 +234,16 @@ def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[l
     except Exception as error:
         failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
     return drawn, failed
+
+
+def laid_out(figure):
+    """A figure whose parts have their places: saved as it is made, it would be drawn once more to find them."""
+    engine = getattr(figure, "get_layout_engine", lambda: None)()
+    if engine is not None:
+        figure.set_dpi(importlib.import_module("matplotlib").rcParams["savefig.dpi"])
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    return figure
 
 
 def called(call: Callable) -> str:

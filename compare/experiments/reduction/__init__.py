@@ -33,6 +33,7 @@ Examples:
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 from tmt.reference import DIGITS
@@ -45,7 +46,7 @@ from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from ...setup import Setup
+from ...setup import Setup, nothing
 from . import exact_motion, sub_blocks
 from .cost import measure_costs
 from .needs import MOST_IN_A_BAND, of_case
@@ -86,28 +87,54 @@ def tolerance(robot: Robot) -> str:
     )
 
 
+def begin(setup: Setup) -> None:
+    """Begin with all that is not timed, beside other work."""
+    alone = replace(setup, map=map, quiet=nothing, progress=nothing, background={}, reading=None)
+    setup.background["reduction"] = setup.map(untimed, [alone])
+
+
 def rows(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> Result:
     """Sub-blocks for every subset; for each case what it needs, runs and times; exact solutions; costs in MuJoCo.
 
     cases: the robot's, if none are given. timed=False: one choice of angles, the scenes with fewer joints, and the exact
     solutions, in a few tenths of a second: enough to see a wrong model.
     """
+    begun = setup.background.pop("reduction", None) if timed and cases is None else None
+    result, models = next(iter(begun)) if begun else untimed(setup, cases, timed)
+    try:
+        if timed and models is not None:
+            setup.quiet()
+            rounds = setup.of(160, 16, 2)
+            time_models(result, models, setup, rounds)
+            measure_costs(result, setup, rounds)
+    except ModelError as error:
+        say_not_lockable(result, setup.robot, error)
+    return result
+
+
+def untimed(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = True) -> tuple[Result, list[tuple] | None]:
+    """What of `rows` is no timing, and the models whose steps are to be timed; None: nothing can be locked."""
     result = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}})
     if left_out := [case.name for case in setup.robot.cases if case.controller]:
         result.notes.append(f"Scenes in which actuators act are not reduced: {'; '.join(left_out)}.")
     cases = cases or [case for case in setup.robot.cases_of_torque if timed or "fewer joints" in case.scene.tags]
     try:
-        fill(result, setup, cases, timed)
-    except ModelError as error:  # a model with something that cannot be taken out with its joint
-        if setup.robot.is_read:
-            result.notes.append(f"Nothing is reduced: {error}.")
-            return result
+        return result, fill(result, setup, cases, timed)
+    except ModelError as error:
+        say_not_lockable(result, setup.robot, error)
+        return result, None
+
+
+def say_not_lockable(result: Result, robot: Robot, error: ModelError) -> None:
+    """Of a model with something that cannot be taken out with its joint: a note, or a failed check where it should be there."""
+    if robot.is_read:
+        result.notes.append(f"Nothing is reduced: {error}.")
+    else:
         result.check("every subset", LOCKABLE, 0, 1, "models", str(error), rule="equal")
-    return result
 
 
-def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> None:
-    """All parts of `rows`, one after the other."""
+def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> list[tuple]:
+    """All parts of `rows` that are no timing, one after the other; the models that are to be timed."""
     angles = setup.of(10, 1 if setup.robot.is_read else 3, 1) if timed else 1
     sub_blocks.compare_blocks(result, setup, angles)
     integrators = TWO_INTEGRATORS if timed else TWO_INTEGRATORS[-1:]
@@ -115,11 +142,7 @@ def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> No
     exact_motion.swings(result, setup, cases)
     few = () if timed else (exact_motion.AMPLITUDES[-2:], exact_motion.LESS_FINE)
     exact_motion.small_oscillations(result, setup, *few)
-    if timed:
-        setup.quiet()
-        rounds = setup.of(160, 16, 2)
-        time_models(result, models, setup, rounds)
-        measure_costs(result, setup, rounds)
+    return models
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

@@ -66,7 +66,7 @@ from ...setup import Setup
 from ...truth.reference import Reference, has_no_reference, references
 from ...truth.smallest import reduced
 from . import accuracy, advice, evaluations, growth, targets, tumbling
-from .accuracy import fill_in, reference_in_words, spread_in_words
+from .accuracy import reference_in_words
 from .affordable import forms_in_words
 from .floors import floor
 from .settings import (
@@ -82,6 +82,7 @@ from .settings import (
     too_long_next,
     unavailable,
 )
+from .times import fill_in, prepared, spread_in_words, take_times
 
 TITLE = "Speed against accuracy"
 PARTS = (
@@ -91,7 +92,6 @@ PARTS = (
 )
 # who follows the smaller model of a scene too, where there is one
 SMALLER, SMALLER_STEPS = (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")), 1024
-TIMED_STEPS = 4096  # of a run of MuJoCo that has more
 COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluations", "seconds", "error_rad", "worst_error_rad",
            "energy_error_J", "diverged", "why_not"]  # fmt: skip
 
@@ -191,19 +191,21 @@ def rows(setup: Setup, timed: bool = True) -> Result:
 
 def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Sequence[list[dict]]) -> None:
     """The seconds of all rows, what one evaluation costs, and what follows: what to use, and which aims are met."""
+    chains, ways = growth.ready(setup), evaluations.ready(setup)
+    runs = [prepared(of_scene, setup) for of_scene in of_scenes]
     setup.quiet()  # nothing else may run beside a timing
     spread = []
-    for name, of_scene in zip(names, of_scenes):
+    for name, of_scene, its_runs in zip(names, of_scenes, runs):
         setup.progress(f"speed: timing {name}")
-        spread += fill_in(of_scene, take_times(of_scene, setup))
+        spread += fill_in(of_scene, take_times(its_runs, setup))
     floors = result.curves["floors"]
     result.tables["what_should_i_use"] = advice.advice(result.rows, list(floors), floors)
     driven = [case.name for case in setup.robot.cases if case.controller]
     result.notes += advice.step_response_in_words(result.tables["what_should_i_use"], driven)
     setup.progress("speed: one evaluation")
-    result.tables["evaluations"], sentences = evaluations.costs(setup)
-    result.notes += [*sentences, *spread_in_words(spread, TIMED_STEPS), PARTS]
-    growth.add_growth(result, setup)
+    result.tables["evaluations"], sentences = evaluations.costs(setup, ways)
+    result.notes += [*sentences, *spread_in_words(spread), PARTS]
+    growth.add_growth(result, chains, setup.progress)
     if not setup.robot.is_read:  # of a file nothing was aimed at
         aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
         result.tables["speed_targets"] = aims
@@ -280,24 +282,6 @@ def row_of_run(
         "early": float(error[reference.t <= advice.EARLY].max()), "run": (case, method, setting),
         "whole": None if case is whole else whole.name,
     }  # fmt: skip
-
-
-def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
-    """Seconds of the runs of one scene's rows, all settings in turns."""
-    runs, times_longer = [], []
-    for case, method, setting in (row["run"] for row in rows):
-        dynamics, part = setup.engines[method.engine].of(case), timed_part(method, setting)
-        runs.append(dynamics.prepare(*case.start, case.tau, part, method.name)[0])
-        times_longer.append(setting.duration / part.duration)
-    times = timing.in_turns(runs, rounds=setup.of(5, 2, 2))
-    return [[longer * seconds for seconds in taken] for longer, taken in zip(times_longer, times)]
-
-
-def timed_part(method: Method, setting: Setting) -> Setting:
-    """What of a run is timed: of many steps of MuJoCo, each of which costs the same, the first TIMED_STEPS; else all."""
-    if method.engine != "mujoco" or setting.steps <= TIMED_STEPS:
-        return setting
-    return Setting(setting.duration * TIMED_STEPS / setting.steps, TIMED_STEPS)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

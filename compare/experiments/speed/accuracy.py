@@ -1,10 +1,9 @@
 """What is concluded from the errors of speed's runs, row by row: checks, and sentences that follow from these numbers."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from ...judge import timing
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
@@ -219,22 +218,3 @@ def smaller_models_in_words(rows: list[dict]) -> list[str]:
                     f"times as long; {row['worst_error_rad']:.2e} rad off where that is {error(whole):.2e}."
                 )
     return sentences
-
-
-def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
-    """Give each row the least of its times; of those that have more than one, the median over the least."""
-    for row, of_row in zip(rows, times):
-        row["seconds"] = min(of_row)
-    return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]
-
-
-def spread_in_words(spread: Sequence[float], steps: int) -> list[str]:
-    """How the times of one setting differ, in words. steps: of MuJoCo's runs, over which longer ones are timed."""
-    first = f" A run of MuJoCo with more than {steps} steps is timed over the first {steps}: each costs the same."
-    if not spread:
-        return [f"Each time is that of one run.{first}"]
-    return [
-        f"Each time is the least of several runs (one, if it takes longer than {timing.ONCE:g} s), in turns with all of its "
-        f"scene; where there are more than one, their median is {np.median(spread) - 1:.1%} above the least, for one setting "
-        f"in ten more than {np.quantile(spread, 0.9) - 1:.0%}.{first} Errors come from runs of their own."
-    ]

@@ -1,8 +1,9 @@
 """What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads, and others."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,8 +40,18 @@ WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_
 WHOLE_CALLED = "MuJoCo, mj_forward called from Python"
 
 
-def costs(setup: Setup) -> tuple[list[dict], list[str]]:
-    """The rows of evaluations.csv, and sentences about them."""
+class Ready(NamedTuple):
+    """The ways of one evaluation, made and not yet timed."""
+
+    repeated: Mapping[tuple, Callable]  # {(quantity, implementation, 1, 1): loop(count)}
+    states: Sequence[np.ndarray]
+    numbers: Sequence[int]  # of states that are evaluated at once
+    peers: Peers | None
+    missing: str | None  # why MuJoCo's calls are not timed
+
+
+def ready(setup: Setup) -> Ready:
+    """All that is compiled for `costs`."""
     from ...engines.mujoco.calls import MinimalCalls  # here, for numba takes its time
 
     rng = np.random.default_rng([SEED, 2])
@@ -56,7 +67,15 @@ def costs(setup: Setup) -> tuple[list[dict], list[str]]:
         repeated = {(quantity, name, 1, 1): loop for name, (quantity, loop) in minimal.loops(*first).items()}
     for ways in (of_one_state(tree, first), peers.of_one_state(first) if peers else ()):
         repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in ways}
-    calls = {key: counted(loop) for key, loop in repeated.items()}
+    for loop in repeated.values():
+        loop(1)  # what it does only once
+    return Ready(repeated, states, numbers, peers, missing)
+
+
+def costs(setup: Setup, made: Ready) -> tuple[list[dict], list[str]]:
+    """The rows of evaluations.csv, and sentences about them."""
+    repeated, states, numbers, peers, missing = made
+    tree, calls = setup.robot.tree, {key: counted(loop) for key, loop in repeated.items()}
     for name, side_by_side, loop in processor.peaks():
         run, count = counted(loop)
         calls[processor.PEAK, name, side_by_side, 1] = run, count * side_by_side

@@ -54,22 +54,33 @@ def extent_of(setup: Setup) -> Extent | None:
     return EXTENTS["small" if setup.size == "small" else "short"]
 
 
-def add_growth(result: Result, setup: Setup) -> None:
+class Ready(NamedTuple):
+    """What is made and not yet timed: (joints, implementation): Made; who has no time and where, by why; who is not there."""
+
+    extent: Extent
+    taking: Sequence[Implementation]
+    made: Mapping[tuple[int, Implementation], Made]
+    left_out: Mapping[tuple[Implementation, str], Sequence[int]]
+    absent: Mapping[Implementation, str]
+
+
+def ready(setup: Setup) -> Ready | None:
+    """The chains of a run, their code compiled; None if none is asked."""
+    extent = extent_of(setup)
+    return made_ready(extent, setup.progress) if extent else None
+
+
+def add_growth(result: Result, chains: Ready | None, progress: Callable) -> None:
     """The table of costs against joints in a result, their exponents, and what is said of both; nothing if none is asked."""
-    if extent := extent_of(setup):
-        rows, reasons = costs_of_growth(extent, setup.progress)
+    if chains:
+        rows, reasons = costs_of_growth(chains, progress)
         found = exponents(rows)
         result.tables["growth"], result.curves["exponents"] = rows, found
         result.notes += chain_in_words(rows, found, reasons)
 
 
-def costs_of_growth(
-    extent: Extent, progress: Callable, known: Sequence[Implementation] = IMPLEMENTATIONS
-) -> tuple[list[dict], dict[str, str]]:
-    """The rows of growth.csv, of each number of joints and each implementation; and {who has no time, and where: why}.
-
-    What is not worth it has a row without a time, what cannot take part has none.
-    """
+def made_ready(extent: Extent, progress: Callable, known: Sequence[Implementation] = IMPLEMENTATIONS) -> Ready:
+    """Each implementation that is there, made for each number of joints."""
     absent = {one: why for one in known if (why := one.unavailable())}
     taking = [one for one in known if one not in absent]
     made, left_out = {}, {}
@@ -82,6 +93,15 @@ def costs_of_growth(
                 made[n, one] = found
             else:
                 left_out.setdefault((one, found), []).append(n)
+    return Ready(extent, taking, made, left_out, absent)
+
+
+def costs_of_growth(chains: Ready, progress: Callable) -> tuple[list[dict], dict[str, str]]:
+    """The rows of growth.csv, of each number of joints and each implementation; and {who has no time, and where: why}.
+
+    What is not worth it has a row without a time, what cannot take part has none.
+    """
+    extent, taking, made, left_out, absent = chains
     progress("speed: timing chains")
     times = nanoseconds(made, extent.passes)
     rows = []
