@@ -50,16 +50,16 @@ carried out, for the reason in one line
 """
 
 
-def folded(text: str, indent: str = "") -> str:
+def in_lines(text: str, indent: str = "") -> str:
     """A text in lines that an ordinary terminal has room for; indent: of all lines but the first."""
     return fill(text, LINE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 FOR_ALL = "\n".join([
-    folded("Compare equations of motion with MuJoCo, on the assignment's arm or on your robot, and write a report."),
+    in_lines("Compare equations of motion with MuJoCo, on the assignment's arm or on your robot, and write a report."),
     "",
     "experiments (`all`: every one of them):",
-    *(folded(f"  {name:<13} {what}", " " * 16) for name, what in EXPERIMENTS.items()),
+    *(in_lines(f"  {name:<13} {what}", " " * 16) for name, what in EXPERIMENTS.items()),
 ])  # fmt: skip
 
 
@@ -159,12 +159,12 @@ def help_of(experiment: str) -> str:
     file = FOLDER / f"{experiment}.py"
     file = file if file.exists() else FOLDER / experiment / "__init__.py"
     first, *rest = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))).split("\n")
-    return "\n".join([folded(first), *rest])
+    return "\n".join([in_lines(first), *rest])
 
 
 def what_can_be_asked() -> str:
     """Ten lines for who asks nothing."""
-    return SHORT + folded(f"Experiments: {', '.join(EXPERIMENTS)}.")
+    return SHORT + in_lines(f"Experiments: {', '.join(EXPERIMENTS)}.")
 
 
 def request(arguments: Sequence[str]) -> argparse.Namespace:
