@@ -80,13 +80,13 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             for line in compared.lines:
                 terminal.say(line)
             with start_workers() as workers, terminal.progress("imports"):
-                from . import experiment
+                from . import drawing, experiment
                 from .case import SEED
                 from .report import files, provenance, remaining, verdict
                 from .report.parts import Parts
                 from .setup import Setup, engines
 
-                workers.submit(experiment.warm_up)
+                workers.submit(drawing.warm_up)
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}

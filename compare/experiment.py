@@ -1,25 +1,21 @@
 """How the experiments are run: one after the other, long work and drawing beside it."""
 
-import importlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
-
+from .drawing import draw, quiet
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
 from .process.clock import Clock
 from .process.crash import described
 from .process.workers import WorkerEnded, Workers
-from .report.folder import writing
+from .report import overview
 from .report.remaining import END, START
 from .report.terminal import Terminal
 from .report.verdict import Section, failures
-from .robots import Robot
 from .setup import Setup as Setup
 from .setup import engines as engines
 
@@ -50,7 +46,8 @@ def examine(
     modules = {name: module(name) for name in names}
     crashed = {name: begun(name, experiment, setup, clock) for name, experiment in modules.items()}
     clock.ends(START)
-    for name in sorted(modules, key=TIMED.__contains__):
+    order = sorted(modules, key=TIMED.__contains__)
+    for name in order:
         experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(modules) > 1 and not asked_for:
@@ -71,7 +68,8 @@ def examine(
             causes = new + causes
         clock.ends(name)
         with clock.of(END):
-            drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures")
+            others = overview.results_needed(name, order, {section.name: section.result for section in sections})
+            drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
             drawings.append(None if crash else drawing if name in TIMED else drawing())  # none delays a timing
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
     with clock.of(END):
@@ -159,11 +157,6 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
         return None, result
 
 
-def quiet(robot: Robot) -> AbstractContextManager:
-    """A block in which numpy says nothing of what is no number, where a user's own equations may give such: checks do."""
-    return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()
-
-
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
     try:
@@ -198,62 +191,3 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
         terminal.say(line, "red")
     if len(lines) > SHOWN:
         terminal.say(f"  and {len(lines) - SHOWN} more: in the report", "red")
-
-
-# in the process that draws
-
-
-def draw(experiment: str, result: Result, robot: Robot, folder: Path) -> tuple[list, list]:
-    """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
-
-    `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. An error of the disk is raised.
-    """
-    drawn, failed = [], []
-    try:
-        for call in module(experiment).figures(result, robot):
-            name, path = called(call), None
-            try:
-                with quiet(robot):
-                    file, figure, caption = call()
-                while file.casefold() in {other.casefold() for other, _ in drawn}:
-                    file += "_"  # names that differ in signs alone may give one file
-                suffix = getattr(figure, "suffix", ".png")
-                path = folder / f"{file}{suffix}"
-                with writing(path), quiet(robot):
-                    laid_out(figure).savefig(path)
-                drawn.append((path.name.removesuffix(".png"), caption))
-            except OSError:
-                raise
-            except Exception as error:
-                if path:
-                    path.unlink(missing_ok=True)
-                failed.append((name, described(error)))
-    except OSError:
-        raise
-    except Exception as error:
-        failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
-    return drawn, failed
-
-
-def laid_out(figure):
-    """A figure whose parts have their places: saved as it is made, it would be drawn once more to find them."""
-    engine = getattr(figure, "get_layout_engine", lambda: None)()
-    if engine is not None:
-        figure.set_dpi(importlib.import_module("matplotlib").rcParams["savefig.dpi"])
-        engine.execute(figure)
-        figure.set_layout_engine("none")
-    return figure
-
-
-def called(call: Callable) -> str:
-    """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
-    more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
-    more = [value for value in more if isinstance(value, str)]
-    name = getattr(getattr(call, "func", call), "__name__", "without a name")
-    return " ".join([name.removeprefix("draw_"), *more])
-
-
-def warm_up() -> None:
-    """Load matplotlib while others compute."""
-    importlib.import_module(".report.style", __package__)

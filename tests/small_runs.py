@@ -15,10 +15,10 @@ from crane import crane
 from model_edits import EDITS, failing
 from runs import in_shell, on_terminal
 
-from compare import experiment
+from compare import drawing, experiment
 from compare.engines.mujoco import load, parse
 from compare.experiments import EXPERIMENTS, module, skipped
-from compare.report import files, verdict
+from compare.report import files, overview, verdict
 from compare.robots.arm import ARM
 
 
@@ -64,7 +64,7 @@ def of_crane():
         report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
         files.write(folder, report)
         texts = {name: (folder / name).read_text(encoding="utf-8") for name in ("report.md", "results.json")}
-        sizes = {path.stem: path.stat().st_size for path in (folder / "figures").iterdir()}
+        sizes = {path.name.removesuffix(".png"): path.stat().st_size for path in (folder / "figures").iterdir()}
     for section in sections:
         section.result.curves = {}  # which need not be sent
     return SimpleNamespace(sections=sections, reasons=reasons, lines=lines, texts=texts, sizes=sizes)
@@ -78,8 +78,10 @@ def report_of_arm():
         for name in EXPERIMENTS:
             of = module(name)
             section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
-            section.figures, failed = experiment.draw(name, section.result, ARM, folder / "figures")
-            sections, lost = [*sections, section], lost + failed
+            sections.append(section)
+            others = overview.results_needed(name, list(EXPERIMENTS), {one.name: one.result for one in sections})
+            section.figures, failed = drawing.draw(name, section.result, ARM, folder / "figures", others)
+            lost += failed
         words = verdict.verdict(sections, len(EXPERIMENTS))
         files.write(folder, verdict.Report(sections, ARM, {"command": "a small run"}, words))
         text = (folder / "report.md").read_text(encoding="utf-8")

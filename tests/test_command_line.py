@@ -17,11 +17,12 @@ from sections import GOOD, section
 from small_runs import quick_run
 
 from compare import __main__ as entry
-from compare import command_line, experiment
+from compare import command_line, drawing, experiment
 from compare.__main__ import main
 from compare.experiments import EXPERIMENTS
 from compare.judge.check import Result
 from compare.process.workers import WorkerEnded
+from compare.report import images
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 
@@ -112,8 +113,11 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
     _, folder = ran
     report = folder / "reports" / "latest"
     page = (report / "index.html").read_text()
-    assert not re.search(r'(src|href)="(?!data:|#)', page)
-    assert page.count("data:image/png;base64,") == len(list((report / "figures").glob("*.png")))
+    linked = set(re.findall(r'(?:src|href)="(?!data:|#)([^"]+)"', page))
+    assert linked == {str(path.relative_to(report)) for path in (report / "tables").iterdir()}
+    figures = list((report / "figures").iterdir())
+    assert {path.suffix for path in figures} == {".png", ".gif"} and 'id="motion"' in page
+    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == len(figures) - 1  # but for what moves
     text = (report / "report.md").read_text()
     linked = set(re.findall(r"\((figures/[^)]+|tables/[^)]+)\)", text))
     assert linked == {str(p.relative_to(report)) for p in report.glob("*/*")}
@@ -264,13 +268,15 @@ def late(result, robot):
 
 def test_a_figure_that_raises_leaves_the_others_alone(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "compare.experiments.broken", SimpleNamespace(figures=late))
-    drawn, failed = experiment.draw("broken", None, None, tmp_path)
+    drawn, failed = drawing.draw("broken", None, None, tmp_path)
     assert drawn == [
         (name, "A caption.") for name in ("first", "second", "First_")
     ]  # one file where capitals do not count
     assert [name for name, _ in failed] == ["plot", "half third", "number 6"]
     assert failed[0][1].startswith("TypeError: plot() missing") and failed[2][1].startswith("ValueError: no more")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["First_.png", "first.png", "second.png"]
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["First_.png", "first.png", "second.png"]
+    images.clear_webp(tmp_path)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".png"}
 
 
 def test_a_model_that_an_experiment_does_not_expect_gets_a_report(tmp_path, capsys):

@@ -33,7 +33,7 @@ def test_the_experiment_passes_and_draws(made, name):
 def test_the_report_speaks_of_this_robot(made):
     text = made.texts["report.md"]
     assert text.startswith("# TMT and MuJoCo compared on crane")
-    assert "Crane, five rigid bodies on four hinges, modelled twice" in text and "published: " in text
+    assert "Crane, five rigid bodies on four hinges, modelled twice" in text and "| published |  | skipped | " in text
     for word in ("alpha", "gamma", "forearm", "ball catch", "assignment", "α"):
         assert word not in text, word
     assert all(joint in text for joint in TREE.hinge_names)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from . import markdown, page
+from . import images, markdown, page
 from .folder import files, save
 from .parts import Parts
 from .verdict import Report, passed
@@ -35,6 +35,7 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     save(folder / "report.md", markdown.joined([*parts.lines, *paragraphs]) if text is None else text)
     if html is not None:
         save(folder / "index.html", html)
+    images.clear_webp(folder / "figures")
     reference = report.reference
     results = {
         "passed": passed(report.sections) and not parts.broken,

@@ -47,6 +47,7 @@
     scene = scenes[k];
     time.max = scene.paths[0].length - 1;
     time.value = scene.still;
+    part(".base").setAttribute("d", scene.base);
     part("figcaption span").textContent = scene.seen;
     show();
   }

@@ -12,7 +12,8 @@ import numpy as np
 from .verdict import Section
 
 MOST_BYTES = 280_000  # of the motion in the page
-FEWEST = 8  # one of so many pictures of each scene is shown before scenes are left out
+STICK_BYTES = 48  # of a stick in the picture without script
+ONE_OF_MANY = 8  # one of so many pictures of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
 WIDE, HIGH, BORDER = 1000, 480, 45  # of what is drawn, in its own units
 FEW_STICKS = 6  # up to which they are drawn wide
@@ -34,7 +35,7 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     data, stride, scenes = inlined(drawn, engines)
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
     first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
-    note = f"The {robot.noun} is seen from where its sketch is. "
+    note = f"The {robot.noun} is seen as in its sketch. "
     if stride > 1:
         note += f"One of {stride} pictures of each scene is in this page. "
     if len(scenes) < len(drawn):
@@ -49,6 +50,7 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
         height=HIGH,
         wide=20 if few else 9,
         ring=16 if few else 7,
+        base=scenes[0]["base"],
         first=first,
         second=second,
         options="".join(f"<option>{html.escape(scene['name'])}</option>" for scene in scenes),
@@ -66,9 +68,9 @@ def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dic
         scenes = [inlined_scene(one, stride) for one in drawn[:count]]
         text = json.dumps({"engines": engines, "scenes": scenes}, separators=(",", ":"), allow_nan=False)
         text = text.replace("<", "\\u003c")
-        if len(text.encode()) <= MOST_BYTES:
+        if len(text.encode()) + STICK_BYTES * len(scenes[0]["links"]) <= MOST_BYTES:
             return text, stride, scenes
-        if stride < FEWEST or count == 1:
+        if stride < ONE_OF_MANY or count == 1:
             stride *= 2
         else:
             count -= 1
@@ -92,6 +94,7 @@ def inlined_scene(one: object, stride: int) -> dict:
         "pause": max(1, round(1000.0 * dt * slow)),
         "unit": one.unit,
         "still": alive[-1],
+        "base": "M{} {}m-18-18h36v36h-36z".format(*ours[0][:2]) if one.fixed else "",
         "links": [list(link) for link in one.links],
         "apart": [float(f"{off:.1e}") if math.isfinite(off) else None for off in one.apart[::stride]],
         "paths": [shorter(ours, [()] * len(ours)), shorter(theirs, ours)],

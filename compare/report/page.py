@@ -1,107 +1,129 @@
-"""A report as one HTML file."""
+"""A report as one HTML file: the first screen, then a section for each experiment."""
 
-import base64
 import html
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
 import pandas as pd
 
+from .first_screen import causes_in_html, list_in_html, mark, pictures_in_html, verdict_in_html
+from .images import moves
 from .introduction import first_lines, introduction, title
+from .markup import details, figure, html_table, of_section, words
+from .motion import motion_in_html
+from .one_number import one_number
 from .parts import Parts
-from .tables import asked_by, failing, heading, of_causes, origins, questions, shown
-from .verdict import Report, Section, outcome, passed
+from .shortened import shortened
+from .tables import asked_by, closest_checks, failing, heading, of_causes, origins, questions, shown
+from .verdict import Report, Section, outcome, passed, standing
 
-FOLDED = 30  # rows: a longer table is folded
+MOST_ROWS, MOST_OF_RUNS = 40, 60  # of a table in the page; its file has all
+FIRST_NOTES = 3  # that stand open, the others are details
 
 
 def page(report: Report, body: Sequence[str], parts: Parts) -> str:
-    """The whole page: what the report is of, its verdict, what could not be made of it, links, and its body."""
-    sections, robot = report.sections, report.robot
+    """The whole page: links that stay in view, and around the body the title and the verdict, with what could not be made."""
+    sections = report.sections
     has_questions = any('id="questions"' in text for text in body)
     links = ["questions"] * has_questions + [section.name for section in sections] + ["provenance"]
+    wrong = {section.name for section in sections if standing(section)[0] is False}
     return Template((Path(__file__).parent / "report.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title(robot)),
-        reference="".join(f"<p>{html.escape(line)}</p>\n" for line in first_lines(report.reference)),
-        colour="#009E73" if passed(sections) and not parts.broken else "#D55E00",
-        verdict=html.escape(report.verdict) + "".join(f"<br>{html.escape(line)}" for line in parts.lines),
-        top="".join(f"<p>{words(line)}</p>\n" for line in report.top),
-        contents="".join(f'<a href="#{name}">{name}</a>' for name in links),
+        title=html.escape(title(report.robot)),
+        reference="".join(f'<p class="reference">{html.escape(line)}</p>\n' for line in first_lines(report.reference)),
+        good="good" if passed(sections) and not parts.broken else "bad",
+        verdict=verdict_in_html(report, parts),
+        links="".join(f'<a href="#{name}">{mark(False) if name in wrong else ""}{name}</a>' for name in links),
         body="\n".join(body),
     )
 
 
 def page_body(folder: Path, report: Report, parts: Parts) -> list[str]:
-    """What stands below the links, with its figures inside; folder: where these are. A part that breaks is left out."""
+    """What stands below the verdict, with its figures inside; folder: where these are. A part that breaks is left out."""
     sections, robot, origin, _, causes, skipped, _ = report
-    texts = []
+    texts = [parts.made("the causes in index.html", "", causes_in_html, report)]
+    pictures = parts.made("the pictures of the first screen", "", pictures_in_html, folder, report)
+    texts += [f'<div class="screen">{list_in_html(report, parts)}{pictures}</div>']
+    texts += [parts.made("the motion in index.html", "", motion_in_html, sections, robot)]
+    texts += [f'<p class="wide">{words(parts.made("the introduction", "", introduction, robot))}</p>']
     if causes:
-        texts += [
-            "<h2>Causes (1: an option or a convention, 2: a number)</h2>",
-            html_table(of_causes(causes), "text"),
-        ]
-    texts.append(f"<p>{html.escape(parts.made('the introduction', '', introduction, robot))}</p>")
+        table = html_table(of_causes(causes), "Causes", "text")
+        texts.append(
+            f'<section id="causes"><h2>Causes (1: an option or a convention, 2: a number)</h2>{table}</section>'
+        )
     texts += parts.made("the questions", [], answers_in_html, sections, robot)
     for section in sections:
         missing = [top(section), "<p>This section could not be made.</p>"]
-        texts += parts.made(f"{section.name} in index.html", missing, section_in_html, folder, section)
+        made = parts.made(f"{section.name} in index.html", missing, section_in_html, folder, section)
+        texts += [f'<section id="{section.name}" aria-labelledby="title-{section.name}">', *made, "</section>"]
     if skipped:
-        reasons = "".join(f"<li>{name}: {words(reason)}.</li>" for name, reason in skipped)
-        texts.append(f'<h2 id="skipped">Skipped</h2><ul>{reasons}</ul>')
-    return [*texts, '<h2 id="provenance">Where this comes from</h2>', html_table(origins(origin))]
+        reasons = "".join(f"<li>{html.escape(name)}: {words(reason)}.</li>" for name, reason in skipped)
+        texts.append(f'<section id="skipped"><h2>Skipped</h2><ul>{reasons}</ul></section>')
+    table = html_table(origins(origin), "Where this report comes from", "text")
+    return [*texts, f'<section id="provenance"><h2>Where this comes from</h2>{table}</section>']
 
 
-def answers_in_html(sections: Sequence[Section], robot) -> list[str]:
+def answers_in_html(sections: Sequence[Section], robot: object) -> list[str]:
     """What was asked, and the answers; nothing if there is no question."""
     asked = questions(sections, robot)
-    top = f'<h2 id="questions">{html.escape(asked_by(robot))}</h2>'
-    return [top, html_table(asked, "text")] if len(asked) else []
+    if not len(asked):
+        return []
+    title = asked_by(robot)
+    return [f'<section id="questions"><h2>{html.escape(title)}</h2>{html_table(asked, title, "text")}</section>']
 
 
 def top(section: Section) -> str:
     """The heading of an experiment."""
-    return f'<h2 id="{section.name}">{html.escape(section.title)}</h2>'
+    return f'<h2 id="title-{section.name}">{html.escape(section.title)}</h2>'
 
 
 def section_in_html(folder: Path, section: Section) -> list[str]:
-    """What stands in the page of one experiment."""
-    failed = failing(section)
+    """What stands in the page of one experiment: what was found, figures, the tolerance, and the details details."""
+    good, _ = standing(section)
+    kind = "good" if good else "none" if good is None else "bad"
+    number, notes = one_number(section), section.result.notes
     texts = [
         top(section),
-        f"<p><em>Claim:</em> {words(section.claim)} <strong>{html.escape(outcome(section))}</strong></p>",
-        f"<p><em>Tolerance:</em> {words(section.tolerance)}</p>",
+        f'<p class="outcome {kind}">{mark(good)} <strong>{html.escape(outcome(section))}</strong> {words(number)}.</p>',
+        f"<p><em>Claim:</em> {words(section.claim)}</p>",
     ]
+    failed = failing(section)
     if len(failed):
-        texts += ["<p><strong>Checks that fail:</strong></p>", foldable(failed, f"{len(failed)} checks")]
-    for name, caption in section.figures:
-        if name.endswith(".gif"):  # it is in the page as what moves
-            continue
-        data = base64.b64encode((folder / "figures" / f"{name}.png").read_bytes()).decode()
-        image = f'<img alt="{name}" src="data:image/png;base64,{data}">'
-        texts.append(f"<figure>{image}<figcaption>{words(caption)}</figcaption></figure>")
-    for name, rows in section.tables.items():
-        table = shown(pd.DataFrame(rows), section.result.shown if name == section.name else None)
-        texts += [f"<h3>{heading(name)}</h3>"] if name != section.name else []
-        texts += [foldable(table, f"Table, {len(table)} rows")] if len(table.columns) else []
-    checks = shown(pd.DataFrame([check.record() for check in section.result.checks]))
-    texts.append(f"<details><summary>All {len(checks)} checks</summary>{html_table(checks)}</details>")
-    if section.result.notes:
-        texts.append("<ul>" + "".join(f"<li>{words(note)}</li>" for note in section.result.notes) + "</ul>")
-    return texts
+        many = f"{len(failed)} checks that fail"
+        table = html_table(failed.head(MOST_ROWS), many)
+        texts += ["<p><strong>Checks that fail:</strong></p>", table if len(failed) <= 8 else details(many, table)]
+    texts += [listed_in_html(notes[:FIRST_NOTES])] if notes else []
+    texts += [figure(folder, file, caption) for file, caption in of_section(section) if not moves(file)]
+    texts += [f"<h3>What the tolerance is, and why</h3><p>{words(section.tolerance)}</p>"] if section.tolerance else []
+    more = notes[FIRST_NOTES:]
+    texts += [details(f"Further findings ({len(more)})", listed_in_html(more))] if more else []
+    texts += [table_in_html(section, name, rows) for name, rows in section.tables.items()]
+    return [*texts, checks_in_html(section)]
 
 
-def words(text: str) -> str:
-    """A sentence in HTML; what stands between backticks is code."""
-    return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
+def listed_in_html(notes: Sequence[str]) -> str:
+    return "<ul>" + "".join(f"<li>{words(note)}</li>" for note in notes) + "</ul>"
 
 
-def foldable(table: pd.DataFrame, summary: str) -> str:
-    """A table in HTML, folded if it is long."""
-    text = html_table(table)
-    return f"<details><summary>{summary}</summary>{text}</details>" if len(table) > FOLDED else text
+def table_in_html(section: Section, name: str, rows: Sequence[dict]) -> str:
+    """A table, details, with the rows that a reader needs; or where it stands, if its file alone has it."""
+    file = f"tables/{name}.csv"
+    link = f'<a href="{file}">{file}</a>'
+    columns = section.result.shown if name == section.name else None
+    if name in section.result.filed or columns == []:
+        return f"<p>{heading(name)}: {len(rows)} rows in {link}.</p>"
+    few, which = shortened(rows, MOST_ROWS, MOST_OF_RUNS)
+    title = f"{heading(name)}: {which or f'{len(rows)} rows'}"
+    table = html_table(shown(pd.DataFrame(few), columns), heading(name)) if few else ""
+    return details(title, f"{table}<p>All columns, {len(rows)} rows: {link}, beside this page.</p>")
 
 
-def html_table(table: pd.DataFrame, kind: str = "data") -> str:
-    return f'<div class="scroll">{table.to_html(index=False, border=0, classes=kind)}</div>'
+def checks_in_html(section: Section) -> str:
+    """The checks that come closest to their tolerance, details."""
+    checks = section.result.checks
+    if not checks:
+        return "<p>Nothing was checked.</p>"
+    table = closest_checks(section, MOST_ROWS)
+    which = f"All {len(checks)} checks" if len(table) == len(checks) else f"{len(checks)} checks: {len(table)} of them"
+    more = "" if len(table) == len(checks) else "<p>All of them: results.json, beside this page.</p>"
+    return details(which, html_table(table, "Checks") + more)

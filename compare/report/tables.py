@@ -8,7 +8,7 @@ import pandas as pd
 from .questions import answers
 from .verdict import Section
 
-DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled"), 7)  # of a column; else 3
+DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7)  # of a column; else 3
 DIGITS |= dict.fromkeys(
     ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
 )
@@ -38,8 +38,9 @@ def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataF
 
 
 def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
-    """The causes as a table for readers."""
-    return pd.DataFrame([(cause["rank"], cause["text"]) for cause in causes], columns=["rank", "cause"])
+    """The causes as a table for readers: where, what is stated, what is found, and in a sentence."""
+    rows = [(cause["rank"], cause["place"], cause["stated"], cause["found"], cause["text"]) for cause in causes]
+    return shown(pd.DataFrame(rows, columns=["rank", "place", "stated", "found", "cause"]))
 
 
 def questions(sections: Sequence[Section], robot) -> pd.DataFrame:
@@ -57,6 +58,14 @@ def failing(section: Section) -> pd.DataFrame:
     """The checks of a section that fail, as text."""
     failed = [check.record() for check in section.result.checks if not check.passed]
     return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
+
+
+def closest_checks(section: Section, most: int) -> pd.DataFrame:
+    """At most so many checks of a section, as text: those that fail, then those that use most of a tolerance of rounding."""
+    checks = section.result.checks
+    order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
+    kept = [checks[k] for k in sorted(order[:most])]
+    return shown(pd.DataFrame([check.record() for check in kept]).drop(columns="experiment", errors="ignore"))
 
 
 def heading(name: str) -> str:

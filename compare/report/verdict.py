@@ -140,3 +140,16 @@ def outcome(section: Section) -> str:
     if broke:
         return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
     return f"It holds: all {len(checks)} checks pass." if checks else "It is not decided: nothing was compared."
+
+
+def standing(section: Section) -> tuple[bool | None, str]:
+    """Whether a section passes, and that in two or three words; None where nothing was compared."""
+    checks = section.result.checks
+    differing, broke, unstable = failures([section])
+    if differing:
+        return False, f"{len(differing)} of {len(checks)} fail"
+    if broke:
+        return False, "broke off" if any(check.quantity == ENDS for check in broke) else "not whole"
+    if unstable:
+        return False, "its step is not stable"
+    return (True, "pass") if checks else (None, "nothing compared")

@@ -67,10 +67,11 @@ def test_each_section_says_what_became_of_its_own_claim(tmp_path):
 def test_the_page_is_red_if_a_check_fails_and_tables_are_whole(tmp_path):
     (tmp_path / "figures").mkdir()
     rows = [{"a": 0.123456789012345678, "b": k} for k in range(3)]
-    for checks, colour in (((GOOD,), "#009E73"), ((GOOD, BAD), "#D55E00")):
+    for checks, outcome in (((GOOD,), "good"), ((GOOD, BAD), "bad")):
         report, parts = verdict.Report([section("mass", *checks, rows=rows)], ARM, {"command": "c"}, "words"), Parts()
         html = page.page(report, page.page_body(tmp_path, report, parts), parts)
-        assert colour in html and html.count("<td>0.123</td>") == 3
+        assert f'<main id="main" class="{outcome}">' in html and f'<div class="verdict {outcome}">' in html
+        assert html.count("<td>0.123</td>") == 3
         assert ("Checks that fail" in html) == (len(checks) == 2)
     write(tmp_path, verdict.Report([section("mass", GOOD, rows=rows)], ARM, {"command": "c"}, "words"))
     lines = (tmp_path / "tables" / "mass.csv").read_text(encoding="utf-8").split()
@@ -87,7 +88,7 @@ def broken_report():
         section("speed", GOOD),
     ]
     sections[1].figures = [("nowhere", "A caption.")]
-    sections[2].result.tables = {"times": 3}
+    sections[2].result.rows = 3
     return verdict.Report(sections, asks, {"command": "c"}, "The two models agree.")
 
 
@@ -95,11 +96,11 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(tmp_path):
     (tmp_path / "figures").mkdir()
     parts = write(tmp_path, broken_report())
     whys = {
-        "tables/times.csv": "ValueError: DataFrame",
+        "tables/speed.csv": "ValueError: DataFrame",
         "the questions": "ValueError: Unknown format code 'e'",
-        "speed in report.md": "ValueError: DataFrame",
+        "speed in report.md": "TypeError: 'int' object",
         "gravity in index.html": "FileNotFoundError",
-        "speed in index.html": "ValueError: DataFrame",
+        "speed in index.html": "TypeError: 'int' object",
     }
     assert list(parts.broken) == list(whys)
     assert all(parts.broken[name].startswith(why) for name, why in whys.items()), parts.broken
@@ -107,9 +108,9 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(tmp_path):
     for name in whys:
         assert f"This report is not complete: {name} could not be made, " in text
         assert f"This report is not complete: {name} could not be made, " in html
-    assert "## Gravity\n\n*Claim:* They agree." in text and "![nowhere]" in text
+    assert "## Gravity\n\n**It holds: all 1 checks pass.**" in text and "![nowhere]" in text
     assert "## Speed\n\nThis section could not be made." in text and "The two models agree." in text
-    assert "#D55E00" in html and "<em>Claim:</em> They agree." in html
+    assert '<main id="main" class="bad">' in html and "<em>Claim:</em> They agree." in html
     assert sorted(path.name for path in (tmp_path / "tables").iterdir()) == ["gravity.csv", "mass.csv"]
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert results["passed"] is False

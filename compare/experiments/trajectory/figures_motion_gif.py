@@ -18,7 +18,7 @@ from ...judge.words import capital
 from ...report.style import BLUE, ORANGE
 from .motion_frames import Drawn
 
-SIZE, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and what is left to text above and below
+PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and what is left to text above and below
 FINE = 2  # masks are drawn so many times as large
 LEVELS = 5  # of the shades of each colour
 CENTISECONDS, PAUSE = 4, 120  # for which a picture stands, and the last of a scene
@@ -40,7 +40,7 @@ class Animation:
         for scene in self.scenes:
             place = place_of(scene)
             still = text_of_scene(scene, self.label, place)
-            pictures += [picture(scene, k, still, place) for k in range(len(scene.t))]
+            pictures += [one_picture(scene, k, still, place) for k in range(len(scene.t))]
             times += [10 * CENTISECONDS] * (len(scene.t) - 1) + [10 * PAUSE]
         first, *others = pictures
         first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=False)
@@ -61,34 +61,37 @@ def place_of(scene: Drawn) -> tuple[float, np.ndarray]:
     points = np.concatenate([path.reshape(-1, 2) for path in scene.points.values()])
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
-    room = np.array([SIZE[0], SIZE[1] - TOP - BOTTOM]) - 36.0
+    room = np.array([PIXELS[0], PIXELS[1] - TOP - BOTTOM]) - 36.0
     scale = float((room / np.maximum(high - low, 1e-3)).min())
-    middle = np.array([SIZE[0], SIZE[1] + TOP - BOTTOM]) / 2
+    middle = np.array([PIXELS[0], PIXELS[1] + TOP - BOTTOM]) / 2
     return scale, middle - scale * (low + high) / 2 * [1.0, -1.0]
 
 
-def picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image.Image:
+def one_picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image.Image:
     """The k-th picture of a scene in the colours of the palette; still: the text that stands in all of them."""
     scale, origin = place
     text = still.copy()
     write = partial(ImageDraw.Draw(text).text, fill=255, font=font(17))
-    write((SIZE[0] - 16, SIZE[1] - 28), f"t = {scene.t[k]:.2f} s", anchor="ra")
+    write((PIXELS[0] - 16, PIXELS[1] - 28), f"t = {scene.t[k]:.2f} s", anchor="ra")
     gone = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
     words = [f"{capital(LABELS[name])} has diverged" for name in gone]
     words = words or [f"apart in any joint by at most {scene.apart[k]:.2g} {scene.unit}"]
-    write((16, SIZE[1] - 28), "; ".join(words))
+    write((16, PIXELS[1] - 28), "; ".join(words))
+    left = [(time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]]
+    words = [f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left)]
+    write((PIXELS[0] - 16, 68), "; ".join(words), anchor="ra", font=font(14))
     shades = []
     for which, path in enumerate(scene.points.values()):
-        mask = Image.new("L", (FINE * SIZE[0], FINE * (SIZE[1] - BOTTOM)))
+        mask = Image.new("L", (FINE * PIXELS[0], FINE * (PIXELS[1] - BOTTOM)))
         if np.isfinite(path[k]).all():
             points = [tuple(FINE * (origin + scale * point * [1.0, -1.0])) for point in path[k]]
             draw_sticks(ImageDraw.Draw(mask), points, scene.links, which)
         draw_sticks(ImageDraw.Draw(mask), [(FINE * (NAMES_AT[which] + x), FINE * 62) for x in (4, 36)], [(0, 1)], which)
-        small = Image.new("L", SIZE)
+        small = Image.new("L", PIXELS)
         small.paste(mask.reduce(FINE), (0, 0))
         shades.append(small.point(SHADES[which]))
     image = ImageChops.lighter(ImageChops.add(*shades), text.point(SHADES[2]))
-    image.putpalette(PALETTE)
+    image.putpalette(SHADES_OF_ALL)
     return image
 
 
@@ -108,15 +111,14 @@ def draw_sticks(pen: ImageDraw.ImageDraw, points: Sequence[tuple], links: Sequen
 
 def text_of_scene(scene: Drawn, label: str, place: tuple) -> Image.Image:
     """What stands in all pictures of a scene: its name, its run, the engines' names, a frame where the robot is fixed."""
-    text = Image.new("L", SIZE)
+    text = Image.new("L", PIXELS)
     pen = ImageDraw.Draw(text)
     pen.text((16, 10), scene.scene, fill=255, font=font(20))
-    pen.text((SIZE[0] - 16, 50), f"{scene.run}{slower(scene)}", fill=255, font=font(14), anchor="ra")
+    pen.text((PIXELS[0] - 16, 50), f"{scene.run}{slower(scene)}", fill=255, font=font(14), anchor="ra")
     for at, name in zip(NAMES_AT, (label, LABELS["mujoco"])):
         pen.text((at + 48, 62), name, fill=255, font=font(16), anchor="lm")
-    base = np.concatenate([path[:, 0] for path in scene.points.values()])
-    if np.nanmax(np.abs(base - base[0])) < 1e-9:
-        x, y = place[1] + place[0] * base[0] * [1.0, -1.0]
+    if scene.fixed:
+        x, y = place[1] + place[0] * next(iter(scene.points.values()))[0, 0] * [1.0, -1.0]
         pen.rectangle([x - 11, y - 11, x + 11, y + 11], outline=255, width=2)
     return text
 
@@ -153,4 +155,4 @@ FONTS: dict[int, ImageFont.FreeTypeFont] = {}
 SHADE = [round(level * (LEVELS - 1) / 255.0) for level in range(256)]
 # of a mask's level, its part of the palette's index: of the first engine, of MuJoCo, which lies over it, of text
 SHADES = [LEVELS * shade for shade in SHADE], SHADE, [shade and LEVELS**2 + shade for shade in SHADE]
-PALETTE = palette()
+SHADES_OF_ALL = palette()

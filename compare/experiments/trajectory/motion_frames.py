@@ -33,6 +33,7 @@ class Drawn(NamedTuple):
     ended: dict  # of each engine: when it diverged, s, or None
     left: dict  # of each engine: when a held robot left its posture, s, or None
     seen: str  # what is to be seen, with its numbers, in sentences
+    fixed: bool  # whether the first point stands still, as the first joint only turns
 
 
 def follow_and_draw(
@@ -88,7 +89,8 @@ def drawn_motion(case: Case, engines: Mapping[str, Engine], runs: Mapping[tuple,
     if parts > 1:
         words += f" Between two states of a run its own method's steps of dt/{parts} are drawn."
     unit = movement_unit(coordinates)
-    return Drawn(case.name, run, times, points, links, apart, unit, ended, left, words)
+    fixed = case.robot.tree.kind[0] != "slide"
+    return Drawn(case.name, run, times, points, links, apart, unit, ended, left, words, fixed)
 
 
 def in_order(drawn: Sequence[Drawn], robot: Robot) -> list[Drawn]:
@@ -130,14 +132,13 @@ def what_is_seen(
     if case.is_held and any(left.values()):
         longer = case.changed(duration=2.0 * case.duration)
         pushes = accelerations_left(case, engines)
-        for name, time in left.items():
+        for name, time in sorted(left.items(), key=lambda one: one[1] or np.inf):
             at = predicted_leaving(longer, pushes[name]) if np.isfinite(pushes[name]).all() else None
-            when = f"stays within {LEFT} {unit}" if time is None else f"is {LEFT} {unit} away at {time:.2f} s"
-            of_map = f"RK4's linear map predicts {at:.2f} s" if at else "RK4's linear map lets it stay"
-            said.append(f"{capital(LABELS[name])}: the held {noun} {when} ({of_map})")
-        said = ["; ".join(said) + "."]
-        if all(left.values()):
-            said.append(left_to_in_words(case, t, paths, left))
+            when = f"stays within {LEFT} {unit}" if time is None else f"leaves at {time:.2f} s"
+            said.append(f"in {LABELS[name]} the {noun} {when} (predicted: {f'{at:.2f} s' if at else 'it stays'})")
+        side = left_to_in_words(case, t, paths, left) if all(left.values()) else ""
+        said = [f"{capital(', '.join(said))}{side}."]
+        said.append(f"It has left where a joint has moved by {LEFT} {unit}; predicted is that by RK4's linear map.")
         if end > case.duration * (1.0 + 1e-9):
             said.append(f"Both are followed beyond the scene's {case.duration:g} s until both have left.")
     elif np.isfinite(apart).any():
@@ -150,7 +151,7 @@ def what_is_seen(
 
 
 def left_to_in_words(case: Case, t: np.ndarray, paths: dict, left: dict) -> str:
-    """To which sides of the posture both engines leave."""
+    """To which sides of the posture both engines leave, behind a comma."""
     gone, coordinates = {}, case.coordinates
     for name, time in left.items():
         k = int(np.searchsorted(t, time))
@@ -162,4 +163,4 @@ def left_to_in_words(case: Case, t: np.ndarray, paths: dict, left: dict) -> str:
     unit, joint = coordinates.units[i], case.robot.symbol(coordinates.speeds[i])
     sides = "the same side" if ours @ theirs > 0.0 else "different sides"
     by = " and ".join(f"{moved[i]:+.2f} {unit} in {LABELS[name]}" for name, moved in gone.items())
-    return f"They leave to {sides}: {joint} has then moved by {by}."
+    return f", to {sides}: {joint} has then moved by {by}"

@@ -57,7 +57,7 @@ def test_what_is_held_is_drawn_by_its_own_step_until_both_have_left(engines):
         arm = np.array([list(landmarks(q).values()) for q in curve[name][0]])
         parts = 128 // case.steps
         np.testing.assert_allclose(scene.points[name][: parts * case.steps + 1 : parts], on_paper(arm), atol=1e-12)
-        assert f"is 0.1 rad away at {scene.left[name]:.2f} s (RK4's linear map predicts" in scene.seen
+        assert f"the arm leaves at {scene.left[name]:.2f} s (predicted: " in scene.seen
 
 
 def test_between_two_states_stands_what_the_method_gives_with_half_a_step(drawn, runs, engines):
@@ -90,7 +90,7 @@ def test_the_sides_to_which_both_leave_are_said(sign, side):
     away = np.array([0.0, 0.05, 0.2])[:, None] * np.array([1.0, 0.1, 0.0])
     paths = {"tmt": [HELD.q + away], "mujoco": [HELD.q + sign * away]}
     words = frames.left_to_in_words(HELD, t, paths, {"tmt": 1.0, "mujoco": 1.0})
-    assert words == f"They leave to {side}: α has then moved by +0.20 rad in TMT and {sign * 0.2:+.2f} rad in MuJoCo."
+    assert words == f", to {side}: α has then moved by +0.20 rad in TMT and {sign * 0.2:+.2f} rad in MuJoCo"
 
 
 def test_a_scene_without_a_run_of_rk4_is_not_drawn(runs, engines):
@@ -129,7 +129,7 @@ def test_the_gif_shows_both_engines_in_every_picture_and_is_small(drawn, tmp_pat
     figure.savefig(tmp_path / "motion.gif")
     assert (tmp_path / "motion.gif").stat().st_size < 600_000
     with Image.open(tmp_path / "motion.gif") as image:
-        assert image.size == gif.SIZE and image.info["loop"] == 0 and image.n_frames > 200
+        assert image.size == gif.PIXELS and image.info["loop"] == 0 and image.n_frames > 200
         seconds = 0.0
         for k in range(image.n_frames):
             image.seek(k)

@@ -1,0 +1,37 @@
+"""The pictures of the first screen: of which experiments each is, and when it can be drawn.
+
+`engines_apart` and `methods_compared` take from results what they show; `figures_overview` draws that.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from ..judge.check import Result
+
+PICTURES = {  # the pictures in their order, and the experiments whose results they need
+    "agreement": ("mass", "acceleration"),
+    "scenes": ("trajectory",),
+    "times": ("speed",),
+    "limits": ("stability",),
+}
+BEGINNING = "overview_"  # of the names of their files
+
+
+def results_needed(experiment: str, names: Sequence[str], results: Mapping[str, Result]) -> dict[str, Result]:
+    """The results, rows alone, that pictures need which can be drawn once this experiment is done, its own among them.
+
+    names: of the experiments that run, in their order; results: of those that are done. A picture of two experiments is drawn
+    with the later one.
+    """
+    of_pictures = [[name for name in names if name in needs] for needs in PICTURES.values() if experiment in needs]
+    others = [name for ran in of_pictures if ran[-1:] == [experiment] for name in ran if name in results]
+    return {name: Result(name, rows=results[name].rows, label=results[name].label) for name in others}
+
+
+def drawn_with(experiment: str, results: Mapping[str, Result]) -> list[str]:
+    """The pictures that can be drawn of these results, the last of which is this experiment's."""
+    return [name for name, needs in PICTURES.items() if experiment in needs and any(need in results for need in needs)]
+
+
+def times_in_print(ratio: float) -> str:
+    """A ratio in print, without a power of ten where none is results_needed."""
+    return f"{ratio:.2g}" if ratio < 10.0 or ratio >= 1e5 else f"{ratio:.0f}"
