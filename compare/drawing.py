@@ -1,8 +1,9 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from .experiments import module
 from .judge.check import Result
 from .process.crash import described
-from .report import images
+from .report import images, overview
 from .report.folder import writing
 from .robots import Robot
 
@@ -21,12 +22,12 @@ def draw(
     """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. others: what pictures of the first screen need that can be drawn now, see report.overview. An error of
-    the disk is raised.
+    the later ones alone. others: for the pictures of the first screen, see report.overview. An error of the disk is raised.
     """
     drawn, failed = [], []
     try:
-        for call in calls_that_draw(experiment, result, robot, others or {}):
+        figures = module(experiment).figures(result, robot)
+        for call in chain(figures, overview.pictures_due(experiment, result, robot, others)):
             name, path = called(call), None
             try:
                 with quiet(robot):
@@ -58,14 +59,6 @@ def laid_out(figure):
         engine.execute(figure)
         figure.set_layout_engine("none")
     return figure
-
-
-def calls_that_draw(experiment: str, result: Result, robot: Robot, others: Mapping[str, Result]) -> Iterator[Callable]:
-    """Those of the experiment's own figures, then of the pictures of the first screen."""
-    yield from module(experiment).figures(result, robot)
-    if others:
-        pictures = importlib.import_module(".report.figures_overview", __package__).pictures
-        yield from pictures(experiment, {**others, experiment: result}, robot)
 
 
 def called(call: Callable) -> str:

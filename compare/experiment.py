@@ -68,7 +68,7 @@ def examine(
             causes = new + causes
         clock.ends(name)
         with clock.of(END):
-            others = overview.results_needed(name, order, {section.name: section.result for section in sections})
+            others = overview.results_needed(name, order, sections)
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
             drawings.append(None if crash else drawing if name in TIMED else drawing())  # none delays a timing
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new)

@@ -79,7 +79,7 @@ def report_of_arm():
             of = module(name)
             section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
             sections.append(section)
-            others = overview.results_needed(name, list(EXPERIMENTS), {one.name: one.result for one in sections})
+            others = overview.results_needed(name, list(EXPERIMENTS), sections)
             section.figures, failed = drawing.draw(name, section.result, ARM, folder / "figures", others)
             lost += failed
         words = verdict.verdict(sections, len(EXPERIMENTS))

@@ -1,11 +1,13 @@
 """The first screen of the page: the verdict, a line for each experiment, the causes of what fails, the pictures that matter."""
 
 import html
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
 
+from .images import moves
 from .markup import html_table, image, of_section, words
 from .one_number import one_number
 from .overview import BEGINNING, PICTURES
@@ -13,6 +15,7 @@ from .parts import Parts
 from .tables import failing, of_causes
 from .verdict import Report, Section, failures, passed, standing
 
+LONG_SENTENCE = 80  # characters
 FIRST_CAUSES = 4  # on the first screen; all of them stand below it
 TITLES = {
     "agreement": "The same equations?",
@@ -30,14 +33,24 @@ ALTERNATIVES = {  # what stands for a picture that is not seen
 
 def verdict_in_html(report: Report, parts: Parts) -> str:
     """The verdict: its first sentence large, what follows smaller; what could not be made, and what is said of the robot."""
-    first, _, rest = report.verdict.partition(". ")
-    first = first if first.endswith(".") else f"{first}."
+    first, rest = in_two(report.verdict)
     good = passed(report.sections) and not parts.broken
     lines = [rest] * bool(rest) + [*parts.lines, *report.top]
     small = "".join(f'<p class="small">{words(line)}</p>' for line in lines)
     return (
         f'<div class="verdict {"good" if good else "bad"}"><p class="big">{mark(good)} {words(first)}</p>{small}</div>'
     )
+
+
+def in_two(verdict: str) -> tuple[str, str]:
+    """The first sentence of a verdict, short, and what follows: names of many experiments stand there."""
+    first, _, rest = verdict.partition(". ")
+    first = first if first.endswith(".") else f"{first}."
+    names = re.search(r" in ([\w, ]+) \((\d+ of \d+ experiments)[^)]*\)", first)
+    if names is None or len(first) <= LONG_SENTENCE:
+        return first, rest
+    short = first.replace(names.group(), "")
+    return short, f"{names.group(2)}: {names.group(1)}. {rest}".strip()
 
 
 def mark(good: bool | None) -> str:
@@ -123,14 +136,14 @@ def picture(folder: Path, name: str, caption: str, sections: Sequence[Section], 
 
 def linked_figure(sections: Sequence[Section]) -> str:
     """The anchor of the whole figure behind a picture: of distances or limits, else the first of the last section."""
-    files = [file for section in sections for file, _ in of_section(section)]
+    files = [file for section in sections for file, _ in of_section(section) if not moves(file)]
     best = [file for file in files if file.endswith(("_distances", "_limits"))] or files
     return f"figure-{best[0]}" if best else sections[-1].name
 
 
 def first_figure(folder: Path, section: Section) -> str:
     """The first figure of a failing experiment, small; '' if it has none."""
-    figures = of_section(section)
+    figures = [one for one in of_section(section) if not moves(one[0])]
     if not figures:
         return ""
     file, caption = next((one for one in figures if one[0].endswith("_distances")), figures[0])

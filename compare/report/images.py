@@ -19,6 +19,9 @@ def save_figure(figure: object, path: Path) -> None:
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
     with Image.open(drawn) as image:
         few = image.convert("RGB").quantize(PALETTE, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    few.putpalette(
+        [255 if part > 251 else 0 if part < 4 else part for part in few.getpalette()]
+    )  # white and black stay so
     few.save(path)
     few.convert("RGB").save(path.with_suffix(".webp"), lossless=True, method=1)
 

@@ -3,9 +3,11 @@
 `engines_apart` and `methods_compared` take from results what they show; `figures_overview` draws that.
 """
 
-from collections.abc import Mapping, Sequence
+import importlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from ..judge.check import Result
+from .verdict import Section
 
 PICTURES = {  # the pictures in their order, and the experiments whose results they need
     "agreement": ("mass", "acceleration"),
@@ -16,15 +18,25 @@ PICTURES = {  # the pictures in their order, and the experiments whose results t
 BEGINNING = "overview_"  # of the names of their files
 
 
-def results_needed(experiment: str, names: Sequence[str], results: Mapping[str, Result]) -> dict[str, Result]:
+def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Section]) -> dict[str, Result]:
     """The results, rows alone, that pictures need which can be drawn once this experiment is done, its own among them.
 
-    names: of the experiments that run, in their order; results: of those that are done. A picture of two experiments is drawn
+    names: of the experiments that run, in their order; sections: of those that are done. A picture of two experiments is drawn
     with the later one.
     """
+    results = {section.name: section.result for section in sections}
     of_pictures = [[name for name in names if name in needs] for needs in PICTURES.values() if experiment in needs]
     others = [name for ran in of_pictures if ran[-1:] == [experiment] for name in ran if name in results]
     return {name: Result(name, rows=results[name].rows, label=results[name].label) for name in others}
+
+
+def pictures_due(
+    experiment: str, result: Result, robot: object, others: Mapping[str, Result] | None
+) -> Iterator[Callable]:
+    """Calls that draw the pictures that can be drawn now. others: `results_needed` of this experiment."""
+    if others:
+        pictures = importlib.import_module(".figures_overview", __package__).pictures  # where figures are drawn
+        yield from pictures(experiment, {**others, experiment: result}, robot)
 
 
 def drawn_with(experiment: str, results: Mapping[str, Result]) -> list[str]:

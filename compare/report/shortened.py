@@ -39,7 +39,7 @@ def shortened(rows: Sequence[dict], most: int, most_of_runs: int | None = None) 
         off = [row for row in rows if row.get("difference")]
         words = f"{len(off)} of {len(rows)} rows differ" if off else f"none of {len(rows)} rows differs"
         return off[:most], words + (f", the first {most}" if len(off) > most else "")
-    size = next((size for size in MEASURES if size(rows[0]) is not None), None)
+    size = next((size for size in MEASURES if any(size(row) is not None for row in rows)), None)
     for columns in TOLD_APART_BY:
         if set(columns) <= set(rows[0]):
             kept = worst_of_groups(rows, columns, size)
