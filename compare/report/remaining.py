@@ -23,7 +23,7 @@ AFTER_QUICK = {
     "trajectory": 5.0, "diagnosis": 5.0, "stability": 6.0, "speed": 8.0, "reduction": 9.0, END: 10.0,
 }  # fmt: skip
 TRUST = 0.1  # of the whole: what is planned weighs as much as so much of it that has been seen
-OUTSIDE = ("--out",)  # options that change nothing of what is computed
+WITHOUT_EFFECT = ("--out",)  # options that change nothing of what is computed
 
 
 class Remaining:
@@ -97,7 +97,7 @@ def same_kind(one: str, other: str) -> bool:
 def asked(command: str) -> list[str]:
     """The words of a command but for those that change nothing of what is computed, in one order."""
     words = shlex.split(command)
-    for name in OUTSIDE:
+    for name in WITHOUT_EFFECT:
         words = [word for word in words if not word.startswith(f"{name}=")]
         while name in words:
             k = words.index(name)
