@@ -26,7 +26,7 @@ ASKED_BY = {
     "gravity": ("gravity", "bias", "energy"),
 }
 DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
-TIMED = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
+TIMED_LAST = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
@@ -46,7 +46,7 @@ def examine(
     modules = {name: module(name) for name in names}
     crashed = {name: begun(name, experiment, setup, clock) for name, experiment in modules.items()}
     clock.ends(START)
-    order = sorted(modules, key=TIMED.__contains__)
+    order = sorted(modules, key=TIMED_LAST.__contains__)
     for name in order:
         experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
@@ -70,7 +70,7 @@ def examine(
         with clock.of(END):
             others = overview.results_needed(name, order, sections)
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
-            drawings.append(None if crash else drawing if name in TIMED else drawing())  # none delays a timing
+            drawings.append(None if crash else drawing if name in TIMED_LAST else drawing())  # none delays a timing
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
     with clock.of(END):
         setup.progress("figures")

@@ -8,16 +8,21 @@ import numpy as np
 
 from . import composite
 from .dual import Dual, seeded
-from .stepping import stepped
+from .stepping import Completed, stepped
 
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
 
 
-def one_step(stepping, tree, q, qd, tau, dt):
-    """The state (q, qd) of a tree one dt later by a method, over any scalar."""
-    terms = composite.mass_matrix_and_bias
-    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt, terms), q, qd, dt)
+def one_step(stepping, tree, q, qd, tau, dt, *terms):
+    """The state (q, qd) of a tree one dt later by a method, over any scalar; terms: another form of the dynamics, if any."""
+    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt, *terms), q, qd, dt)
+
+
+def takes_terms(stepping) -> bool:
+    """Whether a method's slope is one of tmt's own, which takes another form of the dynamics."""
+    kind = next((kind for kind in type(stepping).__mro__ if "slope" in vars(kind)), None)
+    return kind is not None and kind.__module__.split(".")[0] == __package__ and kind is not Completed
 
 
 def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
@@ -38,7 +43,8 @@ def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:
     start = [values[..., i] for values in start for i in range(values.shape[-1])]
     directions = np.eye(2 * nv).reshape(2 * nv, 2 * nv, *(1 for _ in batch))  # component, direction, state
     state = seeded(start, [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]])
-    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq:], [float(t) for t in tau], dt)
+    regrouped = [composite.mass_matrix_and_bias] * takes_terms(stepping)
+    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq:], [float(t) for t in tau], dt, *regrouped)
     moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
     slopes = [np.broadcast_to(slope, (2 * nv, *batch)) for slope in (*moved, *(x.slope for x in new_qd))]
     return np.moveaxis(np.array(slopes), (0, 1), (-2, -1)).copy()

@@ -12,6 +12,7 @@ from .cache import check_own, own_folder, write_aside
 from .methods import METHODS
 from .tree import Tree
 
+OF_TMT = dict(METHODS)  # the methods that are tmt's own, whatever is added later
 DIGEST = 64  # characters of a SHA-256, before a text
 
 
@@ -36,7 +37,7 @@ def which_of_own(value) -> str | None:
     """A name for a method, a function or a word of tmt's own, None if it is not."""
     if isinstance(value, str):
         return repr(value)
-    name = next((name for name, method in METHODS.items() if method is value), None)
+    name = next((name for name, method in OF_TMT.items() if method is value), None)
     if name is None and getattr(value, "__module__", "").split(".")[0] == __package__:
         name = getattr(value, "__qualname__", None)
         name = name and f"{value.__module__}.{name}"

@@ -4,7 +4,7 @@ How many digits are right is seen from a second run in another form of the equat
 take too long, as with a stiff robot, a run in doubles of order 8 serves, whose digits are seen by halving its steps.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -45,13 +45,9 @@ class Reference(NamedTuple):
         return np.abs(part.difference(q, high) - beyond).max(axis=1)
 
 
-def references(cases: Sequence[Case], map: Callable = map, progress: Callable = print) -> dict[str, Reference]:
+def references(cases: Sequence[Case]) -> dict[str, Reference]:
     """Each case's reference by its name."""
-    found = {}
-    for case, known in zip(cases, map(reference, cases)):
-        found[case.name] = known
-        progress(f"true motions: {len(found)} of {len(cases)}")
-    return found
+    return {case.name: reference(case) for case in cases}
 
 
 def reference(case: Case) -> Reference:

@@ -51,7 +51,7 @@ def test_it_is_read_at_the_times_of_the_runs():
 
 def test_a_changed_scene_has_another_motion_and_an_equal_one_is_not_computed_again():
     before = reference.in_pairs.cache_info()
-    first, again = (reference.references([SHORT], progress=lambda text: None)["short"] for _ in range(2))
+    first, again = (reference.references([SHORT])["short"] for _ in range(2))
     after = reference.in_pairs.cache_info()
     assert first.high is again.high and after.hits > before.hits
     others = [SHORT.changed(**{name: value}) for name, value in (
@@ -63,12 +63,6 @@ def test_a_changed_scene_has_another_motion_and_an_equal_one_is_not_computed_aga
 def test_a_scene_with_locked_joints_has_those_that_are_free():
     swing = reference.reference(SHORT.changed(name="swing", locked=("alpha", "beta")))
     assert swing.high.shape == swing.low.shape == (65, 2)
-
-
-def test_progress_is_said():
-    said = []
-    reference.references([SHORT, SHORT.changed(name="other")], progress=said.append)
-    assert said == ["true motions: 1 of 2", "true motions: 2 of 2"]
 
 
 # what takes too long

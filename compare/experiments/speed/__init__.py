@@ -131,11 +131,17 @@ def begin(setup: Setup) -> None:
     setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
 
 
-def measured(setup: Setup, cases: Sequence[Case], which: str = "all") -> tuple:
-    """The scenes, their references, and for each scene, as it comes, its rows without times and its rounding."""
-    known = references(cases, setup.map, setup.progress)
-    follow = partial(rows_of_scene, engines=setup.engines, known=known, size=setup.size, which=which)
-    return cases, known, setup.map(follow, cases)
+def measured(setup: Setup, cases: Sequence[Case], which: str = "all") -> tuple[Sequence[Case], Iterator[tuple]]:
+    """The scenes, and for each what `scene` returns. Those of unlike models come first: side by side they compile other code."""
+    trees = [case.tree for case in cases]
+    unlike_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
+    return cases, setup.map(partial(scene, engines=setup.engines, size=setup.size, which=which), unlike_first)
+
+
+def scene(case: Case, engines: Mapping[str, Engine], size: str, which: str) -> tuple:
+    """The name of a scene, its reference, its rows without times, and the error that rounding leaves in it, rad."""
+    known = references([case])
+    return case.name, known[case.name], *rows_of_scene(case, engines, known, size, which)
 
 
 def rows(setup: Setup, timed: bool = True) -> Result:
@@ -148,11 +154,10 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     if timed and "speed" not in setup.background:
         begin(setup)
     which, regular = "all" if timed else "same schemes", regular_of(setup.robot)
-    cases, known, found = setup.background.pop("speed") if timed else measured(setup, [regular], which)
-    of_scenes, lefts = zip(*found)
-    result.rows += [row for of_scene in of_scenes for row in of_scene]
-    names = [case.name for case in cases]
-    floors = dict(zip(names, lefts))
+    cases, found = setup.background.pop("speed") if timed else measured(setup, [regular], which)
+    found, names = {name: parts for name, *parts in found}, [case.name for case in cases]
+    known, of_scenes, floors = ({name: found[name][k] for name in names} for k in range(3))
+    result.rows += [row for of_scene in of_scenes.values() for row in of_scene]
     unit = movement_unit(setup.robot.coordinates)
     result.curves |= {"floors": floors, "regular": regular.name, "unit": unit, "of_file": setup.robot.is_read}
     result.curves["doubles"] = [name for name in names if known[name].why]
@@ -176,7 +181,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     followed = forms_in_words(cases, [method.name for method in taking if method.engine == "tmt"])
     result.notes += [followed] * bool(followed)
     if timed:
-        add_times(result, setup, names, of_scenes)
+        add_times(result, setup, of_scenes)
     result.notes += accuracy.first_order_in_words(result.rows, floors)
     if timed:
         absent = unavailable(setup, names)
@@ -189,13 +194,13 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     return result
 
 
-def add_times(result: Result, setup: Setup, names: Sequence[str], of_scenes: Sequence[list[dict]]) -> None:
+def add_times(result: Result, setup: Setup, of_scenes: Mapping[str, list[dict]]) -> None:
     """The seconds of all rows, what one evaluation costs, and what follows: what to use, and which aims are met."""
-    chains, ways = growth.ready(setup), evaluations.ready(setup)
-    runs = [prepared(of_scene, setup) for of_scene in of_scenes]
+    chains, ways = growth.chains_of(setup), evaluations.made_ways(setup)
+    runs = [prepared(of_scene, setup) for of_scene in of_scenes.values()]
     setup.quiet()  # nothing else may run beside a timing
     spread = []
-    for name, of_scene, its_runs in zip(names, of_scenes, runs):
+    for (name, of_scene), its_runs in zip(of_scenes.items(), runs):
         setup.progress(f"speed: timing {name}")
         spread += fill_in(of_scene, take_times(its_runs, setup))
     floors = result.curves["floors"]

@@ -1,6 +1,6 @@
 """What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads, and others."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from types import MappingProxyType
 from typing import NamedTuple
@@ -40,17 +40,17 @@ WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_
 WHOLE_CALLED = "MuJoCo, mj_forward called from Python"
 
 
-class Ready(NamedTuple):
+class Ways(NamedTuple):
     """The ways of one evaluation, made and not yet timed."""
 
     repeated: Mapping[tuple, Callable]  # {(quantity, implementation, 1, 1): loop(count)}
-    states: Sequence[np.ndarray]
-    numbers: Sequence[int]  # of states that are evaluated at once
+    of_many: Mapping[tuple, tuple[Callable, int]]  # {(quantity, implementation, states, threads): a call, its states}
+    pool: ThreadPoolExecutor  # of two threads
     peers: Peers | None
     missing: str | None  # why MuJoCo's calls are not timed
 
 
-def ready(setup: Setup) -> Ready:
+def made_ways(setup: Setup) -> Ways:
     """All that is compiled for `costs`."""
     from ...engines.mujoco.calls import MinimalCalls  # here, for numba takes its time
 
@@ -69,22 +69,24 @@ def ready(setup: Setup) -> Ready:
         repeated |= {(quantity, name, 1, 1): loop for quantity, name, loop in ways}
     for loop in repeated.values():
         loop(1)  # what it does only once
-    return Ready(repeated, states, numbers, peers, missing)
+    pool, of_many = ThreadPoolExecutor(2), {}
+    for count in numbers:
+        for key, run in of_many_states(tree, [a[:count] for a in states], pool).items():
+            of_many[key] = again(run, CALLS // count, count)
+    for key, run in (peers.of_many_states(states) if peers else {}).items():
+        of_many[key] = again(run, key[2] // FEWER, key[2])
+    return Ways(repeated, of_many, pool, peers, missing)
 
 
-def costs(setup: Setup, made: Ready) -> tuple[list[dict], list[str]]:
+def costs(setup: Setup, made: Ways) -> tuple[list[dict], list[str]]:
     """The rows of evaluations.csv, and sentences about them."""
-    repeated, states, numbers, peers, missing = made
+    repeated, of_many, pool, peers, missing = made
     tree, calls = setup.robot.tree, {key: counted(loop) for key, loop in repeated.items()}
     for name, side_by_side, loop in processor.peaks():
         run, count = counted(loop)
         calls[processor.PEAK, name, side_by_side, 1] = run, count * side_by_side
-    with ThreadPoolExecutor(2) as pool:
-        for count in numbers:
-            for key, run in of_many_states(tree, [a[:count] for a in states], pool).items():
-                calls[key] = again(run, CALLS // count, count)
-        for key, run in (peers.of_many_states(states) if peers else {}).items():
-            calls[key] = again(run, key[2] // FEWER, key[2])
+    calls |= of_many
+    with pool:
         taken = timing.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
     overhead = simulate_overhead(regular_of(setup.robot))

@@ -54,7 +54,7 @@ def extent_of(setup: Setup) -> Extent | None:
     return EXTENTS["small" if setup.size == "small" else "short"]
 
 
-class Ready(NamedTuple):
+class Chains(NamedTuple):
     """What is made and not yet timed: (joints, implementation): Made; who has no time and where, by why; who is not there."""
 
     extent: Extent
@@ -64,13 +64,13 @@ class Ready(NamedTuple):
     absent: Mapping[Implementation, str]
 
 
-def ready(setup: Setup) -> Ready | None:
+def chains_of(setup: Setup) -> Chains | None:
     """The chains of a run, their code compiled; None if none is asked."""
     extent = extent_of(setup)
-    return made_ready(extent, setup.progress) if extent else None
+    return made_chains(extent, setup.progress) if extent else None
 
 
-def add_growth(result: Result, chains: Ready | None, progress: Callable) -> None:
+def add_growth(result: Result, chains: Chains | None, progress: Callable) -> None:
     """The table of costs against joints in a result, their exponents, and what is said of both; nothing if none is asked."""
     if chains:
         rows, reasons = costs_of_growth(chains, progress)
@@ -79,7 +79,7 @@ def add_growth(result: Result, chains: Ready | None, progress: Callable) -> None
         result.notes += chain_in_words(rows, found, reasons)
 
 
-def made_ready(extent: Extent, progress: Callable, known: Sequence[Implementation] = IMPLEMENTATIONS) -> Ready:
+def made_chains(extent: Extent, progress: Callable, known: Sequence[Implementation] = IMPLEMENTATIONS) -> Chains:
     """Each implementation that is there, made for each number of joints."""
     absent = {one: why for one in known if (why := one.unavailable())}
     taking = [one for one in known if one not in absent]
@@ -93,10 +93,10 @@ def made_ready(extent: Extent, progress: Callable, known: Sequence[Implementatio
                 made[n, one] = found
             else:
                 left_out.setdefault((one, found), []).append(n)
-    return Ready(extent, taking, made, left_out, absent)
+    return Chains(extent, taking, made, left_out, absent)
 
 
-def costs_of_growth(chains: Ready, progress: Callable) -> tuple[list[dict], dict[str, str]]:
+def costs_of_growth(chains: Chains, progress: Callable) -> tuple[list[dict], dict[str, str]]:
     """The rows of growth.csv, of each number of joints and each implementation; and {who has no time, and where: why}.
 
     What is not worth it has a row without a time, what cannot take part has none.

@@ -161,15 +161,15 @@ def draw_kept(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     axes = fig.subplots(1, 2, sharey=True, sharex=True)
     for ax, torque in zip(axes, NEAR_TORQUES):
-        for dt, colour in zip(steps, (GREEN, BLUE, ORANGE, RED, PINK)):
+        for dt, colour, mark in zip(steps, (GREEN, BLUE, ORANGE, RED, PINK), "osD^v"):
             for engine, dash in (("tmt", "-"), ("mujoco", ":")):
                 path = data["paths"][(engine, torque, dt)]
                 label = f"dt = {dt:.4g} s" if engine == "tmt" else None
-                width = 1.2 if engine == "tmt" else 2.2
+                look = {"linewidth": 2.2}
+                if engine == "tmt":
+                    look = {"linewidth": 1.2, "marker": mark, "markersize": 4, "markevery": (0.08, 0.12)}
                 t = dt * np.arange(len(path))
-                ax.semilogy(
-                    t[1:], np.maximum(path[1:], NOTHING_MOVES), dash, color=colour, linewidth=width, label=label
-                )
+                ax.semilogy(t[1:], np.maximum(path[1:], NOTHING_MOVES), dash, color=colour, **look, label=label)
         ax.axhline(LEFT, color="black", linewidth=0.8, linestyle="--", label=f"{LEFT:g} rad")
         ax.axvline(claims.duration, color=GREY, linewidth=1.2, label=f"{claims.duration:g} s")
         ax.set(title=f"torque: {torque}", xlabel="time, s", xlim=(0, 30), ylim=(1e-17, 1e3))

@@ -70,9 +70,10 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
         step = step_in_words(case, steps)
         column[0].set_title(f"{c['integrator']}, {step}" if len(columns) < 4 else f"{c['integrator']}\n{step}")
         draw_difference(column[2], c, case, result.label)
-    of_all = [line.get_ydata() for ax in axes[2] for line in ax.lines]
-    if zeros := bool(min(np.nanmin(values) for values in of_all) <= DRAWN_ZERO):
-        zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, max(np.nanmax(values) for values in of_all), most=6)
+    of_all = np.concatenate([line.get_ydata() for ax in axes[2] for line in ax.lines])
+    of_all = of_all[np.isfinite(of_all)]
+    if zeros := bool((of_all <= DRAWN_ZERO).any()):
+        zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, of_all.max(), most=6)
     place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
     named_with_its_factor(axes[0, 0], place, unit)
     named_with_its_factor(axes[1, 0], speed, " or ".join(f"{one}/s" for one in unit.split(" or ")))

@@ -6,8 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from speed_rows import NS, row
 
-from compare.experiments import speed
-from compare.experiments.speed import evaluations, targets
+from compare.engines import Method, Setting
+from compare.experiments.speed import evaluations, targets, times
 from compare.experiments.speed.evaluations import (
     CALLED,
     EACH,
@@ -27,14 +27,37 @@ from compare.robots.arm import ARM
 from tmt import answers
 from tmt.cores import cores
 
+OF_RK4 = ("mujoco", "RK4", 4), ("tmt", "rk4", 4)
+
 
 def test_a_row_gets_the_least_of_its_times():
     rows = [row("tmt", "rk4", 1.0), row("mujoco", "RK4", 1.0)]
-    assert speed.fill_in(rows, [[3e-3, 2e-3, 5e-3], [0.4]]) == [pytest.approx(1.5)]
+    assert times.fill_in(rows, [[3e-3, 2e-3, 5e-3], [0.4]]) == [pytest.approx(1.5)]
     assert [r["seconds"] for r in rows] == [2e-3, 0.4]
-    assert "50.0% above the least" in speed.spread_in_words([1.5])[0] and speed.spread_in_words([]) == [
-        "Each time is that of one run."
-    ]
+    (said,), (of_one,) = times.spread_in_words([1.5]), times.spread_in_words([])
+    assert "50.0% above the least" in said and "more than 4096 steps is timed over the first 4096" in said
+    assert of_one.startswith("Each time is that of one run.") and "4096" in of_one
+
+
+@pytest.mark.parametrize(
+    "engine, steps, timed",
+    [("mujoco", 4096, 4096), ("mujoco", 131072, 4096), ("mujoco", 64, 64), ("tmt", 131072, 131072)],
+)
+def test_a_long_run_of_mujoco_is_timed_over_its_first_steps(engine, steps, timed):
+    part = times.timed_part(Method(engine, "RK4", "rk4", 4), Setting(5.0, steps))
+    assert part.steps == timed and part.duration / part.steps == 5.0 / steps and part.every
+
+
+def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
+    now, case = [0.0], setup.robot.cases[0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    rows = [{"run": (case, Method(*which, "rk4"), Setting(5.0, 16384))} for which in OF_RK4]
+
+    def call():
+        now[0] += 0.5
+
+    ready = [(call, longer) for _, longer in times.prepared(rows, setup)]
+    assert times.take_times(ready, setup) == [[pytest.approx(2.0)], [pytest.approx(0.5)]]
 
 
 def test_nanoseconds_of_a_state():

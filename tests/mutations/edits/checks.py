@@ -27,7 +27,7 @@ CHECKS = (
     ("exact_motion", "check_modes", "what"),
     ("needs", "check_smaller", '"smallest model to whole"'),
     ("needs", "check_smaller", '"time judged"'),
-    ("reduction", "rows", "LOCKABLE"),
+    ("reduction", "say_not_lockable", "LOCKABLE"),
     ("sub_blocks", "check_blocks", "name"),
     ("trajectory", "compare_runs", '"time judged"'),
     ("trajectory", "check_divergence", 'f"step of divergence, MuJoCo\'s, is {whose}"'),
