@@ -124,6 +124,10 @@ def checks_in_html(section: Section) -> str:
     if not checks:
         return "<p>Nothing was checked.</p>"
     table = closest_checks(section, MOST_ROWS)
-    which = f"All {len(checks)} checks" if len(table) == len(checks) else f"{len(checks)} checks: {len(table)} of them"
+    which = (
+        f"All {len(checks)} checks"
+        if len(table) == len(checks)
+        else f"{len(checks)} checks: the {len(table)} that fail or come closest"
+    )
     more = "" if len(table) == len(checks) else "<p>All of them: results.json, beside this page.</p>"
     return details(which, html_table(table, "Checks") + more)
