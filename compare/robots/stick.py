@@ -47,7 +47,7 @@ def along_run(vector: Iterable, q: np.ndarray) -> np.ndarray:
     return np.stack([np.broadcast_to(part, len(q)) for part in vector], axis=-1)
 
 
-def on_paper(points: np.ndarray) -> np.ndarray:
+def as_seen(points: np.ndarray) -> np.ndarray:
     """Points in the world, (..., 3) m, as they are seen: to the right and up, (..., 2) m."""
     return points @ np.stack([RIGHTWARD, UPWARD], axis=1)
 

@@ -11,7 +11,7 @@ from ...judge.check import Result
 from ...judge.run import LEFT, departure, diverged_at, movement_unit, step_in_words
 from ...judge.words import capital
 from ...robots import Robot
-from ...robots.stick import on_paper, stick_figure
+from ...robots.stick import as_seen, stick_figure
 from .errors import SCHEMES_OF_RK4
 from .leaving import accelerations_left, predicted_leaving
 from .runs import follow
@@ -68,7 +68,7 @@ def drawn_motion(case: Case, engines: Mapping[str, Engine], runs: Mapping[tuple,
         alive = np.isfinite(q).all(axis=1) & (times < (np.inf if ended[name] is None else ended[name]))
         whole = case.whole_positions(np.where(alive[:, None], q, case.q))
         of_robot, links = stick_figure(case.robot, whole, crosses=True)
-        points[name] = np.where(alive[:, None, None], on_paper(of_robot), np.nan)
+        points[name] = np.where(alive[:, None, None], as_seen(of_robot), np.nan)
         seen[name] = np.where(alive[:, None], q, np.nan)
     apart = np.abs(case.coordinates.difference(*seen.values())).max(axis=1)
     run = f"{curve['integrator']}, {step_in_words(case, steps)}"

@@ -14,7 +14,7 @@ from compare.judge.check import Result
 from compare.judge.run import departure
 from compare.robots.arm import ARM, landmarks
 from compare.robots.file import robot_of
-from compare.robots.stick import on_paper, stick_figure
+from compare.robots.stick import as_seen, stick_figure
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
     np.testing.assert_array_equal(scene.t, curve["t"][::2])
     for name in ("tmt", "mujoco"):
         arm = np.array([list(landmarks(q).values()) for q in curve[name][0][::2]])
-        np.testing.assert_allclose(scene.points[name], on_paper(arm), atol=1e-15)
+        np.testing.assert_allclose(scene.points[name], as_seen(arm), atol=1e-15)
     np.testing.assert_array_equal(scene.apart, np.abs(curve["tmt"][0] - curve["mujoco"][0]).max(axis=1)[::2])
     assert f"at most {scene.apart.max():.2g} rad apart in 5 s" in scene.seen and "dt/" not in scene.seen
     assert scene.left == {"tmt": None, "mujoco": None}  # there is no posture to leave
@@ -59,7 +59,7 @@ def test_what_is_held_is_drawn_by_its_own_step_until_both_have_left(engines):
     for name in left:  # what was run is drawn as it was
         arm = np.array([list(landmarks(q).values()) for q in curve[name][0]])
         parts = 128 // case.steps
-        np.testing.assert_allclose(scene.points[name][: parts * case.steps + 1 : parts], on_paper(arm), atol=1e-12)
+        np.testing.assert_allclose(scene.points[name][: parts * case.steps + 1 : parts], as_seen(arm), atol=1e-12)
         assert f"the arm leaves at {scene.left[name]:.2f} s (predicted: " in scene.seen
 
 
@@ -71,7 +71,7 @@ def test_between_two_states_stands_what_the_method_gives_with_half_a_step(drawn,
         of = compared(engines, FREE)[name]
         half = of.run(curve[name][0][5], curve[name][1][5], FREE.tau, FREE.duration / 128, 1, method).q[1]
         arm = np.array(list(landmarks(half).values()))
-        np.testing.assert_allclose(coarse.points[name][11], on_paper(arm), atol=1e-12)
+        np.testing.assert_allclose(coarse.points[name][11], as_seen(arm), atol=1e-12)
     assert np.abs(coarse.points["tmt"] - scene.points["tmt"])[:20].max() < 1e-2  # and it is near a finer run
 
 
