@@ -1,26 +1,21 @@
 """How the experiments are run: one after the other, long work and drawing beside it."""
 
-import importlib
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
-
+from .drawing import draw, quiet
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
+from .process.clock import Clock
 from .process.crash import described
 from .process.workers import WorkerEnded, Workers
-from .report import images, overview
-from .report.folder import writing
+from .report import overview
+from .report.remaining import END, START
 from .report.terminal import Terminal
 from .report.verdict import Section, failures
-from .robots import Robot
 from .setup import Setup as Setup
 from .setup import engines as engines
 
@@ -37,51 +32,62 @@ SHOWN = 5  # checks of an experiment that fail, on the terminal
 
 
 def examine(
-    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers
+    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers, clock: Clock | None = None
 ) -> tuple[list[Section], list[dict], dict[str, str]]:
     """The section of each experiment, its figures drawn, the causes of what fails, and what is skipped with its reason.
 
     An experiment that raises is one failed check; the others go on. A diagnosis beside other experiments is made where one of
-    these fails.
+    these fails. clock: of the workers, which gets to know what each experiment takes.
     """
+    clock = clock or Clock()
     (folder / "figures").mkdir()
     sections, drawings, causes, reasons = [], [], [], {}
     own, said = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
-    crashed = {
-        name: attempt(name, experiment.begin, setup)[1]
-        for name, experiment in modules.items()
-        if hasattr(experiment, "begin")
-    }
-    in_turn = sorted(names, key=TIMED_LAST.__contains__)
-    for name in in_turn:
+    crashed = {name: begun(name, experiment, setup, clock) for name, experiment in modules.items()}
+    clock.ends(START)
+    order = sorted(modules, key=TIMED_LAST.__contains__)
+    for name in order:
         experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
         if name == "diagnosis" and len(modules) > 1 and not asked_for:
             reasons[name] = NOTHING_FAILED
             terminal.say(f"{name:<13} skipped: {NOTHING_FAILED}")
+            clock.ends(name)
             continue
-        setup.progress(f"{len(sections) + 1} of {len(names)}, {name}: {EXPERIMENTS[name]}")
-        started = time.perf_counter()
-        result, crash = (None, crashed[name]) if crashed.get(name) else attempt(name, experiment.rows, setup)
-        asked, unsaid = attempt(name, partial(own_words, experiment), setup)
-        if own:
-            add_problems(crash or result, own.equations.problems, said)
-        sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
-        sections[-1].result.checks += unsaid.checks if unsaid else []
-        others = overview.results_needed(name, in_turn, sections)
-        job = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
-        # no drawing delays a timing
-        drawings.append(None if crash else job if name in TIMED_LAST else job())
-        new = new_causes(setup, sections, causes)
-        causes = new + causes
-        say_outcome(terminal, sections[-1], time.perf_counter() - started, new)
-    setup.progress("figures")
-    drawings = [drawing() if callable(drawing) else drawing for drawing in drawings]
-    for section, drawing in zip(sections, drawings):
-        if drawing is not None:
-            take_figures(terminal, section, drawing)
+        clock.begins(name)
+        with clock.of(name):
+            setup.progress(EXPERIMENTS[name])
+            result, crash = (None, crashed[name]) if crashed[name] else attempt(name, experiment.rows, setup)
+            asked, unsaid = attempt(name, partial(own_words, experiment), setup)
+            if own:
+                add_problems(crash or result, own.equations.problems, said)
+            sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
+            sections[-1].result.checks += unsaid.checks if unsaid else []
+            new = new_causes(setup, sections, causes)
+            causes = new + causes
+        clock.ends(name)
+        with clock.of(END):
+            others = overview.results_needed(name, order, sections)
+            drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
+            drawings.append(None if crash else drawing if name in TIMED_LAST else drawing())  # none delays a timing
+        say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
+    with clock.of(END):
+        setup.progress("figures")
+        drawings = [drawing() if callable(drawing) else drawing for drawing in drawings]
+        for section, drawing in zip(sections, drawings):
+            if drawing is not None:
+                take_figures(terminal, section, drawing)
+    clock.ends(END)
     return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
+
+
+def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:
+    """Set an experiment's long work going, if it has any; a failed check if that breaks off."""
+    if not hasattr(experiment, "begin"):
+        return None
+    with clock.of(name):
+        return attempt(name, experiment.begin, setup)[1]
 
 
 def add_problems(result: Result, problems: Sequence, said: set) -> None:
@@ -151,11 +157,6 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
         return None, result
 
 
-def quiet(robot: Robot) -> AbstractContextManager:
-    """A block in which numpy says nothing of what is no number, where a user's own equations may give such: checks do."""
-    return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()
-
-
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
     try:
@@ -172,7 +173,10 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
 
 
 def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Sequence[dict]) -> None:
-    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks."""
+    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks.
+
+    seconds: of the processor, for the experiment itself.
+    """
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
@@ -187,54 +191,3 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
         terminal.say(line, "red")
     if len(lines) > SHOWN:
         terminal.say(f"  and {len(lines) - SHOWN} more: in the report", "red")
-
-
-# in the process that draws
-
-
-def draw(
-    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping[str, Result] | None = None
-) -> tuple[list, list]:
-    """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
-
-    `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. others: for the pictures of the first screen, see report.overview. An error of the disk is raised.
-    """
-    drawn, failed = [], []
-    try:
-        figures = module(experiment).figures(result, robot)
-        for call in chain(figures, overview.pictures_due(experiment, result, robot, others)):
-            name, path = called(call), None
-            try:
-                with quiet(robot):
-                    file, figure, caption = call()
-                while file.casefold() in {other.casefold() for other, _ in drawn}:
-                    file += "_"  # names that differ in signs alone may give one file
-                path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
-                with writing(path), quiet(robot):
-                    images.save_figure(figure, path)
-                drawn.append((path.name.removesuffix(".png"), caption))
-            except OSError:
-                raise
-            except Exception as error:
-                if path:
-                    path.unlink(missing_ok=True)
-                failed.append((name, described(error)))
-    except OSError:
-        raise
-    except Exception as error:
-        failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
-    return drawn, failed
-
-
-def called(call: Callable) -> str:
-    """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
-    more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
-    more = [value for value in more if isinstance(value, str)]
-    name = getattr(getattr(call, "func", call), "__name__", "without a name")
-    return " ".join([name.removeprefix("draw_"), *more])
-
-
-def warm_up() -> None:
-    """Load matplotlib while others compute."""
-    importlib.import_module(".report.style", __package__)

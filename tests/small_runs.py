@@ -16,7 +16,7 @@ from drawn_flaws import flaws
 from model_edits import EDITS, failing
 from runs import in_shell, on_terminal
 
-from compare import experiment
+from compare import drawing, experiment
 from compare.engines.mujoco import load, parse
 from compare.experiments import EXPERIMENTS, module, skipped
 from compare.report import files, overview, verdict
@@ -81,7 +81,7 @@ def report_of_arm():
             section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
             sections.append(section)
             others = overview.results_needed(name, list(EXPERIMENTS), sections)
-            section.figures, failed = experiment.draw(name, section.result, ARM, folder / "figures", others)
+            section.figures, failed = drawing.draw(name, section.result, ARM, folder / "figures", others)
             lost += failed
         words = verdict.verdict(sections, len(EXPERIMENTS))
         files.write(folder, verdict.Report(sections, ARM, {"command": "a small run"}, words))

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from models import PATHS
 
-from compare import __main__ as command_line
+from compare import __main__ as entry
 from compare.__main__ import main
 from compare.robots.arm import ARM
 
@@ -90,7 +90,7 @@ def test_a_wrong_scene_of_a_robot_gets_status_2(tmp_path, capsys):
 
 
 def test_in_all_what_cannot_serve_the_robot_is_skipped_with_the_reason(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(command_line, "EXPERIMENTS", dict.fromkeys(("parameters", "published"), ""))
+    monkeypatch.setattr(entry, "EXPERIMENTS", dict.fromkeys(("parameters", "published"), ""))
     assert main(["all", "--quick", "--mjcf", str(PATHS["loop"]), "--out", str(tmp_path)]) == 0
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     reason = "no printed numbers of the robot are known"
@@ -127,7 +127,7 @@ def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(tmp_path, c
 @pytest.mark.parametrize("arguments, says", [
     (["--dt", "0.1"], "arm is compared by its stated numbers, which have no actuator"),
     (["--integrator", "Euler", "--mjcf", str(PATHS["free_body"])], "free_body has no actuator"),
-    (["--integrator", "euler", "--mjcf", str(PATHS["arm7"])], "'euler' is no integrator of MuJoCo; is Euler meant?"),
+    (["--integrator", "euler", "--mjcf", str(PATHS["arm7"])], "'euler' is no integrator of MuJoCo; did you mean Euler?"),
     (["--integrator", "heun", "--mjcf", str(PATHS["arm7"])], "'heun' is no integrator of MuJoCo; Euler, implicitfast,"),
 ])  # fmt: skip
 def test_a_step_that_cannot_be_answered_for_gets_status_2(tmp_path, capsys, arguments, says):

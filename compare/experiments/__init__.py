@@ -1,14 +1,16 @@
 """The experiments, one file or folder for each word of the command line.
 
-Each is the module of its name: `rows(setup)` computes, `figures(result, robot)` yields calls that draw; TITLE, `claim(robot)` and
-`tolerance(robot)` say what is asked. It may have `begin(setup)`, which sets long work going, and `skipped(robot)`, which says why
-it cannot serve a robot.
+Each is the module of its name, whose docstring is its help. `rows(setup)` computes, `figures(result, robot)` yields calls that
+draw; TITLE, `claim(robot)` and `tolerance(robot)` say what is asked. It may have `begin(setup)`, which sets long work going, and
+`skipped(robot)`, which says why it cannot serve a robot.
 """
 
 import importlib
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-from ..robots import Robot
+if TYPE_CHECKING:  # for who asks for help, the words are enough
+    from ..robots import Robot
 
 EXPERIMENTS = {
     "parameters": "MuJoCo's compiled model read back beside the stated numbers, and what is switched off",
@@ -39,7 +41,7 @@ NOT_OF_OWN = {  # why an experiment has nothing to do with equations of a user's
 }
 
 
-def skipped(name: str, robot: Robot) -> str | None:
+def skipped(name: str, robot: "Robot") -> str | None:
     """Why an experiment cannot serve a robot, or None."""
     if robot.own and name in NOT_OF_OWN:
         return NOT_OF_OWN[name]

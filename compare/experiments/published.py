@@ -1,4 +1,25 @@
-"""Every number that an assignment prints, from TMT, from MuJoCo and exactly."""
+"""Every number that an assignment prints, from TMT, from MuJoCo and exactly.
+
+Asks: does either engine contradict the assignment?
+
+Compares: each printed holding torque, acceleration and mass matrix with tmt's,
+MuJoCo's and the value in 50-digit arithmetic. Where a printed number is
+rounding alone (it should be 0), the exact value at the doubles that are nearest
+to the angles shows which rounding it is. Slips of the printed text are named.
+
+It serves a robot whose printed numbers are known, which is the assignment's
+arm.
+
+Tables: published.csv (each number: printed, exact, tmt's, MuJoCo's, tolerance).
+
+Figures: none.
+
+Tolerance: half a unit of the last printed digit, and 64 eps x the scale of the
+quantity; of an acceleration times the condition number of the mass matrix.
+
+Examples:
+    python -m compare published
+"""
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction

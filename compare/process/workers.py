@@ -5,6 +5,7 @@ import os
 import pickle
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from multiprocessing import get_context, parent_process, resource_tracker
 from queue import SimpleQueue
 
 from . import interrupt
+from .clock import Clock
 from .crash import described, place
 
 
@@ -22,11 +24,13 @@ class WorkerEnded(RuntimeError):
 class Workers(ThreadPoolExecutor):
     """At most so many processes, each started when the others are busy, and a thread for each that hands it its calls.
 
-    Without multiprocessing's locks, which an early end would leave behind in the system.
+    Without multiprocessing's locks, which an early end would leave behind in the system. Its clock knows for which task a call
+    was made, and what it took.
     """
 
     def __init__(self, count):
         super().__init__(count)
+        self.clock = Clock()
         self.count, self.futures, self.processes, self.idle = count, [], [], SimpleQueue()
         interrupt.undo.append(self.kill)
 
@@ -44,20 +48,21 @@ class Workers(ThreadPoolExecutor):
         under_way = sum(not future.done() for future in self.futures)
         if len(self.processes) < min(self.count, under_way + 1):
             self.start()
-        self.futures.append(super().submit(self.ask, function, arguments, named))
+        self.futures.append(super().submit(self.ask, self.clock.task, function, arguments, named))
         return self.futures[-1]
 
-    def ask(self, *call):
-        """What a call returns or raises in one of the processes."""
+    def ask(self, task, *call):
+        """What a call for a task returns or raises in one of the processes."""
         connection = self.idle.get()
         try:
             connection.send(call)
-            returned, value = connection.recv()
+            returned, value, seconds = connection.recv()
         except (EOFError, OSError):
             text = "a process that computes beside was ended from outside; a report that was there is unchanged"
             raise WorkerEnded(text) from None
         finally:
             self.idle.put(connection)
+        self.clock.add(task, seconds)
         if returned:
             return value
         raise value
@@ -103,23 +108,26 @@ def deaf() -> Iterator[None]:
 
 
 def serve(connection) -> None:
-    """Answer one call after the other."""
+    """Answer one call after the other: whether it returned, its value or what it raised, seconds of the processor."""
     logging.getLogger("tmt").setLevel(logging.ERROR)  # what the main process says too
     threading.Thread(target=end_with_parent, daemon=True).start()
     while True:
+        began = time.process_time()
         try:
             function, arguments, named = connection.recv()
+            began = time.process_time()
             answer = True, function(*arguments, **named)
         except EOFError:
             return
         except Exception as error:
             answer = False, portable(error)
+        taken = time.process_time() - began
         try:
-            connection.send(answer)
+            connection.send((*answer, taken))
         except BrokenPipeError:
             return
         except Exception as error:  # a value that cannot be sent
-            connection.send((False, portable(error)))
+            connection.send((False, portable(error), taken))
 
 
 def end_with_parent() -> None:

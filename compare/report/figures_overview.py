@@ -179,7 +179,8 @@ def picture_of_times(results: Mapping[str, Result], robot: object) -> tuple[str,
             ax.plot(errors[at], time, "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
             if curve.engine in ("mujoco", "tmt"):
                 above = curve.engine == "mujoco"
-                ax.annotate(f"{method} {time:.2g} ms", (errors[at], time), (-3, 8 if above else -9), fontsize=8, color=colour,
+                text = f"{method} {overview.times_in_print(time)} ms"
+                ax.annotate(text, (errors[at], time), (-3, 8 if above else -9), fontsize=8, color=colour,
                             textcoords="offset points", ha="right" if above else "left",
                             va="bottom" if above else "top")  # fmt: skip
     ax.axvline(methods_compared.ERROR_ASKED, color=GREY, linestyle=":", linewidth=1.2)

@@ -5,9 +5,11 @@ import importlib
 import io
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
-PALETTE = 256  # of a palette: a chart has fewer that the eye tells apart
+PALETTE = 255  # colours, and white: a chart has fewer that the eye tells apart
+COARSE = 3.0  # of 255: by so much the colours of what is drawn may change on average
 MEDIA = {".png": "image/png", ".webp": "image/webp", ".gif": "image/gif"}
 
 
@@ -20,12 +22,29 @@ def save_figure(figure: object, path: Path) -> None:
     place_parts(figure)
     figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
     with Image.open(drawn) as image:
-        few = image.convert("RGB").quantize(PALETTE, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    few.putpalette(
-        [255 if part > 251 else 0 if part < 4 else part for part in few.getpalette()]
-    )  # white and black stay so
+        few = with_palette(image.convert("RGB"))
     few.save(path)
     few.convert("RGB").save(path.with_suffix(".webp"), lossless=True, method=1)
+
+
+def with_palette(image: Image.Image) -> Image.Image:
+    """An image of few colours; paper stays white beside what is nearly white."""
+    whole = np.asarray(image, dtype=np.int16)
+    paper = (whole == 255).all(axis=2)
+    for method in (
+        Image.Quantize.FASTOCTREE,
+        Image.Quantize.MEDIANCUT,
+    ):  # the other one where the fast one is too coarse
+        few = image.quantize(PALETTE, method=method, dither=Image.Dither.NONE)
+        off = np.abs(whole - np.asarray(few.convert("RGB"))).max(axis=2)
+        if off.sum(where=~paper) <= COARSE * max(1, (~paper).sum()):
+            break
+    palette = few.getpalette()[: 3 * PALETTE]
+    places = np.array(few)
+    places[paper] = PALETTE
+    few = Image.fromarray(places)
+    few.putpalette([*palette, *[0] * (3 * PALETTE - len(palette)), 255, 255, 255])
+    return few
 
 
 def place_parts(figure: object) -> None:

@@ -61,7 +61,7 @@ def cheapest_of_curves(curves: Sequence[Curve], unit: str) -> str:
         return ""
     first = min(reached, key=lambda engine: reached[engine][1])
     method, time = reached[first]
-    text = f"to {ERROR_ASKED:.0e} {unit}: {engine_in_print(first)} {method} in {time:.2g} ms"
+    text = f"to {ERROR_ASKED:.0e} {unit}: {engine_in_print(first)} {method} in {times_in_print(time)} ms"
     other = "mujoco" if first != "mujoco" else "tmt"
     if other in reached:
         text += f"; {engine_in_print(other)} {reached[other][0]} takes {times_in_print(reached[other][1] / time)} times as long"

@@ -45,5 +45,5 @@ def drawn_with(experiment: str, results: Mapping[str, Result]) -> list[str]:
 
 
 def times_in_print(ratio: float) -> str:
-    """A ratio in print, without a power of ten where none is results_needed."""
-    return f"{ratio:.2g}" if ratio < 10.0 or ratio >= 1e5 else f"{ratio:.0f}"
+    """A ratio in print, two digits of it, without a power of ten where none is needed."""
+    return f"{float(f'{ratio:.2g}'):g}"

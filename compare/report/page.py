@@ -19,7 +19,7 @@ from .tables import asked_by, closest_checks, failing, heading, of_causes, origi
 from .verdict import Report, Section, outcome, passed, standing
 
 MOST_ROWS, MOST_OF_RUNS = 40, 60  # of a table in the page; its file has all
-FIRST_NOTES = 3  # that stand open, the others are details
+FIRST_NOTES = 3  # that stand open, the others are folded
 
 
 def page(report: Report, body: Sequence[str], parts: Parts) -> str:
@@ -78,7 +78,7 @@ def top(section: Section) -> str:
 
 
 def section_in_html(folder: Path, section: Section) -> list[str]:
-    """What stands in the page of one experiment: what was found, figures, the tolerance, and the details details."""
+    """What stands in the page of one experiment: what was found, figures, the tolerance, and the details folded."""
     good, _ = standing(section)
     kind = "good" if good else "none" if good is None else "bad"
     number, notes = one_number(section), section.result.notes
@@ -106,7 +106,7 @@ def listed_in_html(notes: Sequence[str]) -> str:
 
 
 def table_in_html(section: Section, name: str, rows: Sequence[dict]) -> str:
-    """A table, details, with the rows that a reader needs; or where it stands, if its file alone has it."""
+    """A table, folded, with the rows that a reader needs; or where it stands, if its file alone has it."""
     file = f"tables/{name}.csv"
     link = f'<a href="{file}">{file}</a>'
     columns = section.result.shown if name == section.name else None
@@ -119,11 +119,15 @@ def table_in_html(section: Section, name: str, rows: Sequence[dict]) -> str:
 
 
 def checks_in_html(section: Section) -> str:
-    """The checks that come closest to their tolerance, details."""
+    """The checks that come closest to their tolerance, folded."""
     checks = section.result.checks
     if not checks:
         return "<p>Nothing was checked.</p>"
     table = closest_checks(section, MOST_ROWS)
-    which = f"All {len(checks)} checks" if len(table) == len(checks) else f"{len(checks)} checks: {len(table)} of them"
+    which = (
+        f"All {len(checks)} checks"
+        if len(table) == len(checks)
+        else f"{len(checks)} checks: the {len(table)} that fail or come closest"
+    )
     more = "" if len(table) == len(checks) else "<p>All of them: results.json, beside this page.</p>"
     return details(which, html_table(table, "Checks") + more)

@@ -4,11 +4,13 @@ import hashlib
 import os
 import platform
 import subprocess
+import tomllib
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..judge.timing import vectors
+from ..process.clock import Clock
 from ..process.streams import readable
 
 OURS = "arm-tmt-mujoco"
@@ -32,11 +34,29 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
-    } | {package: installed(package) for package in (OURS, *PACKAGES)}
+        OURS: of_checkout(Path(__file__).resolve().parents[2]) or installed(OURS),
+    } | {package: installed(package) for package in PACKAGES}
+
+
+def durations(clock: Clock) -> dict:
+    """What each task took itself, seconds of the processor; and when it had ended, seconds from the start by a watch."""
+    return {
+        "seconds_of": {task: round(clock.seconds_of(task), 2) for task in clock.ended if clock.seconds_of(task)},
+        "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
+    }
+
+
+def of_checkout(root: Path) -> str | None:
+    """The version that a checkout states, which another one that is installed does not hide; None: it is none of this project."""
+    try:
+        project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        return str(project["version"]) if project["name"] == OURS else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def installed(package: str) -> str | None:
-    """The version of an installed package; None for this one where it runs from a checkout that is not installed."""
+    """The version of an installed package; None where it is not."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -13,6 +13,10 @@ DIGITS |= dict.fromkeys(
     ("predicted_dt_s", "observed_dt_s", "dt_s", "mujoco_dt_s", "tmt_dt_s", "from_dt_s", "to_dt_s"), 5
 )
 
+IN_WORDS = {
+    "seconds_of": "seconds of the processor, without what was waited",
+    "ended_after_s": "seconds until each had ended",
+}
 LISTS = ("names", "hinges", "locked")  # columns with names of joints, which may be many
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
 
@@ -70,4 +74,11 @@ def heading(name: str) -> str:
 
 
 def origins(origin: dict) -> pd.DataFrame:
-    return pd.DataFrame([(name, str(value)) for name, value in origin.items()], columns=["what", "value"])
+    """Where a report comes from, as a table for readers."""
+    rows = [(IN_WORDS.get(name, name), in_one_cell(value)) for name, value in origin.items()]
+    return pd.DataFrame(rows, columns=["what", "value"])
+
+
+def in_one_cell(value) -> str:
+    """A value of the provenance, of several things one after the other."""
+    return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)

@@ -3,6 +3,7 @@
 import os
 import re
 import sys
+from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from textwrap import fill
 
@@ -23,7 +24,7 @@ class Terminal:
         self.lines, self.beside = (
             Console(file=stream, force_terminal=stream.isatty(), width=80, height=25) for stream in (self.out, self.err)
         )
-        self.status = None
+        self.status, self.text, self.how_far = None, "", list
 
     def say(self, text="", style="") -> None:
         """A line; on a terminal that is narrower: its columns closed up, and broken between words."""
@@ -37,29 +38,44 @@ class Terminal:
         with self.paused():
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 
-    def show(self, text) -> None:
-        """What is under way, in one line."""
-        if self.status:
-            self.beside.width = max(self.err.columns() or 80, 20)
-            space = self.beside.width - 6  # the spinner, and what a terminal shows of Ctrl-C
-            self.status.update(Text(text if len(text) <= space else text[: space - 3] + "..."))
+    def show(self, text: str) -> None:
+        """What is under way, in one line behind how far the run is."""
+        self.text = text
+
+    def tell(self, how_far: Callable[[], list[str]]) -> None:
+        """From now on, how far the run is (how many, which, how long still) stands before what is under way.
+
+        It is asked anew at every moment."""
+        self.how_far = how_far
 
     @contextmanager
-    def progress(self, text):
+    def progress(self, text: str):
         """The block's progress is shown, if that is possible."""
+        self.show(text)
         if not self.beside.is_terminal or self.beside.is_dumb_terminal:
             yield
             return
         spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
         interrupt.undo.append(wipe)
-        self.status = self.beside.status("", spinner=spinner)
-        self.show(text)
+        self.status = self.beside.status(Moving(self), spinner=spinner)
         try:
             with self.status:
                 yield
         finally:
             self.status = None
             interrupt.undo.remove(wipe)
+
+    def line(self) -> str:
+        """How far the run is and what is under way, as far as there is room; a name that would stand there twice is said once."""
+        self.beside.width = max(self.err.columns() or 80, 20)
+        space = self.beside.width - 6  # the spinner, and what a terminal shows of Ctrl-C
+        parts, text = self.how_far(), self.text
+        if len(parts) > 2 and len(", ".join(parts)) > space:
+            parts = [parts[0], *parts[2:]]
+        for part in parts:
+            text = text.removeprefix(f"{part}: ")
+        whole = ": ".join(filter(None, (", ".join(parts), text)))
+        return whole if len(whole) <= space else whole[: space - 3] + "..."
 
     @contextmanager
     def paused(self):
@@ -71,6 +87,16 @@ class Terminal:
         finally:
             if self.status:
                 self.status.start()
+
+
+class Moving:
+    """A line that is made anew whenever it is drawn."""
+
+    def __init__(self, terminal: Terminal):
+        self.terminal = terminal
+
+    def __rich__(self) -> Text:
+        return Text(self.terminal.line(), no_wrap=True)
 
 
 def wipe() -> None:

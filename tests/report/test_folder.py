@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from runs import ENVIRONMENT
 from small_report import OLD, files, fill, old_report
 
-from compare.experiment import draw
+from compare.drawing import draw
 from compare.report.folder import FolderError, new_report, save
 
 

@@ -9,6 +9,7 @@ from runs import ROOT, SECOND, compare, in_shell, on_terminal, readable_lines, s
 from small_runs import runs_on_terminals, terminal_folders
 
 from compare.engines.mujoco import load
+from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 
 FIRST = "reference: arm; mjcf/arm.xml compared with the stated numbers"
@@ -35,6 +36,44 @@ def test_mass(runs, columns, term):
     assert ("\x1b" in run.output) == (term == "xterm")
 
 
+SHOWN = re.compile(r"1 of 1, (?:mass, )?about \d+ s left(?:: |\.\.\.)")
+
+
+def test_a_terminal_shows_how_far_and_how_long_still(runs):
+    """Not a dumb one, and not a pipe: they get lines alone. In a narrow one the name gives way to the time."""
+    for columns, term in [(40, "xterm"), (80, "dumb")]:
+        plain = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", runs["arm", columns, term].output)
+        assert bool(SHOWN.search(plain)) == (term == "xterm"), plain
+        assert all(len(part.rstrip()) <= columns for part in re.split(r"[\r\n]+", plain))
+    piped = runs["C"].stdout
+    assert "about" not in piped and "1 of 1," not in piped and "mass " in piped
+
+
+def on_screen(columns, how_far, text):
+    """What a line says on a terminal of so many columns."""
+    terminal = Terminal()
+    terminal.err.columns = lambda: columns
+    terminal.tell(lambda: how_far)
+    terminal.show(text)
+    return terminal.line()
+
+
+@pytest.mark.parametrize("columns, how_far, text, line", [
+    (80, [], "imports", "imports"),
+    (80, ["about 9 s left"], "imports", "about 9 s left: imports"),
+    (80, ["4 of 11", "acceleration", "about 35 s left"], "bias", "4 of 11, acceleration, about 35 s left: bias"),
+    (80, ["9 of 11", "speed"], "speed: timing", "9 of 11, speed: timing"),
+    (51, ["4 of 11", "acceleration", "about 35 s left"], "bias", "4 of 11, acceleration, about 35 s left: bias"),
+    (49, ["4 of 11", "acceleration", "about 35 s left"], "bias", "4 of 11, acceleration, about 35 s left: ..."),
+    (40, ["4 of 11", "acceleration", "about 35 s left"], "bias", "4 of 11, about 35 s left: bias"),
+    (10, ["4 of 11", "acceleration", "about 35 s left"], "bias", "4 of 11, ab..."),
+    (None, ["4 of 11"], "b", "4 of 11: b"),
+])  # fmt: skip
+def test_the_line_of_progress_fits(columns, how_far, text, line):
+    assert on_screen(columns, how_far, text) == line
+    assert len(line) <= max((columns or 80), 20) - 6
+
+
 @pytest.mark.parametrize("columns, term", [(80, "xterm"), (40, "dumb")])
 def test_a_model_that_fails(runs, columns, term):
     run = runs["heavy", columns, term]
@@ -50,7 +89,7 @@ def test_a_model_that_fails(runs, columns, term):
     assert ("\x1b" in run.output) == (term == "xterm")
 
 
-@pytest.mark.parametrize("columns, term, at", [(40, "xterm", b"mass: the"), (80, "dumb", b"mass ")])
+@pytest.mark.parametrize("columns, term, at", [(40, "xterm", b"1 of 1, mass"), (80, "dumb", b"mass ")])
 def test_ctrl_c(tmp_path, columns, term, at):
     arguments = ["all", "--quick"] if term == "dumb" else ["mass"]
     for _ in range(2):  # the machine may be busy
@@ -99,7 +138,8 @@ def test_a_model_of_any_name_can_be_locked(tmp_path):
 
 @pytest.mark.parametrize("line, status", [
     ("compare --help >/dev/full", 0), ("compare --help >&-", 0), ("compare --help | head -1; exit ${PIPESTATUS[0]}", 0),
-    ("compare mass --fast >&- 2>&-", 2), ("compare nothing 2>/dev/full", 2),
+    ("compare >/dev/full", 0), ("compare >&-", 0), ("compare speed --help | head -1; exit ${PIPESTATUS[0]}", 0),
+    ("compare --quick >&- 2>&-", 2), ("compare mass --fast >&- 2>&-", 2), ("compare nothing 2>/dev/full", 2),
     ("compare mass --mjcf none.xml 2>&-", 2), ("compare mass --mjcf none.xml >&- 2>/dev/full", 2),
 ])  # fmt: skip
 def test_nor_does_it_for_what_is_answered_at_once(tmp_path, line, status):
@@ -113,6 +153,6 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     run = compare("mass", cwd=tmp_path)
     assert run.returncode == 2
     assert run.stderr.splitlines() == [
-        "python -m compare: cannot go on: RuntimeError: two lines (compare/report/terminal.py:9)"
+        "python -m compare: cannot go on: RuntimeError: two lines (compare/report/terminal.py:10)"
     ]
     assert ROOT.as_posix() not in run.stderr

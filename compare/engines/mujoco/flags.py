@@ -37,7 +37,7 @@ def integrator_by_name(name: str) -> str:
         raise ValueError(f"MuJoCo {mujoco.__version__} has no {name}; {', '.join(INTEGRATORS)} are expected")
     alike = {known.casefold(): known for known in INTEGRATORS}
     near = get_close_matches(name.casefold(), alike, 1)
-    hint = f"; is {alike[near[0]]} meant?" if near else ";"
+    hint = f"; did you mean {alike[near[0]]}?" if near else ";"
     raise ValueError(f"{name!r} is no integrator of MuJoCo{hint} {', '.join(INTEGRATORS)} are expected")
 
 

@@ -1,4 +1,50 @@
-"""Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
+"""Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps.
+
+Asks: which method, with which step, comes to so many digits in the least time?
+
+Compares: the largest error of each run with the true motion (a Taylor series in
+pairs of doubles, good to some 30 digits, confirmed by a second run in another
+form of the equations and of another order), and the time that the run takes,
+over all useful steps of every integrator of MuJoCo, every method of tmt,
+SciPy's and (where installed) heyoka's. What is compared is code made for this
+one model with an engine made for any model: the ratio says what that costs, not
+that one is better. It is taken apart: so much is the order of the method, so
+much the compiled code.
+
+Then what one evaluation of the forward dynamics costs: mj_forward, the calls of
+MuJoCo that do the same work, tmt's compiled code for independent states, for
+states where each waits for the last, and for many side by side; heyoka's and
+Pinocchio's where they are installed; and how near that is to what the processor
+can multiply and add. Timed are compiled loops: a call of tmt.simulate from
+Python adds some microseconds. Aims that were set beforehand stand in
+speed_targets.csv, the missed ones too.
+
+How cost grows with the joints: a chain of hinges, none along a coordinate axis,
+of 1 to 8 joints in a whole run for the arm, and to 64 with --growth:
+straight-line code, loops over any tree, side by side, MuJoCo's calls.
+
+A robot with servos answers to a step of their targets: which integrator and
+step come to 1e-3 rad (not with --quick).
+
+Tables: speed.csv (each run), what_should_i_use.csv (the cheapest setting for
+each error, of MuJoCo, of tmt, of all), speed_orders.csv (measured orders),
+evaluations.csv (what one evaluation costs), speed_targets.csv (the aims),
+growth.csv (the chain).
+
+Figures: speed_SCENE (time against error), speed_evaluations (evaluations
+against error), speed_energy (drift of energy against time),
+speed_evaluation_cost, speed_growth.
+
+Tolerance: times make no checks. Checked is that each method has its order, that
+MuJoCo and the same scheme in tmt make the same error but for rounding, and that
+errors which have stopped falling are of the size of rounding.
+
+Examples:
+    python -m compare speed
+    python -m compare speed --growth
+    python -m compare speed --scenes my.toml
+    python -m compare speed --mjcf robot.xml --quick
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial

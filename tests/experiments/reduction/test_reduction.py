@@ -1,11 +1,11 @@
 """The whole experiment: a small run, one without timings, wrong models, and other robots."""
 
 import dataclasses
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from shown import blocks
 from trees import mjcf
 
 import tmt
@@ -35,9 +35,9 @@ def test_a_small_run_takes_every_path(small):
     assert stays["nv"] == 0 and stays["ns_per_step"] is None and 0.0 < stays["max_difference_rad"] < 1e-12
 
 
-def test_the_scene_of_the_readme_runs(engines, tmp_path):
-    readme = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
-    (tmp_path / "my.toml").write_text(re.search(r"^```toml\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL).group(1))
+def test_the_scene_that_the_help_shows_runs(engines, tmp_path):
+    (text,) = blocks("toml")
+    (tmp_path / "my.toml").write_text(text)
     scenes = scene_file.read_scenes(tmp_path / "my.toml", ARM)
     (case,) = dataclasses.replace(ARM, scenes=scenes).cases
     assert (case.duration, case.steps) == (2.0, 64)

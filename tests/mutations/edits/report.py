@@ -37,6 +37,18 @@ EDITS = (
     Edit("folder", "refuse_foreign", "name not in own", "False", "files of somebody else's are not seen"),
     Edit("folder", "clear_away", "number is not None", "True", "the folder of a run that is alive is cleared"),
     Edit("folder", "is_of_a_run", "not _1 or _2 or _3", "False", "a folder that no run has made is cleared"),
+    # the first screen, and what is shown of a long table
+    Edit("first_screen", "verdict_in_html", "passed(report.sections)", "True", "the verdict of the page is green whatever fails"),
+    Edit("verdict", "standing", "if differing:\n _1", "pass", "the line of an experiment whose checks fail says pass"),
+    Edit("first_screen", "pictures_in_html", "bool(fails)", "False", "the picture that shows what fails is not marked"),
+    Edit("one_number", "of_agreement", "max(known, key=_1)", "min(known, key=_1)", "its line has the best difference"),
+    Edit("one_number", "of_published", "all(_1)", "any(_1)", "a printed number that one engine meets is met by both"),
+    Edit("engines_apart", "largest_known", "max(known)", "min(known)", "the picture has the least distance"),
+    Edit("methods_compared", "limits_at_a_glance", "max(_1, default=0.0)", "min(_1, default=0.0)",
+         "the nearest limit is told as the farthest"),
+    Edit("report.shortened", "worst_of_groups", "badness(row, size) > badness(rows[best[group]], size)",
+         "badness(row, size) < badness(rows[best[group]], size)", "the best row of each group is shown"),
+    Edit("report.markdown", "markdown_body", "most = middle", "fewest = middle + 1", "report.md is always as short as can be"),
     # what is drawn, and said of it
     Edit("experiments.figures", "draw_distances", "max((largest_of(curves[q][f'{label} to MuJoCo']), q) for q in quantities)",
          "min((largest_of(curves[q][f'{label} to MuJoCo']), q) for q in quantities)", "the least distance is told as the largest"),  # noqa: E501

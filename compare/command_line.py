@@ -1,0 +1,229 @@
+"""What can be asked on the command line: words, options, help, and one line for what is mistyped."""
+
+import argparse
+import ast
+import shlex
+from collections.abc import Sequence
+from contextlib import suppress
+from difflib import get_close_matches
+from pathlib import Path
+from textwrap import fill
+
+from .experiments import EXPERIMENTS, NOT_OF_OWN
+from .process.streams import in_one_line
+
+PROGRAM = "python -m compare"
+FOLDER = Path(__file__).resolve().parent / "experiments"
+LONGEST_ASKED = 5.0  # s, that can be asked about
+FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
+OF_OWN = tuple(name for name in EXPERIMENTS if name not in NOT_OF_OWN)  # which can serve equations of one's own
+LINE_WIDTH = 80
+SHORT = f"""\
+{PROGRAM} compares equations of motion with MuJoCo, in a report.
+
+  {PROGRAM} all                    all of it, for the assignment's arm
+  {PROGRAM} all --quick            the same in seconds: fewer states
+  {PROGRAM} all --mjcf robot.xml   your robot
+  {PROGRAM} speed --help           what one experiment asks and finds
+  {PROGRAM} --help                 all options; equations of your own
+
+"""
+EXAMPLES = """examples:
+  python -m compare all                       everything, for the arm
+  python -m compare all --quick               the same in seconds: fewer states
+  python -m compare mass --out /tmp/mass      one experiment, report elsewhere
+  python -m compare all --mjcf my_arm.xml     your arm and the stated numbers
+  python -m compare all --mjcf robot.xml      any robot
+  python -m compare all --mjcf robot.xml --reference my_equations.py:
+                                              your own equations of that robot
+  python -m compare stability --mjcf robot.xml --integrator Euler --dt 0.001
+                                              whether that step is stable
+  python -m compare speed --scenes my.toml    scenes of your own
+  python -m compare speed --growth            a chain of 1 to 64 joints
+  python -m compare speed --help              what one experiment asks and finds
+
+output: a line for each experiment; its seconds are those of the processor for
+this experiment alone, and what it waited is not in them
+
+exit status: 0 all checks pass; 1 a check failed; 2 the request could not be
+carried out, for the reason in one line
+"""
+
+
+def in_lines(text: str, indent: str = "") -> str:
+    """A text in lines that an ordinary terminal has room for; indent: of all lines but the first."""
+    return fill(text, LINE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+FOR_ALL = "\n".join([
+    in_lines("Compare equations of motion with MuJoCo, on the assignment's arm or on your robot, and write a report."),
+    "",
+    "experiments (`all`: every one of them):",
+    *(in_lines(f"  {name:<13} {what}", " " * 16) for name, what in EXPERIMENTS.items()),
+])  # fmt: skip
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
+
+
+def not_empty(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty; a name is expected")
+    return text
+
+
+def step_in_seconds(text: str) -> float:
+    """A step that is asked about, s."""
+    try:
+        dt = float(text)
+    except ValueError:
+        dt = 0.0
+    if not 0.0 < dt <= LONGEST_ASKED:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no step; seconds above 0 and at most {LONGEST_ASKED:g} are expected"
+        )
+    return dt
+
+
+def stated_reference(text: str) -> str:
+    """What a model is compared with: what has a colon is read later."""
+    if text in ("arm", "model") or ":" in text:
+        return text
+    if text.endswith(".py"):
+        hint = f"a colon is missing: {text}:OBJECT, or {text}: for the file itself"
+    else:
+        hint = expected(text, {name: name for name in ("arm", "model")}, "arm, model, FILE.py:OBJECT or MODULE:OBJECT")
+    raise argparse.ArgumentTypeError(f"{text!r} is no reference; {hint}")
+
+
+# every option with the experiments that take it; None: all of them do
+OPTIONS_OF_ALL = {
+    "--out": (None, {
+        "type": not_empty, "default": "reports/latest", "metavar": "DIR",
+        "help": "where the report goes (default: %(default)s)",
+    }),
+    "--quick": (None, {"action": "store_true", "help": "fewer states, in seconds"}),
+    "--mjcf": (None, {"type": not_empty, "metavar": "FILE", "help": "your model, an MJCF file"}),
+    "--reference": (None, {
+        "type": stated_reference, "metavar": "WHAT",
+        "help": "what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); "
+        "model, tmt's equations for the model as MuJoCo compiled it (default for any other); or your own equations, "
+        "FILE.py:OBJECT or MODULE:OBJECT, with mass_matrix(q) and bias(q, qd) (nothing after the colon: the module itself)",
+    }),
+    "--joints": (OF_OWN, {
+        "type": not_empty, "metavar": "LIST",
+        "help": "the joints as your own equations take them, in their order: first,-second,third+90deg",
+    }),
+    "--scenes": (FOLLOWING_SCENES, {
+        "type": not_empty, "metavar": "FILE",
+        "help": "scenes of your own (TOML), beside those of the robot in trajectory, speed and reduction",
+    }),
+    "--dt": (("stability",), {
+        "type": step_in_seconds, "metavar": "S",
+        "help": "stability: whether this step, s, is stable under the robot's own servos (default: the file's)",
+    }),
+    "--integrator": (("stability",), {
+        "type": not_empty, "metavar": "NAME",
+        "help": "stability: the same with this integrator of MuJoCo (default: the file's)",
+    }),
+    "--growth": (("speed",), {
+        "action": "store_true",
+        "help": "speed: what a chain costs as it grows to 64 joints, not to 8 as in a whole run for the arm",
+    }),
+}  # fmt: skip
+
+
+def parser(experiment: str | None = None) -> Parser:
+    """The command line, of one experiment with the options that it takes, or of all."""
+    made = Parser(
+        prog=PROGRAM,
+        usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
+        description=(FOR_ALL if experiment is None else help_of(experiment)),
+        epilog=None if experiment else EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        add_help=False,
+    )
+    if experiment is None:
+        made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
+    made.add_argument("-h", "--help", action="store_true", help="this text; after an experiment: what it asks")
+    for name, (takers, how) in OPTIONS_OF_ALL.items():
+        if takers is None or experiment is None or experiment in takers:
+            made.add_argument(name, **how)
+    return made
+
+
+def help_of(experiment: str) -> str:
+    """What an experiment asks, compares and writes: the docstring of its module, which is not imported for that."""
+    file = FOLDER / f"{experiment}.py"
+    file = file if file.exists() else FOLDER / experiment / "__init__.py"
+    first, *rest = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))).split("\n")
+    return "\n".join([in_lines(first), *rest])
+
+
+def what_can_be_asked() -> str:
+    """Ten lines for who asks nothing."""
+    return SHORT + in_lines(f"Experiments: {', '.join(EXPERIMENTS)}.")
+
+
+def request(arguments: Sequence[str]) -> argparse.Namespace:
+    """What is asked for. SystemExit: with 0 where help is asked for, or nothing; with 2 and one line for what is mistyped."""
+    whole = parser()
+    if not arguments:
+        with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
+            print(what_can_be_asked(), flush=True)
+        raise SystemExit(0)
+    options, unknown = whole.parse_known_args(with_minus(arguments))
+    refuse_unknown(whole, options, unknown, shlex.join(arguments))
+    if options.help:
+        (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
+        raise SystemExit(0)
+    refuse_what_does_not_go_together(whole, options)
+    return options
+
+
+def with_minus(arguments: Sequence[str]) -> list[str]:
+    """The arguments, a list of joints that begins with a minus as part of its option: it is none itself."""
+    given = list(arguments)
+    for k in range(len(given) - 1, 0, -1):
+        if given[k - 1] == "--joints" and given[k].startswith("-") and not given[k].startswith("--"):
+            given[k - 1 : k + 1] = [f"--joints={given[k]}"]
+    return given
+
+
+def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence[str], given: str) -> None:
+    """End with the first word that is not known, or where no experiment is asked for. given: all words."""
+    words = {name: name for name in (*EXPERIMENTS, "all")}
+    names = {name.strip("-"): name for name in OPTIONS_OF_ALL}
+    for word in unknown:
+        if word.startswith("-"):
+            whole.error(
+                f"{word!r} is no option; {expected(word.strip('-').split('=')[0], names, ' '.join(OPTIONS_OF_ALL))}"
+            )
+    name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
+    if name is None and not options.help:
+        whole.error(f"no experiment is named; one of {choices} is expected, as in {PROGRAM} all {given}")
+    if name is not None and name not in words:
+        whole.error(f"{name!r} is no experiment; {expected(name, words | {'help': '--help'}, choices)}")
+    if unknown:
+        whole.error(f"{unknown[0]!r} is one word too many; one experiment, or all, is expected")
+
+
+def expected(word: str, known: dict[str, str], choices: str) -> str:
+    """What was meant instead of a word: the nearest of those that are known, by what it stands for; or all choices."""
+    near = get_close_matches(word.casefold(), known, 1)
+    return f"did you mean {known[near[0]]}?" if near else f"one of {choices} is expected"
+
+
+def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace) -> None:
+    """End with the first option that the experiment does not take."""
+    name = options.experiment
+    if options.scenes and name not in (*FOLLOWING_SCENES, "all"):
+        whole.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {name} follows no scene")
+    if options.joints and ":" not in (options.reference or ""):
+        whole.error("--joints is for equations of your own (--reference FILE.py:OBJECT or MODULE:OBJECT)")
+    if (options.dt, options.integrator) != (None, None) and name != "stability":
+        whole.error(f"--dt and --integrator are for stability; {name} answers for no other step")
+    if options.growth and name != "speed":
+        whole.error(f"--growth is for speed; it does not go with {name}")

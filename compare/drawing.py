@@ -1,0 +1,79 @@
+"""Figures on disk, drawn in another process than the one that computes."""
+
+import importlib
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from .experiments import module
+from .judge.check import Result
+from .process.crash import described
+from .report import images, overview
+from .report.folder import writing
+from .robots import Robot
+
+
+def draw(
+    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping[str, Result] | None = None
+) -> tuple[list, list]:
+    """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
+
+    `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
+    the later ones alone. others: for the pictures of the first screen, see report.overview. An error of the disk is raised.
+    """
+    drawn, failed = [], []
+    try:
+        figures = module(experiment).figures(result, robot)
+        for call in chain(figures, overview.pictures_due(experiment, result, robot, others)):
+            name, path = called(call), None
+            try:
+                with quiet(robot):
+                    file, figure, caption = call()
+                while file.casefold() in {other.casefold() for other, _ in drawn}:
+                    file += "_"  # names that differ in signs alone may give one file
+                path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
+                with writing(path), quiet(robot):
+                    images.save_figure(laid_out(figure), path)
+                drawn.append((path.name.removesuffix(".png"), caption))
+            except OSError:
+                raise
+            except Exception as error:
+                if path:
+                    path.unlink(missing_ok=True)
+                failed.append((name, described(error)))
+    except OSError:
+        raise
+    except Exception as error:
+        failed.append((f"number {len(drawn) + len(failed) + 1}", described(error)))
+    return drawn, failed
+
+
+def laid_out(figure):
+    """A figure whose parts have their places: saved as it is made, it would be drawn once more to find them."""
+    engine = getattr(figure, "get_layout_engine", lambda: None)()
+    if engine is not None:
+        figure.set_dpi(importlib.import_module("matplotlib").rcParams["savefig.dpi"])
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    return figure
+
+
+def called(call: Callable) -> str:
+    """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
+    more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
+    more = [value for value in more if isinstance(value, str)]
+    name = getattr(getattr(call, "func", call), "__name__", "without a name")
+    return " ".join([name.removeprefix("draw_"), *more])
+
+
+def warm_up() -> None:
+    """Load matplotlib while others compute."""
+    importlib.import_module(".report.style", __package__)
+
+
+def quiet(robot: Robot) -> AbstractContextManager:
+    """A block in which numpy says nothing of what is no number, where a user's own equations may give such: checks do."""
+    return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()

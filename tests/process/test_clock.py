@@ -1,0 +1,54 @@
+"""What each task takes itself: in this process and in those that compute for it, and not what it waits for others."""
+
+import time
+
+import pytest
+
+from compare.process.clock import Clock
+from compare.process.workers import start_workers
+
+LONG = 0.2  # s
+
+
+def busy(seconds):
+    """Use so many seconds of the processor."""
+    began = time.process_time()
+    while time.process_time() - began < seconds:
+        pass
+    return seconds
+
+
+def break_off():
+    busy(LONG)
+    raise ValueError("broken")
+
+
+def test_waiting_is_nobodys_and_work_is_whose_it_is():
+    clock = Clock()
+    with clock.of("waits"):
+        time.sleep(LONG)
+    with clock.of("works"):
+        busy(LONG)
+    clock.begins("works")
+    assert clock.under_way == "works"
+    clock.ends("works")
+    assert clock.under_way == ""
+    busy(LONG)  # for nobody
+    assert clock.seconds_of("waits") < LONG / 2 and LONG <= clock.seconds_of("works") < 2 * LONG
+    assert clock.seconds_of("another") == 0.0
+    assert 2 * LONG <= clock.ended["works"] <= clock.elapsed - LONG
+
+
+def test_what_a_worker_does_is_for_the_task_that_asked():
+    with start_workers() as workers:
+        with workers.clock.of("first"):
+            first = workers.submit(busy, 2 * LONG)
+            mapped = workers.map(busy, [LONG, LONG])
+        with workers.clock.of("second"):
+            assert first.result() == 2 * LONG and list(mapped) == [LONG, LONG]  # waits for the first's
+            broken = workers.submit(break_off)
+        with pytest.raises(ValueError, match="broken"):
+            broken.result()
+        assert workers.clock.task == ""
+        assert workers.clock.seconds_of("first") >= 4 * LONG
+        assert LONG <= workers.clock.seconds_of("second") < 3 * LONG
