@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 from crane import crane
+from drawn_flaws import flaws
 from model_edits import EDITS, failing
 from runs import in_shell, on_terminal
 
@@ -90,6 +91,12 @@ def report_of_arm():
     return SimpleNamespace(words=words, captions=captions, text=text, drawn=drawn, lost=lost)
 
 
+def flaws_of_arm():
+    """What is wrong with each figure of matplotlib of all experiments on the arm, as it is drawn: {its name: in words}."""
+    calls = (call for name in EXPERIMENTS for call in module(name).figures(of_arm(name), ARM))
+    return {name: flaws(figure) for name, figure, _ in (call() for call in calls) if hasattr(figure, "axes")}
+
+
 def quick_run(folder):
     """A quick run of everything, on a terminal, from a folder that is not the project's."""
     folder.mkdir()
@@ -140,6 +147,7 @@ def jobs(folder) -> list[tuple]:
         *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
         (runs_on_terminals, *terminal_folders(folder)),
         (report_of_arm,),
+        (flaws_of_arm,),
         (quick_run, folder / "anywhere"),
         (of_crane,),
         *((failing, old, new) for old, new, _ in EDITS.values()),

@@ -11,11 +11,17 @@ from ..judge.check import Result
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR, gravity_scale
 from ..judge.words import capital
-from ..report.style import BLUE, LINES, ORANGE, RED, WIDTH, plain
+from ..report.style import BLUE, LINES, ORANGE, RED, WIDTH, plain, zero_at_the_end
 from ..robots import Robot
 
 ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
+WORST_LOOKS = (  # of the maximum of each engine, the second in the first
+    {"marker": "o", "color": RED, "markersize": 10, "markeredgecolor": "white"},
+    {"marker": "P", "color": "white", "markersize": 6, "markeredgecolor": "black"},
+)
+MOST_DRAWN = 600  # points of a curve: more are not seen
 SHOWN_POSTURES = 8  # in one figure
+HATCHES = (None, "///", "...", "xxx", "\\\\\\", "+++")  # of joints, for who prints in grey
 
 
 def draw_distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
@@ -37,11 +43,18 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
         for name, colour, dash in styles if exact else styles[:1]:
             values = np.maximum(curves[quantity][name], ZERO_AT)
             share = np.arange(1, len(values) + 1) / len(values)
-            ax.step(values, share, where="post", color=colour, linestyle=dash, label=name)
+            of_many = np.unique(np.linspace(0, len(values) - 1, MOST_DRAWN).round().astype(int))
+            shown = of_many if len(values) > MOST_DRAWN else slice(None)
+            ax.step(values[shown], share[shown], where="post", color=colour, linestyle=dash, label=name)
         ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
         ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
     for ax in axes.flat[len(quantities) :]:
         ax.set_visible(False)
+    of_all = [line.get_xdata() for ax in axes.flat for line in ax.lines]
+    largest = max((values[-1] for values in of_all if np.isfinite(values[-1])), default=FACTOR)
+    zeros = min(values[0] for values in of_all) <= ZERO_AT
+    if zeros:
+        zero_at_the_end(axes[0, 0].xaxis, ZERO_AT, largest, most=4 + 2 * (columns < 3))
     for ax in axes[:, 0]:
         ax.set_ylabel("share of states")
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
@@ -59,7 +72,7 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
         )
     caption = (
         f"Share of the {sample} whose difference is at most so many eps. The engines are {eps_in_words(worst)} apart "
-        f"({of_worst}).{against} Differences of exactly zero are drawn at {ZERO_AT:g}."
+        f"({of_worst}).{against}{f' Differences below {ZERO_AT:g} eps are drawn at 0.' if zeros else ''}"
     )
     return f"{result.experiment}_distances", fig, caption
 
@@ -78,24 +91,24 @@ def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     *angles, values = result.curves["condition"]
     first, second = np.degrees(angles)
     x, y = (robot.symbol(joint) for joint in robot.conditioning.joints)
-    worst = np.degrees(result.curves["worst"]["tmt"][1])
-    fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 3.9), layout="constrained")
     ax = fig.subplots()
     image = ax.pcolormesh(first, second, values, cmap="viridis", shading="nearest", rasterized=True)
     lines = ax.contour(first, second, values, levels=[10, 20, 40, 80], colors="white", linewidths=0.7)
     ax.clabel(lines, fontsize=7)
-    ax.plot(*worst, marker="o", color=RED, markersize=8, markeredgecolor="white")
     ax.set(xlabel=f"{x}, deg", ylabel=f"{y}, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
     fig.colorbar(image, label="condition number of Mbar")
     largest = []
-    for name, (value, at, mirrored) in result.curves["worst"].items():
+    for (name, (value, at, mirrored)), look in zip(result.curves["worst"].items(), WORST_LOOKS):
         a, b = np.degrees(at)
-        other = f"the same at -{x}" if abs(mirrored - value) <= 1e-6 * value else f"{mirrored:.2f} at -{x}"
+        twice = abs(mirrored - value) <= 1e-6 * value
+        other = f"the same at -{x}" if twice else f"{mirrored:.2f} at -{x}"
+        places = ([a, -a], [b, b]) if twice else ([a], [b])
+        ax.plot(*places, linestyle="none", **look, label=f"maximum, {LABELS[name]}")
         largest.append(f"{LABELS[name]}'s is {value:.2f} at {x} = {a:.1f}°, {y} = {b:.1f}°, and {other}")
+    fig.legend(loc="outside upper center", ncols=2)
     others = "".join(f", {robot.symbol(joint)} = 0" for joint in robot.joints if joint not in robot.conditioning.joints)
-    caption = (
-        f"Condition number of TMT's Mbar over {x} and {y}{others}. The maximum (dot: TMT's): {'; '.join(largest)}."
-    )
+    caption = f"Condition number of TMT's Mbar over {x} and {y}{others}. The maximum: {'; '.join(largest)}."
     return "mass_condition", fig, caption
 
 
@@ -113,14 +126,18 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
         ours, theirs = (np.array([of[name][k] for of in postures.values()]) for name in (first, second))
         x = places + width * (i - (len(shown) - 1) / 2)
         labels.append(f"{plain(robot.symbol(speeds[k]))}, {LABELS[first]}")
-        ax.bar(x, ours, width=0.92 * width, color=(LINES[i % len(LINES)][0], 0.75), label=labels[-1])
+        look = {"facecolor": (LINES[i % len(LINES)][0], 0.75), "hatch": HATCHES[i % len(HATCHES)], "edgecolor": "white"}
+        ax.bar(x, ours, width=0.92 * width, **look, linewidth=0, label=labels[-1])
         mark = {"markersize": min(50 * width, 20), "markeredgewidth": 2, "label": "MuJoCo" if i == 0 else None}
         ax.plot(x, theirs, "_", color="black", **mark)
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.set_xticks(places, [plain(name) for name in postures])
     ax.set(ylabel=f"holding torque, {unit(robot.tree, 'N m', 'N')}")
     columns = 100 // (8 + max(map(len, labels)))  # that a page has room for
-    fig.legend(loc="outside upper center", ncols=max(1, min(len(shown) + 1, 6, columns)))
+    handles, texts = ax.get_legend_handles_labels()
+    order = sorted(range(len(texts)), key=lambda i: texts[i] == "MuJoCo")  # it is the last
+    handles, texts = ([of[i] for i in order] for of in (handles, texts))
+    fig.legend(handles, texts, loc="outside upper center", ncols=max(1, min(len(shown) + 1, 6, columns)))
     apart = max(np.abs(of[first] - of[second]).max() for of in kept.values())
     which = "each named posture" if len(postures) == len(kept) else f"the first {len(postures)} of {len(kept)} postures"
     of = "" if len(shown) == len(speeds) else f", at the {len(shown)} of {len(speeds)} joints that need most"

@@ -29,7 +29,7 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
     drawn = np.concatenate([*tips, *(part for lines, coms in parts.values() for part in (*lines, coms))])
     half, middle = 0.55 * np.ptp(drawn, axis=0).max(), (drawn.max(axis=0) + drawn.min(axis=0)) / 2
     fig = Figure(figsize=(WIDTH, 3.9))
-    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.95, wspace=0.05)
+    fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.93, wspace=0.05)
     for k, (name, (lines, coms)) in enumerate(parts.items()):
         ax = fig.add_subplot(1, len(poses), k + 1, projection="3d", facecolor="none")
         for line in lines:

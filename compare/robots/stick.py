@@ -1,5 +1,7 @@
 """The stick figure of a robot: its points in the world at any positions, the sticks between them, and how they are seen."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 import tmt
@@ -13,27 +15,39 @@ RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
 UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
-def stick_figure(robot: Robot, q: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
+def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Its points, (times, points, 3) m in the world, at positions q (times, nq), and the pairs of points that a stick joins.
 
     Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move: the
-    slides of a free joint are no points.
+    slides of a free joint are no points. crosses: a ball with no further joint has its axes too, so that its turn is seen.
     """
     if robot.landmarks:
         points = np.array([list(robot.landmarks(one).values()) for one in q])
         return points, [(k, k + 1) for k in range(points.shape[1] - 1)]
     tree, free = robot.tree, free_parts(robot.tree)
-    origins = [list(frame.origin) for frame in method.joint_frames(tree, list(q.T))]
+    frames = method.joint_frames(tree, list(q.T))
+    points = [along_run(frame.origin, q) for frame in frames]
     links = [(up, j) for j, up in enumerate(tree.parent) if up >= 0 and not (free[j] and free[up])]
-    ends = [body for body, joint in enumerate(tree.body_hinge) if joint >= 0 and joint not in tree.parent]
-    links += [(tree.body_hinge[body], len(origins) + k) for k, body in enumerate(ends)]
-    joints = np.stack([np.stack([np.broadcast_to(part, len(q)) for part in one], axis=-1) for one in origins], axis=1)
-    points = np.concatenate([joints, literal.com_positions(q, tree)[:, ends]], axis=1).astype(float)
+    coms = literal.com_positions(q, tree)
+    for body, joint in enumerate(tree.body_hinge):
+        if joint >= 0 and joint not in tree.parent:
+            ends = [coms[:, body]]
+            if crosses and tree.kind[joint] == "ball":  # as long as the radius of a full ball of this mass and inertia
+                radius = np.sqrt(np.trace(tree.inertia[body]) / (1.2 * tree.mass[body]))
+                ends += [points[joint] + radius * along_run(axis, q) for axis in frames[joint].axes]
+            links += [(joint, len(points) + k) for k in range(len(ends))]
+            points += ends
     joined = sorted({point for link in links for point in link})
-    return points[:, joined], [(joined.index(one), joined.index(other)) for one, other in links]
+    found = np.stack([points[k] for k in joined], axis=1).astype(float)
+    return found, [(joined.index(one), joined.index(other)) for one, other in links]
 
 
-def on_paper(points: np.ndarray) -> np.ndarray:
+def along_run(vector: Iterable, q: np.ndarray) -> np.ndarray:
+    """A vector whose parts are numbers or one for each position, (times, 3)."""
+    return np.stack([np.broadcast_to(part, len(q)) for part in vector], axis=-1)
+
+
+def as_seen(points: np.ndarray) -> np.ndarray:
     """Points in the world, (..., 3) m, as they are seen: to the right and up, (..., 2) m."""
     return points @ np.stack([RIGHTWARD, UPWARD], axis=1)
 

@@ -52,6 +52,8 @@ def test_the_figure_of_holding_torques_says_whose_they_are_and_where_none_is_nee
     _, fig, caption = draw.draw_holding_torques(Result("gravity", curves={"postures": postures}), ARM)
     assert [bar.get_height() for bar in fig.axes[0].patches][::2] == ours.tolist()
     assert [line.get_ydata()[0] for line in fig.axes[0].lines][:3] == theirs.tolist()
+    assert [text.get_text() for text in fig.legends[0].get_texts()] == ["α, TMT", "β, TMT", "γ, TMT", "MuJoCo"]
+    assert len({bar.get_hatch() for bar in fig.axes[0].patches}) == 3
     assert "at most 6.0e+00 N m apart. Both need none, but for rounding, at: hanging." in caption
     one = {"zero": both(0 * ours, ours), "bent": both(ours, ours + 0.99 * 64 * EPS * WEIGHT)}
     assert draw.needless(one, ARM) == (
@@ -73,8 +75,10 @@ def test_the_map_of_the_condition_number_says_whose_maximum_is_where():
     assert caption.startswith("Condition number of TMT's Mbar over β and γ, α = 0.")
     assert "TMT's is 126.80 at β = -90.0°, γ = 90.0°, and the same at -β" in caption
     assert "MuJoCo's is 99.00 at β = 45.0°, γ = -60.0°, and 50.00 at -β" in caption
-    (dot,) = lines_of(fig.axes[0], draw.RED)
-    assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (pytest.approx(-90.0), pytest.approx(90.0))
+    marks = {line.get_label(): line for line in fig.axes[0].lines}
+    for label, x, y in (("maximum, TMT", [-90.0, 90.0], [90.0, 90.0]), ("maximum, MuJoCo", [45.0], [-60.0])):
+        assert marks[label].get_xdata() == pytest.approx(x) and marks[label].get_ydata() == pytest.approx(y)
+    assert [text.get_text() for text in fig.legends[0].get_texts()] == list(marks)
 
 
 def test_the_grid_of_condition_numbers_has_the_first_joint_along_its_rows():

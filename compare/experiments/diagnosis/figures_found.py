@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from ...judge.check import Result
 from ...judge.scale import EPS
@@ -20,6 +21,8 @@ def draw_nearest(result: Result) -> tuple[str, Figure, str]:
     ax.set(xscale="log", xlim=(EPS / 3.0, 1.5), xlabel="left of the difference, share", yticks=range(len(names)))
     ax.set_yticklabels(map(plain, names))
     ax.invert_yaxis()
+    looks = ((GREEN, "explains the difference down to rounding"), (GREY, "does not"))
+    fig.legend(handles=[Patch(color=colour, label=name) for colour, name in looks], loc="outside upper center", ncols=2)
     caption = (
         f"What is left of the difference of M and h when one number, term or coefficient is changed as well as it can be: "
         f"{names[0]} leaves {left[0]:.2g} of it, the next, {names[1]}, {left[1]:.2g}." if len(names) > 1

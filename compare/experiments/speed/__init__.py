@@ -246,14 +246,15 @@ def take_times(rows: list[dict], setup: Setup) -> list[list[float]]:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
-    from . import figures_evaluations, figures_growth, figures_times  # matplotlib is for the process that draws
+    # matplotlib is for the process that draws
+    from . import figures_evaluations, figures_growth, figures_panels, figures_times
 
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
     for scene in figures_times.scenes(result):
         yield partial(figures_times.draw_times, result, scene, beginning=scene_begins(scene, robot))
-    yield partial(figures_times.draw_evaluations, result)
-    yield partial(figures_times.draw_energy, result)
+    yield partial(figures_panels.draw_evaluations, result)
+    yield partial(figures_panels.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)
     if "growth" in result.tables:
         yield partial(figures_growth.draw_chain, result)

@@ -1,6 +1,7 @@
 """The figure of what one evaluation of the dynamics costs."""
 
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from tmt.source import LANES
 
@@ -27,6 +28,12 @@ def draw_cost(result: Result, name: str) -> tuple[str, Figure, str]:
     ax.set(xscale="log", xlabel="ns per state")
     ax.grid(axis="y", visible=False)
     ax.margins(y=0.01)
+    looks = [(BLUE, "tmt"), (ORANGE, "MuJoCo"), (GREY, "others")]
+    looks = [(colour, name) for colour, name in looks if colour in colours]
+    if looks:
+        fig.legend(
+            handles=[Patch(color=colour, label=name) for colour, name in looks], loc="outside upper center", ncols=3
+        )
     caption = f"Forward dynamics of the {name} for one state."
     if rows:
         ax.set_xlim(min(values) / 2, max(values) * 16)  # the longest bar has its number beside it

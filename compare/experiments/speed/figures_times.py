@@ -1,24 +1,22 @@
-"""Figures of speed against accuracy."""
-
-from collections.abc import Sequence
+"""Figures of speed against accuracy: one scene, a curve for each method."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 
 from ...engines import LABELS
-from ...judge.check import Check, Result
+from ...judge.check import Result
 from ...judge.units import value
 from ...judge.words import capital
-from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name
+from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name, name_ends
 
 COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
 SAME_BITS = ("implicitfast", "discrete")  # as Euler's
 MARKS = "osD^v<>PXph*"
 COARSE_END, FINE_END = 3.0, 3e-16  # rad: the axis of errors runs from coarse to fine
 NO_RESULT = 1.0  # rad: a run that is farther off is none
-OF_DIVERGED = 30.0  # rad: where what has diverged is drawn
+OF_DIVERGED, COLUMN = 30.0, 2.0  # rad: where what has diverged is drawn, and the ratio to the next method's place
+LINES_OF_ENGINES = {"mujoco": ("-", 1.6), "tmt": ("-", 1.0), "scipy": ("--", 1.0), "heyoka": ("-.", 1.0)}  # dash, width
 
 
 def written(engine: str) -> str:
@@ -81,44 +79,99 @@ def pareto(rows: list[dict], of: str) -> list[dict]:
 
 def draw_times(result: Result, scene: str, beginning: str = "") -> tuple[str, Figure, str]:
     """One scene: worst error against time, a curve for each method, the Pareto front marked."""
-    fig = Figure(figsize=(WIDTH, 5.2), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 5.6))  # laid out by hand, as names find their places on it
+    fig.subplots_adjust(left=0.085, right=0.985, bottom=0.085, top=0.905)
     ax = fig.subplots()
     by_method = curves(result, scene)
     ends = []
     for (engine, method), rows in by_method.items():
-        colour = colour_of(engine)
-        good = [r for r in rows if not r["diverged"]]
+        good = seen(rows)
         errors, spent = visible(good), [1e3 * r["seconds"] for r in good]
-        ax.plot(errors, spent, marker=marker(method), markersize=3.5, linewidth=1, color=colour)
-        if good:
+        ax.plot(errors, spent, marker=marker(method), markersize=3.5, **line_of(engine))
+        if good and not is_twice(engine, method):
             k = int(np.argmin(errors))
-            if engine != "mujoco" or method not in SAME_BITS:
-                name = ", ".join([method, *SAME_BITS]) if (engine, method) == ("mujoco", "Euler") else method
-                ends.append([errors[k], spent[k], name, colour])
+            ends.append((errors[k], spent[k], in_full(engine, method), colour_of(engine)))
     front = pareto([r for rows in by_method.values() for r in rows], "seconds")
     ax.plot(
         visible(front), [1e3 * r["seconds"] for r in front], "o", markersize=9, markerfacecolor="none",
         markeredgecolor="black", label="nothing is both faster and more exact",
     )  # fmt: skip
-    for engine in dict.fromkeys(engine for engine, _ in by_method):
-        ax.plot([], [], color=colour_of(engine), linewidth=3, label=written(engine))
+    engines = list(dict.fromkeys(engine for engine, _ in by_method))
+    for engine in engines:
+        ax.plot([], [], **line_of(engine) | {"linewidth": 2.5}, label=written(engine))
     ax.axvline(result.curves["floors"][scene], color=GREY, linestyle=":", label=least_in_words(result, scene))
-    ax.set(xscale="log", yscale="log", xlim=(OF_DIVERGED * 3, FINE_END / 30))
+    lost, widest = draw_diverged(ax, by_method)
+    ax.set(xscale="log", yscale="log", xlim=(widest, FINE_END / 30))
     ax.set(
         xlabel=f"worst error on the way, {result.curves.get('unit', 'rad')} (finer to the right)",
         ylabel=f"time for {motion(runs_of(result, scene))} of motion, ms",
     )
-    labelled(ax, ends)
-    lost = [r for rows in by_method.values() for r in rows if r["diverged"]]
-    for row in lost:
-        ax.plot(OF_DIVERGED, 1e3 * row["seconds"], "x", color=colour_of(row["engine"]), markersize=6)
-    if lost:
-        ax.plot([], [], "x", color="black", label="diverged (no error)")
-    fig.legend(loc="outside upper center", ncols=3, fontsize=8)
+    ax.minorticks_off()
+    ax.set_xticks([10.0**k for k in range(0, -17, -2)])
+    name_ends(ax, ends)
+    handles, labels = ax.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda k: labels[k] not in map(written, engines))  # the engines first
+    fig.legend(*([of[k] for k in order] for of in (handles, labels)), loc="upper center", ncols=4, fontsize=8)
     caption = f"{beginning or capital(scene)}: {spoken(result, scene)}"
     if lost:
-        caption += f" {len(lost)} {'settings diverge' if len(lost) > 1 else 'setting diverges'} (crosses at the left)."
-    return file_name("speed", scene), fig, caption
+        count, whose = sum(lost.values()), ", ".join(f"{name} {number}" for name, number in lost.items())
+        caption += f" {count} {'settings diverge' if count > 1 else 'setting diverges'} (at the left): {whose}."
+    return file_name("speed", scene), fig, caption + unseen_in_words(result, runs_of(result, scene))
+
+
+def draw_diverged(ax: Axes, by_method: dict) -> tuple[dict[str, int], float]:
+    """What has diverged, at the left, each method's own mark in a column of its own.
+
+    How many settings of each method have, and where the axis of errors begins.
+    """
+    lost, place = {}, OF_DIVERGED
+    for (engine, method), rows in by_method.items():
+        gone = [r for r in rows if r["diverged"]]
+        if not gone:
+            continue
+        lost[f"{written(engine)}'s {method}"] = len(gone)
+        if is_twice(engine, method):
+            continue
+        times = [1e3 * r["seconds"] for r in gone]
+        ax.plot(
+            [place] * len(gone), times, marker(method), mfc="white", markersize=5, color=colour_of(engine),
+            label=f"_{written(engine)} {method}, diverged",
+        )  # fmt: skip
+        place *= COLUMN
+    if lost:
+        ax.axvspan(OF_DIVERGED / 2.0, 2.0 * place, color=(GREY, 0.15), linewidth=0, label="diverged: no error")
+    return lost, 2.0 * place
+
+
+def is_twice(engine: str, method: str) -> bool:
+    """Whether MuJoCo's method gives the bits of another one, which is drawn."""
+    return engine == "mujoco" and method in SAME_BITS
+
+
+def in_full(engine: str, method: str) -> str:
+    """A method's name, with those that give its bits."""
+    return ", ".join([method, *SAME_BITS]) if (engine, method) == ("mujoco", "Euler") else method
+
+
+def line_of(engine: str) -> dict:
+    """How an engine's lines look."""
+    dash, wide = LINES_OF_ENGINES.get(engine, ("-", 1.0))
+    return {"color": colour_of(engine), "linestyle": dash, "linewidth": wide}
+
+
+def seen(rows: list[dict]) -> list[dict]:
+    """The rows that are drawn at their errors: what is farther off than the axis goes, has no error that says anything."""
+    return [r for r in rows if not r["diverged"] and value(r, "worst_error") <= COARSE_END]
+
+
+def unseen_in_words(result: Result, rows: list[dict]) -> str:
+    """How many of some rows are not drawn, as a sentence; nothing where all are."""
+    count = sum(not r["diverged"] for r in rows) - len(seen(rows))
+    unit = result.curves.get("unit", "rad")
+    one = (
+        f"{count} setting{'s' if count > 1 else ''} more than {COARSE_END:g} {unit} off {'are' if count > 1 else 'is'}"
+    )
+    return f" {one} not drawn." if count else ""
 
 
 def visible(rows: list[dict]) -> np.ndarray:
@@ -130,22 +183,6 @@ def motion(rows: list[dict]) -> str:
     """How long the motion is that was timed."""
     times = {round(r["dt_s"] * r["steps"], 9) for r in rows if r["dt_s"]}
     return " or ".join(f"{t:g} s" for t in sorted(times)) or "the scene"
-
-
-def labelled(ax: Axes, ends: list[list]) -> None:
-    """The name of each curve beside its most exact point, none over another."""
-    ends.sort(key=lambda end: end[1])
-    placed = []
-    for error, time, name, colour in ends:
-        y = np.log10(time)
-        while any(abs(np.log10(error / e)) < 2.9 and abs(y - p) < 0.17 for e, p in placed):
-            y += 0.04
-        placed.append((error, y))
-        ax.annotate(
-            name, (error, time), (error / 1.8, 10**y), fontsize=7, color=colour, va="center",
-            path_effects=[withStroke(linewidth=2, foreground="white")],
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.4} if 10**y > 1.3 * time else None,
-        )  # fmt: skip
 
 
 def spoken(result: Result, scene: str) -> str:
@@ -163,94 +200,3 @@ def spoken(result: Result, scene: str) -> str:
     said = [f"MuJoCo's cheapest setting takes {slower} as tmt's"] if slower else []
     said += [f"tmt's cheapest setting takes {faster} as MuJoCo's"] if faster else []
     return f"{'; '.join(said) or 'no error asked for is reached by both MuJoCo and tmt'}."
-
-
-def draw_evaluations(result: Result) -> tuple[str, Figure, str]:
-    """Worst error against evaluations of the right-hand side: independent of the machine and of who wrote the kernel."""
-    fig, axes = panels(result)
-    for ax, scene in zip(axes, scenes(result)):
-        for (engine, method), rows in curves(result, scene).items():
-            good = [r for r in rows if not r["diverged"] and r["evaluations"]]
-            if good and not (engine == "mujoco" and method in SAME_BITS):
-                errors = np.clip([value(r, "worst_error") for r in good], FINE_END, COARSE_END)
-                line(ax, engine, method, errors, [r["evaluations"] for r in good])
-        ax.set(xlim=(COARSE_END * 2, 2e-16), ylim=(40, 2e6))
-    fig.supylabel("evaluations of the right-hand side", fontsize=9)
-    finish(fig, axes, f"worst error on the way, {result.curves.get('unit', 'rad')}")
-    caption = (
-        "The same errors against evaluations of the equations of motion, which do not depend on the machine. "
-        f"{agreeing(result.checks)}{fewest(result, result.curves.get('regular'), 1e-9)}Of an implicit method an evaluation with "
-        "its derivatives counts once; a method without evaluations, as heyoka's Taylor, is not drawn."
-    )
-    return "speed_evaluations", fig, caption
-
-
-def agreeing(checks: Sequence[Check]) -> str:
-    """For how many settings MuJoCo and the same scheme in tmt make the same error, in words."""
-    alike = [check.passed for check in checks if check.quantity.startswith("the same error as tmt's")]
-    if not alike:
-        return ""
-    return (
-        f"Of {len(alike)} settings of MuJoCo near the reference {sum(alike)} have the error of the same scheme in tmt, but for "
-        "rounding. "
-    )
-
-
-def fewest(result: Result, scene: str, target: float) -> str:
-    """How many evaluations RK4 and the 8th-order method need for an error, in words."""
-    counts = {}
-    for method in ("rk4", "dopri8"):
-        rows = curves(result, scene).get(("tmt", method), [])
-        good = [r["evaluations"] for r in rows if not r["diverged"] and value(r, "worst_error") <= target]
-        counts[method] = min(good, default=None)
-    if None in counts.values():
-        return ""
-    return f"For {target:.0e} {result.curves.get('unit', 'rad')} ({scene}) rk4 needs {counts['rk4']}, dopri8 {counts['dopri8']}. "
-
-
-def draw_energy(result: Result) -> tuple[str, Figure, str]:
-    """Energy error against time."""
-    fig, axes = panels(result)
-    for ax, scene in zip(axes, scenes(result)):
-        for (engine, method), rows in curves(result, scene).items():
-            good = [r for r in rows if not r["diverged"]]
-            if good and not (engine == "mujoco" and method in SAME_BITS):
-                errors = np.clip([r["energy_error_J"] for r in good], 1e-15, 10)
-                line(ax, engine, method, errors, [1e3 * r["seconds"] for r in good])
-        ax.set(xlim=(20, 3e-16))
-    fig.supylabel(f"time for {motion(rows_of_runs(result))} of motion, ms", fontsize=9)
-    finish(fig, axes, "largest energy error on the grid, J")
-    least = []
-    for engine, method in (("tmt", "semi_implicit_euler"), ("tmt", "rk4"), ("mujoco", "Euler"), ("mujoco", "RK4")):
-        rows = [r for s in scenes(result) for r in curves(result, s).get((engine, method), []) if not r["diverged"]]
-        if rows:
-            least.append(f"{written(engine)} {method} {min(r['energy_error_J'] for r in rows):.1e} J")
-    caption = "Largest error of the energy against time."
-    caption += f" The least in any scene: {'; '.join(least)}." if least else ""
-    return "speed_energy", fig, caption
-
-
-def panels(result: Result) -> tuple[Figure, list[Axes]]:
-    """One panel for each scene."""
-    names = scenes(result)
-    columns = 2 if len(names) > 1 else 1
-    lines = max(1, -(-len(names) // columns))
-    fig = Figure(figsize=(WIDTH, 1.2 + 2.6 * lines), layout="constrained")
-    axes = list(fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).flat)
-    for ax, name in zip(axes, names):
-        ax.set(xscale="log", yscale="log", title=name)
-    return fig, axes
-
-
-def line(ax: Axes, engine: str, method: str, errors: np.ndarray, costs: Sequence[float]) -> None:
-    name, colour = written(engine), colour_of(engine)
-    dash = "-" if engine in ("mujoco", "tmt") else "--"
-    wide = 2.5 if engine == "mujoco" else 0.9  # seen where the same scheme of tmt lies on it
-    label = f"{name}: {'Euler, implicitfast, discrete' if engine == 'mujoco' and method == 'Euler' else method}"
-    size = 3 + (engine == "mujoco")
-    ax.plot(errors, costs, dash, marker=marker(method), markersize=size, linewidth=wide, color=colour, label=label)
-
-
-def finish(fig: Figure, axes: Sequence[Axes], label: str) -> None:
-    fig.supxlabel(f"{label} (finer to the right)", fontsize=9)
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=7)

@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ...engines import LABELS
 from ...judge.check import Result
@@ -38,26 +39,36 @@ def draw_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
             stacks[at] = stacks.get(at, 0) + 1
             colour, mark, _ = sides[row["direction"]]
             ax.plot(at, stacks[at], mark, color=colour, markersize=5, fillstyle="full" if engine == "tmt" else "none")
-        ax.set(ylabel=f"runs, {LABELS[engine]}", xlim=(first - 2 * claims.dt, never + 2 * claims.dt), ylim=(0, 15))
+        most = max(stacks.values(), default=0)
+        ax.set(
+            ylabel=f"runs, {LABELS[engine]}",
+            xlim=(first - 2 * claims.dt, never + 2 * claims.dt),
+            ylim=(0, max(15, most + 1)),
+        )
         ticks = np.arange(0.0, 10.0, 0.2 if last - first < 1.5 else 1.0)
         ticks = [t for t in ticks if first - 2 * claims.dt < t < last + claims.dt]
         ax.set_xticks([*ticks, never], [*(f"{t:g}" for t in ticks), "never"])
+        ax.yaxis.set_major_locator(MaxNLocator(4, integer=True))
         if k == 0:
             ax.tick_params(labelbottom=False)
         else:
             ax.set_xlabel(f"time until a hinge is {LEFT:g} rad away, s")
     ax = fig.add_subplot(grid[:, 1])
+    largest = max((abs(row["push_rad_per_s2"]) for row in rows if row["push_rad_per_s2"]), default=1.0)
+    factor = 10.0 ** np.floor(np.log10(largest))
     for engine, fill in (("tmt", "full"), ("mujoco", "none")):
         for row in (row for row in rows if row["engine"] == engine and row["observed_s"] is not None):
             colour, mark, _ = sides[row["direction"]]
-            ax.plot(row["push_rad_per_s2"] * 1e15, row["observed_s"], mark, color=colour, fillstyle=fill, markersize=5)
+            ax.plot(
+                row["push_rad_per_s2"] / factor, row["observed_s"], mark, color=colour, fillstyle=fill, markersize=5
+            )
     known = sorted(
-        {(row["push_rad_per_s2"] * 1e15, row["predicted_s"]) for row in rows if row["predicted_s"] is not None}
+        {(row["push_rad_per_s2"] / factor, row["predicted_s"]) for row in rows if row["predicted_s"] is not None}
     )
     known_x, known_y = zip(*known) if known else ((), ())
     ax.plot(known_x, known_y, drawstyle="steps-mid", color="black", linewidth=0.8, label="predicted by the linear map")
     ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set(xlabel="push on the unstable mode, 1e-15 rad/s2", ylabel="time, s")
+    ax.set(xlabel=f"push on the unstable mode, {factor:.0e} rad/s2", ylabel="time, s")
     for colour, mark, text in sides.values():
         ax.plot([], [], mark, color=colour, label=text)
     ax.plot([], [], "^", color="black", fillstyle="none", label="open: MuJoCo")
@@ -84,7 +95,7 @@ def draw_finer_steps(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """The torque one ulp off: time to leave and movement after a run of the claims against the number of steps."""
     rows, claims, joint = result.tables["stability_finer_steps"], robot.claims, robot.joints[0]
     column, symbol, run = ulps_of(robot)[0], robot.symbol(joint), f"{claims.duration:g} s"
-    fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     left, right = fig.subplots(1, 2, sharex=True)
     for engine, (colour, _) in ENGINE_LOOKS.items():
         for sign, dash, fill in ((1, "-", "full"), (-1, "--", "none")):
@@ -108,11 +119,11 @@ def draw_finer_steps(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         xscale="log", xlabel=f"steps in {run}", ylabel=f"time until a hinge is {LEFT:g} rad away, s", ylim=(4, 10.2)
     )
     right.set(yscale="log", xlabel=f"steps in {run}", ylabel=f"largest movement after {run}, rad", ylim=(3e-18, 10))
-    right.text(16384, 2.2e-17, "none", ha="right", va="bottom", fontsize=8)
+    right.text(16384, 2.2e-17, "none", ha="right", va="bottom")
     for ax in (left, right):
         ax.set_xticks([32, 128, 512, 2048, 8192], ["32", "128", "512", "2048", "8192"])
         ax.minorticks_off()
-    fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=7, fontsize=7.5, columnspacing=1.0)
+    fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     caption = (
         f"Held at {claims.left} by RK4, the torque one unit in the last place off in {joint}. Triangles: to which side the "
         f"{robot.name} leaves. {finest_in_words(robot, rows)} The linear map, which does not round here, leaves after "
@@ -147,29 +158,28 @@ def draw_kept(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     """The posture that is kept, under RK4 below and beyond its limit: deviation against the number of steps."""
     data, claims = result.curves["kept"], robot.claims
     steps = [dt for engine, torque, dt in data["paths"] if (engine, torque) == ("tmt", ONE_ULP)][:5]
-    fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     axes = fig.subplots(1, 2, sharey=True, sharex=True)
     for ax, torque in zip(axes, NEAR_TORQUES):
-        for dt, colour in zip(steps, (GREEN, BLUE, ORANGE, RED, PINK)):
+        for dt, colour, mark in zip(steps, (GREEN, BLUE, ORANGE, RED, PINK), "osD^v"):
             for engine, dash in (("tmt", "-"), ("mujoco", ":")):
                 path = data["paths"][(engine, torque, dt)]
                 label = f"dt = {dt:.4g} s" if engine == "tmt" else None
-                width = 1.2 if engine == "tmt" else 2.2
+                look = {"linewidth": 2.2}
+                if engine == "tmt":
+                    look = {"linewidth": 1.2, "marker": mark, "markersize": 4, "markevery": (0.08, 0.12)}
                 t = dt * np.arange(len(path))
-                ax.semilogy(
-                    t[1:], np.maximum(path[1:], NOTHING_MOVES), dash, color=colour, linewidth=width, label=label
-                )
-        ax.axhline(LEFT, color="black", linewidth=0.6)
-        ax.axvline(claims.duration, color=GREY, linewidth=0.8)
+                ax.semilogy(t[1:], np.maximum(path[1:], NOTHING_MOVES), dash, color=colour, **look, label=label)
+        ax.axhline(LEFT, color="black", linewidth=0.8, linestyle="--", label=f"{LEFT:g} rad")
+        ax.axvline(claims.duration, color=GREY, linewidth=1.2, label=f"{claims.duration:g} s")
         ax.set(title=f"torque: {torque}", xlabel="time, s", xlim=(0, 30), ylim=(1e-17, 1e3))
     axes[0].plot([], [], ":", color="black", linewidth=2.2, label="MuJoCo")
     axes[0].set_ylabel("largest deviation of a hinge, rad")
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=6, fontsize=8)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     limit = data["limit"]
     caption = (
         f"Held at {claims.kept} by RK4, its predicted limit {limit:.4f} s. "
         f"{above_in_words([row for row in data['rows'] if row['dt_s'] > limit])} "
-        f"{within_in_words(robot, data['rows'], data['leaves'], len(data['counts']))} "
-        f"Grey line: {claims.duration:g} s; black line: {LEFT:g} rad."
+        f"{within_in_words(robot, data['rows'], data['leaves'], len(data['counts']))}"
     )
     return "stability_bent", fig, caption

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from ...engines import LABELS
 from ...judge.check import Result
 from ...judge.words import scene_begins
-from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH
+from ...report.style import BLUE, GREEN, ORANGE, RED, WIDTH, name_ends
 from ...robots import Robot
 from .choice import coarsest_case, fraction, step_text
 from .failure import LARGE_DEVIATION, RESONANCE, fold, gain_in_words, reset_in_words
@@ -83,10 +83,15 @@ def draw_silent(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     if reset["caught_in_it_s"] is not None:
         left.axvline(reset["caught_in_it_s"], color=RED, linestyle="--", label="caught here")
     left.axhline(gain["range"], color="black", linewidth=0.8, linestyle=":", label="range of the potential")
-    left.set(xlabel="time, s", ylabel="energy gained, J", xlim=(0, reset["t"][-1]), title="Euler, automatic reset on")
+    left.set(
+        xlabel="time, s",
+        ylabel="energy gained, J",
+        xlim=(0, reset["t"][-1]),
+        title="MuJoCo's Euler, automatic reset on",
+    )
     right.plot(gain["t"], gain["energy"] - gain["energy"][0], ".-", color=BLUE, markersize=4, linewidth=0.8)
     right.axhline(gain["range"], color="black", linewidth=0.8, linestyle=":")
-    right.set(ylabel="energy gained, J", title="implicit")
+    right.set(ylabel="energy gained, J", title="MuJoCo's implicit")
     right.tick_params(labelbottom=False)
     under.plot(gain["t"], gain["smallest"], ".-", color=GREEN, markersize=3, linewidth=0.8)
     under.axhline(0.0, color="black", linewidth=0.6)
@@ -108,8 +113,10 @@ def draw_minutes(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     runs, coarse = result.curves["minutes"], coarsest_case(robot)
     steps = sorted({run["row"]["dt_s"] for run in runs}, reverse=True)
     seconds = runs[0]["seconds"]
-    fig = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 3.8))  # laid out by hand, as names find their places on it
+    fig.subplots_adjust(left=0.085, right=0.985, bottom=0.13, top=0.8, wspace=0.18)
     axes = fig.subplots(1, len(steps), sharex=True, squeeze=False)[0]
+    gone = {}
     bound = result.curves["silent"]["gain"]["range"]
     for run in runs:
         row = run["row"]
@@ -122,14 +129,18 @@ def draw_minutes(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         if row["engine"] == "tmt":
             ax.semilogy(at, top, linestyle=dash, color=colour, label=name)
             if row["diverged_at_s"] is not None:
-                ax.plot(row["diverged_at_s"], bound, "x", color=colour)
+                ax.plot(row["diverged_at_s"], bound, "x", color=colour, markersize=7, markeredgewidth=1.8)
+                gone.setdefault(row["dt_s"], []).append((row["diverged_at_s"], bound, name, colour))
         else:
             label = f"{LABELS[row['engine']]}, same scheme" if run["scheme"] == "rk4" else None
             ax.semilogy(at[::3], top[::3], "o", mfc="none", markersize=3.5, color=colour, label=label)
     for ax, dt in zip(axes, steps):
         ax.set(xlabel="time, s", xlim=(0, seconds), title=f"dt = {step_text(coarse, dt)} s")
+        name_ends(ax, gone.get(dt, []))
+    if gone:
+        axes[-1].plot([], [], "x", color="black", markersize=7, markeredgewidth=1.8, label="diverged")
     axes[0].set_ylabel("largest |energy - energy at start|, J")
-    fig.legend(*axes[-1].get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    fig.legend(*axes[-1].get_legend_handles_labels(), loc="upper center", ncols=5, fontsize=8)
     ours = [run["row"] for run in runs if run["row"]["engine"] == "tmt"]
     texts = []
     for dt in steps:

@@ -9,7 +9,7 @@ from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
 from ...setup import Setup
-from . import drift, errors, horizon, motion, sentences
+from . import drift, errors, horizon, leaving, motion, sentences
 from .derivative import compare_derivatives
 from .motion_frames import follow_and_draw, in_order
 from .own_runs import within_time
@@ -150,6 +150,13 @@ def rows(setup: Setup) -> Result:
     result.curves["errors"] = errors.errors_when_held(result, setup.robot) | errors.errors_when_free(
         result, setup.robot
     )
+    robot, ran = setup.robot, {name for name, *_ in result.curves["runs"]}
+    numbers = robot.claims.figures if robot.claims else {}
+    result.curves["leaving"] = {
+        case.name: leaving.leaving(case, setup.engines)
+        for case in robot.cases
+        if case.is_held and case.name in ran and case.name in numbers
+    }
     said = sentences.notes(result, setup.robot, setup.engines, work["finer"], entries(setup))
     result.notes = said + work["left_out"] + result.notes
     return result
@@ -157,7 +164,7 @@ def rows(setup: Setup) -> Result:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Those of the assignment that show a held posture, one for each scene, drift, and the growth of errors."""
-    from . import figures_motion_gif, figures_runs  # matplotlib is for the process that draws
+    from . import figures_drift, figures_motion_gif, figures_runs  # matplotlib is for the process that draws
 
     names = {name for name, *_ in result.curves["runs"]}
     cases = [case for case in robot.cases if case.name in names]
@@ -170,8 +177,8 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         if grown or case not in numbered:  # a quick run has nothing more to show of those
             yield partial(figures_runs.draw_run, result, case)
     if result.curves["drift"]["drifts"]:
-        yield partial(figures_runs.draw_drift, result)
+        yield partial(figures_drift.draw_drift, result)
     if grown:
-        yield partial(figures_runs.draw_growth, result)
+        yield partial(figures_drift.draw_growth, result)
     if result.curves.get("drawn"):
         yield partial(figures_motion_gif.draw_motion, result)

@@ -1,44 +1,53 @@
-"""Figures of runs: angles and rates against time, differences in their bands, drift, growth of errors."""
+"""Figures of runs: angles and rates against time, and the engines' difference in its band."""
 
 from collections.abc import Sequence
-from itertools import cycle
+from textwrap import fill
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from ...case import Case
 from ...engines import LABELS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit, step_in_words
-from ...judge.words import scene_begins
-from ...report.style import BLUE, GREEN, GREY, LINES, ORANGE, PINK, RED, SKY, WIDTH, file_name
-from .drift import DRIFT_DURATION, found_order
-from .figures_lines import differing_most, drawn, over_time
-from .horizon import CARRIED, early, power
-from .leaving import left_in_words
+from ...judge.scale import EPS
+from ...judge.words import capital, scene_begins
+from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name, zero_at_the_end
+from .figures_lines import differing_most, drawn, named_with_its_factor, over_time, while_it_lasts
+from .leaving import left_in_words, why_in_words
 from .sentences import agreement, rad
 
-SCHEME_LINES = dict(zip(("semi_implicit_euler", "implicit", "rk4"), LINES))  # colour and dash
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEGEND_COLUMNS = 4  # of a legend; with names longer than LONG three
+LETTERS = 85  # of a line above a panel as wide as the page
 LONG = 14  # letters of a joint's name
+NOT_JUDGED = {"color": (GREY, 0.2), "linewidth": 0}
 
 
 def draw_held(result: Result, case: Case, number: int) -> tuple[str, Figure, str]:
-    """The assignment's figure of a held posture: joint angles against time."""
+    """The assignment's figure of a held posture: joint angles against time, and why the engines leave it or stay."""
     curve = result.curves["runs"][(case.name, "rk4", case.steps)]
-    fig = Figure(figsize=(WIDTH, 2.9), layout="constrained")
+    fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
-    over_time(ax, curve["t"], np.degrees(curve["tmt"][0]), np.degrees(curve["mujoco"][0]), case)
+    paths = (np.degrees(while_it_lasts(curve, name, curve[name][0])) for name in ("tmt", "mujoco"))
+    over_time(ax, curve["t"], *paths, case)
+    for (name, left), dash in zip(curve["left"].items(), ("--", ":")):
+        if left is not None:
+            ax.axvline(left, color="black", linestyle=dash, label=f"{LABELS[name]} {left_in_words(left)}")
     ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, curve["t"][-1]))
-    fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS)
+    found = result.curves.get("leaving", {}).get(case.name)
+    why = f"{capital(why_in_words(found))}." if found else ""
+    ax.set_title(fill(why, LETTERS), loc="left")
+    fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS + 1)
     ours, theirs = result.curves["errors"][case.name]
     end = f"{curve['t'][-1]:g}"
     caption = (
         f"The assignment's Figure {number} redrawn: {case.name} with TMT's torque in both engines, RK4, "
         f"dt = {end}/{len(curve['t']) - 1} s. In {end} s the {case.robot.noun} of TMT {left_in_words(curve['left']['tmt'])}, "
-        f"that of MuJoCo {left_in_words(curve['left']['mujoco'])}. "
+        f"that of MuJoCo {left_in_words(curve['left']['mujoco'])}. {why}{' ' * bool(why)}"
         f"The true motion is rest: of that TMT is at most {rad(ours)} off, MuJoCo {rad(theirs)}; while judged, to "
         f"{curve['judged_until_s']:.2f} s, they are {agreement(curve, case):.1e} rad apart."
     )
@@ -50,73 +59,70 @@ def draw_run(result: Result, case: Case) -> tuple[str, Figure, str]:
     of_case = [key for key in result.curves["runs"] if key[0] == case.name]
     steps = max(n for *_, n in of_case if n <= 16 * case.steps)
     columns = [result.curves["runs"][key] for key in of_case if key[-1] == steps]
-    shown, unit, label = differing_most(case, columns), movement_unit(case.coordinates), result.label
+    shown, unit = differing_most(case, columns), movement_unit(case.coordinates)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
-    long = any(len(case.coordinates.speeds[i]) > LONG for i in shown)
-    columns_of_legend = LEGEND_COLUMNS - long
-    lines_of_legend = -(-(len(shown) + 4) // columns_of_legend)
-    fig.subplots_adjust(
-        left=0.105,
-        right=0.985,
-        bottom=0.075,
-        top=(93 - 3 * lines_of_legend - 2 * (len(columns) > 3)) / 100,
-        hspace=0.12,
-        wspace=0.08,
-    )
     axes = fig.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
-    until = []
     for column, c in zip(axes.T, columns):
         for row, ax in enumerate(column[:2]):
-            paths = [c[name][row] for name in case.robot.compared]
-            over_time(ax, c["t"], *(paths if row else (drawn(case, q) for q in paths)), case, shown)
-            ax.ticklabel_format(axis="y", scilimits=(-2, 3))
+            paths = [(name, c[name][row] if row else drawn(case, c[name][0])) for name in case.robot.compared]
+            paths = [while_it_lasts(c, name, path) for name, path in paths]
+            over_time(ax, c["t"], *paths, case, shown, 64 // len(columns))
         step = step_in_words(case, steps)
         column[0].set_title(f"{c['integrator']}, {step}" if len(columns) < 4 else f"{c['integrator']}\n{step}")
-        ours, theirs = (c[name][0] for name in case.robot.compared)
-        difference = moved_from(ours, theirs, case.coordinates).max(axis=1)
-        ulp = moved_from(ours, c["ulp"], case.coordinates).max(axis=1)
-        band = np.where(c["band"] < 1e3, c["band"], np.nan)
-        lines = column[2]
-        lines.semilogy(
-            c["t"][1:],
-            np.maximum(ulp[1:], DRAWN_ZERO),
-            color=BLUE,
-            linewidth=0.8,
-            label=f"{label}, start 1 ulp away{' (0: of 1)' if case.robot.is_read else ''}",
-        )
-        lines.semilogy(
-            c["t"][1:], np.maximum(difference[1:], DRAWN_ZERO), color="black", linewidth=1, label=f"{label} to MuJoCo"
-        )
-        lines.semilogy(c["t"][:: c["every"]][1:], band[1:], "--", color=ORANGE, label="band of rounding")
-        if c["judged_until_s"] < case.duration:
-            lines.axvspan(c["judged_until_s"], case.duration, color=(GREY, 0.15))
-        lines.set(xlabel="time, s", xlim=(0, case.duration))
-        if (
-            len(f"{case.duration:g}") > 2 or case.duration < 2.0
-        ):  # the last number of a column would meet the first of the next
-            few = 3 if len(columns) > 3 and case.duration < 1.0 else 5
-            lines.xaxis.set_major_locator(MaxNLocator(few, prune="upper"))
-        until.append(f"{c['integrator']} to {c['judged_until_s']:.2f} s")
+        draw_difference(column[2], c, case, result.label)
+    of_all = [line.get_ydata() for ax in axes[2] for line in ax.lines]
+    if zeros := bool(min(np.nanmin(values) for values in of_all) <= DRAWN_ZERO):
+        zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, max(np.nanmax(values) for values in of_all), most=6)
     place, speed = ("angle", "rate") if unit == "rad" and not case.coordinates.has_balls else ("position", "speed")
-    per = " or ".join(f"{one}/s" for one in unit.split(" or "))
-    for ax, label in zip(
-        axes[:, 0],
-        (
-            f"{place}, {unit}",
-            f"{speed}, {per}",
-            f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}",
-        ),
+    named_with_its_factor(axes[0, 0], place, unit)
+    named_with_its_factor(axes[1, 0], speed, " or ".join(f"{one}/s" for one in unit.split(" or ")))
+    axes[2, 0].set_ylabel(f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}")
+    fig.align_ylabels(axes[:, 0])
+    add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
+    return file_name("trajectory", case.name), fig, run_caption(result, case, columns, len(shown), zeros)
+
+
+def draw_difference(ax: Axes, c: dict, case: Case, label: str) -> None:
+    """How far the engines are apart in a run, under its band; beside it what rounding of the start makes of itself."""
+    ours, theirs = (while_it_lasts(c, name, c[name][0]) for name in case.robot.compared)
+    difference = moved_from(ours, theirs, case.coordinates).max(axis=1)
+    of_itself = moved_from(ours, c["nudged"], case.coordinates).max(axis=1)
+    band = np.where(c["band"] < 1e3, c["band"], np.nan)
+    for values, look, name in (
+        (of_itself, {"color": BLUE, "linewidth": 0.9}, f"{label}, start {EPS:.0e} away"),
+        (difference, {"color": "black", "linewidth": 1}, f"{label} to MuJoCo"),
     ):
-        ax.set_ylabel(label)
-    handles = [ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0])]
-    fig.legend(
-        handles[0][0] + handles[1][0], handles[0][1] + handles[1][1], loc="upper center", ncols=columns_of_legend
-    )
-    return file_name("trajectory", case.name), fig, run_caption(result, case, until, len(shown))
+        ax.semilogy(c["t"][1:], np.maximum(values[1:], DRAWN_ZERO), **look, label=name)
+    ax.semilogy(c["t"][:: c["every"]][1:], band[1:], "--", color=ORANGE, label="band of rounding")
+    if c["judged_until_s"] < case.duration:
+        ax.axvspan(c["judged_until_s"], case.duration, **NOT_JUDGED)
+    ax.set(xlabel="time, s", xlim=(0, case.duration))
+    if (
+        len(f"{case.duration:g}") > 2 or case.duration < 2.0
+    ):  # the last number of a column would meet the next one's first
+        few = 3 if ax.get_subplotspec().get_gridspec().ncols > 3 and case.duration < 1.0 else 5
+        ax.xaxis.set_major_locator(MaxNLocator(few, prune="upper"))
 
 
-def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) -> str:
-    """How far the engines are apart in a scene, how far from the true motion, and what diverges."""
+def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
+    """The legend of a run above its panels, which take what it leaves. long: it has long names."""
+    handles, labels = (a + b for a, b in zip(*(ax.get_legend_handles_labels() for ax in (axes[0, 0], axes[2, 0]))))
+    if any(ax.patches for ax in axes[2]):
+        handles, labels = [*handles, Patch(**NOT_JUDGED)], [*labels, "not judged"]
+    columns, high = LEGEND_COLUMNS - long, axes[0, 0].get_title().count("\n")
+    lines = -(-len(handles) // columns)
+    fig.legend(handles, labels, loc="upper center", ncols=columns)
+    top = (94.5 - 3 * lines - 2.4 * high) / 100
+    fig.subplots_adjust(left=0.105, right=0.985, bottom=0.075, top=top, hspace=0.12, wspace=0.08)
+
+
+def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int, zeros: bool) -> str:
+    """How far the engines are apart in a scene, how far from the true motion, and what diverges.
+
+    columns: the curves that are drawn; shown: of how many positions; zeros: whether some differences are drawn as none.
+    """
+    until = ", ".join(f"{c['integrator']} to {c['judged_until_s']:.2f} s" for c in columns)
+    until += "; grey: not judged" * any(c["judged_until_s"] < case.duration for c in columns)
     rows = [row for row in result.rows if row["scene"] == case.name and row["level"] == "open loop"]
     diverged = [row for row in rows if row["diverged_at_s"] is not None]
     ended = sorted({f"{row['engine_integrator']} at dt = {row['dt_s']:.3g} s" for row in diverged})
@@ -125,7 +131,7 @@ def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) ->
     errors, unit = result.curves["errors"].get(case.name), movement_unit(case.coordinates)
     count, label = case.coordinates.nv, result.label
     return (
-        f"{scene_begins(case.name, case.robot)}. While judged ({', '.join(until)}; grey: not judged) the engines' difference "
+        f"{scene_begins(case.name, case.robot)}. While judged ({until}) the engines' difference "
         f"is {most} of the band, over all steps and integrators. "
         + (
             f"With {case.steps} steps of RK4 {label} is {rad(errors[0], unit)} and MuJoCo {rad(errors[1], unit)} from the true "
@@ -139,92 +145,13 @@ def run_caption(result: Result, case: Case, until: Sequence[str], shown: int) ->
             if shown < count
             else ""
         )
-        + ("Of a ball the turn from its start is drawn, in its own axes. " if case.coordinates.has_balls else "")
-        + f"Differences of exactly zero are drawn at {DRAWN_ZERO:g}."
+        + (
+            "Of a ball the turn from its start is drawn, in its own axes, beyond half a turn from the other side. "
+            if case.coordinates.has_balls
+            else ""
+        )
+        + f"Blue: {label} beside itself, its start moved by {EPS:.1e}."
+        + f" Differences below {DRAWN_ZERO:g} are drawn at 0." * zeros
+        + " Lines and marks end where a run has diverged."
+        * any(at is not None for c in columns for at in c["ended"].values())
     )
-
-
-def draw_drift(result: Result) -> tuple[str, Figure, str]:
-    """Drift of energy and momentum against the step size, both engines."""
-    drifts, steps = (result.curves["drift"][key] for key in ("drifts", "steps"))
-    lines = -(-len(drifts) // 3)
-    fig = Figure(figsize=(WIDTH, 0.8 + 1.8 * lines), layout="constrained")
-    axes = fig.subplots(lines, 3, sharex=True, sharey=True, squeeze=False)
-    for ax in axes.flat[len(drifts) :]:
-        ax.set_visible(False)
-    for ax, ((scene, quantity, unit), of_scene) in zip(axes.flat, drifts.items()):
-        for k, (method, engines) in enumerate(of_scene.items()):
-            colour, dash = SCHEME_LINES[method.scheme]
-            dt = DRIFT_DURATION / np.array(steps[method])
-            ax.loglog(dt, engines["tmt"], linestyle=dash, color=colour, label=f"{method.name}, TMT")
-            ax.loglog(dt, engines["mujoco"], "o", mfc="none", color=colour, label=None if k else "MuJoCo")
-        ax.set_title(f"{scene}: {quantity}, {unit}", fontsize=8)
-        ax.set_xticks([2e-4, 1e-3, 4e-3], ["2e-4", "1e-3", "4e-3"])
-        ax.minorticks_off()
-    fig.supylabel(f"largest drift in {DRIFT_DURATION:g} s", fontsize=9)
-    fig.supxlabel("dt, s", fontsize=9)
-    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=LEGEND_COLUMNS)
-    return "trajectory_drift", fig, drift_caption(drifts, steps)
-
-
-def drift_caption(drifts: dict, steps: dict) -> str:
-    """At which order the drift falls, how large that of the energy is, and how alike the engines are in it."""
-    orders, largest = [], []
-    for method in dict.fromkeys(method for of in drifts.values() for method in of):
-        of_engine = {name: [of[method][name] for of in drifts.values()] for name in ("tmt", "mujoco")}
-        spans = [
-            f"{LABELS[name]} {range_in_words([found_order(v) for v in values], '.2f')}"
-            for name, values in of_engine.items()
-        ]
-        orders.append(f"{method.name}: {', '.join(spans)}")
-        energy = {name: max(of[method][name][-1] for (_, what, _), of in drifts.items() if what == "energy")
-                  for name in of_engine}  # fmt: skip
-        of_energy = ", ".join(f"{LABELS[name]} {value:.1e} J" for name, value in energy.items())
-        largest.append(f"{method.name} at dt = 1/{steps[method][-1] / DRIFT_DURATION:g} s: {of_energy}")
-    pairs = [
-        pair for of in drifts.values() for engines in of.values() for pair in zip(engines["tmt"], engines["mujoco"])
-    ]
-    ratios = [theirs / ours if ours else np.nan for ours, theirs in pairs]
-    return (
-        "Drift of what should be constant (lines: TMT; marks: MuJoCo). The order at which it falls at the finest step, "
-        f"{'; '.join(orders)}. Largest of energy, {'; '.join(largest)}. MuJoCo's drift over TMT's: "
-        f"{range_in_words(ratios, '.3g')}."
-    )
-
-
-def range_in_words(values: Sequence[float], digits: str) -> str:
-    """The least and the largest of some numbers in words."""
-    values = [value for value in values if np.isfinite(value)]
-    return f"{min(values):{digits}} to {max(values):{digits}}" if values else "no number"
-
-
-def draw_growth(result: Result) -> tuple[str, Figure, str]:
-    """Growth of a small difference over the whole time, scene by scene."""
-    t, curves = (result.curves["growth"][key] for key in ("t", "curves"))
-    fig = Figure(figsize=(WIDTH, 3.2), layout="constrained")
-    ax = fig.subplots()
-    colours = cycle((BLUE, RED, GREEN, ORANGE, PINK, SKY, GREY, "black"))
-    last = {name: grown[np.isfinite(grown)][-1] for name, grown in curves.items()}
-    ends = sorted(last, key=last.get)
-    low = -20.0 if min(last.values()) < -5.0 else -5.0
-    high = 65.0 if max(last.values()) > min(CARRIED) else 20.0
-    apart, places = 0.065 * (high - low), {}
-    for name in ends:  # labels at the ends of the curves, not over each other
-        places[name] = max(min(last[name], high - apart), max(places.values(), default=low) + apart)
-    for (name, grown), colour in zip(curves.items(), colours):
-        ax.plot(t, grown, color=colour)
-        ax.text(t[-1] * 1.01, places[name], name, color=colour, va="center", fontsize=8)
-    for digits, text in ((16, "doubles"), (30, "30 digits")):
-        if digits < high:
-            ax.axhline(digits, color="black", linewidth=0.8, linestyle=":")
-            ax.text(t[-1] / 120, digits + 0.01 * (high - low), text, fontsize=8)
-    ax.set(xlabel="time, s", ylabel="log10 of the growth", xlim=(0, t[-1]), ylim=(low, high))
-    soon = early(t)
-    each = "; ".join(
-        f"{name}: {power(curves[name][soon], 1)} and {power(curves[name][-1], 0)}" for name in reversed(ends)
-    )
-    caption = (
-        f"How much a small difference of the state grows in {t[soon]:g} s and in {t[-1]:g} s: {each}. Where a curve crosses a "
-        "dotted line, numbers of so many digits know nothing of the state."
-    )
-    return "trajectory_growth", fig, caption

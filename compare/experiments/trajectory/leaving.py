@@ -1,6 +1,7 @@
 """Why a held robot leaves its posture: the acceleration that the torque leaves, grown by RK4's own linear map."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -82,14 +83,55 @@ def causes_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str
 
 def growing_in_words(case: Case) -> str:
     """What the linear map of RK4 lets small deviations do."""
-    J, _ = linear_map(case)
-    rate = np.log(np.abs(np.linalg.eigvals(J)).max()) / (case.duration / case.steps)
+    rate = growth_rate(case)
     return f"small deviations grow by up to e^{rate:.1f} per second" if rate > STEADY else "no small deviation grow"
+
+
+def growth_rate(case: Case) -> float:
+    """How fast the linear map of RK4 lets the fastest small deviation grow, 1/s; below 0: it shrinks."""
+    J, _ = linear_map(case)
+    return float(np.log(np.abs(np.linalg.eigvals(J)).max()) / (case.duration / case.steps))
+
+
+class Leaving(NamedTuple):
+    """Why the engines leave a held posture, or do not."""
+
+    rate: float  # 1/s, at which small deviations grow
+    allowed: float  # rad/s2, of the acceleration that rounding may leave
+    left_over: dict[str, float]  # rad/s2, of each engine: the acceleration that the torque leaves
+    predicted: dict[
+        str, float | None
+    ]  # s: when the linear map has the robot away by that alone; None: not in this scene
+
+
+def leaving(case: Case, engines: Mapping[str, Engine]) -> Leaving:
+    """What explains when each engine leaves the posture of a case."""
+    pushes = accelerations_left(case, engines)
+    return Leaving(
+        growth_rate(case),
+        allowed(case),
+        {name: float(np.abs(push).max()) for name, push in pushes.items()},
+        {name: predicted_leaving(case, push) if np.isfinite(push).all() else None for name, push in pushes.items()},
+    )
 
 
 def per_s2(unit: str) -> str:
     """The unit of accelerations, by that of movements."""
     return " or ".join(f"{one}/s2" for one in unit.split(" or "))
+
+
+def why_in_words(found: Leaving, unit: str = "rad") -> str:
+    """Why the engines leave a held posture when they do, or stay, in one line."""
+    beyond = [name for name, size in found.left_over.items() if not size <= found.allowed]
+    if beyond:
+        sizes = " and ".join(f"{found.left_over[name]:.1e} {per_s2(unit)} in {LABELS[name]}" for name in beyond)
+        return f"the torque leaves an acceleration of {sizes}: that is no rounding, which allows {found.allowed:.1e}"
+    if found.rate <= STEADY:
+        return "no small deviation grows here, and the torque leaves no more than rounding"
+    (first, at), *others = found.predicted.items()
+    times = [f"{LABELS[first]} would {f'be {LEFT} {unit} away at {at:.2f} s' if at is not None else 'stay'}"]
+    times += [f"{LABELS[name]} {f'at {at:.2f} s' if at is not None else 'would stay'}" for name, at in others]
+    return f"rounding of the torque grows by e^{found.rate:.1f} per second; by that alone {', '.join(times)}"
 
 
 def stays_in_words(case: Case, engines: Mapping[str, Engine], left: Mapping[str, float | None]) -> str | None:

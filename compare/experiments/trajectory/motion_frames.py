@@ -11,7 +11,7 @@ from ...judge.check import Result
 from ...judge.run import LEFT, departure, diverged_at, movement_unit, step_in_words
 from ...judge.words import capital
 from ...robots import Robot
-from ...robots.stick import on_paper, stick_figure
+from ...robots.stick import as_seen, stick_figure
 from .errors import SCHEMES_OF_RK4
 from .leaving import accelerations_left, predicted_leaving
 from .runs import follow
@@ -56,41 +56,52 @@ def drawn_motion(case: Case, engines: Mapping[str, Engine], runs: Mapping[tuple,
         return None
     key = (min if case.is_held else max)(found, key=lambda key: key[2])
     _, scheme, steps = key
-    curve, dynamics, coordinates = runs[key], compared(engines, case), case.coordinates
+    curve, dynamics = runs[key], compared(engines, case)
     dt, methods = case.duration / steps, dict(zip(dynamics, (scheme, curve["integrator"])))
-    t, paths, ended, left = curve["t"], {name: curve[name] for name in dynamics}, curve["ended"], curve["left"]
-    goes_on = case.is_held and len({time is None for time in left.values()}) == 2 and not case.robot.own
-    if goes_on and not any(ended.values()):
-        motions = {name: of.run(*case.start, case.tau, dt, 2 * steps, methods[name]) for name, of in dynamics.items()}
-        t = motions[name := next(iter(motions))].t
-        left = {name: departure(t, motion.q, coordinates) for name, motion in motions.items()}
-        last = max(np.inf if time is None else time for time in left.values()) + SEEN_AFTER * case.duration
-        shown = int(np.sum(t <= (case.duration if last == np.inf else last)))
-        t, paths = t[:shown], {name: [motion.q[:shown], motion.v[:shown]] for name, motion in motions.items()}
-        ended = {name: diverged_at(case, t, *path) for name, path in paths.items()}
-        left = {name: None if time is None or time > t[-1] else time for name, time in left.items()}
-    every = -(-steps // FRAMES)
-    parts = 1 if case.robot.own else max(1, FRAMES // steps)
-    seen = {
-        name: with_parts_of_steps(dynamics[name], [part[::every] for part in path], case.tau, dt, parts, methods[name])
-        for name, path in paths.items()
-    }
+    t, paths, ended, left = followed_on(case, dynamics, methods, curve, steps)
+    every, parts = -(-steps // FRAMES), 1 if case.robot.own else max(1, FRAMES // steps)
     times = t[::every] if parts == 1 else np.arange(parts * (len(t) - 1) + 1) * (dt / parts)
-    for name, time in ended.items():
-        seen[name][times >= (np.inf if time is None else time)] = np.nan
-    points, links = {}, []
-    for name, q in seen.items():
-        alive = np.isfinite(q).all(axis=1)
-        of_robot, links = stick_figure(case.robot, case.whole_positions(np.where(alive[:, None], q, case.q)))
-        points[name] = np.where(alive[:, None, None], on_paper(of_robot), np.nan)
-    apart = np.abs(coordinates.difference(*seen.values())).max(axis=1)
+    seen, points, links = {}, {}, []
+    for name, path in paths.items():
+        few = [part[::every] for part in path]
+        q = with_parts_of_steps(dynamics[name], few, case.tau, dt, parts, methods[name])
+        alive = np.isfinite(q).all(axis=1) & (times < (np.inf if ended[name] is None else ended[name]))
+        whole = case.whole_positions(np.where(alive[:, None], q, case.q))
+        of_robot, links = stick_figure(case.robot, whole, crosses=True)
+        points[name] = np.where(alive[:, None, None], as_seen(of_robot), np.nan)
+        seen[name] = np.where(alive[:, None], q, np.nan)
+    apart = np.abs(case.coordinates.difference(*seen.values())).max(axis=1)
     run = f"{curve['integrator']}, {step_in_words(case, steps)}"
     words = what_is_seen(case, engines, t, paths, ended, left, apart)
     if parts > 1:
         words += f" Between two states of a run its own method's steps of dt/{parts} are drawn."
-    unit = movement_unit(coordinates)
     fixed = case.robot.tree.kind[0] != "slide"
-    return Drawn(case.name, run, times, points, links, apart, unit, ended, left, words, fixed)
+    return Drawn(
+        case.name, run, times, points, links, apart, movement_unit(case.coordinates), ended, left, words, fixed
+    )
+
+
+def followed_on(
+    case: Case, dynamics: Mapping[str, Dynamics], methods: Mapping[str, str], curve: dict, steps: int
+) -> tuple[np.ndarray, dict, dict, dict]:
+    """Times of a run (times,) s, and of both engines the states, when they diverged, and when a held robot left its posture.
+
+    Those of the run; or, where only one engine has left at its end, of one with the same steps that goes on until both have.
+    """
+    t, paths, ended = curve["t"], {name: curve[name] for name in dynamics}, curve["ended"]
+    left = curve["left"] if case.is_held else dict.fromkeys(dynamics)  # what is let go has no posture to leave
+    if len({time is None for time in left.values()}) == 1 or any(ended.values()) or case.robot.own:
+        return t, paths, ended, left
+    dt = case.duration / steps
+    motions = {name: of.run(*case.start, case.tau, dt, 2 * steps, methods[name]) for name, of in dynamics.items()}
+    leaving = {name: departure(motion.t, motion.q, case.coordinates) for name, motion in motions.items()}
+    if None in leaving.values():
+        return t, paths, ended, left
+    last = max(leaving.values()) + SEEN_AFTER * case.duration
+    longer = next(iter(motions.values())).t
+    t = longer[longer <= last]
+    paths = {name: [motion.q[: len(t)], motion.v[: len(t)]] for name, motion in motions.items()}
+    return t, paths, {name: diverged_at(case, t, *path) for name, path in paths.items()}, leaving
 
 
 def in_order(drawn: Sequence[Drawn], robot: Robot) -> list[Drawn]:

@@ -20,6 +20,7 @@ from ...judge.run import (
     required_time,
     step_in_words,
 )
+from ...judge.scale import EPS
 from ...truth.smallest import reduced
 from .motion import at_equal_times
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
@@ -48,7 +49,7 @@ class TmtSide(NamedTuple):
     derivative_tolerance: np.ndarray  # (states,)
     stepped: list  # q and v one step from each of the states
     step_tolerance: np.ndarray  # (states, 2 nv)
-    ulp: np.ndarray  # (steps + 1, nq): positions of the run that starts one ulp away
+    nudged: np.ndarray  # (steps + 1, nq): positions of the run that starts as little away as a number of 1 can
 
 
 def steps_afforded(case: Case, entries: int = MOST_ENTRIES) -> int:
@@ -128,7 +129,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
     ended = diverged_at(case, t, q, v)
     alive = t[::every] < (np.inf if ended is None else ended)
     states = [path[::every][alive] for path in (q, v)]
-    one_ulp_away = (nudged(start, case.robot.is_read) for start in case.start)
+    beside = (nudged(start) for start in case.start)
     return TmtSide(
         t, q, v,
         band(stepping, tree, q, v, tau, dt, every, steps_afforded(case, entries)),
@@ -138,14 +139,13 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
         slope_rounding(METHODS["rk4"], tree, *states, tau, dt)[2],
         one_step(dynamics, states, tau, dt, scheme),
         step_rounding(stepping, tree, *states, tau, dt),
-        dynamics.run(*one_ulp_away, tau, dt, steps, scheme).q,
+        dynamics.run(*beside, tau, dt, steps, scheme).q,
     )  # fmt: skip
 
 
-def nudged(start: np.ndarray, of_file: bool) -> np.ndarray:
-    """Numbers, one unit of their last place away; of a file's robot a zero, whose last place is far below all else, that of 1."""
-    away = np.nextafter(start, np.inf)
-    return np.where(start == 0.0, np.spacing(1.0), away) if of_file else away
+def nudged(start: np.ndarray) -> np.ndarray:
+    """Numbers, eps away, which is one unit of the last place of 1; of larger ones one unit of their own last place."""
+    return start + np.maximum(np.spacing(np.abs(start)), EPS)
 
 
 def compare_runs(
@@ -198,7 +198,7 @@ def compare_runs(
             first = method, theirs
             result.curves[(case.name, method.scheme, steps)] = {
                 "integrator": method.name, "t": t, "every": every, name: [mine.q, mine.v], "mujoco": theirs,
-                "band": angle_band, "ulp": mine.ulp, "judged_until_s": until, "ended": ends,
+                "band": angle_band, "nudged": mine.nudged, "judged_until_s": until, "ended": ends,
                 "left": {name: departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
                 "records": records,
             }  # fmt: skip

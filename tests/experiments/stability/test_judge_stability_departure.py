@@ -110,6 +110,22 @@ def test_departure_figure_marks_each_engine_at_its_times(result):
     ]
     result.curves["looked at"] = subjects_of(ARM).names
     _, fig, caption = figures_departure.draw_departure(result, ARM)
-    lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].lines}
-    assert lines["MuJoCo RK4"] == 3.0 and lines["RK4"] == 2.0
-    assert "Marks: 3 runs. 2 leave as the map does, 2 of them" in caption
+    lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].lines if len(line.get_ydata())}
+    assert lines["MuJoCo: RK4"] == 3.0 and lines["TMT: RK4"] == 2.0
+    assert "Marks: 3 runs, with one mark for" in caption and " 2 leave as the map does, 2 of them" in caption
+
+
+@pytest.mark.parametrize("off, shared", [(0.079, True), (0.081, False), (None, False)])
+def test_methods_whose_marks_would_lie_on_each_other_share_one(result, off, shared):
+    """Two hundredths of the longest time, 4 s, apart: nothing that is seen. Marks of the two engines are never one."""
+    other = None if off is None else 4.0 - off
+    rows = [departure_row(1.0, 1.0), departure_row(4.0, 4.0, size=1e-9)]
+    rows += [row | {"method": "implicit"} for row in (rows[0], departure_row(other, 4.0, size=1e-9))]
+    rows += [departure_row(1.0, 1.0, engine="mujoco") | {"method": "RK4"}]
+    result.tables["stability_modes"] = [{"scene": "ball catch", "real_per_s": 7.5}]
+    result.tables["departure"] = rows
+    result.curves["looked at"] = subjects_of(ARM).names
+    _, fig, _ = figures_departure.draw_departure(result, ARM)
+    labels = [text.get_text() for text in fig.legends[0].get_texts()]
+    assert ("TMT: RK4, implicit" in labels) is shared and ("TMT: implicit" in labels) is not shared
+    assert "MuJoCo: RK4" in labels and fig.axes[0].get_title() == "dt = 0.01 s"

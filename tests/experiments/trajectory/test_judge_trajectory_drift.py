@@ -10,8 +10,8 @@ import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.experiments.trajectory import drift
-from compare.experiments.trajectory.figures_runs import draw_drift as draw
-from compare.experiments.trajectory.figures_runs import drift_caption
+from compare.experiments.trajectory.figures_drift import draw_drift as draw
+from compare.experiments.trajectory.figures_drift import drift_caption
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 
@@ -81,7 +81,7 @@ def test_the_figure_of_drift_says_whose_drift_falls_how():
     assert "MuJoCo's drift over TMT's: 0.1 to 2." in caption
     lines = {line.get_label(): line for line in fig.axes[0].lines}
     assert lines["implicit, TMT"].get_ydata().tolist() == [8.0, 4.0, 2.0]
-    assert [line.get_ydata().tolist() for line in fig.axes[0].lines if line.get_marker() == "o"][2] == [16.0, 4.0, 1.0]
+    assert [line.get_ydata().tolist() for line in fig.axes[0].lines if line.get_marker() == "D"] == [[16.0, 4.0, 1.0]]
     for engine in ("tmt", "mujoco"):  # nothing moves: no order, no ratio, and no error
         for values in of.values():
             values[engine] = [0.0, 0.0, 0.0]

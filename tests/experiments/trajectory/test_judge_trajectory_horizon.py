@@ -8,7 +8,7 @@ from trajectory_curves import FREE, run_of
 
 import tmt
 from compare.experiments.trajectory import horizon
-from compare.experiments.trajectory.figures_runs import draw_growth as draw
+from compare.experiments.trajectory.figures_drift import draw_growth as draw
 from compare.judge.check import Result
 from tmt.methods import METHODS, one_step
 

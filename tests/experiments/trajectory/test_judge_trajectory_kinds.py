@@ -78,7 +78,7 @@ def curve(case, off):
     v = np.ones((5, case.coordinates.nv))
     theirs = case.coordinates.move(q, np.outer(t <= 0.5, off) + np.outer(t > 0.5, off[::-1]))
     return {
-        "integrator": "RK4", "t": t, "every": 1, "tmt": [q, v], "mujoco": [theirs, v], "band": np.full(5, 1e-9), "ulp": q,
+        "integrator": "RK4", "t": t, "every": 1, "tmt": [q, v], "mujoco": [theirs, v], "band": np.full(5, 1e-9), "nudged": q,
         "judged_until_s": 0.5, "ended": {"tmt": None, "mujoco": None}, "left": {"tmt": None, "mujoco": None},
     }  # fmt: skip
 
@@ -92,7 +92,7 @@ def test_of_many_joints_the_six_that_differ_most_are_drawn():
     _, fig, caption = figures_runs.draw_run(result, case)
     names = [text.get_text() for text in fig.legends[0].get_texts()]
     drawn = ["joint3, TMT", "joint6, TMT", "joint8, TMT", "joint12, TMT", "joint31, TMT", "joint40, TMT"]
-    assert names[:6] == drawn and len(names) == 10
+    assert names[:6] == drawn and names[10:] == ["not judged"]
     assert "Of 40 positions and speeds the 6 are shown in which" in caption and "Of a ball" not in caption
 
 
@@ -107,6 +107,11 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
             assert values[:, by] == pytest.approx(of_case["tmt"][0][:, at])
     result = Result("trajectory", curves={"runs": {("c", "rk4", 4): of_case}, "errors": {}})
     _, fig, caption = figures_runs.draw_run(result, case)
+    for k, turn in ((2, 1.75), (3, 1.85)):  # times the root of 3: on this side of half a turn and beyond it
+        of_case["tmt"][0][k] = case.coordinates.move(case.q, np.full(case.coordinates.nv, turn))
+    beyond = figures_lines.drawn(case, of_case["tmt"][0])
+    balls = [by for kind, _, by in case.coordinates.places.joints if kind == "ball"]
+    assert all(np.isnan(beyond[3, by]).all() and np.isfinite(beyond[:3, by]).all() for by in balls) and balls
     assert fig.axes[0].get_ylabel() == "position, rad or m" and "Of a ball the turn from its start is drawn" in caption
     assert values.shape == (5, count)
 

@@ -6,13 +6,15 @@ from PIL import Image
 from trajectory_curves import FREE, HELD
 
 from compare.engines import compared
+from compare.engines.mujoco import reading
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import motion_frames as frames
 from compare.experiments.trajectory.runs import follow
 from compare.judge.check import Result
 from compare.judge.run import departure
 from compare.robots.arm import ARM, landmarks
-from compare.robots.stick import on_paper, stick_figure
+from compare.robots.file import robot_of
+from compare.robots.stick import as_seen, stick_figure
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +36,10 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
     np.testing.assert_array_equal(scene.t, curve["t"][::2])
     for name in ("tmt", "mujoco"):
         arm = np.array([list(landmarks(q).values()) for q in curve[name][0][::2]])
-        np.testing.assert_allclose(scene.points[name], on_paper(arm), atol=1e-15)
+        np.testing.assert_allclose(scene.points[name], as_seen(arm), atol=1e-15)
     np.testing.assert_array_equal(scene.apart, np.abs(curve["tmt"][0] - curve["mujoco"][0]).max(axis=1)[::2])
     assert f"at most {scene.apart.max():.2g} rad apart in 5 s" in scene.seen and "dt/" not in scene.seen
+    assert scene.left == {"tmt": None, "mujoco": None}  # there is no posture to leave
 
 
 def test_what_is_held_is_drawn_by_its_own_step_until_both_have_left(engines):
@@ -56,7 +59,7 @@ def test_what_is_held_is_drawn_by_its_own_step_until_both_have_left(engines):
     for name in left:  # what was run is drawn as it was
         arm = np.array([list(landmarks(q).values()) for q in curve[name][0]])
         parts = 128 // case.steps
-        np.testing.assert_allclose(scene.points[name][: parts * case.steps + 1 : parts], on_paper(arm), atol=1e-12)
+        np.testing.assert_allclose(scene.points[name][: parts * case.steps + 1 : parts], as_seen(arm), atol=1e-12)
         assert f"the arm leaves at {scene.left[name]:.2f} s (predicted: " in scene.seen
 
 
@@ -68,7 +71,7 @@ def test_between_two_states_stands_what_the_method_gives_with_half_a_step(drawn,
         of = compared(engines, FREE)[name]
         half = of.run(curve[name][0][5], curve[name][1][5], FREE.tau, FREE.duration / 128, 1, method).q[1]
         arm = np.array(list(landmarks(half).values()))
-        np.testing.assert_allclose(coarse.points[name][11], on_paper(arm), atol=1e-12)
+        np.testing.assert_allclose(coarse.points[name][11], as_seen(arm), atol=1e-12)
     assert np.abs(coarse.points["tmt"] - scene.points["tmt"])[:20].max() < 1e-2  # and it is near a finer run
 
 
@@ -155,3 +158,18 @@ def test_the_gif_draws_no_engine_that_has_diverged(drawn, tmp_path):
 @pytest.mark.parametrize("dt, words", [(0.04, ""), (0.02, ", shown 2 times slower"), (0.08, ", shown 2 times faster")])
 def test_a_scene_that_is_not_shown_at_its_own_speed_says_so(drawn, dt, words):
     assert gif.slower(drawn[FREE.name]._replace(t=dt * np.arange(3))) == words
+
+
+def test_a_free_body_has_a_cross_that_turns_with_it():
+    mjcf = """<mujoco><worldbody><body name="stone"><freejoint name="root"/>
+      <inertial pos="0 0 0" mass="2" diaginertia="0.05 0.05 0.05"/></body></worldbody></mujoco>"""
+    robot = robot_of(reading.read(mjcf), "stone.xml")
+    half = np.sqrt(0.5)
+    q = np.array([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, half, 0.0, 0.0, half]])  # a quarter turn about z
+    points, links = stick_figure(robot, q, crosses=True)
+    assert points.shape == (2, 5, 3) and links == [(0, 1), (0, 2), (0, 3), (0, 4)]
+    radius = np.sqrt(0.15 / (1.2 * 2.0))
+    np.testing.assert_allclose(points[0, 2:] - points[0, 0], radius * np.eye(3), atol=1e-15)
+    turned = radius * np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(points[1, 2:] - [0.0, 0.0, 2.0], turned, atol=1e-15)
+    assert stick_figure(robot, q)[0].shape == (2, 2, 3)

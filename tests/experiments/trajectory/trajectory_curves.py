@@ -15,6 +15,6 @@ def run_of(case, ours=0.0, theirs=0.0, until=5.0, ended=(None, None), left=(None
     start = case.q
     return {
         "integrator": "RK4", "t": t, "every": 1, "tmt": [start + ours * ramp, 10.0 + ours * ramp],
-        "mujoco": [start + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9), "ulp": start + 0.0 * ramp,
+        "mujoco": [start + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9), "nudged": start + 0.0 * ramp,
         "judged_until_s": until, "ended": dict(zip(("tmt", "mujoco"), ended)), "left": dict(zip(("tmt", "mujoco"), left)),
     }  # fmt: skip

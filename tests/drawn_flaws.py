@@ -1,0 +1,86 @@
+"""What is wrong with a figure as it is drawn: text that is cut or lies on other text, legends on data, factors at axes' ends."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.text import Text
+
+SLACK = 1.0  # pixels
+SMALLEST = 7.0  # points: letters that are still read where a page is 950 pixels wide
+MOST_ON_A_POINT = 4  # marks of different lines
+
+
+def flaws(figure) -> list[str]:
+    """Each in words, found where matplotlib puts things on the paper. Inside a panel in space nothing is looked at."""
+    figure.draw_without_rendering()
+    panels = [ax for ax in figure.findobj(Axes) if ax.get_visible()]
+    flat = [ax for ax in panels if ax.name != "3d"]
+    written = [(text.get_text(), Text.get_window_extent(text).extents) for text in texts_of(figure, panels, flat)]
+    small = (text for text in texts_of(figure, panels, flat) if text.get_fontsize() < SMALLEST)
+    found = [f"too small: {text.get_text()!r}" for text in small]
+    found += [f"cut: {text!r}" for text, box in written if cut(box, figure.bbox.extents)]
+    for k, (text, box) in enumerate(written):
+        found += [f"on each other: {text!r} and {other!r}" for other, its_box in written[:k] if overlap(box, its_box)]
+    for ax in flat:
+        if len(flat) > 1 and beside(ax.title.get_window_extent().extents, ax.bbox.extents):
+            found.append(f"wider than its panel: {ax.get_title()!r}")
+        if (most := on_one_point(ax)) > MOST_ON_A_POINT:
+            found.append(f"{most} marks on a point of {ax.get_title()!r}")
+        offsets = (axis.get_offset_text().get_text() for axis in (ax.xaxis, ax.yaxis))
+        found += [f"a factor at the end of an axis: {text}" for text in offsets if text]
+        for legend in [*figure.findobj(Legend)]:
+            if covered(ax, legend.get_window_extent().extents):
+                found.append(f"a legend on data: {[text.get_text() for text in legend.get_texts()]}")
+    return found
+
+
+def texts_of(figure, panels, flat) -> list[Text]:
+    """All text that is seen."""
+    texts = [figure._supxlabel, figure._supylabel, figure._suptitle, *figure.texts]
+    texts += [text for legend in figure.findobj(Legend) for text in legend.get_texts()]
+    for ax in panels:
+        texts += [ax.title, ax._left_title, ax._right_title]
+    for ax in flat:
+        texts += ax.texts
+        for axis in (ax.xaxis, ax.yaxis):
+            numbers = (label for tick in axis._update_ticks() for label in (tick.label1, tick.label2))
+            texts += [axis.label, axis.get_offset_text(), *numbers]
+    return [
+        text for text in dict.fromkeys(texts) if text is not None and text.get_visible() and text.get_text().strip()
+    ]
+
+
+def cut(box, page) -> bool:
+    return bool((box[:2] < page[:2] - SLACK).any() or (box[2:] > page[2:] + SLACK).any())
+
+
+def overlap(box, other) -> bool:
+    return bool((box[:2] + SLACK < other[2:] - SLACK).all() and (other[:2] + SLACK < box[2:] - SLACK).all())
+
+
+def beside(box, panel) -> bool:
+    """Whether a text, (left, lower, right, upper), reaches to the left or to the right of its panel."""
+    return bool(box[2] > box[0] and (box[0] < panel[0] - SLACK or box[2] > panel[2] + SLACK))
+
+
+def on_one_point(ax) -> int:
+    """The most lines of a panel that have a mark on one point of the paper."""
+    points = [np.unique(np.round(on_paper(line, ax) / 2.0), axis=0) for line in ax.lines if line.get_marker() != "None"]
+    _, counts = np.unique(np.concatenate([np.empty((0, 2)), *points]), axis=0, return_counts=True)
+    return int(counts.max(initial=0))
+
+
+def on_paper(line, ax) -> np.ndarray:
+    """The points of a line that are seen, (n, 2), pixels."""
+    points = line.get_transform().transform(np.column_stack(line.get_data()).astype(float))
+    view, points = ax.bbox.extents, points[np.isfinite(points).all(axis=1)]
+    return points[((points >= view[:2]) & (points <= view[2:])).all(axis=1)]
+
+
+def covered(ax, box) -> bool:
+    """Whether a box has points of a panel's lines, or the end of a bar, in it."""
+    lines = (on_paper(line, ax) for line in ax.lines)
+    if any(((points > box[:2]) & (points < box[2:])).all(axis=1).any() for points in lines):
+        return True
+    bars = (bar.get_window_extent().extents for bar in ax.patches)
+    return any(overlap(bar, box) and overlap(bar, ax.bbox.extents) for bar in bars)
