@@ -180,8 +180,8 @@ def picture_of_times(results: Mapping[str, Result], robot: object) -> tuple[str,
             if curve.engine in ("mujoco", "tmt"):
                 above, fine = curve.engine == "mujoco", errors[at] < np.sqrt(errors[0] * errors[-1])
                 text = f"{method} {overview.times_in_print(time)} ms"
-                ax.annotate(text, (errors[at], time), (0, 8 if above else -9), fontsize=8, color=colour,
-                            textcoords="offset points", ha="right" if above or fine else "left",
+                ax.annotate(text, (errors[at], time), (0, 8 if above else -11), fontsize=8, color=colour,
+                            textcoords="offset points", ha="right" if above else "center" if fine else "left",
                             va="bottom" if above else "top")  # fmt: skip
     ax.axvline(methods_compared.ERROR_ASKED, color=GREY, linestyle=":", linewidth=1.2)
     ax.set(xscale="log", yscale="log", xlabel=f"worst error, {unit} (finer to the right)", ylabel="time, ms")
