@@ -2,7 +2,6 @@
 
 import base64
 import importlib
-import io
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +17,8 @@ def save_figure(figure: object, path: Path) -> None:
     if path.suffix != ".png":  # a figure that writes its own files
         figure.savefig(path)
         return
-    drawn = io.BytesIO()
-    place_parts(figure)
-    figure.savefig(drawn, format="png", pil_kwargs={"compress_level": 0})
-    with Image.open(drawn) as image:
-        few = with_palette(image.convert("RGB"))
+    pixels = importlib.import_module(".style", __package__).pixels(figure)
+    few = with_palette(Image.fromarray(pixels).convert("RGB"))
     few.save(path)
     few.convert("RGB").save(path.with_suffix(".webp"), lossless=True, method=1)
 
@@ -45,15 +41,6 @@ def with_palette(image: Image.Image) -> Image.Image:
     few = Image.fromarray(places)
     few.putpalette([*palette, *[0] * (3 * PALETTE - len(palette)), 255, 255, 255])
     return few
-
-
-def place_parts(figure: object) -> None:
-    """Give the parts of a figure their places: saved as it is made, it would be drawn once more to find them."""
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        figure.set_dpi(importlib.import_module(".style", __package__).STYLE["savefig.dpi"])  # as it is saved
-        engine.execute(figure)
-        figure.set_layout_engine("none")
 
 
 def embedded(path: Path) -> tuple[str, int, int]:

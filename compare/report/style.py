@@ -11,7 +11,9 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.textpath import TextPath
 
@@ -175,3 +177,11 @@ def on_paper(ax: Axes) -> np.ndarray:
             count = min(300, 1 + int(np.abs(end - start).max() / 3.0))
             points.append(start + np.linspace(0.0, 1.0, count + 1)[:, None] * (end - start))
     return np.concatenate(points)
+
+
+def pixels(figure: Figure) -> np.ndarray:
+    """A figure as it is saved, (height, width, 4), drawn once: `savefig` would draw it once more to find its places."""
+    figure.set_dpi(STYLE["savefig.dpi"])
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())
