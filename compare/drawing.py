@@ -1,7 +1,7 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain
 from pathlib import Path
@@ -15,19 +15,29 @@ from .report import images, overview
 from .report.folder import writing
 from .robots import Robot
 
+HALVES = ("like the first", "others")  # of the figures of an experiment, drawn side by side
+
 
 def draw(
-    experiment: str, result: Result, robot: Robot, folder: Path, others: Mapping[str, Result] | None = None
+    experiment: str,
+    result: Result,
+    robot: Robot,
+    folder: Path,
+    others: Mapping[str, Result] | None = None,
+    part: str | None = None,
 ) -> tuple[list, list]:
     """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. others: for the pictures of the first screen, see report.overview. An error of the disk is raised.
+    the later ones alone. others: for the pictures of the first screen, see report.overview. part: one of HALVES, or all. An error
+    of the disk is raised.
     """
     drawn, failed = [], []
     try:
-        figures = module(experiment).figures(result, robot)
-        for call in chain(figures, overview.pictures_due(experiment, result, robot, others)):
+        figures = chain(
+            module(experiment).figures(result, robot), overview.pictures_due(experiment, result, robot, others)
+        )
+        for call in of_part(figures, part) if part else figures:
             name, path = called(call), None
             try:
                 with quiet(robot):
@@ -36,7 +46,7 @@ def draw(
                     file += "_"  # names that differ in signs alone may give one file
                 path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
                 with writing(path), quiet(robot):
-                    images.save_figure(laid_out(figure), path)
+                    images.save_figure(figure, path)
                 drawn.append((path.name.removesuffix(".png"), caption))
             except OSError:
                 raise
@@ -51,14 +61,14 @@ def draw(
     return drawn, failed
 
 
-def laid_out(figure):
-    """A figure whose parts have their places: saved as it is made, it would be drawn once more to find them."""
-    engine = getattr(figure, "get_layout_engine", lambda: None)()
-    if engine is not None:
-        figure.set_dpi(importlib.import_module("matplotlib").rcParams["savefig.dpi"])
-        engine.execute(figure)
-        figure.set_layout_engine("none")
-    return figure
+def of_part(figures: Iterable[Callable], part: str) -> Iterator[Callable]:
+    """Those of the calls that draw by the same function as the first one, or by others: names are alike in the former alone."""
+    first = None
+    for call in figures:
+        function = getattr(call, "func", call)
+        first = first or function
+        if (function is first) == (part == HALVES[0]):
+            yield call
 
 
 def called(call: Callable) -> str:

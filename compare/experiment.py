@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-from .drawing import draw, quiet
+from .drawing import HALVES, draw, quiet
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
 from .process.clock import Clock
@@ -41,7 +41,7 @@ def examine(
     """
     clock = clock or Clock()
     (folder / "figures").mkdir()
-    sections, drawings, causes, reasons = [], [], [], {}
+    sections, drawings, waiting, causes, reasons = [], [], [], [], {}
     own, said = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
     crashed = {name: begun(name, experiment, setup, clock) for name, experiment in modules.items()}
@@ -70,14 +70,16 @@ def examine(
         with clock.of(END):
             others = overview.results_needed(name, order, sections)
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
-            drawings.append(None if crash else drawing if name in TIMED_LAST else drawing())  # none delays a timing
+            if not crash and name in TIMED_LAST:  # no drawing delays a timing; afterwards there is nothing else to do
+                waiting += [(sections[-1], partial(drawing, part)) for part in HALVES]
+            elif not crash:
+                drawings.append((sections[-1], drawing()))
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
     with clock.of(END):
         setup.progress("figures")
-        drawings = [drawing() if callable(drawing) else drawing for drawing in drawings]
-        for section, drawing in zip(sections, drawings):
-            if drawing is not None:
-                take_figures(terminal, section, drawing)
+        drawings += [(section, drawing()) for section, drawing in waiting]
+        for section, drawing in drawings:
+            take_figures(terminal, section, drawing)
     clock.ends(END)
     return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
 
@@ -160,7 +162,8 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
     try:
-        section.figures, failed = drawing.result()
+        figures, failed = drawing.result()
+        section.figures = [*section.figures, *figures]
     except OSError:
         raise
     except WorkerEnded:  # what was computed is kept

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 TIMED_ENOUGH = 0.01  # s: what has taken so long in all is timed no more than twice
-ONCE = 0.02  # s: what takes so long is timed once, without a call to warm up: both weigh little beside it
+WARM = 0.004  # s: what takes so long needs no call to warm up, which weighs little beside it
+ONCE = 0.02  # s: and what takes so long is timed once
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
 
 def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
-    """Seconds of each call of each function, at most so many rounds, after one to warm up."""
+    """Seconds of each call of each function, at most so many rounds, after one to warm up what is short."""
     times = [[] for _ in runs]
     for k in range(rounds + 1):
         for run, taken in zip(runs, times):
@@ -19,7 +20,7 @@ def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
                 begin = time.perf_counter()
                 run()
                 taken.append(time.perf_counter() - begin)
-                if k == 0 and taken[0] < ONCE:
+                if k == 0 and taken[0] < WARM:
                     taken.clear()
     return times
 
