@@ -104,7 +104,7 @@ OPTIONS_OF_ALL = {
         "type": not_empty, "default": "reports/latest", "metavar": "DIR",
         "help": "where the report goes (default: %(default)s)",
     }),
-    "--quick": (None, {"action": "store_true", "help": "fewer states, in seconds"}),
+    "--quick": (None, {"action": "store_true", "help": "fewer states; with all, one figure of each experiment that passes"}),
     "--mjcf": (None, {"type": not_empty, "metavar": "FILE", "help": "your model, an MJCF file"}),
     "--reference": (None, {
         "type": stated_reference, "metavar": "WHAT",

@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,8 @@ from .report import images, overview
 from .report.folder import writing
 from .robots import Robot
 
-HALVES = ("like the first", "others")  # of the figures of an experiment, drawn side by side
+FIRST = "the first"  # of the figures of an experiment
+HALVES = ("like the first", "others")  # drawn side by side
 
 
 def draw(
@@ -29,15 +30,14 @@ def draw(
     """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
 
     `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. others: for the pictures of the first screen, see report.overview. part: one of HALVES, or all. An error
-    of the disk is raised.
+    the later ones alone. others: for the pictures of the first screen, see report.overview. part: FIRST, one of HALVES, or all.
+    An error of the disk is raised.
     """
     drawn, failed = [], []
     try:
-        figures = chain(
-            module(experiment).figures(result, robot), overview.pictures_due(experiment, result, robot, others)
-        )
-        for call in of_part(figures, part) if part else figures:
+        own = islice(module(experiment).figures(result, robot), 1 if part == FIRST else None)
+        figures = chain(own, overview.pictures_due(experiment, result, robot, others))
+        for call in of_half(figures, part) if part in HALVES else figures:
             name, path = called(call), None
             try:
                 with quiet(robot):
@@ -61,13 +61,13 @@ def draw(
     return drawn, failed
 
 
-def of_part(figures: Iterable[Callable], part: str) -> Iterator[Callable]:
+def of_half(figures: Iterable[Callable], half: str) -> Iterator[Callable]:
     """Those of the calls that draw by the same function as the first one, or by others: names are alike in the former alone."""
     first = None
     for call in figures:
         function = getattr(call, "func", call)
         first = first or function
-        if (function is first) == (part == HALVES[0]):
+        if (function is first) == (half == HALVES[0]):
             yield call
 
 

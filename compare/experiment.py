@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-from .drawing import HALVES, draw, quiet
+from .drawing import FIRST, HALVES, draw, quiet
 from .experiments import EXPERIMENTS, module
 from .judge.check import DRAWN, ENDS, Result
 from .process.clock import Clock
@@ -70,10 +70,12 @@ def examine(
         with clock.of(END):
             others = overview.results_needed(name, order, sections)
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
-            if not crash and name in TIMED_LAST:  # no drawing delays a timing; afterwards there is nothing else to do
-                waiting += [(sections[-1], partial(drawing, part)) for part in HALVES]
-            elif not crash:
-                drawings.append((sections[-1], drawing()))
+            parts = [] if crash else parts_drawn(name, sections[-1], setup)
+            jobs = [(sections[-1], partial(drawing, part)) for part in parts]
+            if name in TIMED_LAST:  # no drawing delays a timing
+                waiting += jobs
+            else:
+                drawings += [(section, job()) for section, job in jobs]
         say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
     with clock.of(END):
         setup.progress("figures")
@@ -157,6 +159,13 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
         result = Result(name, shown=[])
         result.check("", ENDS, None, 0.0, "", described(error), rule="equal")
         return None, result
+
+
+def parts_drawn(name: str, section: Section, setup: Setup) -> Sequence[str | None]:
+    """What is drawn of an experiment: all its figures; in a quick run of several experiments the first, unless a check fails."""
+    if setup.is_quick and not setup.alone and not any(failures([section])):
+        return (FIRST,)
+    return HALVES if name in TIMED_LAST else (None,)
 
 
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:

@@ -61,6 +61,7 @@ from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
 from ...setup import Setup
+from ...truth.reference import reference
 from . import drift, errors, horizon, leaving, motion, sentences
 from .derivative import compare_derivatives
 from .motion_frames import follow_and_draw, in_order
@@ -153,10 +154,14 @@ def begin(setup: Setup) -> None:
     digits = setup.of(horizon.MOST_EXACT_STEPS, 0, FEW_EXACT_STEPS)
     grown = [] if setup.robot.own else setup.of(cases, [], cases)
     grown = [case for case in grown if not case.controller]
+    true = [case for case in cases if errors.is_followed(case)]
+    drift_steps = setup.of(drift.DRIFT_STEPS, drift.DRIFT_STEPS, drift.FEW_DRIFT_STEPS)
     duration, steps = horizon.growth_run(setup.robot, grown, setup.size == "small")
     of_growth = partial(horizon.grown, engines=setup.engines, duration=duration, steps=steps)
     setup.background["trajectory"] = {
         "runs": spread(partial(follow_and_draw, engines=setup.engines, finer=finer, entries=entries(setup)), cases),
+        "drift": spread(partial(drift.drifts_alone, engines=setup.engines, steps=drift_steps), [setup.robot]),
+        "true": ([case.name for case in true], spread(reference, true)),
         "finer": finer,
         "left_out": left_out,
         "exact": (exact, setup.map(partial(horizon.exact_runs, schemes=schemes, most=digits), exact)),
@@ -180,10 +185,9 @@ def rows(setup: Setup) -> Result:
     work = setup.background.pop("trajectory")
     if not setup.robot.own:
         compare_derivatives(result, setup.robot, setup.engines)
-    drift.measure_drift(
-        result, setup.robot, setup.engines, setup.of(drift.DRIFT_STEPS, drift.DRIFT_STEPS, drift.FEW_DRIFT_STEPS)
-    )
-    result.curves |= {"runs": {}, "drawn": []}
+    (drifts,) = work["drift"]
+    result.checks, result.notes = [*result.checks, *drifts.checks], [*result.notes, *drifts.notes]
+    result.curves |= drifts.curves | {"runs": {}, "drawn": []}
     for part, drawn in work["runs"]:
         result.rows += part.rows
         result.checks += part.checks
@@ -199,8 +203,9 @@ def rows(setup: Setup) -> Result:
         )
     if work["growth"][0]:
         horizon.growth_of_errors(result, *work["growth"])
+    known = dict(zip(*work["true"]))
     result.curves["errors"] = errors.errors_when_held(result, setup.robot) | errors.errors_when_free(
-        result, setup.robot
+        result, setup.robot, known
     )
     robot, ran = setup.robot, {name for name, *_ in result.curves["runs"]}
     numbers = robot.claims.figures if robot.claims else {}

@@ -46,6 +46,13 @@ def measure_drift(result: Result, robot: Robot, engines: Mapping[str, Engine], s
         result.notes.append(f"No scene of this {robot.noun} is free and without damping: there is no drift to measure.")
 
 
+def drifts_alone(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> Result:
+    """What `measure_drift` adds to a result, by itself: it may be computed beside other work."""
+    result = Result("trajectory")
+    measure_drift(result, robot, engines, steps)
+    return result
+
+
 def constants(case: Case) -> dict[tuple, Callable]:
     """What stays constant in a free case without damping: (name, unit): a function of q and v along a run.
 

@@ -1,6 +1,7 @@
 """How far the runs with the coarsest step of RK4 are from the true motion, where that is known."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 from ...case import Case
 from ...judge.check import Result
@@ -23,12 +24,17 @@ def errors_when_held(result: Result, robot: Robot) -> dict[str, tuple]:
     }
 
 
-def errors_when_free(result: Result, robot: Robot) -> dict[str, tuple]:
-    """The same of the other scenes that all methods follow for speed, of which the true motion is known to many digits."""
+def errors_when_free(
+    result: Result, robot: Robot, known: Mapping[str, reference.Reference] = MappingProxyType({})
+) -> dict[str, tuple]:
+    """The same of the other scenes that all methods follow for speed, of which the true motion is known to many digits.
+
+    known: references that were computed beside, by the name of the scene.
+    """
     errors = {}
     for case, curve in coarsest_runs(result, robot):
-        if is_followed(case) and case.steps == reference.RECORDS:
-            true = reference.reference(case)
+        if is_followed(case):
+            true = known.get(case.name) or reference.reference(case)
             joints = range(len(case.joints))
             of_run = (true.error(curve[name][0], joints).max() for name in robot.compared)
             errors[case.name] = tuple(map(number_or_none, of_run))
@@ -37,7 +43,7 @@ def errors_when_free(result: Result, robot: Robot) -> dict[str, tuple]:
 
 def is_followed(case: Case) -> bool:
     """Whether the true motion of a case is asked for here: not of a file's robot, whose scenes have steps of their own."""
-    return "speed" in case.scene.tags and not case.robot.is_read
+    return "speed" in case.scene.tags and not case.robot.is_read and case.steps == reference.RECORDS
 
 
 def deviations(case: Case, curve: dict) -> dict[str, float | None]:
