@@ -17,11 +17,14 @@ import shlex
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 
 from .command_line import PROGRAM, request
 from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import in_one_line
+
+LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a word
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,6 +61,8 @@ class Refused(ValueError):
 def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
+    from tmt.cache import cache_folder, size_of_cache
+
     from .engines.mujoco import ModelError
     from .own_file import OwnFileError
     from .process.workers import WorkerEnded, start_workers
@@ -66,7 +71,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     from .report.terminal import Terminal
     from .scene_file import SceneError, read_scenes
 
-    terminal = Terminal()
+    terminal, kept = Terminal(), size_of_cache()
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
     try:
         compared, robot, mujoco, reading = known = compared_with(options.reference, options.mjcf, options.joints)
@@ -119,7 +124,17 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         say_error(line)
     place = f" in place of that of `{before}`" if before not in (None, origin["command"]) else ""
     terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
+    if (size := size_of_cache()) > kept + LITTLE:
+        folder = f"{in_home(cache_folder())}, now {size / 1e6:.0f} MB"
+        terminal.say(f"Compiled code is kept for later runs in {folder}; to clear it, delete that folder.")
     return 0 if good else 1
+
+
+def in_home(path: Path) -> str:
+    """A path with ~ for the user's folder."""
+    with suppress(ValueError, RuntimeError):
+        return str("~" / path.relative_to(Path.home()))
+    return str(path)
 
 
 def run_and_leave() -> None:

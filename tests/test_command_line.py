@@ -117,8 +117,8 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
     linked = set(re.findall(r'(?:src|href)="(?!data:|#)([^"]+)"', page))
     assert linked == {str(path.relative_to(report)) for path in (report / "tables").iterdir()}
     figures = list((report / "figures").iterdir())
-    assert {path.suffix for path in figures} == {".png", ".gif"} and 'id="motion"' in page
-    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == len(figures) - 1  # but for what moves
+    assert {path.suffix for path in figures} == {".png"} and 'id="motion"' in page
+    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == len(figures)
     text = (report / "report.md").read_text()
     linked = set(re.findall(r"\((figures/[^)]+|tables/[^)]+)\)", text))
     assert linked == {str(p.relative_to(report)) for p in report.glob("*/*")}
@@ -223,6 +223,35 @@ def only(monkeypatch, *names):
     """These are all experiments that there are."""
     for module in (entry, command_line, experiment):
         monkeypatch.setattr(module, "EXPERIMENTS", dict.fromkeys(names, ""))
+
+
+@pytest.mark.parametrize("size, said", [(1_900_000, ""), (2_600_000, "now 3 MB; to clear it, delete that folder.")])
+def test_what_a_run_adds_to_the_cache_folder_is_said(size, said, tmp_path, capsys, monkeypatch):
+    folder = tmp_path / "cache"
+    folder.mkdir()
+    (folder / "kernel_0.py").write_bytes(b"0" * 1_000_000)
+
+    def rows(setup):
+        (folder / "kernel_1.py").write_bytes(b"1" * (size - 1_000_000))
+        return Result("grows")
+
+    monkeypatch.setenv("TMT_CACHE", str(folder))
+    monkeypatch.setitem(
+        sys.modules,
+        "compare.experiments.grows",
+        SimpleNamespace(rows=rows, figures=lambda result, robot: (), **asked("grows")),
+    )
+    only(monkeypatch, "grows")
+    main(["grows", "--quick", "--out", str(tmp_path / "out")])
+    words = [line for line in capsys.readouterr().out.splitlines() if "Compiled code" in line]
+    assert len(words) == bool(said) and all(line.endswith(said) and str(folder) in line for line in words)
+
+
+def test_a_folder_at_home_is_said_with_a_tilde():
+    home = entry.Path.home()
+    assert entry.in_home(home / "a" / "b") == os.path.join("~", "a", "b") and entry.in_home(home.parent) == str(
+        home.parent
+    )
 
 
 def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeypatch):
