@@ -45,6 +45,9 @@ EXAMPLES = """examples:
 output: a line for each experiment; its seconds are those of the processor for
 this experiment alone, and what it waited is not in them
 
+compiled code is kept in ~/.cache/tmt, or $TMT_CACHE, for later runs and tests of
+any checkout, some 10 MB for each robot; to clear it, delete that folder
+
 exit status: 0 all checks pass; 1 a check failed; 2 the request could not be
 carried out, for the reason in one line
 """
