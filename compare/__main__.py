@@ -24,6 +24,8 @@ from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import in_one_line
 
+COMPUTING = ("compare.experiment", "scipy.optimize", "tmt.kernels")  # modules that take long to load
+DRAWING = ("compare.report.style", *COMPUTING)
 LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a word
 
 
@@ -65,7 +67,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
 
     from .engines.mujoco import ModelError
     from .own_file import OwnFileError
-    from .process.workers import WorkerEnded, start_workers
+    from .process.workers import WorkerEnded, load_modules, start_workers
     from .reference import compared_with  # imports are here, so that --help and a wrong word answer at once
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
@@ -85,13 +87,14 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             for line in compared.lines:
                 terminal.say(line)
             with start_workers() as workers, terminal.progress("imports"):
-                from . import drawing, experiment
+                for needed in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
+                    workers.submit(load_modules, *needed)
+                from . import experiment
                 from .case import SEED
                 from .report import files, provenance, remaining, verdict
                 from .report.parts import Parts
                 from .setup import Setup, engines
 
-                workers.submit(drawing.warm_up)
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}

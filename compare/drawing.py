@@ -1,6 +1,5 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
-import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
@@ -77,11 +76,6 @@ def called(call: Callable) -> str:
     more = [value for value in more if isinstance(value, str)]
     name = getattr(getattr(call, "func", call), "__name__", "without a name")
     return " ".join([name.removeprefix("draw_"), *more])
-
-
-def warm_up() -> None:
-    """Load matplotlib while others compute."""
-    importlib.import_module(".report.style", __package__)
 
 
 def quiet(robot: Robot) -> AbstractContextManager:

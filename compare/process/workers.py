@@ -1,5 +1,6 @@
 """Two further processes: they draw the figures of an experiment while the next one computes, and follow scenes."""
 
+import importlib
 import logging
 import os
 import pickle
@@ -105,6 +106,12 @@ def deaf() -> Iterator[None]:
 
 
 # in a worker
+
+
+def load_modules(*modules: str) -> None:
+    """Load modules before they are needed."""
+    for name in modules:
+        importlib.import_module(name)
 
 
 def serve(connection) -> None:
