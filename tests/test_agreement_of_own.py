@@ -259,6 +259,20 @@ def test_rounded_constants_agree_with_rtol_and_without_it_their_digits_are_said(
     assert "digits" not in message_of(mass_matrix=lambda q: mass_matrix(q) * 1.2)
 
 
+def test_a_slip_is_no_rounding_however_far_from_the_origin_the_model_stands(monkeypatch):
+    """There the terms of each entry are large, and a difference of a tenth is a thousandth of them."""
+    monkeypatch.setattr("compare.agreement.why.SECONDS_OF_CAUSE", 0.1)
+    aloft = PENDULUM.replace("<worldbody>", '<worldbody><body pos="0 0 20">').replace(
+        "</worldbody>", "</body></worldbody>"
+    )
+    assert aloft.count("20") == 1
+    compare.assert_agrees(aloft, mass_matrix=mass_matrix)
+    for factor, said in ((1.1, False), (1.0001, True)):
+        with pytest.raises(AssertionError) as raised:
+            compare.assert_agrees(aloft, mass_matrix=lambda q, factor=factor: mass_matrix(q) * factor)
+        assert ("if your constants are rounded" in str(raised.value)) is said
+
+
 # joints
 
 STATED = ["-knee+90deg in deg", "hip"]
@@ -343,7 +357,7 @@ def test_the_message_in_the_manner_of_numpy_testing(given):
     assert float(lines[3].removeprefix("    yours:  ")) == values[7, 1]
     assert float(lines[4].removeprefix("    MuJoCo: ")) == given.values["bias"][7, 1]
     assert lines[5].startswith("    difference: 0.25, ") and "times its tolerance of" in lines[5]
-    assert lines[6].startswith("Probable cause: No single number or term explains this")
+    assert lines[6].startswith("Probable cause: None of the changes that are tried, nor two of them, explains this")
     assert lines[-1] == (
         "Compared with joints=['hip', 'knee']; another order, or '-hip', 'hip+90deg' and 'hip in deg', can be stated."
     )

@@ -48,9 +48,15 @@ def lines_of_quantity(given: Given, name: str, one: Compared) -> list[str]:
 
 
 def line_of_digits(given: Given) -> list[str]:
-    """To how many digits all agree, and what to state if the constants are rounded."""
-    worst = max(float(over(np.abs(one.own - one.right), one.scale).max()) for one in given.compared.values())
-    if not 0.0 < worst <= 10.0**-LEAST_DIGITS:
+    """To how many digits all agree, and what to state if the constants are rounded.
+
+    Not where a quantity is off by more than that of its own largest entry: terms far from the origin are large, and a slip is
+    small beside them.
+    """
+    off = {name: np.abs(one.own - one.right) for name, one in given.compared.items()}
+    worst = max(float(over(off[name], one.scale).max()) for name, one in given.compared.items())
+    of_largest = max(float(over(off[name].max(), np.abs(one.right).max())) for name, one in given.compared.items())
+    if not 0.0 < worst <= 10.0**-LEAST_DIGITS or not of_largest <= 10.0**-LEAST_DIGITS:
         return []
     exponent = int(np.floor(np.log10(worst)))
     rtol = float(f"{np.ceil(worst / 10.0**exponent):.0f}e{exponent}")

@@ -44,7 +44,7 @@ class Diagnosis(NamedTuple):
                 f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
             )
         share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
-        return f"No single number or term explains this, nor do two: {share} is left. {self.where}{rounded}"
+        return f"None of the changes that are tried, nor two of them, explains this: {share} is left. {self.where}{rounded}"
 
     @property
     def where(self) -> str:

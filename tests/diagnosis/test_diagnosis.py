@@ -69,7 +69,7 @@ def test_what_nothing_explains_names_the_entries():
     assert found.differs and found.causes == ()
     assert found.entries == ("M[0][1]", "h[2]")
     assert "M[0][1] and h[2] differ, the others agree" in found.sentence
-    assert found.sentence.startswith("No single number or term explains this, nor do two: ")
+    assert found.sentence.startswith("None of the changes that are tried, nor two of them, explains this: ")
     assert 0.0 < found.left <= 1.0
 
 
