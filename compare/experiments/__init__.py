@@ -19,7 +19,7 @@ EXPERIMENTS = {
     "mass": "the mass matrix",
     "gravity": "the torque that holds each posture",
     "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
-    "trajectory": "five seconds of motion, the same scheme in tmt for every integrator",
+    "trajectory": "motion in each scene, by every integrator of MuJoCo and the same scheme in tmt",
     "diagnosis": "what explains a difference: one number, one term, a convention; alone, without a file: made faults",
     "speed": "time against error: every method, every step, and what to use",
     "stability": "step limits, also under a robot's own servos; departure from unstable postures; where methods fail",
