@@ -66,6 +66,8 @@ def test_without_groups_the_worst_rows_are_shown_in_their_order_and_the_first_wh
     rows = [{"at": k, "predicted_dt_s": 1.0, "observed_dt_s": 1.0 + 0.1 * (k % 7)} for k in range(21)]
     kept, which = shortened(rows, 3)
     assert [row["at"] for row in kept] == [6, 13, 20] and which == "the worst 3 of 21 rows"
+    rows = [row | {"observed_dt_s": 2.0 - row["observed_dt_s"]} for row in rows]  # as far below what is predicted
+    assert [row["at"] for row in shortened(rows, 3)[0]] == [6, 13, 20]
     kept, which = shortened([{"at": k} for k in range(21)], 3)
     assert [row["at"] for row in kept] == [0, 1, 2] and which == "the first 3 of 21 rows"
 
