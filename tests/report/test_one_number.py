@@ -62,6 +62,8 @@ FAULT = {"visible": True, "outcome": "right", "faults": 3}
     ("mass", [APART, APART | {"worst_difference": None}], "Mbar: no number"),
     ("trajectory", [{"scene": "a", "difference_over_band": 0.5}, {"scene": "b", "difference_over_band": 0.04}],
      "2 scenes, 50 % of the rounding band apart at most"),
+    ("trajectory", [{"scene": "a", "difference_over_band": 0.04}, {"scene": "a", "difference_over_band": 0.5}],
+     "1 scene, 50 % of the rounding band apart at most"),
     ("trajectory", [{"scene": "a", "difference_over_band": 12.0}], "1 scene, 12 times the rounding band apart at most"),
     ("diagnosis", [{"place": "mass of forearm"}, {"place": "other"}], "explained by: mass of forearm and 1 more"),
     ("diagnosis", [FAULT, FAULT | {"outcome": "wrong"}, FAULT | {"visible": False}],
