@@ -110,3 +110,12 @@ def test_a_table_that_stands_in_its_file_alone_is_linked():
     of.result.filed = ("what_should_i_use",)
     text = "\n".join(markdown.markdown_body(report, Parts()))
     assert "1.25" not in text and "(tables/what_should_i_use.csv)" in text
+
+
+def test_names_are_no_markup_in_report_md():
+    of = section("mass", GOOD, rows=[{"scene": "<script>a</script> | b", "x": 1.5}])
+    of.result.notes, of.figures = ["In `<option>`, 1 < 2 and a<b.", "<img src=x>"], [("a", "At <b>.")]
+    report = Report([of], ARM, {"command": "c"}, "Worst in <i>.")
+    text = markdown.markdown(report, markdown.markdown_body(report, Parts()), Parts())
+    assert r"\<script>a\</script> \| b" in text and r"In `<option>`, 1 < 2 and a\<b." in text
+    assert r"- \<img src=x>" in text and r"At \<b>." in text and r"**Worst in \<i>.**" in text
