@@ -119,3 +119,16 @@ def test_names_are_no_markup_in_report_md():
     text = markdown.markdown(report, markdown.markdown_body(report, Parts()), Parts())
     assert r"\<script>a\</script> \| b" in text and r"In `<option>`, 1 < 2 and a\<b." in text
     assert r"- \<img src=x>" in text and r"At \<b>." in text and r"**Worst in \<i>.**" in text
+
+
+def test_report_md_says_how_each_experiment_stands():
+    sections = [section("mass", GOOD), section("gravity", GOOD, BAD), section("speed")]
+    report = Report(sections, ARM, {"command": "c"}, "words", (), [("published", "nothing is printed")])
+    text = "\n".join(markdown.markdown_body(report, Parts()))
+    for row in (
+        "| mass | Mass | pass | 1 of 1 checks pass, at most 50 % of a tolerance |",
+        "| gravity | Gravity | 1 of 2 fail | 1 of 2 checks pass, at most 50 % of a tolerance |",
+        "| speed | Speed | nothing compared |  |",
+        "| published |  | skipped | nothing is printed |",
+    ):
+        assert row in text
