@@ -62,7 +62,7 @@ def test_the_sentence_on_agreement_comes_out_either_way():
         "TMT and MuJoCo have the same bias h: at most 4.8 eps apart (bias h), and 5 eps from exact."
     )
     assert engines_apart.agreement_in_words([good, bad], "yours") == (
-        "yours and MuJoCo differ in accelerations: up to 64 eps apart (accelerations)."
+        "Yours and MuJoCo differ in accelerations: up to 64 eps apart (accelerations)."
     )
 
 
@@ -81,7 +81,7 @@ def test_a_scene_at_a_glance():
         SceneRun("a", 0.7, (0.5, 3.0), 5.0, 0.6, None, True),
         SceneRun("a, more", None, (3.0, 3.0), 3.0, None, None, False),
     ]
-    assert "do not move alike in a, more" in engines_apart.scenes_in_words(found, "TMT")
+    assert engines_apart.scenes_in_words(found, "yours").startswith("Yours and MuJoCo do not move alike in a, more: ")
     assert engines_apart.scenes_in_words(found[:1], "TMT") == (
         "TMT and MuJoCo move alike in all 1 scenes: at most 70 % of the rounding band apart, judged for 0.5 to 3 s."
     )
