@@ -296,6 +296,49 @@ def late(result, robot):
     raise ValueError("no more")
 
 
+class Here:
+    """Draws in this process at once, and writes down when that is asked for."""
+
+    def __init__(self, log):
+        self.log = log
+
+    def submit(self, function, /, name, *more):
+        self.log.append(("figures", name, *more[4:]))
+        future = Future()
+        future.set_result(function(name, *more))
+        return future
+
+
+def test_what_is_timed_comes_last_and_is_drawn_when_nothing_is_timed_any_more(tmp_path, monkeypatch):
+    names, log = ["mass", "speed", "stability", "reduction"], []
+
+    def plot_other(result, name):
+        return plot(result, name)
+
+    def rows(name, setup):
+        log.append(("rows", name))
+        return Result(name)
+
+    def figures(name, result, robot):
+        yield partial(plot, result, f"{name}_first")
+        yield partial(plot_other, result, f"{name}_other")
+        yield partial(plot, result, f"{name}_second")
+
+    for name in names:
+        module = SimpleNamespace(**asked(name), rows=partial(rows, name), figures=partial(figures, name))
+        monkeypatch.setitem(sys.modules, f"compare.experiments.{name}", module)
+    setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, faults=False)
+    sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Here(log))
+    assert log == [
+        ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
+        ("rows", "reduction"), *[("figures", name, part) for name in ("speed", "reduction") for part in drawing.HALVES],
+    ]  # fmt: skip
+    assert [section.name for section in sections] == names and (causes, skipped) == ([], {})  # as they are asked for
+    for one in sections:
+        assert sorted(file for file, _ in one.figures) == [f"{one.name}_{k}" for k in ("first", "other", "second")]
+        assert not one.result.checks
+
+
 def test_a_figure_that_raises_leaves_the_others_alone(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "compare.experiments.broken", SimpleNamespace(figures=late))
     drawn, failed = drawing.draw("broken", None, None, tmp_path)

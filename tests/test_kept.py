@@ -1,6 +1,7 @@
 """Traced text in the cache folder: it is the text that is traced, and only of what is tmt's own."""
 
 import dataclasses
+import hashlib
 
 import numpy as np
 import pytest
@@ -54,6 +55,23 @@ def test_another_version_of_tmt_traces_anew(folder, monkeypatch):
     assert len(texts(folder)) == 2
 
 
+def test_each_way_has_a_text_of_its_own(folder):
+    found = {name: getattr(source, name)(tmt.ARM, *more) for name, more in WAYS.items()}
+    for name, more in WAYS.items():
+        function = getattr(source, name)
+        assert function(tmt.ARM, *more) == found[name] == function.__wrapped__(tmt.ARM, *more)
+    assert len(texts(folder)) == len(WAYS)
+
+
+def test_a_version_is_known_by_the_contents_of_its_files(tmp_path, monkeypatch):
+    monkeypatch.setattr(kept, "__file__", str(tmp_path / "kept.py"))
+    found = set()
+    for content in ("", "a = 1", "a = 2"):
+        (tmp_path / "trace.py").write_text(content)
+        found.add(kept.own_sources.__wrapped__())
+    assert len(found) == 3
+
+
 @pytest.mark.parametrize("content", ["", "damaged", "0" * 64 + "raise SystemExit", None])
 def test_a_text_that_was_not_written_so_is_not_taken(content, folder):
     text = source.run_source(tmt.ARM, RK4)
@@ -67,7 +85,8 @@ def test_a_text_that_was_not_written_so_is_not_taken(content, folder):
 def test_a_text_that_others_can_write_is_not_read(folder):
     text = source.run_source(tmt.ARM, RK4)
     (path,) = texts(folder)
-    path.write_text("planted")
+    planted = "planted, and signed as what is written here"
+    path.write_text(hashlib.sha256(planted.encode()).hexdigest() + planted)
     path.chmod(0o666)
     assert source.run_source(tmt.ARM, RK4) == text
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ..judge.check import Result
-from ..judge.words import listed
+from ..judge.words import capital, listed
 from .overview import times_in_print
 
 NAMES_OF_QUANTITIES = {"Mbar": "mass matrix M", "bias": "bias h", "qdd": "accelerations"}
@@ -51,8 +51,8 @@ def agreement_in_words(found: Sequence[Agreement], label: str) -> str:
     names = listed([one.name for one in found])
     if wrong:
         far = f"{top.apart:.2g} eps" if math.isfinite(top.apart) else "no number of eps"
-        return f"{label} and MuJoCo differ in {listed(wrong)}: up to {far} apart ({top.name})."
-    alike = f"{label} and MuJoCo have the same {names}: at most {top.apart:.2g} eps apart ({top.name})"
+        return f"{capital(label)} and MuJoCo differ in {listed(wrong)}: up to {far} apart ({top.name})."
+    alike = f"{capital(label)} and MuJoCo have the same {names}: at most {top.apart:.2g} eps apart ({top.name})"
     exact = [value for one in found for value in (one.ours, one.theirs) if value is not None]
     return alike + (f", and {max(exact):.2g} eps from exact." if exact else ".")
 
@@ -110,11 +110,11 @@ def scenes_in_words(found: Sequence[SceneRun], label: str) -> str:
     wrong = [one.name for one in found if not one.passed]
     times = [time for one in found for time in one.judged]
     if wrong:
-        text = f"{label} and MuJoCo do not move alike in {'; '.join(wrong)}"
+        text = f"{capital(label)} and MuJoCo do not move alike in {'; '.join(wrong)}"
         text += f": up to {times_in_print(max(shares))} times the rounding band apart." if shares else "."
     else:
         most = f"at most {100 * max(shares):.2g} % of the rounding band apart" if shares else "not measured"
-        text = f"{label} and MuJoCo move alike in all {len(found)} scenes: {most}, "
+        text = f"{capital(label)} and MuJoCo move alike in all {len(found)} scenes: {most}, "
         text += f"judged for {min(times):.2g} to {max(times):.2g} s."
     left = [one for one in found if one.left and (one.left[0] is None) != (one.left[1] is None)]
     for one in left:

@@ -43,8 +43,9 @@ def markdown(report: Report, body: Sequence[str], parts: Parts) -> str:
 
 
 def joined(paragraphs: Sequence[str]) -> str:
-    """Paragraphs as one text; the items of a list without empty lines between them."""
-    return "\n\n".join(paragraphs).replace("\n\n- ", "\n- ") + "\n"
+    """Paragraphs as one text; the items of a list without empty lines between them. No name in it is a tag of HTML."""
+    text = "\n\n".join(paragraphs).replace("\n\n- ", "\n- ") + "\n"
+    return re.sub(r"(`[^`\n]*`)|(?<!\\)<(?=[A-Za-z/!?])", lambda found: found[1] or r"\<", text)
 
 
 def markdown_body(report: Report, parts: Parts) -> list[str]:

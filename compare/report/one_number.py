@@ -1,5 +1,6 @@
 """The one number of each experiment, for its line on the first screen, computed from its result."""
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -43,9 +44,19 @@ def of_parameters(result: Result) -> str:
     same = f"{len(rows) - len(off)} of {len(rows)} numbers equal to the last bit"
     if not off:
         return f"{len(rows)} numbers equal to the last bit"
-    top = max(off, key=lambda row: abs(row["difference"]) / max(abs(row["stated"]), abs(row["compiled"])))
+    # beside the largest of its kind, as its tolerance is: what rounding leaves of a stated zero is not the farthest
+    size = {}
+    for row in rows:
+        kind = row["of"], row["quantity"]
+        size[kind] = max(size.get(kind, 0.0), abs(row["stated"]))
+    top = max(off, key=lambda row: over_size(abs(row["difference"]), size[row["of"], row["quantity"]]))
     where = " ".join(filter(None, (top["quantity"], top["component"])))
     return f"{same}; {where} of {top['of']} is {abs(top['difference']):.2g} {top['unit']}".rstrip() + " off"
+
+
+def over_size(difference: float, size: float) -> float:
+    """A difference beside its size; inf where nothing is stated."""
+    return difference / size if size else math.inf
 
 
 def of_published(result: Result) -> str:

@@ -76,6 +76,34 @@ def test_a_failing_report_shows_causes_stated_beside_found_and_first_the_picture
     assert re.search(r'<a href="#trajectory"><span class="mark bad" aria-hidden="true">✗</span>trajectory</a>', top)
 
 
+@pytest.mark.parametrize("checks, kind, sign", [((GOOD,), "good", "✓"), ((GOOD, BAD), "bad", "✗"), ((), "none", "–")])
+def test_a_line_and_a_section_stand_as_their_checks_do(tmp_path, checks, kind, sign):
+    """By the class, which has the colour, and by the sign."""
+    html = written(tmp_path, [section("mass", *checks), section("gravity", GOOD)])
+    marked = f'<span class="mark {kind}" aria-hidden="true">{sign}</span>'
+    assert f'<li class="{kind}">{marked}<div><a href="#mass">' in html
+    assert f'<p class="outcome {kind}">{marked} <strong>' in html
+
+
+def test_a_report_of_which_a_part_broke_is_not_shown_as_passing(tmp_path):
+    (tmp_path / "figures").mkdir()
+    report, parts = Report([section("mass", GOOD)], ARM, {"command": "c"}, "All agree."), Parts()
+    for broken, kind in ((False, "good"), (True, "bad")):
+        if broken:
+            parts.made("a table", None, float, "no number")
+        html = page.page(report, page.page_body(tmp_path, report, parts), parts)
+        assert f'<div class="verdict {kind}">' in html and ("a table could not be made" in html) == broken
+        assert f'<main id="main" class="{kind}">' in html
+
+
+@pytest.mark.parametrize(
+    "count, more", [(4, ""), (5, "and 1 more, in their sections"), (7, "and 3 more, in their sections")]
+)
+def test_checks_without_a_cause_are_counted(tmp_path, count, more):
+    top = first_screen(written(tmp_path, [section("mass", GOOD, *[BAD] * count)]))
+    assert top.count("<td>Mbar</td>") == 4 and (more in top if more else " more, in their" not in top)
+
+
 def test_where_no_picture_shows_what_fails_a_figure_of_the_failing_experiment_does(tmp_path):
     sections = [
         with_figures(section("kinematics", BAD), "kinematics_distances"),

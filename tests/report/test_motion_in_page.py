@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -159,3 +161,25 @@ def test_any_robot_is_named():
         [SimpleNamespace(name="trajectory", result=SimpleNamespace(curves={"drawn": [drawn()]}, label="TMT"))],
         SimpleNamespace(noun="robot"),
     )
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium to run the script")
+def test_the_script_draws_each_engine_where_it_is(tmp_path):
+    one = drawn(apart=0.3)
+    text = page_of(one)
+    found = pictures_of(data_of(text)["scenes"][0])
+    script = text.index("<script")
+    (tmp_path / "page.html").write_text(
+        re.sub(r' d="M[^"]*"', ' d=""', text[:script]) + text[script:], encoding="utf-8"
+    )
+    asked = ["--headless=new", "--no-sandbox", "--disable-gpu", "--force-prefers-reduced-motion", "--dump-dom"]
+    asked += [
+        f"--user-data-dir={tmp_path / 'profile'}",
+        "--virtual-time-budget=2000",
+        (tmp_path / "page.html").as_uri(),
+    ]
+    run = subprocess.run(["chromium", *asked], capture_output=True, text=True, timeout=120)
+    for name, pictures in zip(("ours", "theirs"), found):
+        assert f'class="{name}" d="{motion.outline(pictures[-1], [(0, 1), (1, 2)])}"' in run.stdout, name
+    assert "t = 5.00 s: apart in any joint by at most 0.3 rad" in run.stdout
+    assert '<div class="controls">' in run.stdout

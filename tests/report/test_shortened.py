@@ -66,6 +66,8 @@ def test_without_groups_the_worst_rows_are_shown_in_their_order_and_the_first_wh
     rows = [{"at": k, "predicted_dt_s": 1.0, "observed_dt_s": 1.0 + 0.1 * (k % 7)} for k in range(21)]
     kept, which = shortened(rows, 3)
     assert [row["at"] for row in kept] == [6, 13, 20] and which == "the worst 3 of 21 rows"
+    rows = [row | {"observed_dt_s": 2.0 - row["observed_dt_s"]} for row in rows]  # as far below what is predicted
+    assert [row["at"] for row in shortened(rows, 3)[0]] == [6, 13, 20]
     kept, which = shortened([{"at": k} for k in range(21)], 3)
     assert [row["at"] for row in kept] == [0, 1, 2] and which == "the first 3 of 21 rows"
 
@@ -108,3 +110,25 @@ def test_a_table_that_stands_in_its_file_alone_is_linked():
     of.result.filed = ("what_should_i_use",)
     text = "\n".join(markdown.markdown_body(report, Parts()))
     assert "1.25" not in text and "(tables/what_should_i_use.csv)" in text
+
+
+def test_names_are_no_markup_in_report_md():
+    of = section("mass", GOOD, rows=[{"scene": "<script>a</script> | b", "x": 1.5}])
+    of.result.notes, of.figures = ["In `<option>`, 1 < 2 and a<b.", "<img src=x>"], [("a", "At <b>.")]
+    report = Report([of], ARM, {"command": "c"}, "Worst in <i>.")
+    text = markdown.markdown(report, markdown.markdown_body(report, Parts()), Parts())
+    assert r"\<script>a\</script> \| b" in text and r"In `<option>`, 1 < 2 and a\<b." in text
+    assert r"- \<img src=x>" in text and r"At \<b>." in text and r"**Worst in \<i>.**" in text
+
+
+def test_report_md_says_how_each_experiment_stands():
+    sections = [section("mass", GOOD), section("gravity", GOOD, BAD), section("speed")]
+    report = Report(sections, ARM, {"command": "c"}, "words", (), [("published", "nothing is printed")])
+    text = "\n".join(markdown.markdown_body(report, Parts()))
+    for row in (
+        "| mass | Mass | pass | 1 of 1 checks pass, at most 50 % of a tolerance |",
+        "| gravity | Gravity | 1 of 2 fail | 1 of 2 checks pass, at most 50 % of a tolerance |",
+        "| speed | Speed | nothing compared |  |",
+        "| published |  | skipped | nothing is printed |",
+    ):
+        assert row in text

@@ -72,14 +72,10 @@ def one_picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image
     scale, origin = place
     text = still.copy()
     write = partial(ImageDraw.Draw(text).text, fill=255, font=font(17))
-    write((PIXELS[0] - 16, PIXELS[1] - 28), f"t = {scene.t[k]:.2f} s", anchor="ra")
-    gone = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
-    words = [f"{capital(LABELS[name])} has diverged" for name in gone]
-    words = words or [f"apart in any joint by at most {scene.apart[k]:.2g} {scene.unit}"]
-    write((16, PIXELS[1] - 28), "; ".join(words))
-    left = [(time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]]
-    words = [f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left)]
-    write((PIXELS[0] - 16, 68), "; ".join(words), anchor="ra", font=font(14))
+    time, apart, gone = words_of_picture(scene, k)
+    write((PIXELS[0] - 16, PIXELS[1] - 28), time, anchor="ra")
+    write((16, PIXELS[1] - 28), apart)
+    write((PIXELS[0] - 16, 68), gone, anchor="ra", font=font(14))
     shades = []
     for which, path in enumerate(scene.points.values()):
         mask = Image.new("L", (FINE * PIXELS[0], FINE * (PIXELS[1] - BOTTOM)))
@@ -93,6 +89,19 @@ def one_picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image
     image = ImageChops.lighter(ImageChops.add(*shades), text.point(SHADES[2]))
     image.putpalette(SHADES_OF_ALL)
     return image
+
+
+def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
+    """What the k-th picture says: its time; how far the engines are apart, or who has diverged; who has left by then."""
+    lost = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
+    apart = "; ".join(f"{capital(LABELS[name])} has diverged" for name in lost)
+    left = [(time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]]
+    gone = "; ".join(f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left))
+    return (
+        f"t = {scene.t[k]:.2f} s",
+        apart or f"apart in any joint by at most {scene.apart[k]:.2g} {scene.unit}",
+        gone,
+    )
 
 
 def draw_sticks(pen: ImageDraw.ImageDraw, points: Sequence[tuple], links: Sequence[tuple], which: int) -> None:

@@ -13,6 +13,7 @@ from compare import experiment, scene_file
 from compare.case import Scene
 from compare.engines.mujoco import parse
 from compare.experiments import reduction, trajectory
+from compare.judge.check import Result
 from compare.robots import Robot
 from compare.robots.arm import ARM
 
@@ -162,3 +163,27 @@ def test_a_robot_of_few_hinges_without_postures_and_scenes_goes_through(tree):
     result = reduction.rows(experiment.Setup.small(bare, experiment.engines(parse(mjcf(tree), tree))))
     assert all(check.passed for check in result.checks), [str(check) for check in result.checks if not check.passed]
     assert [figure()[0] for figure in reduction.figures(result, bare)] == ["reduction_cost_in_mujoco"]
+
+
+def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
+    """What is no timing is computed once: beside other work where that was begun, else here."""
+    log = []
+
+    def untimed(setup, *more):
+        log.append("computed")
+        return Result("reduction", notes=["computed"]), []
+
+    monkeypatch.setattr(reduction, "untimed", untimed)
+    monkeypatch.setattr(reduction, "time_models", lambda *given: log.append("timed"))
+    monkeypatch.setattr(reduction, "measure_costs", lambda *given: log.append("measured"))
+    setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"), background={})
+    for ahead in (False, True):
+        log.clear()
+        if ahead:
+            reduction.begin(setup)
+        assert reduction.rows(setup).notes == ["computed"] and setup.background == {}
+        assert log == ["computed", "quiet", "timed", "measured"]
+    reduction.begin(setup)
+    log.clear()
+    reduction.rows(setup, timed=False)
+    assert log == ["computed"]  # of another kind than what was begun

@@ -2,11 +2,13 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 from speed_rows import NS, row
 
 from compare.engines import Method, Setting
+from compare.experiments import speed
 from compare.experiments.speed import evaluations, targets, times
 from compare.experiments.speed.evaluations import (
     CALLED,
@@ -151,3 +153,20 @@ def test_of_many_states_that_code_is_timed_which_answers_in_the_end(rng, monkeyp
         assert not known.lanes
         runs[FORWARD, CALLED, 40, cores()]()
     assert FORWARD in known.lanes
+
+
+def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):
+    class TimedError(Exception):
+        pass
+
+    def take_times(runs, setup):
+        log.append("timed")
+        raise TimedError
+
+    log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
+    monkeypatch.setattr(speed, "take_times", take_times)
+    monkeypatch.setattr(speed.growth, "chains_of", lambda setup: log.append("made"))
+    monkeypatch.setattr(speed.evaluations, "made_ways", lambda setup: log.append("made"))
+    with pytest.raises(TimedError):
+        speed.add_times(Result("speed"), setup, {"a": []})
+    assert log == ["made", "made", "quiet", "timed"]

@@ -155,6 +155,47 @@ def test_the_gif_draws_no_engine_that_has_diverged(drawn, tmp_path):
     assert found[0] == (True, True) and found[-1] == (True, False)
 
 
+def where(picture, colour) -> np.ndarray:
+    """The middle of the pixels of a colour below the names, to the right and up."""
+    pixels = np.asarray(picture.convert("RGB"), int)[gif.TOP : -gif.BOTTOM]
+    found = np.abs(pixels - [int(colour[i : i + 2], 16) for i in (1, 3, 5)]).max(axis=2) < 8
+    y, x = np.nonzero(found)
+    return np.array([x.mean(), -y.mean()])
+
+
+def test_each_engine_is_drawn_where_it_is(drawn):
+    scene = drawn[FREE.name]
+    high, right = np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]]), np.array([[1.0, -1.0], [1.5, -1.0], [2.0, -1.0]])
+    scene = scene._replace(t=scene.t[:2], points={"tmt": np.stack([high, high]), "mujoco": np.stack([right, high])})
+    place = gif.place_of(scene)
+    still = gif.text_of_scene(scene, "TMT", place)
+    first, second = (gif.one_picture(scene, k, still, place) for k in range(2))
+    away = where(first, gif.ORANGE) - where(first, gif.BLUE)
+    np.testing.assert_allclose(away, place[0] * (right - high).mean(axis=0), atol=3.0)
+    np.testing.assert_allclose(where(second, gif.ORANGE), where(second, gif.BLUE), atol=3.0)
+
+
+def test_each_name_stands_beside_its_stick(drawn):
+    place = gif.place_of(drawn[FREE.name])
+    for label in ("TMT", ""):
+        text = np.asarray(gif.text_of_scene(drawn[FREE.name], label, place))[52:72]
+        first, second = (text[:, at + 48 : at + 80].any() for at in gif.NAMES_AT)
+        assert first == bool(label) and second  # MuJoCo's is the second, as in the pictures
+
+
+def test_a_picture_of_the_gif_says_what_is_so_at_its_time(drawn):
+    scene = drawn[FREE.name]
+    points, left = {name: path[:3].copy() for name, path in scene.points.items()}, {"tmt": 0.75, "mujoco": 0.5}
+    t, apart = np.array([0.0, 0.5, 1.0]), np.array([1e-9, 2e-9, np.nan])
+    scene = scene._replace(t=t, apart=apart, unit="rad", left=left, points=points)
+    scene.points["mujoco"][2] = np.nan
+    assert [gif.words_of_picture(scene, k) for k in range(3)] == [
+        ("t = 0.00 s", "apart in any joint by at most 1e-09 rad", ""),
+        ("t = 0.50 s", "apart in any joint by at most 2e-09 rad", "MuJoCo has left at 0.50 s"),
+        ("t = 1.00 s", "MuJoCo has diverged", "MuJoCo has left at 0.50 s; TMT has left at 0.75 s"),
+    ]
+
+
 @pytest.mark.parametrize("dt, words", [(0.04, ""), (0.02, ", shown 2 times slower"), (0.08, ", shown 2 times faster")])
 def test_a_scene_that_is_not_shown_at_its_own_speed_says_so(drawn, dt, words):
     assert gif.slower(drawn[FREE.name]._replace(t=dt * np.arange(3))) == words
