@@ -3,7 +3,7 @@
 import pytest
 from sections import BAD, GOOD, section
 
-from compare.experiment import say_outcome
+from compare.experiment import most_in_words, say_outcome
 from compare.report import verdict
 
 
@@ -41,6 +41,14 @@ def test_what_does_not_agree_is_named_and_nothing_else():
     )
 
 
+@pytest.mark.parametrize("share, said", [
+    (1.0, "at most 100 % of tolerance"), (0.996, "at most 100 % of tolerance"), (0.104, "at most 10 % of tolerance"),
+    (0.0123, "at most 1.2 % of tolerance"), (0.00102, "at most 0.1 % of tolerance"), (0.00099, "below 0.1 % of tolerance"),
+])  # fmt: skip
+def test_the_share_of_a_tolerance_fits_its_column(share, said):
+    assert most_in_words(share) == said and len(said) <= 26
+
+
 class Lines(list):
     """A terminal that keeps what is said."""
 
@@ -51,7 +59,7 @@ class Lines(list):
 def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     said = Lines()
     say_outcome(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
-    assert said == ["mass          ok           2 checks  uses 0.5 of a tolerance      1.2 s"]
+    assert said == ["mass          ok           2 checks  at most 50 % of tolerance    1.2 s"]
     said.clear()
     say_outcome(
         said,
