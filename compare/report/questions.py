@@ -80,7 +80,7 @@ def far_from_true(results: Mapping[str, Result]) -> str:
 
 
 def choice(results: Mapping[str, Result]) -> list[tuple]:
-    """What a user of MuJoCo asks: which integrator, which step: a line of the table, where there is one of the caption's scene."""
+    """What a user of MuJoCo asks: which integrator, which step: a line of the table, of the caption's scene if it has one."""
     lines = results["speed"].tables.get("what_should_i_use", []) if "speed" in results else []
     named = [line for line in lines if units.value(line, "target") == ERROR_ASKED and line["mujoco"] and line["tmt"]]
     if not named:

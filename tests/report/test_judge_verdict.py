@@ -33,6 +33,13 @@ def test_what_does_not_agree_is_named_and_nothing_else():
     assert verdict.verdict(sections, 10).startswith(
         "The two models do not agree in mass (3 of 10 experiments ran): 1 of 4 checks fail."
     )
+    sought = section("diagnosis", BAD)
+    assert verdict.verdict([*sections, sought], 10).startswith(
+        "The two models do not agree in mass (4 of 10 experiments ran): 2 of 5 checks fail."
+    )
+    assert verdict.verdict([sought], 10).startswith(
+        "The two models do not agree (1 of 10 experiments ran): 1 of 1 checks fail."
+    )
     broken = section("speed")
     broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no", rule="equal")
     assert verdict.verdict([section("mass", GOOD), broken], 10) == (
