@@ -42,11 +42,11 @@ EXAMPLES = """examples:
   python -m compare speed --growth            a chain of 1 to 64 joints
   python -m compare speed --help              what one experiment asks and finds
 
-output: a line for each experiment; its seconds are those of the processor for
-this experiment alone, and what it waited is not in them
+output: a line for each experiment; seconds are CPU time of the experiment, not
+waiting
 
-compiled code is kept in ~/.cache/tmt, or $TMT_CACHE, for later runs and tests of
-any checkout, some 10 MB for each robot; to clear it, delete that folder
+compiled code is kept in ~/.cache/tmt, or $TMT_CACHE, for later runs and tests
+of any checkout, some 10 MB for each robot; to clear it, delete that folder
 
 exit status: 0 all checks pass; 1 a check failed; 2 the request could not be
 carried out, for the reason in one line
@@ -150,6 +150,7 @@ def parser(experiment: str | None = None) -> Parser:
     )
     if experiment is None:
         made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
+        made.add_argument("--version", action="store_true", help="the version of this program, and nothing else")
     made.add_argument("-h", "--help", action="store_true", help="this text; after an experiment: what it asks")
     for name, (takers, how) in OPTIONS_OF_ALL.items():
         if takers is None or experiment is None or experiment in takers:
@@ -182,6 +183,11 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
     if options.help:
         (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
         raise SystemExit(0)
+    if options.version:
+        from .report.provenance import OURS, own_version  # what is imported takes its time
+
+        print(OURS, own_version())
+        raise SystemExit(0)
     refuse_what_does_not_go_together(whole, options)
     return options
 
@@ -205,7 +211,7 @@ def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence
                 f"{word!r} is no option; {expected(word.strip('-').split('=')[0], names, ' '.join(OPTIONS_OF_ALL))}"
             )
     name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
-    if name is None and not options.help:
+    if name is None and not (options.help or options.version):
         whole.error(f"no experiment is named; one of {choices} is expected, as in {PROGRAM} all {given}")
     if name is not None and name not in words:
         whole.error(f"{name!r} is no experiment; {expected(name, words | {'help': '--help'}, choices)}")

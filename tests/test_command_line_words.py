@@ -11,6 +11,7 @@ from compare.__main__ import main
 from compare.command_line import OPTIONS_OF_ALL
 from compare.engines.mujoco.flags import integrator_by_name
 from compare.experiments import EXPERIMENTS
+from compare.report import provenance
 
 
 def answered(arguments, capsys):
@@ -76,6 +77,14 @@ def test_help_has_examples_and_every_option(capsys):
         assert "python -m compare all --quick" in text and "exit status" in text
         assert all(f"  {name} " in text for name in (*EXPERIMENTS, *OPTIONS_OF_ALL))
         assert max(map(len, text.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["all", "--version"]])
+def test_the_version_is_that_of_a_report(arguments, capsys):
+    assert answered(arguments, capsys) == (0, f"{provenance.OURS} {provenance.own_version()}\n", "")
+    assert re.fullmatch(r"\d+(\.\d+)+", provenance.own_version())
+    assert "--version" in answered(["--help"], capsys)[1]
+    assert answered(["mas", "--version"], capsys)[0] == 2
 
 
 TAKEN = {"--scenes": {"trajectory", "speed", "reduction"}, "--dt": {"stability"}, "--growth": {"speed"},

@@ -119,5 +119,5 @@ def scenes_in_words(found: Sequence[SceneRun], label: str) -> str:
     left = [one for one in found if one.left and (one.left[0] is None) != (one.left[1] is None)]
     for one in left:
         name, time = next((who, time) for who, time in zip((label, "MuJoCo"), one.left) if time is not None)
-        text += f" In {one.name} the posture is left by {name} alone, at {time:.2g} s."
+        text += f" In {one.name} the posture is left by {name} alone within its {one.duration:.3g} s, at {time:.2g} s."
     return text

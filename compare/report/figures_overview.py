@@ -174,7 +174,7 @@ def picture_of_times(results: Mapping[str, Result], robot: object) -> tuple[str,
         ax.plot(errors, curve.milliseconds, marker=MARK_OF_ENGINE.get(curve.engine, "v"), markersize=3.5, linewidth=1.2,
                 color=colour, label=methods_compared.engine_in_print(curve.engine))  # fmt: skip
         if curve.cheapest:
-            method, time = curve.cheapest
+            method, time, _ = curve.cheapest
             at = curve.milliseconds.index(time)
             ax.plot(errors[at], time, "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
             if curve.engine in ("mujoco", "tmt"):
@@ -182,7 +182,8 @@ def picture_of_times(results: Mapping[str, Result], robot: object) -> tuple[str,
                 text = f"{method} {overview.times_in_print(time)} ms"
                 ax.annotate(text, (errors[at], time), (0, 8 if above else -11), fontsize=8, color=colour,
                             textcoords="offset points", ha="right" if above else "center" if fine else "left",
-                            va="bottom" if above else "top")  # fmt: skip
+                            va="bottom" if above else "top",
+                            path_effects=[withStroke(linewidth=3, foreground="white")])  # fmt: skip
     ax.axvline(methods_compared.ERROR_ASKED, color=GREY, linestyle=":", linewidth=1.2)
     ax.set(xscale="log", yscale="log", xlabel=f"worst error, {unit} (finer to the right)", ylabel="time, ms")
     ax.invert_xaxis()

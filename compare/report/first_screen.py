@@ -17,6 +17,7 @@ from .verdict import Report, Section, failures, passed, standing
 
 LONG_SENTENCE = 80  # characters
 FIRST_CAUSES = 4  # on the first screen; all of them stand below it
+LINKED = ("_distances", "_limits")  # ends of the names of figures to which a picture leads
 TITLES = {
     "agreement": "The same equations?",
     "scenes": "The same motion?",
@@ -137,7 +138,7 @@ def picture(folder: Path, name: str, caption: str, sections: Sequence[Section], 
 def linked_figure(sections: Sequence[Section]) -> str:
     """The anchor of the whole figure behind a picture: of distances or limits, else the first of the last section."""
     files = [file for section in sections for file, _ in of_section(section) if not moves(file)]
-    best = [file for file in files if file.endswith(("_distances", "_limits"))] or files
+    best = [file for file in files if file.endswith(LINKED)] or files
     return f"figure-{best[0]}" if best else sections[-1].name
 
 

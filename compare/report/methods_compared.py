@@ -11,13 +11,21 @@ ERROR_ASKED = 1e-6  # rad or m: for which the cheapest setting is named
 NOT_SOLVED = 1.0  # rad or m: a run that is farther off is none
 
 
+class Cheapest(NamedTuple):
+    """The setting that takes least time within the error asked for."""
+
+    method: str
+    milliseconds: float
+    setting: str = ""  # its steps and dt, or its tolerance, in words; "": not known
+
+
 class Curve(NamedTuple):
     """The settings of one engine that nothing of the same engine beats in both error and time."""
 
     engine: str
     errors: list[float]  # rad or m, from coarse to fine
     milliseconds: list[float]
-    cheapest: tuple[str, float] | None  # the method and the time, ms, of the first that is within ERROR_ASKED
+    cheapest: Cheapest | None  # the first that is within ERROR_ASKED
 
 
 def best_curves(result: Result, scene: str | None = None) -> list[Curve]:
@@ -43,7 +51,7 @@ def best_curves(result: Result, scene: str | None = None) -> list[Curve]:
                     engine,
                     [float(units.value(row, "worst_error")) for row in front],
                     [1e3 * row["seconds"] for row in front],
-                    (cheap["method"], 1e3 * cheap["seconds"]) if cheap else None,
+                    Cheapest(cheap["method"], 1e3 * cheap["seconds"], setting_in_words(cheap)) if cheap else None,
                 )
             )
     return found
@@ -54,25 +62,39 @@ def engine_in_print(engine: str) -> str:
     return {"mujoco": "MuJoCo", "scipy": "SciPy"}.get(engine, engine)
 
 
-def cheapest_of_curves(curves: Sequence[Curve], unit: str) -> str:
-    """Who is cheapest within the target, and how much longer MuJoCo takes; '' if nobody is."""
+def setting_in_words(row: dict) -> str:
+    """The steps and the dt of a run, or the tolerance with which it chose its steps."""
+    if row.get("dt_s"):
+        return steps_in_words(f"{row['steps']:.0f} steps", row["dt_s"])
+    return f"tolerance {row['tolerance']:.0e}" if row.get("tolerance") else ""
+
+
+def steps_in_words(steps: str, dt: float | None) -> str:
+    """A number of steps with their dt, s, where they have the same."""
+    return f"{steps} (dt {dt:.2g} s)" if dt else steps
+
+
+def cheapest_of_curves(curves: Sequence[Curve], unit: str, scene: str | None) -> str:
+    """Who is cheapest within the target in a scene, and the cheapest of MuJoCo (of tmt, if that is MuJoCo); '' if nobody is."""
     reached = {curve.engine: curve.cheapest for curve in curves if curve.cheapest}
     if not reached:
         return ""
-    first = min(reached, key=lambda engine: reached[engine][1])
-    method, time = reached[first]
-    text = f"to {ERROR_ASKED:.0e} {unit}: {engine_in_print(first)} {method} in {times_in_print(time)} ms"
+    first = min(reached, key=lambda engine: reached[engine].milliseconds)
     other = "mujoco" if first != "mujoco" else "tmt"
-    if other in reached:
-        text += f"; {engine_in_print(other)} {reached[other][0]} takes {times_in_print(reached[other][1] / time)} times as long"
-    return text
+    texts = []
+    for engine in (first, *([other] if other in reached else [])):
+        method, time, setting = reached[engine]
+        words = (f"{engine_in_print(engine)} {method}", setting, f"{times_in_print(time)} ms")
+        texts.append(", ".join(filter(None, words)))
+    where = f" ({scene})" if scene else ""
+    return f"to {ERROR_ASKED:.0e} {unit}{where}: {'; '.join(texts)}"
 
 
 def times_in_words(result: Result) -> str:
     """The caption: what is cheapest within the target."""
     scene, unit = result.curves.get("regular"), result.curves.get("unit", "rad")
-    found = cheapest_of_curves(best_curves(result), unit)
-    return f"The cheapest settings of each engine ({scene}). {found[:1].upper()}{found[1:]}." if found else (
+    found = cheapest_of_curves(best_curves(result), unit, scene)
+    return f"The cheapest settings of each engine. {found[:1].upper()}{found[1:]}." if found else (
         f"The cheapest settings of each engine ({scene}). None reaches {ERROR_ASKED:.0e} {unit}."
     )  # fmt: skip
 

@@ -105,7 +105,7 @@ def of_diagnosis(result: Result) -> str:
 
 def of_speed(result: Result) -> str:
     """What is cheapest within the error asked for."""
-    return cheapest_of_curves(best_curves(result), result.curves.get("unit", "rad"))
+    return cheapest_of_curves(best_curves(result), result.curves.get("unit", "rad"), result.curves.get("regular"))
 
 
 def of_stability(result: Result) -> str:

@@ -7,7 +7,7 @@ from string import Template
 
 import pandas as pd
 
-from .first_screen import causes_in_html, list_in_html, mark, pictures_in_html, verdict_in_html
+from .first_screen import LINKED, causes_in_html, list_in_html, mark, pictures_in_html, verdict_in_html
 from .images import moves
 from .introduction import first_lines, introduction, title
 from .markup import details, figure, html_table, of_section, words
@@ -20,6 +20,7 @@ from .verdict import Report, Section, outcome, passed, standing
 
 MOST_ROWS, MOST_OF_RUNS = 40, 60  # of a table in the page; its file has all
 FIRST_NOTES = 3  # that stand open, the others are folded
+MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that stand open; the first, where there are more
 
 
 def page(report: Report, body: Sequence[str], parts: Parts) -> str:
@@ -93,12 +94,24 @@ def section_in_html(folder: Path, section: Section) -> list[str]:
         table = html_table(failed.head(MOST_ROWS), many)
         texts += ["<p><strong>Checks that fail:</strong></p>", table if len(failed) <= 8 else details(many, table)]
     texts += [listed_in_html(notes[:FIRST_NOTES])] if notes else []
-    texts += [figure(folder, file, caption) for file, caption in of_section(section) if not moves(file)]
+    texts += figures_in_html(folder, section)
     texts += [f"<h3>What the tolerance is, and why</h3><p>{words(section.tolerance)}</p>"] if section.tolerance else []
     more = notes[FIRST_NOTES:]
     texts += [details(f"Further findings ({len(more)})", listed_in_html(more))] if more else []
     texts += [table_in_html(section, name, rows) for name, rows in section.tables.items()]
     return [*texts, checks_in_html(section)]
+
+
+def figures_in_html(folder: Path, section: Section) -> list[str]:
+    """The figures of a section; of many the first open, with those to which the first screen links, the others folded."""
+    figures = [(file, caption) for file, caption in of_section(section) if not moves(file)]
+    firsts = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
+    texts, folded = [], []
+    for file, caption in figures:
+        is_open = (file, caption) in firsts or file.endswith(LINKED)
+        (texts if is_open else folded).append(figure(folder, file, caption))
+    more = f"{len(folded)} more figure{'s' if len(folded) > 1 else ''}"
+    return [*texts, details(more, "".join(folded))] if folded else texts
 
 
 def listed_in_html(notes: Sequence[str]) -> str:

@@ -34,7 +34,7 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
-        OURS: of_checkout(Path(__file__).resolve().parents[2]) or installed(OURS),
+        OURS: own_version(),
     } | {package: installed(package) for package in PACKAGES}
 
 
@@ -44,6 +44,11 @@ def durations(clock: Clock) -> dict:
         "seconds_of": {task: round(clock.seconds_of(task), 2) for task in clock.ended if clock.seconds_of(task)},
         "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
     }
+
+
+def own_version() -> str | None:
+    """The version of the program that runs."""
+    return of_checkout(Path(__file__).resolve().parents[2]) or installed(OURS)
 
 
 def of_checkout(root: Path) -> str | None:

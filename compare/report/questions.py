@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from ..judge import units
 from ..judge.check import Result
+from .methods_compared import ERROR_ASKED, engine_in_print, steps_in_words
+from .overview import times_in_print
 from .verdict import Section
 
 NOTHING = "no result: the experiment broke off"
@@ -78,18 +80,21 @@ def far_from_true(results: Mapping[str, Result]) -> str:
 
 
 def choice(results: Mapping[str, Result]) -> list[tuple]:
-    """What a user of MuJoCo asks: which integrator, which step; one line of the table that answers it."""
+    """What a user of MuJoCo asks: which integrator, which step: a line of the table, of the caption's scene if it has one."""
     lines = results["speed"].tables.get("what_should_i_use", []) if "speed" in results else []
-    named = (line for line in lines if units.value(line, "target") == 1e-6 and line["mujoco"] and line["tmt"])
-    line = next(named, None)
-    if line is None:
+    named = [line for line in lines if units.value(line, "target") == ERROR_ASKED and line["mujoco"] and line["tmt"]]
+    if not named:
         return []
+    regular = results["speed"].curves.get("regular")
+    line = next((line for line in named if line["scene"] == regular), named[0])
+    theirs, ours = (steps_in_words(line[engine], line.get(f"{engine}_dt_s")) for engine in ("mujoco", "tmt"))
+    theirs = theirs.replace("mujoco", engine_in_print("mujoco"), 1)
     of_scene = (
         row["dt_s"] * row["steps"] for row in results["speed"].rows if row["scene"] == line["scene"] and row["dt_s"]
     )
     error = f"{units.value(line, 'target'):.0e} {line.get('unit', 'rad')}"
     text = (
-        f"What should I use? For {error} over {next(of_scene):.4g} s ({line['scene']}): {line['mujoco']} "
-        f"({line['mujoco_ms']:.2g} ms), or {line['tmt']} ({line['tmt_ms']:.2g} ms); more in the table of that name."
+        f"What should I use? For {error} over {next(of_scene):.4g} s ({line['scene']}): {theirs}, "
+        f"{times_in_print(line['mujoco_ms'])} ms, or {ours}, {times_in_print(line['tmt_ms'])} ms; more in the table of that name."
     )
     return [("", "which integrator and which step", "speed", text)]

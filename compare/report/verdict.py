@@ -7,6 +7,8 @@ from typing import NamedTuple
 from ..judge.check import AT_OWN_STEP, DRAWN, ENDS, LOCKABLE, Check, Result
 from ..judge.words import listed
 
+SEEKS_CAUSES = "diagnosis"  # the experiment in which nothing can agree or not: it says why others fail
+
 
 @dataclass
 class Section:
@@ -92,10 +94,11 @@ def verdict(
         return f"Nothing was compared in {empty}: the notes there say why."
     sections = [section for section in sections if section.result.checks]
     differing, broke, unstable = failures(sections)
-    failing = {check.experiment for check in differing}
+    failing = {check.experiment for check in differing} - {SEEKS_CAUSES}
     names = ", ".join(section.name for section in sections if not differing or section.name in failing)
     is_whole, some = len(sections) == experiments, f"{len(sections)} of {experiments} experiments"
-    ran = "" if is_whole else f" in {names} ({some}{' ran' if differing else ''})"
+    where = f" in {names}" if names else ""
+    ran = "" if is_whole else f"{where} ({some}{' ran' if differing else ''})"
     own = f"{robot} is {unstable_in_words(unstable)}." if unstable else ""
     stopped = f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."
     if differing:

@@ -138,6 +138,28 @@ def test_a_section_begins_with_what_was_found_and_folds_its_details(tmp_path):
     assert '<a href="tables/extra.csv">' in text and "<td>1.5</td>" not in text
 
 
+@pytest.mark.parametrize("count, folded", [(2, 0), (4, 0), (5, 3), (8, 6)])
+def test_of_many_figures_the_first_two_stand_open(tmp_path, count, folded):
+    html = written(tmp_path, [with_figures(section("trajectory", GOOD), *[f"trajectory_{k}" for k in range(count)])])
+    text = html[html.index('<section id="trajectory"') :]
+    places = [text.index(f'id="figure-trajectory_{k}"') for k in range(count)]
+    assert places == sorted(places)
+    if not folded:
+        assert "more figure" not in text
+        return
+    fold = text.index(f"<details><summary>{folded} more figures</summary>")
+    assert places[1] < fold < places[2] and places[-1] < text.index("</details>", fold) < text.index(
+        "What the tolerance is"
+    )
+
+
+def test_a_figure_to_which_the_first_screen_leads_is_not_folded(tmp_path):
+    names = [f"stability_{k}" for k in range(4)] + ["stability_limits"]
+    html = written(tmp_path, [with_figures(section("stability", GOOD), *names)])
+    text = html[html.index('<section id="stability"') :]
+    assert text.index('id="figure-stability_limits"') < text.index("<summary>2 more figures</summary>")
+
+
 def test_tables_can_be_reached_by_keyboard_and_the_page_needs_nothing_else(tmp_path):
     html = written(tmp_path, [section("mass", GOOD, rows=[{"a": 1.5}])])
     regions = re.findall(r'<div class="scroll" role="region" tabindex="0" aria-label="([^"]+)">', html)

@@ -63,21 +63,22 @@ def test_what_to_use_gives_each_engine_its_own_time(unit):
     line = {
         "scene": "bent",
         "target_rad": 1e-6,
-        "mujoco": "RK4, 9 steps",
+        "mujoco": "mujoco RK4, 9 steps",
         "mujoco_ms": 7.0,
         "tmt": "rk4",
         "tmt_ms": 2.0,
     }
-    lines = renamed([line | {"target_rad": 1e-3, "mujoco_ms": 5.0}, line | {"tmt": None}, line], unit)
-    found = [
-        answer
-        for *_, answer in answers(
-            [section("speed", rows=[{"scene": "bent", "dt_s": 0.5, "steps": 9}], what_should_i_use=lines)], ARM
-        )
-    ]
-    assert found[-1].startswith(
-        f"What should I use? For 1e-06 {unit} over 4.5 s (bent): RK4, 9 steps (7 ms), or rk4 (2 ms)"
-    )
+    other = line | {"scene": "zero", "mujoco_ms": 8.0, "mujoco_dt_s": 0.25}
+    lines = [line | {"target_rad": 1e-3, "mujoco_ms": 5.0}, line | {"tmt": None}, line | {"mujoco_dt_s": 0.5}, other]
+    rows = [{"scene": "bent", "dt_s": 0.5, "steps": 9}, {"scene": "zero", "dt_s": 0.5, "steps": 8}]
+    for regular, over, theirs in (
+        (None, "4.5 s (bent)", "MuJoCo RK4, 9 steps (dt 0.5 s), 7 ms"),
+        ("zero", "4 s (zero)", "MuJoCo RK4, 9 steps (dt 0.25 s), 8 ms"),  # the scene of the caption, where it is named
+    ):
+        ran = section("speed", rows=rows, what_should_i_use=renamed(lines, unit))
+        ran.result.curves["regular"] = regular
+        found = [answer for *_, answer in answers([ran], ARM)]
+        assert found[-1].startswith(f"What should I use? For 1e-06 {unit} over {over}: {theirs}, or rk4, 2 ms; more")
 
 
 def test_where_no_question_is_of_an_assignment_there_is_no_column_for_its_parts():

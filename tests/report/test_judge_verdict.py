@@ -3,7 +3,7 @@
 import pytest
 from sections import BAD, GOOD, section
 
-from compare.experiment import say_outcome
+from compare.experiment import most_in_words, say_outcome
 from compare.report import verdict
 
 
@@ -33,12 +33,27 @@ def test_what_does_not_agree_is_named_and_nothing_else():
     assert verdict.verdict(sections, 10).startswith(
         "The two models do not agree in mass (3 of 10 experiments ran): 1 of 4 checks fail."
     )
+    sought = section("diagnosis", BAD)
+    assert verdict.verdict([*sections, sought], 10).startswith(
+        "The two models do not agree in mass (4 of 10 experiments ran): 2 of 5 checks fail."
+    )
+    assert verdict.verdict([sought], 10).startswith(
+        "The two models do not agree (1 of 10 experiments ran): 1 of 1 checks fail."
+    )
     broken = section("speed")
     broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no", rule="equal")
     assert verdict.verdict([section("mass", GOOD), broken], 10) == (
         "Not everything could be compared (2 of 10 experiments); the other 1 checks pass. "
         "Broken off: speed, ValueError: no."
     )
+
+
+@pytest.mark.parametrize("share, said", [
+    (1.0, "at most 100 % of tolerance"), (0.996, "at most 100 % of tolerance"), (0.104, "at most 10 % of tolerance"),
+    (0.0123, "at most 1.2 % of tolerance"), (0.00102, "at most 0.1 % of tolerance"), (0.00099, "below 0.1 % of tolerance"),
+])  # fmt: skip
+def test_the_share_of_a_tolerance_fits_its_column(share, said):
+    assert most_in_words(share) == said and len(said) <= 26
 
 
 class Lines(list):
@@ -51,7 +66,7 @@ class Lines(list):
 def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     said = Lines()
     say_outcome(said, section("mass", ("a", 0.25, 1.0, "at most", True), ("b", 0.5, 1.0, "at most", True)), 1.25, [])
-    assert said == ["mass          ok           2 checks  uses 0.5 of a tolerance      1.2 s"]
+    assert said == ["mass          ok           2 checks  at most 50 % of tolerance    1.2 s"]
     said.clear()
     say_outcome(
         said,

@@ -10,7 +10,8 @@ from compare.experiments import EXPERIMENTS
 from compare.judge.check import Result
 from compare.report import engines_apart, figures_overview, methods_compared, overview
 from compare.report.engines_apart import Agreement, SceneRun
-from compare.report.methods_compared import Curve, Limit
+from compare.report.methods_compared import Cheapest, Curve, Limit
+from compare.report.one_number import one_number
 from compare.report.style import BLUE, GREY, ORANGE, RED
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
@@ -86,7 +87,9 @@ def test_a_scene_at_a_glance():
         "TMT and MuJoCo move alike in all 1 scenes: at most 70 % of the rounding band apart, judged for 0.5 to 3 s."
     )
     left = found[0]._replace(left=(None, 4.7))
-    assert engines_apart.scenes_in_words([left], "TMT").endswith("In a the posture is left by MuJoCo alone, at 4.7 s.")
+    assert engines_apart.scenes_in_words([left], "TMT").endswith(
+        "In a the posture is left by MuJoCo alone within its 5 s, at 4.7 s."
+    )
     assert "is left" not in engines_apart.scenes_in_words([left._replace(left=(4.6, 4.7))], "TMT")
 
 
@@ -104,15 +107,26 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats():
     result = Result("speed", rows=rows, curves={"regular": "s", "unit": "rad"})
     found = methods_compared.best_curves(result)
     assert found == [
-        Curve("tmt", [1e-3, 1e-6, 1e-9], [1.0, 4.0, 5.0], ("dopri8", 4.0)),
+        Curve("tmt", [1e-3, 1e-6, 1e-9], [1.0, 4.0, 5.0], Cheapest("dopri8", 4.0)),
         Curve("mujoco", [1.1e-6], [10.0], None),
     ]
-    assert methods_compared.times_in_words(result).endswith("To 1e-06 rad: tmt dopri8 in 4 ms.")
+    assert methods_compared.times_in_words(result).endswith("To 1e-06 rad (s): tmt dopri8, 4 ms.")
     rows.append(timed("mujoco", "RK4", 3e-3, 1e-6))
-    assert "MuJoCo RK4 in 3 ms; tmt dopri8 takes 1.3 times as long" in methods_compared.times_in_words(result)
+    assert methods_compared.times_in_words(result).endswith("(s): MuJoCo RK4, 3 ms; tmt dopri8, 4 ms.")
     assert methods_compared.times_in_words(Result("speed", rows=rows[:2], curves={"regular": "s"})).endswith(
         "None reaches 1e-06 rad."
     )
+
+
+def test_the_cheapest_settings_have_their_scene_and_their_steps():
+    rows = [
+        timed("scipy", "DOP853", 5e-4, 1e-7), timed("mujoco", "RK4", 0.039, 1e-6, dt_s=0.00244140625, steps=2048.0),
+        timed("tmt", "dopri8_adaptive", 9.3e-5, 1e-6, dt_s=None, steps=80, tolerance=1e-9),
+    ]  # fmt: skip
+    result = Result("speed", rows=rows, curves={"regular": "s", "unit": "m"})
+    said = "o 1e-06 m (s): tmt dopri8_adaptive, tolerance 1e-09, 0.093 ms; MuJoCo RK4, 2048 steps (dt 0.0024 s), 39 ms"
+    assert methods_compared.times_in_words(result) == f"The cheapest settings of each engine. T{said}."
+    assert one_number(Section("speed", "", "", "", result)) == f"t{said}"
 
 
 def limits(*observed):

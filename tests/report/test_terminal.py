@@ -29,7 +29,7 @@ def test_mass(runs, columns, term):
     assert run.status == 0, run.output
     text = words(readable_lines(run))
     assert re.match(
-        FIRST + r" mass ok \d+ checks uses .* of a tolerance .* s The two models agree in mass \(1 of 11 experiments\)",
+        FIRST + r" mass ok \d+ checks .* % of tolerance .* s The two models agree in mass \(1 of 11 experiments\)",
         text,
     )
     assert f"Report: arm({columns}, '{term}')/index.html (" in text and text.endswith(" s)")

@@ -55,11 +55,17 @@ CALM = run("implicitfast", 1e-12, True)
      "Not stable at its own 2 ms under implicitfast at p (limit 1 ms, joint7, at p)."),
     (limits(own=("p", 0.1, "q", "saddle"), euler=("p", 0.1)), [],
      "Stable at its own 2 ms under implicitfast at p (limit 0.1 s, joint7). At the others that cannot be said: q: a saddle, "
-     "which is left by itself."),
+     "which the robot leaves by itself whatever the step, as what stands upright falls."),
+    (limits(own=("p", "saddle"), euler=(), file="Euler"), [],
+     "Whether its own 2 ms under Euler is stable cannot be said: p: a saddle, which the robot leaves by itself whatever the "
+     "step, as what stands upright falls; no posture that rests stably was found or given (a keyframe of one would be looked "
+     "at)."),
+    (limits(own=("p", "drifts"), euler=()), [], "cannot be said: p: nothing holds or brakes a movement."),
     (limits(own=("p", "drifts", "q", "not_at_rest"), euler=()), [],
      "Whether its own 2 ms under implicitfast is stable cannot be said: p: nothing holds or brakes a movement; q: it does "
-     "not rest."),
-    (limits(own=("p", "not_at_rest"), euler=(), base="free"), [], "cannot be said: p: without gravity it does not rest."),
+     "not rest; no posture that rests stably was found or given (a keyframe of one would be looked at)."),
+    (limits(own=("p", "not_at_rest"), euler=(), base="free"), [],
+     "cannot be said: p: without gravity it does not rest; no posture that rests"),
 ])  # fmt: skip
 def test_what_is_said_first(rows, full, said):
     if not any(row["integrator"] == "Euler" for row in rows):

@@ -59,7 +59,8 @@ def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = Tr
         text = f"No actuator feeds back: there is no servo that its own {in_seconds(dt)} could make unstable"
         return f"{text} ({kinds})." if kinds else f"{text}."
     if not own:
-        return f"Whether its own {in_seconds(dt)} under {integrator} is stable cannot be said: {kinds_in_words(rows)}."
+        whether = f"Whether its own {in_seconds(dt)} under {integrator} is stable cannot be said"
+        return f"{whether}: {kinds_in_words(rows)}{no_rest_in_words(rows)}."
     words = own_in_words(rows, own, full)
     return words if integrator == DEFAULT_INTEGRATOR else f"{words} {default_in_words(rows, own, full)}"
 
@@ -149,7 +150,7 @@ def least_speed(full: Sequence[dict], posture: str) -> float:
 
 
 WITHOUT_LIMIT = {
-    "saddle": "a saddle, which is left by itself",
+    "saddle": "a saddle, which the robot leaves by itself whatever the step, as what stands upright falls",
     "drifts": "nothing holds or brakes a movement",
     "not_at_rest": "it does not rest",
 }
@@ -164,3 +165,10 @@ def kinds_in_words(rows: Sequence[dict]) -> str:
         where = some_of(list(dict.fromkeys(row["posture"] for row in of)))
         texts += [f"{where}: {'without gravity ' * weightless}{why}"] * bool(of)
     return "; ".join(texts)
+
+
+def no_rest_in_words(rows: Sequence[dict]) -> str:
+    """What would be looked at, where no posture has a limit and some do not rest stably; '' where all drift."""
+    if all(row["limit"] == "drifts" for row in rows if row["base"] != "locked"):
+        return ""
+    return "; no posture that rests stably was found or given (a keyframe of one would be looked at)"
