@@ -117,9 +117,9 @@ def runs_on_terminals(plain, umlauts):
         ("heavy", *at): partial(on_terminal, [*heavy, f"heavy{at}"], *at, plain) for at in [(80, "xterm"), (40, "dumb")]
     }
     calls |= {
-        "ascii, head": partial(in_shell, "PYTHONIOENCODING=ascii compare mass --quick --mjcf Käfer.xml --out Öl | head -1;"
+        "ascii, head": partial(in_shell, "PYTHONIOENCODING=ascii compare published --quick --mjcf Käfer.xml --out Öl | head -1;"
                                "exit ${PIPESTATUS[0]}", umlauts),
-        "C": partial(in_shell, f"{old} compare mass --quick --mjcf Käfer.xml --out 'Öl im C'", umlauts),
+        "C": partial(in_shell, f"{old} compare published --quick --mjcf Käfer.xml --out 'Öl im C'", umlauts),
         "bytes, full": partial(in_shell, f"{old} compare mass --quick --mjcf $'\\xff.xml' --out $'\\xfe'"
                                " >/dev/full 2>&1", umlauts),
         "closed": partial(in_shell, "compare mass --quick --mjcf heavy.xml --out closed <&- >&- 2>&-", plain),
