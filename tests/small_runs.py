@@ -136,6 +136,7 @@ def jobs(folder) -> list[tuple]:
     from test_speed_growth import by_command
     from test_speed_run import with_and_without
     from test_stability_small import SPARE, lacking
+    from test_trajectory_other_models import MODELS, said_of
 
     return [
         (of_arm, "reduction"),
@@ -146,6 +147,7 @@ def jobs(folder) -> list[tuple]:
         (on_the_moon, "stability"),
         *((lacking, name) for name in SPARE),
         *((failing_in, name) for name in IN_THE_MJCF),
+        *((said_of, name) for name in MODELS),
         *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
         (runs_on_terminals, *terminal_folders(folder)),
         (report_of_arm,),
