@@ -117,9 +117,9 @@ def runs_on_terminals(plain, umlauts):
         ("heavy", *at): partial(on_terminal, [*heavy, f"heavy{at}"], *at, plain) for at in [(80, "xterm"), (40, "dumb")]
     }
     calls |= {
-        "ascii, head": partial(in_shell, "PYTHONIOENCODING=ascii compare mass --quick --mjcf Käfer.xml --out Öl | head -1;"
+        "ascii, head": partial(in_shell, "PYTHONIOENCODING=ascii compare published --quick --mjcf Käfer.xml --out Öl | head -1;"
                                "exit ${PIPESTATUS[0]}", umlauts),
-        "C": partial(in_shell, f"{old} compare mass --quick --mjcf Käfer.xml --out 'Öl im C'", umlauts),
+        "C": partial(in_shell, f"{old} compare published --quick --mjcf Käfer.xml --out 'Öl im C'", umlauts),
         "bytes, full": partial(in_shell, f"{old} compare mass --quick --mjcf $'\\xff.xml' --out $'\\xfe'"
                                " >/dev/full 2>&1", umlauts),
         "closed": partial(in_shell, "compare mass --quick --mjcf heavy.xml --out closed <&- >&- 2>&-", plain),
@@ -133,17 +133,21 @@ def jobs(folder) -> list[tuple]:
     """All of these and some of test modules, which are collected by now, in the order in which the tests ask for them."""
     from test_reduction import leg
     from test_seeded_errors import IN_THE_MJCF, failing_in
+    from test_speed_growth import by_command
     from test_speed_run import with_and_without
     from test_stability_small import SPARE, lacking
+    from test_trajectory_other_models import MODELS, said_of
 
     return [
         (of_arm, "reduction"),
         (leg,),
+        (by_command, folder / "grown"),
         (with_and_without,),
         (of_arm, "stability"),
         (on_the_moon, "stability"),
         *((lacking, name) for name in SPARE),
         *((failing_in, name) for name in IN_THE_MJCF),
+        *((said_of, name) for name in MODELS),
         *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
         (runs_on_terminals, *terminal_folders(folder)),
         (report_of_arm,),

@@ -139,6 +139,10 @@ def test_several_cores_give_the_bits_of_one(form, rng, monkeypatch):
 def test_the_states_that_are_kept_are_those_of_all(name, form, rng):
     if form.endswith("lanes") and not METHODS[name].lanes:
         pytest.skip("it has no lanes")
+    if form == "straight_line_lanes" and name not in ("rk4", "implicit"):
+        pytest.skip(
+            "one text keeps the states for all methods; the lanes of each have the bits of one run: test_kernels"
+        )
     starts, tau = rng.uniform(-1, 1, (2, 35, 3))
     qd = np.zeros((35, 3))
     qd[3], qd[34] = 1e200, 2.0**51  # some diverge at once, or on the way

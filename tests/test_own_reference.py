@@ -33,8 +33,15 @@ def folder(tmp_path, monkeypatch):
     assert not list(tmp_path.rglob("__pycache__"))
 
 
-def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30):
-    """Experiments with equations of one's own, in this process: sections, lines, the setup."""
+class Idle:
+    """Workers that draw nothing."""
+
+    def submit(self, function, *arguments):
+        return SimpleNamespace(result=lambda: ([], []))
+
+
+def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, draws=False):
+    """Experiments with equations of one's own, in this process: sections, lines, the setup; draws: their figures too."""
     reference, robot, mujoco, reading = compared_with(asked, str(mjcf), joints)
     setup = Setup(
         robot,
@@ -48,7 +55,7 @@ def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30):
     place = folder / f"out{len(list(folder.iterdir()))}"
     place.mkdir()
     lines = Lines()
-    sections, causes, _ = experiment.examine(names, setup, place, lines, Here())
+    sections, causes, _ = experiment.examine(names, setup, place, lines, Here() if draws else Idle())
     return SimpleNamespace(sections=sections, causes=causes, lines=lines, setup=setup, reference=reference)
 
 
@@ -65,7 +72,10 @@ def failed(run):
     ("mine.py:", "-hip,-knee"),  # the double pendulum is its own mirror image
 ])  # fmt: skip
 def test_right_equations_agree_in_whatever_form(folder, asked, joints):
-    run = examined(folder, asked, ["mass", "gravity", "acceleration"], joints=joints)
+    # captions are of equations with energy and without: they are the same in whatever form these stand
+    draws = asked in ("mine.py:Object", "mine.py:of_symbols")
+    run = examined(folder, asked, ["mass", "gravity", "acceleration"], joints=joints, draws=draws)
+    assert all(bool(section.figures) == draws for section in run.sections)
     assert not failed(run) and all(section.result.checks for section in run.sections)
     assert run.reference.lines == (f"reference: own; double.xml compared with {asked}",)
     assert (run.reference.kind, run.reference.name) == ("own", asked)
@@ -84,7 +94,7 @@ def test_right_equations_agree_in_whatever_form(folder, asked, joints):
 def test_so_does_a_tree_of_another_robot(folder, name):
     text = "from pathlib import Path\nfrom compare.engines.mujoco import read\n"
     (folder / "trees.py").write_text(f"{text}tree = read(Path({str(PATHS[name])!r})).tree\n")
-    run = examined(folder, "trees.py:tree", ["kinematics", "mass", "gravity", "acceleration"], PATHS[name])
+    run = examined(folder, "trees.py:tree", ["kinematics", "mass", "gravity", "acceleration"], PATHS[name], draws=True)
     assert not failed(run)
     assert {row["quantity"] for row in run.sections[0].result.rows} == {"x_b", "T_b", "B_b"}
 
@@ -106,7 +116,7 @@ def test_a_wrong_sign_is_seen_where_it_acts(folder):
 
 
 def test_trajectories_are_those_of_rk4(folder):
-    run = examined(folder, "mine.py:Object", ["trajectory"])
+    run = examined(folder, "mine.py:Object", ["trajectory"], draws=True)
     result = run.sections[0].result
     assert result.checks and not failed(run)
     assert {(row["engine_integrator"], row["level"]) for row in result.rows} == {
@@ -132,7 +142,7 @@ def test_slow_equations_get_fewer_states_and_that_is_said(folder):
     ("changes", ["mass"], "mass_matrix", "changes its argument q at q = ["),
 ])  # fmt: skip
 def test_what_is_wrong_at_some_states_is_a_failed_check_with_the_state(folder, name, experiments, quantity, says):
-    run = examined(folder, f"mine.py:{name}", experiments)
+    run = examined(folder, f"mine.py:{name}", experiments, draws=True)
     first = failed(run)[0]
     assert first.quantity == f"{quantity} gives what it should" and says in first.note
     assert (first.experiment, first.passed, first.value) == (experiments[-1], False, None)
@@ -144,7 +154,9 @@ def test_what_is_wrong_at_some_states_is_a_failed_check_with_the_state(folder, n
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("name, says", [("singular", "mass_matrix is singular"), ("infinite", "bias is not finite")])
 def test_equations_without_any_use_are_compared_to_the_end(folder, name, says):
-    run = examined(folder, f"mine.py:{name}", ["mass", "gravity", "acceleration", "trajectory", "diagnosis"])
+    run = examined(
+        folder, f"mine.py:{name}", ["mass", "gravity", "acceleration", "trajectory", "diagnosis"], draws=True
+    )
     assert any(says in check.note for check in failed(run))
     assert not any(check.quantity == "runs to its end" or check.quantity.startswith("figure") for check in failed(run))
 

@@ -46,7 +46,7 @@ def test_a_terminal_shows_how_far_and_how_long_still(runs):
         assert bool(SHOWN.search(plain)) == (term == "xterm"), plain
         assert all(len(part.rstrip()) <= columns for part in re.split(r"[\r\n]+", plain))
     piped = runs["C"].stdout
-    assert "about" not in piped and "1 of 1," not in piped and "mass " in piped
+    assert "about" not in piped and "1 of 1," not in piped and "published " in piped
 
 
 def on_screen(columns, how_far, text):
@@ -89,7 +89,7 @@ def test_a_model_that_fails(runs, columns, term):
     assert ("\x1b" in run.output) == (term == "xterm")
 
 
-@pytest.mark.parametrize("columns, term, at", [(40, "xterm", b"1 of 1, mass"), (80, "dumb", b"mass ")])
+@pytest.mark.parametrize("columns, term, at", [(40, "xterm", b"1 of 1, mass"), (80, "dumb", b"parameters ")])
 def test_ctrl_c(tmp_path, columns, term, at):
     arguments = ["all", "--quick"] if term == "dumb" else ["mass"]
     for _ in range(2):  # the machine may be busy

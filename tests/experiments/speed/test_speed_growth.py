@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import subprocess
+import sys
 from functools import partial
 
 import numpy as np
@@ -9,10 +11,10 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
 from models import PATHS
+from runs import ENVIRONMENT
 
 import tmt
 from compare import experiment
-from compare.__main__ import main
 from compare.engines.mujoco import load, read
 from compare.experiments.speed import figures_growth, growth, implementations
 from compare.experiments.speed.growth import Exponent, Extent, costs_of_growth, exponents, made_chains
@@ -316,14 +318,31 @@ def test_the_chain_grows_where_it_is_asked_for_and_a_little_in_a_whole_run_of_th
     assert not extents["short"].cold and extents["whole"].cold and extents["whole"].most == np.inf
 
 
-def test_it_can_be_asked_for_on_the_command_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(growth.EXTENTS, "short", Extent((1, 2), 1, most=0.0))
-    assert main(["speed", "--quick", "--growth", "--out", str(tmp_path)]) == 0, capsys.readouterr()
-    table = pd.read_csv(tmp_path / "tables" / "growth.csv")
+PROGRAM = """
+import sys
+from compare.__main__ import main
+from compare.experiments.speed.growth import EXTENTS, Extent
+EXTENTS["short"] = Extent((1, 2), 1, most=0.0)
+sys.exit(main(["speed", "--quick", "--growth", "--out", sys.argv[1]]))
+"""
+
+
+def by_command(folder) -> tuple:
+    """Of `speed --quick --growth` with short chains: the run, the table, the figure's bytes, report.md."""
+    run = subprocess.run([sys.executable, "-c", PROGRAM, folder], env=ENVIRONMENT, capture_output=True, text=True)
+    table, size = (
+        pd.read_csv(folder / "tables" / "growth.csv"),
+        (folder / "figures" / "speed_growth.png").stat().st_size,
+    )
+    return run, table, size, (folder / "report.md").read_text(encoding="utf-8")
+
+
+def test_it_can_be_asked_for_on_the_command_line(beside):
+    run, table, size, text = beside.result(by_command, beside.folder / "grown")
+    assert run.returncode == 0, run
     assert list(table.columns) == COLUMNS and set(table["n"]) == {1, 2}
     assert table[table["implementation"] == "straight_line"]["ns_per_state"].isna().all()
-    assert (tmp_path / "figures" / "speed_growth.png").stat().st_size > 5000
-    assert "straight-line code is not timed with 1, 2 joints" in (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert size > 5000 and "straight-line code is not timed with 1, 2 joints" in text
 
 
 def test_nothing_is_added_where_nothing_is_asked():
