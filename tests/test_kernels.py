@@ -2,9 +2,11 @@
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
+from cache_folder import new_folder as new_folder
 from trees import random_tree
 
 import tmt
@@ -103,3 +105,16 @@ def test_lanes_lie_in_the_widest_registers():
         (code,) = known[name].inspect_asm().values()
         fused = [line for line in code.splitlines() if line.strip().startswith(("vfmadd", "vfnmadd")) and "pd" in line]
         assert fused and all(register in line for line in fused), name
+
+
+def test_the_machine_code_of_a_tree_is_read_without_that_of_another(folder):
+    """It names no other generated module: numba takes functions of the same lines for one, and would keep its name."""
+    for beta in (0.2, 0.3):
+        kernels._evaluator.__wrapped__(
+            tmt.ARM.lock({"alpha": 0.1, "beta": beta}), "mass_matrix_and_bias", composite.mass_matrix_and_bias, "sincos"
+        )
+    kept = list(folder.glob("__pycache__/kernel_*.nbc"))
+    assert len(kept) == 6
+    for path in kept:
+        named = {name.decode() for name in re.findall(rb"kernel_[0-9a-f]{16}", path.read_bytes())}
+        assert named == {path.name.partition(".")[0]}

@@ -6,6 +6,8 @@ the two and sets their signs by bits. Off by at most 2.2e-16 up to |x| = LIMIT. 
 an eighth of a radian apart, both are NaN, so that a caller can take the library's.
 """
 
+import math
+
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
@@ -91,3 +93,11 @@ def sincos(x):
     swap = (k & 1) != 0
     sine, cosine = (c if swap else s), (s if swap else c)
     return from_bits(bits(sine) ^ ((k & 2) << 62)), from_bits(bits(cosine) ^ (((k + 1) & 2) << 62))
+
+
+# here and not in the generated modules: numba takes functions of the same lines for one, and what calls it would be kept with the
+# name of the module in which it was first met, without which no other process can read it
+@njit(error_model="numpy")
+def library_sincos(x):
+    """(sin x, cos x) by the library, for any x in rad."""
+    return math.sin(x), math.cos(x)

@@ -13,13 +13,8 @@ from math import atan as arctan, sqrt
 import numpy as np
 from numba import carray, njit
 
-from tmt.sine import LIMIT, block, fma, sincos, widest
+from tmt.sine import LIMIT, block, fma, library_sincos, sincos, widest
 from tmt.written import written
-
-
-@njit(cache=CACHE, error_model="numpy")
-def library_sincos(x):
-    return math.sin(x), math.cos(x)
 
 '''
 
