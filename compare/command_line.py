@@ -184,7 +184,7 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
         (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
         raise SystemExit(0)
     if options.version:
-        from .report.provenance import OURS, own_version  # what is imported takes its time
+        from .version import OURS, own_version  # what is imported takes its time
 
         print(OURS, own_version())
         raise SystemExit(0)

@@ -7,11 +7,11 @@ import sys
 import pytest
 from runs import ENVIRONMENT, compare
 
+from compare import version
 from compare.__main__ import main
 from compare.command_line import OPTIONS_OF_ALL
 from compare.engines.mujoco.flags import integrator_by_name
 from compare.experiments import EXPERIMENTS
-from compare.report import provenance
 
 
 def answered(arguments, capsys):
@@ -81,8 +81,8 @@ def test_help_has_examples_and_every_option(capsys):
 
 @pytest.mark.parametrize("arguments", [["--version"], ["all", "--version"]])
 def test_the_version_is_that_of_a_report(arguments, capsys):
-    assert answered(arguments, capsys) == (0, f"{provenance.OURS} {provenance.own_version()}\n", "")
-    assert re.fullmatch(r"\d+(\.\d+)+", provenance.own_version())
+    assert answered(arguments, capsys) == (0, f"{version.OURS} {version.own_version()}\n", "")
+    assert re.fullmatch(r"\d+(\.\d+)+", version.own_version())
     assert "--version" in answered(["--help"], capsys)[1]
     assert answered(["mas", "--version"], capsys)[0] == 2
 

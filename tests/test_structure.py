@@ -46,7 +46,7 @@ DIRECTIONS = {
     "truth": {"tmt", "case", "actuators"},
     "judge": {"tmt", "case"},
     "process": set(),
-    "report": {"judge", "process"},
+    "report": {"version", "judge", "process"},
     "setup": {"tmt", "case", "states", "robots", "engines"},
     "experiments": {
         "diagnosis",
@@ -63,7 +63,7 @@ DIRECTIONS = {
     },
     "drawing": {"robots", "judge", "process", "report", "experiments"},
     "experiment": {"drawing", "robots", "setup", "judge", "process", "report", "experiments"},
-    "command_line": {"experiments", "process"},
+    "command_line": {"version", "experiments", "process"},
     "__main__": {
         "case",
         "command_line",

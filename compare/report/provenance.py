@@ -4,16 +4,14 @@ import hashlib
 import os
 import platform
 import subprocess
-import tomllib
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from ..judge.timing import vectors
 from ..process.clock import Clock
 from ..process.streams import readable
+from ..version import OURS, installed, own_version
 
-OURS = "arm-tmt-mujoco"
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich", "heyoka")
 
 
@@ -44,28 +42,6 @@ def durations(clock: Clock) -> dict:
         "seconds_of": {task: round(clock.seconds_of(task), 2) for task in clock.ended if clock.seconds_of(task)},
         "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
     }
-
-
-def own_version() -> str | None:
-    """The version of the program that runs."""
-    return of_checkout(Path(__file__).resolve().parents[2]) or installed(OURS)
-
-
-def of_checkout(root: Path) -> str | None:
-    """The version that a checkout states, which another one that is installed does not hide; None: it is none of this project."""
-    try:
-        project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-        return str(project["version"]) if project["name"] == OURS else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-
-
-def installed(package: str) -> str | None:
-    """The version of an installed package; None where it is not."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def commit() -> str | None:

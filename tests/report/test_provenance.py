@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from compare.process.clock import Clock
-from compare.report.provenance import OURS, durations, installed, of_checkout, provenance
+from compare.report.provenance import durations, provenance
 from compare.report.tables import origins
 from compare.robots.arm import ARM
+from compare.version import OURS, installed, of_checkout
 
 ROOT = Path(__file__).resolve().parents[2]
 
