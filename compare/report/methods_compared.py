@@ -51,7 +51,7 @@ def best_curves(result: Result, scene: str | None = None) -> list[Curve]:
                     engine,
                     [float(units.value(row, "worst_error")) for row in front],
                     [1e3 * row["seconds"] for row in front],
-                    Cheapest(cheap["method"], 1e3 * cheap["seconds"], setting_in_words(cheap)) if cheap else None,
+                    Cheapest(cheap["method"], 1e3 * cheap["seconds"], steps_or_tolerance(cheap)) if cheap else None,
                 )
             )
     return found
@@ -62,7 +62,7 @@ def engine_in_print(engine: str) -> str:
     return {"mujoco": "MuJoCo", "scipy": "SciPy"}.get(engine, engine)
 
 
-def setting_in_words(row: dict) -> str:
+def steps_or_tolerance(row: dict) -> str:
     """The steps and the dt of a run, or the tolerance with which it chose its steps."""
     if row.get("dt_s"):
         return steps_in_words(f"{row['steps']:.0f} steps", row["dt_s"])
