@@ -33,6 +33,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status. SystemExit where nothing is to be run: see command_line.request."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options = request(arguments)
+    if options.version:
+        from .version import OURS, own_version  # what is imported takes its time
+
+        with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
+            print(OURS, own_version(), flush=True)
+        return 0
     command = shlex.join(["python", "-m", "compare", *arguments])
     try:
         return carry_out(options, command)

@@ -183,12 +183,8 @@ def request(arguments: Sequence[str]) -> argparse.Namespace:
     if options.help:
         (whole if options.experiment in (None, "all") else parser(options.experiment)).print_help()
         raise SystemExit(0)
-    if options.version:
-        from .version import OURS, own_version  # what is imported takes its time
-
-        print(OURS, own_version())
-        raise SystemExit(0)
-    refuse_what_does_not_go_together(whole, options)
+    if not options.version:
+        refuse_what_does_not_go_together(whole, options)
     return options
 
 

@@ -184,7 +184,7 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
         terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
 
 
-def largest_in_words(share: float) -> str:
+def largest_share_in_words(share: float) -> str:
     """The largest share of a tolerance that is used, in at most 26 characters."""
     percent = 100.0 * share
     if percent < 0.1:
@@ -200,7 +200,7 @@ def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Se
     checks = section.result.checks
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
-    most = largest_in_words(max(used)) if any(used) and not failed else ""
+    most = largest_share_in_words(max(used)) if any(used) and not failed else ""
     word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")

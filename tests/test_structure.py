@@ -63,8 +63,9 @@ DIRECTIONS = {
     },
     "drawing": {"robots", "judge", "process", "report", "experiments"},
     "experiment": {"drawing", "robots", "setup", "judge", "process", "report", "experiments"},
-    "command_line": {"version", "experiments", "process"},
+    "command_line": {"experiments", "process"},
     "__main__": {
+        "version",
         "case",
         "command_line",
         "drawing",

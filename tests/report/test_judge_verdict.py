@@ -3,7 +3,7 @@
 import pytest
 from sections import BAD, GOOD, section
 
-from compare.experiment import largest_in_words, say_outcome
+from compare.experiment import largest_share_in_words, say_outcome
 from compare.report import verdict
 
 
@@ -53,7 +53,7 @@ def test_what_does_not_agree_is_named_and_nothing_else():
     (0.0123, "at most 1.2 % of tolerance"), (0.00102, "at most 0.1 % of tolerance"), (0.00099, "below 0.1 % of tolerance"),
 ])  # fmt: skip
 def test_the_share_of_a_tolerance_fits_its_column(share, said):
-    assert largest_in_words(share) == said and len(said) <= 26
+    assert largest_share_in_words(share) == said and len(said) <= 26
 
 
 class Lines(list):
