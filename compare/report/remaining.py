@@ -15,12 +15,12 @@ from ..process.clock import Clock
 START, END = "start", "figures"  # what comes before the first experiment and after the last
 # s by a watch from the start until each ends, of the assignment's arm on two cores: where an estimate begins, no more
 AFTER_FULL = {
-    START: 5.0, "parameters": 5.5, "published": 6.0, "kinematics": 7.0, "mass": 8.0, "gravity": 9.0, "acceleration": 10.0,
-    "trajectory": 22.0, "diagnosis": 22.0, "stability": 30.0, "speed": 70.0, "reduction": 76.0, END: 80.0,
+    START: 2.0, "parameters": 2.5, "published": 2.6, "kinematics": 6.8, "mass": 7.3, "gravity": 8.9, "acceleration": 10.4,
+    "trajectory": 14.7, "diagnosis": 14.7, "stability": 38.2, "speed": 61.7, "reduction": 63.0, END: 65.4,
 }  # fmt: skip
 AFTER_QUICK = {
-    START: 2.0, "parameters": 2.2, "published": 2.4, "kinematics": 2.7, "mass": 3.0, "gravity": 3.3, "acceleration": 3.6,
-    "trajectory": 5.0, "diagnosis": 5.0, "stability": 6.0, "speed": 8.0, "reduction": 9.0, END: 10.0,
+    START: 1.9, "parameters": 2.0, "published": 2.0, "kinematics": 2.9, "mass": 3.0, "gravity": 3.2, "acceleration": 3.5,
+    "trajectory": 4.3, "diagnosis": 4.3, "stability": 5.6, "speed": 8.2, "reduction": 9.2, END: 9.8,
 }  # fmt: skip
 TRUST = 0.1  # of the whole: what is planned weighs as much as so much of it that has been seen
 WITHOUT_EFFECT = ("--out",)  # options that change nothing of what is computed
