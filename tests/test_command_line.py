@@ -327,7 +327,7 @@ def test_what_is_timed_comes_last_and_is_drawn_when_nothing_is_timed_any_more(tm
     for name in names:
         module = SimpleNamespace(**asked(name), rows=partial(rows, name), figures=partial(figures, name))
         monkeypatch.setitem(sys.modules, f"compare.experiments.{name}", module)
-    setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, faults=False)
+    setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, faults=False, is_quick=False, alone=True)
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Here(log))
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
