@@ -330,7 +330,7 @@ def test_what_is_timed_comes_last_and_is_drawn_when_nothing_is_timed_any_more(tm
     setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, faults=False, is_quick=False, alone=True)
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Here(log))
     assert log == [
-        ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
+        ("rows", "mass"), ("figures", "mass", None), ("rows", "stability"), ("figures", "stability", None), ("rows", "speed"),
         ("rows", "reduction"), *[("figures", name, part) for name in ("speed", "reduction") for part in drawing.HALVES],
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})  # as they are asked for

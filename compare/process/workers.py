@@ -97,9 +97,10 @@ def deaf() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # its start would end the blocking
     before = signal.pthread_sigmask(signal.SIG_BLOCK, interrupt.NUMBERS)
     try:
+        resource_tracker.ensure_running()  # a process too, whose start ends the blocking
+        signal.pthread_sigmask(signal.SIG_BLOCK, interrupt.NUMBERS)
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
