@@ -84,7 +84,7 @@ def without_others(whole: dict[str, float], names: Sequence[str]) -> dict[str, f
     for name, ended in sorted(whole.items(), key=lambda item: item[1]):
         if name in (START, *names, END):
             at += ended - before
-            taken[name] = at
+            taken[name] = round(at, 2)
         before = ended
     return taken
 

@@ -38,8 +38,8 @@ largest difference, its band of rounding, until when it is judged), motion.csv
 (each scene at equal times, by both engines).
 
 Figures: trajectory_SCENE for every scene, trajectory_drift (energy and
-momentum), trajectory_growth (how differences grow); of the assignment's arm
-also assignment_figure_2 and assignment_figure_3.
+momentum), trajectory_growth (how differences grow), motion (both engines, a
+GIF); of the assignment's arm also assignment_figure_2 and assignment_figure_3.
 
 Tolerance: a band that is computed along the run: the rounding that every step
 can add, carried to the present by the exact Jacobians of the method's own
