@@ -11,7 +11,8 @@ from compare.engines import Method, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import engine, read
 from compare.engines.scipy import Scipy
-from compare.experiments.speed import accuracy, advice, evaluations, floors, row_of_run, settings, tumbling
+from compare.experiments.speed import accuracy, advice, evaluations, floors, settings, tumbling
+from compare.experiments.speed.runs import row_of_run
 from compare.judge.check import Result
 from compare.judge.rounding import growth
 from compare.judge.units import renamed, said, value
@@ -274,12 +275,11 @@ def test_an_order_of_a_file_is_asked_where_it_has_settled(change, asked):
 
 
 def test_errors_below_what_is_known_have_its_size(gripper):
-    from compare.experiments import speed
 
     robot, known, case = gripper
     truth = reference.in_doubles(case)._replace(why="too stiff")
     setting = settings.halvings(known["tmt"].methods["dopri8"], case)[1]
-    row = speed.row_of_run(case, case, known, known["tmt"].methods["dopri8"], setting, truth, 1e-11)
+    row = row_of_run(case, case, known, known["tmt"].methods["dopri8"], setting, truth, 1e-11)
     assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]
     assert Setup.small(robot, known).robot is robot
 

@@ -12,7 +12,7 @@ from compare import experiment
 from compare.engines import Method, Setting
 from compare.engines.mujoco import load, read
 from compare.experiments import speed
-from compare.experiments.speed import accuracy, settings
+from compare.experiments.speed import accuracy, runs, settings
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from tmt.methods import METHODS
@@ -23,7 +23,7 @@ def test_every_method_follows_the_scene(engines, bent, known_reference):
     for method in settings.methods(engines, "full"):
         steps = None if method.adaptive else 2**14 if method.order == 1 else 1024
         setting = Setting(5.0, steps, 1e-7 if method.adaptive else None)
-        row = speed.row_of_run(bent, bent, engines, method, setting, known_reference)
+        row = runs.row_of_run(bent, bent, engines, method, setting, known_reference)
         tolerance = {1: 0.3, 2: 0.03}.get(method.order, 1e-4)
         assert 0.0 < row["worst_error_rad"] < tolerance, method
         assert row["error_rad"] <= row["worst_error_rad"] and not row["diverged"]
@@ -35,7 +35,7 @@ def test_every_method_follows_the_scene(engines, bent, known_reference):
 
 
 def test_a_run_that_diverges_has_no_error(engines, bent, known_reference):
-    row = speed.row_of_run(
+    row = runs.row_of_run(
         bent, bent, engines, engines["tmt"].methods["explicit_euler"], Setting(5.0, 64), known_reference
     )
     assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
@@ -43,11 +43,11 @@ def test_a_run_that_diverges_has_no_error(engines, bent, known_reference):
 
 def test_the_smaller_model_has_the_error_of_the_whole_one(engines, known_reference):
     zero = next(case for case in ARM.cases if case.name == "zero, free")
-    known = speed.references([zero])["zero, free"]
-    smaller = speed.reduced(zero)
+    known = runs.references([zero])["zero, free"]
+    smaller = runs.reduced(zero)
     assert smaller.locked == {"beta": 0.0}
     method, setting = engines["tmt"].methods["rk4"], Setting(5.0, 1024)
-    whole, small = (speed.row_of_run(case, zero, engines, method, setting, known) for case in (zero, smaller))
+    whole, small = (runs.row_of_run(case, zero, engines, method, setting, known) for case in (zero, smaller))
     assert small["worst_error_rad"] == pytest.approx(whole["worst_error_rad"], rel=1e-3)
     assert small["energy_error_J"] == pytest.approx(whole["energy_error_J"], rel=1e-3)
     assert (whole["whole"], small["whole"], small["scene"]) == (None, "zero, free", "zero, free, beta locked")
@@ -55,7 +55,7 @@ def test_the_smaller_model_has_the_error_of_the_whole_one(engines, known_referen
 
 def test_rounding_leaves_eps_times_the_growth(bent, engines):
     def floor(case):
-        return speed.floor(case, engines["tmt"].of(case))
+        return runs.floor(case, engines["tmt"].of(case))
 
     slow = bent.changed(posture=(), gravity=False, duration=1.0, dt=1 / 64)
     assert 1.0 <= floor(slow) / np.finfo(float).eps < 3.0  # nothing grows, at rest
@@ -66,9 +66,9 @@ def test_rounding_leaves_eps_times_the_growth(bent, engines):
 
 
 def test_where_the_reference_is_not_known_nothing_is_judged(engines, bent, known_reference):
-    for apart, left in ((1e-30, speed.floor(bent, engines["tmt"].of(bent))), (1e-6, 1e-6)):
+    for apart, left in ((1e-30, runs.floor(bent, engines["tmt"].of(bent))), (1e-6, 1e-6)):
         known = {"bent, free": known_reference._replace(apart=apart)}
-        assert speed.rows_of_scene(bent, engines, known, "small", "same schemes")[1] == left
+        assert runs.rows_of_scene(bent, engines, known, "small", "same schemes")[1] == left
 
 
 def test_a_small_run_takes_every_path(engines, small):

@@ -7,7 +7,7 @@ EDITS = (
     Edit("timing", "in_turns", "time.perf_counter() - begin", "7 * (time.perf_counter() - begin)", "seconds x 7"),
     Edit("speed.times", "fill_in", "min(of_row)", "7 * min(of_row)", "reported seconds x 7", nth=1),
     Edit("speed.times", "fill_in", "min(of_row)", "max(of_row)", "the slowest run is reported", nth=1),
-    Edit("speed", "rows_of_scene", "max(_1, reference.apart)", "_1",
+    Edit("speed.runs", "rows_of_scene", "max(_1, reference.apart)", "_1",
          "a reference of few digits is taken as exact"),
     Edit("evaluations", "per_state", "1e9 * min(taken) / count", "1e9 * min(taken)", "time of all states as that of one"),
     Edit("speed.operations", "fma", "2", "1", "a fused multiply-add is one operation"),
