@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import sympy
 from models import PATHS
+from own_states import COORDINATES, NAMES, as_lists, asked, single, states, values
 from sympy.physics.mechanics import dynamicsymbols
 
 import tmt
@@ -23,38 +24,7 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 
 ROOT = Path(__file__).resolve().parents[2]
-COORDINATES = ARM.coordinates
 TWO = Coordinates(("hip", "knee"))
-NAMES = {"gravity": "gravity_balance"}
-
-
-def single(function):
-    """The function of one state alone: as a user writes it."""
-
-    def of_one(*state):
-        assert all(part.ndim == 1 for part in state)
-        return function(*state)
-
-    return of_one
-
-
-def as_lists(function):
-    """The same with lists and plain numbers for arrays."""
-    return single(lambda *state: np.array(function(*state)).tolist())
-
-
-def states(rng, count=6, n=3):
-    return rng.uniform(-2.0, 2.0, (3, count, n))
-
-
-def asked(own, name, state):
-    return getattr(own, NAMES.get(name, name))(*state[: ARGUMENTS[name]])
-
-
-def values(own, state):
-    """Every quantity at states."""
-    found = {name: asked(own, name, state) for name in ARGUMENTS if name != "jacobians"}
-    return found | dict(zip("TB", own.jacobians(state[0])))
 
 
 @pytest.mark.parametrize("make", [
@@ -265,135 +235,6 @@ def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_nu
     assert motion.ended[0] is None and motion.ended[1].endswith("s: a number is not finite")
     assert np.isfinite(motion.q[0]).all() and np.isnan(motion.q[1, -1]).all() and np.isfinite(motion.q[1, 0]).all()
     assert own.equations.problems == []
-
-
-# equations that cannot be used
-
-
-class Called:
-    def mass_matrix(self, q): ...
-
-    bias = None
-
-
-@pytest.mark.parametrize("value, said", [
-    (lambda q: np.eye(2), r"mass_matrix has shape \(2, 2\); \(3, 3\) is expected, at q = \["),
-    (lambda q: 1.0, r"has shape \(\); \(3, 3\) is expected"), (lambda q: np.eye(3)[None], r"has shape \(1, 3, 3\)"),
-    (lambda q: None, r"is None; real numbers of shape \(3, 3\) are expected"), (lambda q: "M", "is 'M'; real numbers"),
-    (lambda q: [[1, 2], [3]], "real numbers of shape"), (lambda q: np.eye(3) * 1j, "is complex"),
-    (lambda q: np.eye(3) > 0, "real numbers of shape"), (lambda q: q[7], "raised IndexError: .* at q = "),
-    (lambda: 0, "raised TypeError"), (lambda q: sys.exit(3), "raised SystemExit: 3"),
-    (lambda q: np.linalg.inv(np.zeros((3, 3))), r"raised LinAlgError: Singular matrix \(test_own.py, line \d+\)"),
-    (4.0, r"mass_matrix is 4.0; a function mass_matrix\(q\) is expected"),
-])  # fmt: skip
-def test_what_cannot_be_used_is_one_line(value, said, rng):
-    with pytest.raises(OwnError, match=f"mass_matrix {said}|{said}") as error:
-        OwnEquations({"mass_matrix": value, "bias": tmt.bias}, COORDINATES).mass_matrix(states(rng)[0])
-    assert "\n" not in str(error.value) and str(error.value).startswith("mass_matrix ")
-
-
-@pytest.mark.parametrize("source, said", [
-    (np, "numpy has no mass_matrix; mass_matrix(q) and bias(q, qd) are expected"),
-    ({"mass_matrix": tmt.mass_matrix}, "the dict has no bias; mass_matrix(q) and bias(q, qd) are expected"),
-    (None, "the NoneType has no mass_matrix"), (Called, "the class Called has no bias"),
-    (dataclasses.replace(tmt.ARM.lock({"beta": 0.0})), "the Tree has 2 positions and 2 speeds (alpha, gamma); 3 and 3"),
-])  # fmt: skip
-def test_what_is_not_there_is_said(source, said):
-    with pytest.raises(OwnError) as error:
-        OwnEquations(source, COORDINATES)
-    assert str(error.value).startswith(said)
-
-
-def test_of_a_class_an_object_is_expected(rng):
-    with pytest.raises(OwnError, match=r"of the class Called an object such as Called\(\) is expected"):
-        OwnEquations(Called, COORDINATES, required=("mass_matrix",)).mass_matrix(states(rng)[0])
-
-
-def test_bodies_are_those_of_the_first_state(rng):
-    own = OwnEquations({"com_positions": lambda q: np.zeros((2, 2))}, COORDINATES, required=())
-    with pytest.raises(OwnError, match=r"has shape \(2, 2\); \(bodies, 3\) is expected"):
-        own.com_positions(states(rng)[0])
-
-
-# equations that can be used, with something wrong
-
-
-def problems(mass_matrix, q):
-    own = OwnEquations({"mass_matrix": mass_matrix}, COORDINATES, required=())
-    return own.mass_matrix(q), own.problems
-
-
-@pytest.mark.parametrize("way", [single, lambda f: f])
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_values_that_are_not_finite(value, way, rng):
-    q = states(rng)[0]
-
-    def mass_matrix(q):
-        return np.where(q[..., 0, None, None] > 1.0, value, tmt.mass_matrix(q))
-
-    q[:, 0] = [0.0, 0.5, 1.5, 0.0, 2.0, 0.0]
-    M, (problem,) = problems(way(mass_matrix), q)
-    assert not np.isfinite(M[[2, 4]]).any() and np.isfinite(M[[0, 1, 3, 5]]).all()
-    assert problem.quantity == "mass_matrix" and problem.state.startswith("q = [1.5, ")
-    assert problem.text == f"mass_matrix is not finite at {problem.state}, and at 1 more state"
-
-
-def test_one_that_raises_later(rng):
-    q = states(rng)[0]
-    q[:, 0] = [0.0, 0.5, 1.5, 0.0, 2.0, 0.0]
-
-    def mass_matrix(q):
-        if q[0] > 1.0:
-            raise ValueError("too\nfar")
-        return tmt.mass_matrix(q)
-
-    M, (problem,) = problems(mass_matrix, q)
-    assert np.isnan(M[[2, 4]]).all() and np.isfinite(M[[0, 1, 3, 5]]).all()
-    assert "raised ValueError: too far (test_own.py, line " in problem.text and "\n" not in problem.text
-    assert problem.text.endswith("and at 1 more state")
-
-
-@pytest.mark.parametrize("way", [single, lambda f: f])
-def test_one_that_changes_its_argument_is_handed_copies(way, rng):
-    q = states(rng)[0]
-    before = q.copy()
-
-    def bias(q, v):
-        h = tmt.bias(q, v)
-        v *= 2.0
-        return h
-
-    own = OwnEquations({"bias": way(bias)}, COORDINATES, required=())
-    assert np.array_equal(own.bias(q, q), tmt.bias(before, before)) and np.array_equal(q, before)
-    assert [problem.text.split(" at ")[0] for problem in own.problems] == ["bias changes its argument qd"]
-    assert own.problems[0].state.startswith("q = [") and ", qd = [" in own.problems[0].state
-
-
-@pytest.mark.parametrize("skew, found", [(0.9e-9, 0), (1.1e-9, 1)])
-def test_a_mass_matrix_that_is_not_symmetric(skew, found, rng):
-    def mass_matrix(q):
-        M = tmt.mass_matrix(q)
-        M[..., 0, 1] += skew * np.abs(M).max(axis=(-1, -2))
-        return M
-
-    said = problems(mass_matrix, states(rng)[0])[1]
-    assert len(said) == found
-    assert all("is not symmetric at q = [" in problem.text and "5 more states" in problem.text for problem in said)
-
-
-def test_a_singular_mass_matrix_has_no_acceleration(rng):
-    q, v, tau = states(rng)
-    own = OwnEquations({"mass_matrix": lambda q: np.zeros((3, 3)), "bias": tmt.bias}, COORDINATES)
-    assert np.isnan(own.acceleration(q, v, tau)).all()
-    assert own.problems[0].text.startswith("mass_matrix is singular at q = [")
-
-
-def test_one_that_prints_is_left_alone(capsys, rng):
-    def mass_matrix(q):
-        print("here")
-        return tmt.mass_matrix(q)
-
-    assert problems(mass_matrix, states(rng)[0])[1] == [] and "here" in capsys.readouterr().out
 
 
 # time
