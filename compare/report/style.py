@@ -60,7 +60,7 @@ def zero_at_the_end(axis: Axis, end: float, far: float, most: int) -> None:
     first, last = round(np.log10(end)), int(np.ceil(np.log10(far)))
     powers = range(first, last + 1, max(1, -(-(last - first) // (most - 1))))
     axis.set_ticks([10.0**power for power in powers], ["0", *(f"$10^{{{power}}}$" for power in powers[1:])])
-    axis.minorticks_off()
+    axis.set_ticks([], minor=True)
 
 
 # labels beside what they name
