@@ -1,7 +1,7 @@
 """python -m compare: compare the two models and write a report."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from .process import interrupt, streams
 
@@ -17,6 +17,7 @@ import shlex
 import sys
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from .command_line import PROGRAM, request
@@ -26,12 +27,15 @@ from .process.streams import in_one_line
 
 COMPUTING = ("compare.experiment", "scipy.optimize", "tmt.kernels")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
+FLEET = "fleet"  # the word that is no experiment
 LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a word
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit status. SystemExit where nothing is to be run: see command_line.request."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments[:1] == [FLEET]:
+        return answered(partial(fleet, arguments[1:]))
     options = request(arguments)
     if options.version:
         from .version import OURS, own_version  # what is imported takes its time
@@ -39,9 +43,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
             print(OURS, own_version(), flush=True)
         return 0
-    command = shlex.join(["python", "-m", "compare", *arguments])
+    return answered(partial(carry_out, options, shlex.join(["python", "-m", "compare", *arguments])))
+
+
+def fleet(arguments: Sequence[str]) -> int:
+    """Carry out what is asked of many files; the exit status."""
+    from .fleet import command  # what is imported takes its time
+    from .fleet.piece import FleetError
+
     try:
-        return carry_out(options, command)
+        return command.fleet(arguments)
+    except FleetError as error:
+        raise Refused(error) from None
+
+
+def answered(act: Callable[[], int]) -> int:
+    """The exit status of what is carried out; 2 with a line where it cannot be."""
+    try:
+        return act()
     except Refused as error:
         line = str(error)
     except OSError as error:

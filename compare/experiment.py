@@ -1,6 +1,6 @@
 """How the experiments are run: one after the other, long work and drawing beside it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,10 @@ from .report.verdict import Section, failures
 from .setup import Setup as Setup
 from .setup import engines as engines
 
+Found = tuple[
+    Result | None, Result | None
+]  # what an experiment found, or the failed check that stands for it where it broke off
+
 # which of a user's own equations an experiment asks; others ask all
 ASKED_BY = {
     "kinematics": ("com_positions", "jacobians"),
@@ -32,19 +36,26 @@ SHOWN = 5  # checks of an experiment that fail, on the terminal
 
 
 def examine(
-    names: Sequence[str], setup: Setup, folder: Path, terminal: Terminal, workers: Workers, clock: Clock | None = None
+    names: Sequence[str],
+    setup: Setup,
+    folder: Path,
+    terminal: Terminal,
+    workers: Workers,
+    clock: Clock | None = None,
+    have: Mapping[str, Found] | None = None,
 ) -> tuple[list[Section], list[dict], dict[str, str]]:
     """The section of each experiment, its figures drawn, the causes of what fails, and what is skipped with its reason.
 
     An experiment that raises is one failed check; the others go on. A diagnosis beside other experiments is made where one of
-    these fails. clock: of the workers, which gets to know what each experiment takes.
+    these fails. clock: of the workers, which gets to know what each experiment takes; have: what some of them found already.
     """
-    clock = clock or Clock()
+    clock, have = clock or Clock(), have or {}
     (folder / "figures").mkdir()
     sections, drawings, waiting, causes, reasons = [], [], [], [], {}
     own, said = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
-    crashed = {name: begun(name, experiment, setup, clock) for name, experiment in modules.items()}
+    begin = {name: experiment for name, experiment in modules.items() if name not in have}
+    crashed = {name: begun(name, experiment, setup, clock) for name, experiment in begin.items()}
     clock.ends(START)
     order = sorted(modules, key=TIMED_LAST.__contains__)
     for name in order:
@@ -58,7 +69,7 @@ def examine(
         clock.begins(name)
         with clock.of(name):
             setup.progress(EXPERIMENTS[name])
-            result, crash = (None, crashed[name]) if crashed[name] else attempt(name, experiment.rows, setup)
+            result, crash = have.get(name) or found_by(name, experiment, setup, crashed[name])
             asked, unsaid = attempt(name, partial(own_words, experiment), setup)
             if own:
                 add_problems(crash or result, own.equations.problems, said)
@@ -84,6 +95,16 @@ def examine(
             take_figures(terminal, section, drawing)
     clock.ends(END)
     return sorted(sections, key=lambda section: names.index(section.name)), causes, reasons
+
+
+def computed(name: str, experiment: ModuleType, setup: Setup) -> Found:
+    """What an experiment finds by itself."""
+    return found_by(name, experiment, setup, begun(name, experiment, setup, Clock()))
+
+
+def found_by(name: str, experiment: ModuleType, setup: Setup, crashed: Result | None) -> Found:
+    """What an experiment finds. crashed: its failed check, if it broke off when it was set going."""
+    return (None, crashed) if crashed else attempt(name, experiment.rows, setup)
 
 
 def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:

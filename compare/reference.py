@@ -79,13 +79,13 @@ class Compared(NamedTuple):
         return (self.reading.dt if dt is None else dt), name
 
 
-def compared_with(asked: str | None, path: str | None, joints: str | None = None) -> Compared:
+def compared_with(asked: str | None, path: str | None, joints: str | None = None, shown: str | None = None) -> Compared:
     """A file (None: the arm's own) and the reference that is asked for; None: the arm, if the file has exactly its hinges.
 
-    joints: of equations of one's own, separated by commas, see joint_map.
+    joints: of equations of one's own, separated by commas, see joint_map; shown: what the file is called, if not by its path.
     ModelError, in one line, for a file that cannot be compared so; OwnFileError for equations that cannot be used.
     """
-    file, shown = path or ARM.mjcf, in_one_line(path or OWN_FILE)
+    file, shown = path or ARM.mjcf, in_one_line(shown or path or OWN_FILE)
     if asked is None:
         asked = "arm" if path is None or has_hinges(path, ARM.joints) else "model"
     if asked == "arm":

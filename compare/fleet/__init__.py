@@ -1,0 +1,1 @@
+"""Many files: pieces of work, a pool or a cluster that carries them out, what is done already, and the table."""

@@ -1,0 +1,171 @@
+"""The pieces of one file: it is read; each experiment computes; what all of them found becomes its report and its row."""
+
+import pickle
+import platform
+import shutil
+import time
+import zlib
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from .. import experiment
+from ..case import SEED
+from ..engines.mujoco import ModelError, read
+from ..experiments import EXPERIMENTS, module, skipped
+from ..judge.check import ENDS, Result
+from ..judge.timing import vectors
+from ..process.clock import Clock
+from ..reference import Compared, compared_with
+from ..report import files, folder, provenance, verdict
+from ..report.parts import Parts
+from ..setup import Setup, engines
+from .models import unpacked
+from .row import row_of
+
+UNPACKED = 4  # models of which a process keeps the files
+
+
+class Asked(NamedTuple):
+    """What is asked of each file."""
+
+    names: tuple[str, ...]  # of experiments
+    is_quick: bool
+
+    def command(self, shown: str) -> list[str]:
+        """The words that make the report of one file alone, if these can."""
+        size = ["--quick"] * self.is_quick
+        if set(self.names) >= set(EXPERIMENTS):
+            return ["python", "-m", "compare", "all", *size, "--mjcf", shown]
+        return [
+            "python",
+            "-m",
+            "compare",
+            "fleet",
+            shown,
+            *["--full"] * (not self.is_quick),
+            "--only",
+            ",".join(self.names),
+        ]
+
+
+class Known(NamedTuple):
+    """What is known of a file that was read."""
+
+    refused: str  # why it cannot be compared; "": it can
+    experiments: tuple[str, ...] = ()  # those that serve it
+    reasons: tuple[tuple[str, str], ...] = ()  # the others, and why not
+    joints: int | None = None
+    integrator: str | None = None
+    dt: float | None = None  # s
+
+
+@lru_cache(UNPACKED)
+def place(bundle: bytes) -> Path:
+    """A file with what it needs, unpacked."""
+    return unpacked(pickle.loads(bundle), Path.cwd())
+
+
+def compared(shown: str, bundle: bytes) -> Compared:
+    """A file as it is compared. ModelError if it cannot be."""
+    return compared_with(None, str(place(bundle)), shown=shown)
+
+
+def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
+    """What is known of a file, and which experiments serve it."""
+    try:
+        known = compared(shown, bundle)
+        reading = known.reading or read(place(bundle))
+    except ModelError as error:
+        return Known(as_given(str(error), shown, bundle))
+    reasons = {name: reason for name in asked.names if (reason := skipped(name, known.robot))}
+    serving = tuple(name for name in asked.names if name not in reasons)
+    return Known("", serving, tuple(reasons.items()), len(known.robot.joints), reading.integrator, reading.dt)
+
+
+def as_given(text: str, shown: str, bundle: bytes) -> str:
+    """A text in which a file is called as it was given, not by where it was unpacked."""
+    return text.replace(str(place(bundle)), shown).replace(f"{place(bundle).parent}/", "")
+
+
+def setup_of(known: Compared, asked: Asked) -> Setup:
+    make = Setup.quick if asked.is_quick else Setup
+    return make(known.robot, engines(known.mujoco), reading=known.reading)
+
+
+def computed(name: str, timed: bool, shown: str, asked: Asked, bundle: bytes) -> bytes:
+    """What an experiment finds, or that it broke off: see experiment.computed, packed."""
+    setup = setup_of(compared(shown, bundle), asked)
+    found = experiment.computed(name, module(name), setup)
+    for result in filter(None, found):
+        result.notes = [as_given(note, shown, bundle) for note in result.notes]
+        result.checks = [replace(check, note=as_given(check.note, shown, bundle)) for check in result.checks]
+    if timed and found[0]:
+        found[0].notes.append(f"Timed on {platform.node()} ({vectors()}), by a worker that did nothing else.")
+    return zlib.compress(pickle.dumps(found), 1)
+
+
+def broken(name: str, why: str) -> tuple[None, Result]:
+    """What stands for an experiment that gave nothing: one failed check."""
+    result = Result(name, shown=[])
+    result.check("", ENDS, None, 0.0, "", why, rule="equal")
+    return None, result
+
+
+def reported(
+    found: Mapping[str, bytes | str],
+    left_out: Sequence[tuple[str, str]],
+    seconds: float,
+    shown: str,
+    asked: Asked,
+    bundle: bytes,
+) -> tuple[dict, dict[str, bytes]]:
+    """The row of a file, and its own report: {path: content}.
+
+    found: what experiments found, see `computed`, or in words why one gave nothing; left_out: others, with the reason; seconds:
+    what they took.
+    """
+    began = time.process_time()
+    known = compared(shown, bundle)
+    setup, names = setup_of(known, asked), [name for name in asked.names if name in found or name == "diagnosis"]
+    have = {
+        name: broken(name, value) if isinstance(value, str) else pickle.loads(zlib.decompress(value))
+        for name, value in found.items()
+    }
+    with TemporaryDirectory(dir=Path.cwd()) as place_of_report:
+        out, clock = Path(place_of_report), Clock()
+        sections, causes, needless = experiment.examine(names, setup, out, Silent(), Here(), clock, have)
+        parts, count = Parts(), len(EXPERIMENTS) - len(needless)
+        outcome = sections, count, causes, known.reference.compared, known.robot.name
+        words = parts.made("the verdict", "No verdict could be made.", verdict.verdict, *outcome)
+        origin = provenance.provenance(" ".join(asked.command(shown)), known.robot.mjcf, shown, SEED)
+        seconds += time.process_time() - began
+        origin["seconds"] = round(seconds, 1)
+        skips = [*left_out, *needless.items()]
+        files.write(out, verdict.Report(sections, known.robot, origin, words, causes, skips, known.reference), parts)
+        written = {name: (out / name).read_bytes() for name in folder.files(out)}
+        shutil.rmtree(out / "figures", ignore_errors=True)
+    return row_of(sections, causes, parts.lines) | {"seconds": round(seconds, 2)}, written
+
+
+class Silent:
+    """A terminal that says nothing."""
+
+    def say(self, text: str = "", style: str = "") -> None:
+        pass
+
+
+class Here:
+    """Workers that do at once what they are asked to do, in this process."""
+
+    def submit(self, function, /, *arguments, **named) -> Future:
+        future = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future

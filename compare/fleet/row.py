@@ -1,0 +1,55 @@
+"""The row of a file in the table of a fleet."""
+
+from collections.abc import Sequence
+
+from ..judge.check import ENDS
+from ..report.verdict import Section, failures, worst
+
+COLUMNS = (
+    "file", "sha256", "verdict", "reason", "joints", "worst_ratio",
+    "file_integrator", "file_dt_s", "stable_at_file_dt", "limit_s", "seconds",
+)  # fmt: skip
+AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
+
+
+def row_of(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str]) -> dict:
+    """The verdict and its reason, the largest share of a tolerance, and the step. lost: parts of the report that broke."""
+    differing, broke, _ = failures(sections)
+    top = worst(sections)
+    stable, limit = own_step(sections)
+    if differing:
+        outcome, reason = DIFFER, causes[0]["text"] if causes else str(differing[0])
+    elif broke or lost:
+        outcome, reason = BROKE, in_words(broke[0]) if broke else lost[0]
+    elif not any(section.result.checks for section in sections):
+        outcome, reason = REFUSED, "nothing could be compared"
+    else:
+        outcome, reason = AGREE, ""
+    return {
+        "verdict": outcome, "reason": reason, "worst_ratio": None if top is None else top.over_tolerance,
+        "stable_at_file_dt": stable, "limit_s": limit,
+    }  # fmt: skip
+
+
+def in_words(check) -> str:
+    """What broke off."""
+    return (
+        f"{check.experiment} {check.note}"
+        if check.quantity == ENDS
+        else f"{check.experiment}: {check.quantity}: {check.note}"
+    )
+
+
+def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
+    """Whether the file's own step is stable under its own servos wherever that is known, and the least limit, s."""
+    rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
+    own = [row for row in rows if row["integrator"] == row["file_integrator"] and row["base"] != "locked"]
+    told = [row["stable_at_file_dt"] for row in own if row["stable_at_file_dt"] is not None]
+    limits = [row["predicted_dt_s"] for row in own if row["limit"] == "finite"]
+    return (all(told) if told else None), min(limits, default=None)
+
+
+def order(row: dict) -> tuple:
+    """What needs a look comes first: it differs, broke off, could not be compared, is not stable; then the largest ratio."""
+    rank = (DIFFER, BROKE, REFUSED, AGREE).index(row["verdict"])
+    return rank, row["stable_at_file_dt"] is not False, -(row["worst_ratio"] or 0.0), row["file"]
