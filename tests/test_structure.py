@@ -64,7 +64,22 @@ DIRECTIONS = {
     "drawing": {"robots", "judge", "process", "report", "experiments"},
     "experiment": {"drawing", "robots", "setup", "judge", "process", "report", "experiments"},
     "command_line": {"experiments", "process"},
+    "fleet": {
+        "tmt",
+        "case",
+        "command_line",
+        "engines",
+        "experiment",
+        "experiments",
+        "judge",
+        "process",
+        "reference",
+        "report",
+        "setup",
+        "version",
+    },
     "__main__": {
+        "fleet",
         "version",
         "case",
         "command_line",
@@ -142,6 +157,7 @@ def test_libraries_are_imported_where_they_belong(path):
     assert "pandas" not in outer or name.startswith("compare.report")
     assert "matplotlib" not in outer or path.stem.startswith("figures") or name == "compare.report.style"
     assert "PIL" not in outer or path.stem.startswith("figures") or name == "compare.report.images"
+    assert "distributed" not in outer or name == "compare.fleet.cluster"
     assert "rich" not in outer or name == "compare.report.terminal"
 
 

@@ -115,7 +115,7 @@ def fleet(arguments: Sequence[str]) -> int:
     options = made.parse_args(arguments)
     if options.help:
         made.print_help()
-        return 0
+        raise SystemExit(0)
     if not options.paths:
         made.error("no file is named; a file, a folder, a pattern or @LIST is expected")
     if options.dask and options.workers:
