@@ -2,15 +2,15 @@
 
 import pickle
 import platform
+import shlex
 import shutil
+import tempfile
 import time
 import zlib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from .. import experiment
@@ -36,21 +36,13 @@ class Asked(NamedTuple):
     names: tuple[str, ...]  # of experiments
     is_quick: bool
 
-    def command(self, shown: str) -> list[str]:
-        """The words that make the report of one file alone, if these can."""
-        size = ["--quick"] * self.is_quick
+    def command(self, shown: str) -> str:
+        """The command that makes the report of one file alone."""
         if set(self.names) >= set(EXPERIMENTS):
-            return ["python", "-m", "compare", "all", *size, "--mjcf", shown]
-        return [
-            "python",
-            "-m",
-            "compare",
-            "fleet",
-            shown,
-            *["--full"] * (not self.is_quick),
-            "--only",
-            ",".join(self.names),
-        ]
+            words = ["all", *["--quick"] * self.is_quick, "--mjcf", shown]
+        else:
+            words = ["fleet", shown, *["--full"] * (not self.is_quick), "--only", ",".join(self.names)]
+        return shlex.join(["python", "-m", "compare", *words])
 
 
 class Known(NamedTuple):
@@ -64,10 +56,20 @@ class Known(NamedTuple):
     dt: float | None = None  # s
 
 
-@lru_cache(UNPACKED)
+places = {}  # where models are unpacked, by their bundles; the one that was used last at the end
+
+
 def place(bundle: bytes) -> Path:
     """A file with what it needs, unpacked."""
-    return unpacked(pickle.loads(bundle), Path.cwd())
+    places[bundle] = path = places.pop(bundle, None) or unpacked(pickle.loads(bundle), Path.cwd())
+    while len(places) > UNPACKED:
+        shutil.rmtree(top_of(places.pop(next(iter(places)))), ignore_errors=True)
+    return path
+
+
+def top_of(path: Path) -> Path:
+    """The folder in which a model was unpacked."""
+    return Path.cwd() / path.relative_to(Path.cwd()).parts[0]
 
 
 def compared(shown: str, bundle: bytes) -> Compared:
@@ -136,13 +138,13 @@ def reported(
         name: broken(name, value) if isinstance(value, str) else pickle.loads(zlib.decompress(value))
         for name, value in found.items()
     }
-    with TemporaryDirectory(dir=Path.cwd()) as place_of_report:
+    with tempfile.TemporaryDirectory(dir=Path.cwd()) as place_of_report:
         out, clock = Path(place_of_report), Clock()
         sections, causes, needless = experiment.examine(names, setup, out, Silent(), Here(), clock, have)
         parts, count = Parts(), len(EXPERIMENTS) - len(needless)
         outcome = sections, count, causes, known.reference.compared, known.robot.name
         words = parts.made("the verdict", "No verdict could be made.", verdict.verdict, *outcome)
-        origin = provenance.provenance(" ".join(asked.command(shown)), known.robot.mjcf, shown, SEED)
+        origin = provenance.provenance(asked.command(shown), known.robot.mjcf, shown, SEED)
         seconds += time.process_time() - began
         origin["seconds"] = round(seconds, 1)
         skips = [*left_out, *needless.items()]
