@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tmt.cores import cores
 
-from ..command_line import PROGRAM, Parser, expected, in_lines, not_empty
+from ..command_line import FLEET, PROGRAM, Parser, expected, in_lines, not_empty
 from ..experiments import EXPERIMENTS
 from ..process.streams import in_one_line
 from ..report.remaining import in_words
@@ -19,7 +19,6 @@ from ..report.terminal import Terminal
 if TYPE_CHECKING:
     from .run import Run
 
-WORD = "fleet"
 SHOWN = 20  # changes, on the terminal
 LIMIT = 600.0  # s, that a piece may take
 TEXT = "\n\n".join(
@@ -65,7 +64,7 @@ def seconds(text: str) -> float:
 
 OPTIONS = {
     "--out": {
-        "type": not_empty, "default": f"reports/{WORD}", "metavar": "DIR",
+        "type": not_empty, "default": f"reports/{FLEET}", "metavar": "DIR",
         "help": "where the fleet goes (default: %(default)s)",
     },
     "--full": {"action": "store_true", "help": "each file as by `all`, not by `all --quick`"},
@@ -89,7 +88,7 @@ OPTIONS = {
 
 def parser() -> Parser:
     made = Parser(
-        prog=f"{PROGRAM} {WORD}", usage=f"{PROGRAM} {WORD} PATH... [options]", description=TEXT, epilog=EPILOG,
+        prog=f"{PROGRAM} {FLEET}", usage=f"{PROGRAM} {FLEET} PATH... [options]", description=TEXT, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
     )  # fmt: skip
     for name, how in OPTIONS.items():
@@ -123,13 +122,15 @@ def fleet(arguments: Sequence[str]) -> int:
         made.error(f"{word!r} is no option; {expected(name.strip('-'), known, ' '.join(OPTIONS))}")
     if options.help:
         made.print_help()
-        return 0
+        raise SystemExit(0)
     if not options.paths:
-        made.error(f"no file is named; a file, a folder, a pattern or @LIST is expected, as in {PROGRAM} {WORD} models")
+        made.error(
+            f"no file is named; a file, a folder, a pattern or @LIST is expected, as in {PROGRAM} {FLEET} models"
+        )
     if options.dask and options.workers:
         made.error("--workers is for processes on this machine; a cluster has its own (--dask)")
     names = experiments_of(made, options.only)
-    return carry_out(options, names, shlex.join(["python", "-m", "compare", WORD, *arguments]))
+    return carry_out(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
 
 def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str) -> int:
@@ -162,6 +163,8 @@ def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str)
 
             with terminal.progress(""):
                 run.carry_out(progress)
+            for name, why in run.parts:
+                terminal.say(f"left out: {name}, {why}")
         finally:
             door.close()
         changed = None if before is None else changes(before, sorted(run.rows, key=lambda row: row["file"]))

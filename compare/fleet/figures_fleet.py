@@ -18,9 +18,9 @@ STEP_CAPTION = (
 
 
 def draw_steps(rows: Sequence[dict]) -> tuple[str, Figure, str] | None:
-    """The figure; None where no file has a limit. rows: of the table."""
+    """The figure; None where fewer than two files have a limit. rows: of the table."""
     known = [row for row in rows if row["limit_s"] and row["file_dt_s"]]
-    if not known:
+    if len(known) < 2:
         return None
     known.sort(key=lambda row: row["file_dt_s"] / row["limit_s"])
     share = np.array([row["file_dt_s"] / row["limit_s"] for row in known])

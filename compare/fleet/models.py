@@ -40,7 +40,7 @@ class Model:
 
     @cached_property
     def hash(self) -> str:
-        """Of the file with everything that it includes and loads, by their places relative to it. OSError if it cannot be read."""
+        """Of the file with everything that it includes and loads, by their places relative to it. OSError: it cannot be read."""
         return hash_of(self.contents())
 
     def contents(self) -> dict[str, bytes]:

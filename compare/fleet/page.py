@@ -23,14 +23,18 @@ HEADS = {
     "seconds": "processor, s",
 }
 MARKS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
-WHAT_IS_WHAT = (
-    "What needs a look comes first; each name leads to the file's own report. <i>agree</i>: MuJoCo and what the file is compared "
-    "with differ by rounding alone. <i>differ</i>: a check that compares them fails. <i>broke</i>: something did not come to its "
-    "end. <i>refused</i>: the file cannot be compared. <i>Share of tolerance</i>: the largest difference, as a share of its "
-    "tolerance of rounding; above 1 it fails. <i>Step</i> and <i>integrator</i> are the file's own; <i>stable</i>: whether that "
-    "step is, under the file's own servos, at each posture where that is known; <i>limit</i>: the largest stable step with that "
-    "integrator, at the posture where it is least. What is not known is left empty."
-)
+FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
+MEANINGS = {
+    "agree": "MuJoCo and what the file is compared with differ by rounding alone",
+    "differ": "a check that compares them fails; the reason is the cause, where one is found",
+    "broke": "something did not come to its end, so that nothing can be said",
+    "refused": "the file cannot be compared",
+    "share of tolerance": "the largest difference, as a share of its tolerance of rounding; above 1 it is more than rounding",
+    "step, integrator": "the file's own",
+    "stable": "whether that step is, with that integrator under the file's own servos, at each posture where this is known",
+    "limit": "the largest stable step with that integrator, at the posture where it is least",
+    "processor": "what was computed for the file, on whatever machine",
+}  # what is not known is left empty
 
 
 def page(
@@ -49,9 +53,11 @@ def page(
         parts.append("<h2>What has changed</h2>" + list_of(changed or ["Nothing."]))
     head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in HEADS.values())
     body = "\n".join(row_in_html(row) for row in rows)
+    meanings = "".join(f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in MEANINGS.items())
     parts.append(
-        f'<h2 id="files">Files</h2>\n<p class="quiet">{WHAT_IS_WHAT} All digits: <a href="fleet.csv">fleet.csv</a>.</p>'
+        f'<h2 id="files">Files</h2>\n<p class="quiet">{html.escape(FIRST)} <a href="fleet.csv">fleet.csv</a>.</p>'
     )
+    parts.append(f"<details><summary>What the words mean</summary><dl>{meanings}</dl></details>")
     parts.append(f'<div class="scroll" role="region" tabindex="0" aria-labelledby="files"><table class="files"><thead><tr>{head}'
                  f"</tr></thead><tbody>\n{body}\n</tbody></table></div>")  # fmt: skip
     if picture:
@@ -79,7 +85,7 @@ def list_of(texts: Sequence[str]) -> str:
 def row_in_html(row: dict) -> str:
     """A row of the table, its file a link if there is a report."""
     cells = [cell_in_html(name, row[name]) for name in HEADS if name != "file"]
-    name = html.escape(row["file"])
+    name = html.escape(row["file"]).replace("/", "/<wbr>")
     if row["has_report"]:
         address = html.escape(quote(f"{place_of(row['file'])}/index.html"))
         name = f'<a href="{address}">{name}</a>'
