@@ -51,7 +51,7 @@ def fleet(arguments: Sequence[str]) -> int:
     from .fleet.piece import FleetError
 
     try:
-        return command.fleet(arguments)
+        return command.fleet_status(arguments)
     except FleetError as error:
         raise Refused(error) from None
 

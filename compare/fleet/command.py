@@ -19,9 +19,9 @@ from ..report.terminal import Terminal
 if TYPE_CHECKING:
     from .run import Run
 
-SHOWN = 20  # changes, on the terminal
+SHOWN_CHANGES = 20  # changes, on the terminal
 LIMIT = 600.0  # s, that a piece may take
-TEXT = "\n\n".join(
+FLEET_TEXT = "\n\n".join(
     in_lines(text)
     for text in (
         "Compare every model that is found with tmt's equations for it, each with a report of its own, and list what needs a "
@@ -52,7 +52,7 @@ def count(text: str) -> int:
     return int(text)
 
 
-def seconds(text: str) -> float:
+def duration(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
@@ -62,7 +62,7 @@ def seconds(text: str) -> float:
     return value
 
 
-OPTIONS = {
+FLEET_OPTIONS = {
     "--out": {
         "type": not_empty, "default": f"reports/{FLEET}", "metavar": "DIR",
         "help": "where the fleet goes (default: %(default)s)",
@@ -76,7 +76,7 @@ OPTIONS = {
         "type": not_empty, "metavar": "ADDRESS", "help": "the scheduler of a Dask cluster, whose workers do the work",
     },
     "--limit": {
-        "type": seconds, "default": LIMIT, "metavar": "S",
+        "type": duration, "default": LIMIT, "metavar": "S",
         "help": "seconds that a piece, an experiment of a file, may take (default: %(default)g)",
     },
     "--since": {
@@ -86,12 +86,12 @@ OPTIONS = {
 }  # fmt: skip
 
 
-def parser() -> Parser:
+def fleet_parser() -> Parser:
     made = Parser(
-        prog=f"{PROGRAM} {FLEET}", usage=f"{PROGRAM} {FLEET} PATH... [options]", description=TEXT, epilog=EPILOG,
+        prog=f"{PROGRAM} {FLEET}", usage=f"{PROGRAM} {FLEET} PATH... [options]", description=FLEET_TEXT, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
     )  # fmt: skip
-    for name, how in OPTIONS.items():
+    for name, how in FLEET_OPTIONS.items():
         made.add_argument(name, **how)
     made.add_argument("paths", nargs="*", type=not_empty, metavar="PATH", help=argparse.SUPPRESS)
     made.add_argument("-h", "--help", action="store_true", help="this text")
@@ -112,14 +112,14 @@ def experiments_of(made: Parser, only: str | None) -> tuple[str, ...]:
     return tuple(name for name in EXPERIMENTS if name in names)
 
 
-def fleet(arguments: Sequence[str]) -> int:
+def fleet_status(arguments: Sequence[str]) -> int:
     """Run the command; the exit status. SystemExit for help, and with one line for what is mistyped. FleetError, one line."""
-    made = parser()
+    made = fleet_parser()
     options, unknown = made.parse_known_intermixed_args(arguments)
     for word in unknown:
         name = word.split("=")[0]
-        known = {option.strip("-"): option for option in (*OPTIONS, "--help")}
-        made.error(f"{word!r} is no option; {expected(name.strip('-'), known, ' '.join(OPTIONS))}")
+        known = {option.strip("-"): option for option in (*FLEET_OPTIONS, "--help")}
+        made.error(f"{word!r} is no option; {expected(name.strip('-'), known, ' '.join(FLEET_OPTIONS))}")
     if options.help:
         made.print_help()
         raise SystemExit(0)
@@ -130,10 +130,10 @@ def fleet(arguments: Sequence[str]) -> int:
     if options.dask and options.workers:
         made.error("--workers is for processes on this machine; a cluster has its own (--dask)")
     names = experiments_of(made, options.only)
-    return carry_out(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
+    return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
 
-def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str) -> int:
+def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str) -> int:
     """Find, compute, write; the exit status."""
     started = time.perf_counter()
     from .cluster import Cluster  # what is imported takes its time
@@ -158,7 +158,7 @@ def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str)
             terminal.tell(lambda: words)
 
             def progress() -> None:
-                words[:] = how_far(run)
+                words[:] = how_far_it_is(run)
                 say_new(terminal, run)
 
             with terminal.progress(""):
@@ -177,17 +177,17 @@ def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str)
     terminal.say(said[0], "bold green" if run.is_good else "bold red")
     for line in said[1:]:
         terminal.say(line)
-    for line in (changed or ())[:SHOWN]:
+    for line in (changed or ())[:SHOWN_CHANGES]:
         terminal.say(f"changed: {line}")
-    if changed and len(changed) > SHOWN:
-        terminal.say(f"and {len(changed) - SHOWN} more have changed: in index.html")
+    if changed and len(changed) > SHOWN_CHANGES:
+        terminal.say(f"and {len(changed) - SHOWN_CHANGES} more have changed: in index.html")
     if changed == []:
         terminal.say(f"nothing has changed since {in_one_line(options.since)}")
     terminal.say(f"Fleet: {in_one_line(os.path.join(options.out, 'index.html'))} ({took:.1f} s)")
     return 0 if run.is_good else 1
 
 
-def how_far(run: "Run") -> list[str]:
+def how_far_it_is(run: "Run") -> list[str]:
     """How far a fleet is: files, pieces, the verdicts so far, how long still."""
     from .times import seconds_left
 

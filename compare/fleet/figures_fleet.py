@@ -10,7 +10,7 @@ from PIL import Image
 from ..report.images import with_palette
 from ..report.style import BLUE, GREY, RED, WIDTH, pixels, plain
 
-MOST_NAMED, LONGEST_FILE = 40, 40  # files with a name beside their points; letters of a name
+MOST_NAMED_FILES, LONGEST_FILE = 40, 40  # files with a name beside their points; letters of a name
 STEP_CAPTION = (
     "Each file's own step as a share of the largest step that is stable under its own servos, with its own integrator, at the "
     "posture where that is least: right of the line it is not stable. {} of {} files have such a limit."
@@ -24,7 +24,7 @@ def draw_steps(rows: Sequence[dict]) -> tuple[str, Figure, str] | None:
         return None
     known.sort(key=lambda row: row["file_dt_s"] / row["limit_s"])
     share = np.array([row["file_dt_s"] / row["limit_s"] for row in known])
-    places, named = np.arange(len(known)), len(known) <= MOST_NAMED
+    places, named = np.arange(len(known)), len(known) <= MOST_NAMED_FILES
     figure = Figure(figsize=(WIDTH, 1.0 + (0.19 * len(known) if named else 4.0)), layout="constrained")
     ax = figure.subplots()
     for of, colour, marker, label in (

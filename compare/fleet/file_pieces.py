@@ -25,7 +25,7 @@ from ..report import files, folder, provenance, verdict
 from ..report.parts import Parts
 from ..setup import Setup, engines
 from .models import unpacked
-from .row import row_of
+from .row import row_of_file
 
 UNPACKED = 4  # models of which a process keeps the files
 
@@ -59,7 +59,7 @@ class Known(NamedTuple):
 places = {}  # where models are unpacked, by their bundles; the one that was used last at the end
 
 
-def place(bundle: bytes) -> Path:
+def unpacked_at(bundle: bytes) -> Path:
     """A file with what it needs, unpacked."""
     places[bundle] = path = places.pop(bundle, None) or unpacked(pickle.loads(bundle), Path.cwd())
     while len(places) > UNPACKED:
@@ -72,16 +72,16 @@ def top_of(path: Path) -> Path:
     return Path.cwd() / path.relative_to(Path.cwd()).parts[0]
 
 
-def compared(shown: str, bundle: bytes) -> Compared:
+def compared_file(shown: str, bundle: bytes) -> Compared:
     """A file as it is compared. ModelError if it cannot be."""
-    return compared_with(None, str(place(bundle)), shown=shown)
+    return compared_with(None, str(unpacked_at(bundle)), shown=shown)
 
 
 def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
     """What is known of a file, and which experiments serve it."""
     try:
-        known = compared(shown, bundle)
-        reading = known.reading or read(place(bundle))
+        known = compared_file(shown, bundle)
+        reading = known.reading or read(unpacked_at(bundle))
     except ModelError as error:
         return Known(as_given(str(error), shown, bundle))
     reasons = {name: reason for name in asked.names if (reason := skipped(name, known.robot))}
@@ -91,7 +91,7 @@ def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
 
 def as_given(text: str, shown: str, bundle: bytes) -> str:
     """A text in which a file is called as it was given, not by where it was unpacked."""
-    return text.replace(str(place(bundle)), shown).replace(f"{place(bundle).parent}/", "")
+    return text.replace(str(unpacked_at(bundle)), shown).replace(f"{unpacked_at(bundle).parent}/", "")
 
 
 def setup_of(known: Compared, asked: Asked) -> Setup:
@@ -99,9 +99,9 @@ def setup_of(known: Compared, asked: Asked) -> Setup:
     return make(known.robot, engines(known.mujoco), reading=known.reading)
 
 
-def computed(name: str, timed: bool, shown: str, asked: Asked, bundle: bytes) -> bytes:
+def findings(name: str, timed: bool, shown: str, asked: Asked, bundle: bytes) -> bytes:
     """What an experiment finds, or that it broke off: see experiment.computed, packed."""
-    setup = setup_of(compared(shown, bundle), asked)
+    setup = setup_of(compared_file(shown, bundle), asked)
     found = experiment.computed(name, module(name), setup)
     for result in filter(None, found):
         result.notes = [as_given(note, shown, bundle) for note in result.notes]
@@ -128,11 +128,11 @@ def reported(
 ) -> tuple[dict, dict[str, bytes]]:
     """The row of a file, and its own report: {path: content}.
 
-    found: what experiments found, see `computed`, or in words why one gave nothing; left_out: others, with the reason; seconds:
+    found: what experiments found, see `findings`, or in words why one gave nothing; left_out: others, with the reason; seconds:
     what they took.
     """
     began = time.process_time()
-    known = compared(shown, bundle)
+    known = compared_file(shown, bundle)
     setup, names = setup_of(known, asked), [name for name in asked.names if name in found or name == "diagnosis"]
     have = {
         name: broken(name, value) if isinstance(value, str) else pickle.loads(zlib.decompress(value))
@@ -151,7 +151,7 @@ def reported(
         files.write(out, verdict.Report(sections, known.robot, origin, words, causes, skips, known.reference), parts)
         written = {name: (out / name).read_bytes() for name in folder.files(out)}
         shutil.rmtree(out / "figures", ignore_errors=True)
-    return row_of(sections, causes, parts.lines) | {"seconds": round(seconds, 2)}, written
+    return row_of_file(sections, causes, parts.lines) | {"seconds": round(seconds, 2)}, written
 
 
 class Silent:

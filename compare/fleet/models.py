@@ -11,10 +11,10 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from ..process.streams import in_one_line, readable
-from .parts import is_file, parts_of
+from .parts import is_a_file, needed_by
 from .piece import FleetError
 
-MODEL, PART = "mujoco", "mujocoinclude"  # the outermost elements of MJCF
+MODEL_ELEMENT, PART_ELEMENT = "mujoco", "mujocoinclude"  # the outermost elements of MJCF
 SUFFIXES = (".xml", ".mjcf")
 LONGEST_NAME = 120  # characters of a folder of reports
 
@@ -74,15 +74,15 @@ def found_models(asked: Sequence[str]) -> Found:
     for path, named in sorted(paths.values(), key=lambda pair: (os.path.islink(pair[0]), os.fspath(pair[0]))):
         shown = in_one_line(os.fspath(path))
         same = files.setdefault(os.path.realpath(path), shown)
-        kind = MODEL if named or same != shown else outermost(path)
+        kind = MODEL_ELEMENT if named or same != shown else outermost(path)
         if same != shown:
             left_out.append((shown, f"it is the same file as {same}"))
         elif shown in models:
             left_out.append((shown, "another file is shown by the same name"))
-        elif kind == PART:
+        elif kind == PART_ELEMENT:
             parts.append(path)
-        elif kind == MODEL:
-            models[shown] = Model(path, parts_of(path))
+        elif kind == MODEL_ELEMENT:
+            models[shown] = Model(path, needed_by(path))
     needed = {model.shown: {os.path.realpath(part) for part in model.parts[1:]} for model in models.values()}
     by = {}  # who includes a file
     for model in models.values():
@@ -112,7 +112,7 @@ def paths_of(words: Iterable[str], left_out: list, lists: tuple[str, ...] = ()) 
             name = os.path.realpath(word[1:])
             if name not in lists:  # a list that names itself adds nothing
                 yield from paths_of(lines_of(word[1:]), left_out, (*lists, name))
-        elif is_file(path):
+        elif is_a_file(path):
             yield path, True
         elif is_there(path):
             if not path.is_dir():
@@ -123,7 +123,7 @@ def paths_of(words: Iterable[str], left_out: list, lists: tuple[str, ...] = ()) 
             if not matches:
                 raise FleetError(f"there is no {in_one_line(word)}; a file, a folder, a pattern or @LIST is expected")
             for match in map(Path, matches):
-                files = files_in(match, left_out) if match.is_dir() else [match] * is_file(match)
+                files = files_in(match, left_out) if match.is_dir() else [match] * is_a_file(match)
                 yield from ((file, False) for file in files)
 
 
@@ -143,7 +143,7 @@ def files_in(folder: Path, left_out: list) -> Iterator[Path]:
     for place, folders, names in os.walk(folder, onerror=cannot_be_read):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names):
-            if name.lower().endswith(SUFFIXES) and not name.startswith(".") and is_file(Path(place, name)):
+            if name.lower().endswith(SUFFIXES) and not name.startswith(".") and is_a_file(Path(place, name)):
                 yield Path(place, name)
 
 
@@ -164,16 +164,16 @@ def outermost(path: Path) -> str:
             return element.tag
         return ""
     except PermissionError:
-        return MODEL  # nobody knows: it is refused with this reason
+        return MODEL_ELEMENT  # nobody knows: it is refused with this reason
     except (ElementTree.ParseError, LookupError, OSError, ValueError):
         pass
     try:
         with path.open("rb") as file:
             text = file.read(4096)
     except OSError:
-        return MODEL
+        return MODEL_ELEMENT
     is_text = b"\0" not in text
-    return MODEL if is_text and b"<mujoco" in text and b"<mujocoinclude" not in text else ""
+    return MODEL_ELEMENT if is_text and b"<mujoco" in text and b"<mujocoinclude" not in text else ""
 
 
 def bundle(model: Model) -> dict[str, bytes]:
@@ -199,7 +199,7 @@ def unpacked(files: dict[str, bytes], folder: Path) -> Path:
     return place / next(iter(files))
 
 
-def place_of(shown: str) -> str:
+def place_of_report(shown: str) -> str:
     """The folder of a model's own report, relative to that of the fleet: no two models have the same, or one inside the other."""
     parts = [part for part in Path(readable(shown)).parts if part not in (os.sep, os.curdir)]
     is_plain = not os.path.isabs(shown) and os.pardir not in parts and max(map(len, parts)) <= LONGEST_NAME

@@ -7,7 +7,7 @@ from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
-from .models import place_of
+from .models import place_of_report
 from .row import BROKE, DIFFER, REFUSED
 
 HEADS = {
@@ -22,8 +22,8 @@ HEADS = {
     "limit_s": "limit, ms",
     "seconds": "processor, s",
 }
-MARKS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
-FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
+ROW_KINDS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
+WHAT_COMES_FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
 MEANINGS = {
     "agree": "MuJoCo and what the file is compared with differ by rounding alone",
     "differ": "a check that compares them fails; the reason is the cause, where one is found",
@@ -37,7 +37,7 @@ MEANINGS = {
 }  # what is not known is left empty
 
 
-def page(
+def fleet_page(
     title: str,
     said: Sequence[str],
     rows: Sequence[dict],
@@ -55,7 +55,7 @@ def page(
     body = "\n".join(row_in_html(row) for row in rows)
     meanings = "".join(f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in MEANINGS.items())
     parts.append(
-        f'<h2 id="files">Files</h2>\n<p class="quiet">{html.escape(FIRST)} <a href="fleet.csv">fleet.csv</a>.</p>'
+        f'<h2 id="files">Files</h2>\n<p class="quiet">{html.escape(WHAT_COMES_FIRST)} <a href="fleet.csv">fleet.csv</a>.</p>'
     )
     parts.append(f"<details><summary>What the words mean</summary><dl>{meanings}</dl></details>")
     parts.append(f'<div class="scroll" role="region" tabindex="0" aria-labelledby="files"><table class="files"><thead><tr>{head}'
@@ -87,9 +87,9 @@ def row_in_html(row: dict) -> str:
     cells = [cell_in_html(name, row[name]) for name in HEADS if name != "file"]
     name = html.escape(row["file"]).replace("/", "/<wbr>")
     if row["has_report"]:
-        address = html.escape(quote(f"{place_of(row['file'])}/index.html"))
+        address = html.escape(quote(f"{place_of_report(row['file'])}/index.html"))
         name = f'<a href="{address}">{name}</a>'
-    kind = MARKS.get(row["verdict"], "bad" if row["stable_at_file_dt"] is False else "good")
+    kind = ROW_KINDS.get(row["verdict"], "bad" if row["stable_at_file_dt"] is False else "good")
     return f'<tr class="{kind}"><th scope="row">{name}</th>{"".join(cells)}</tr>'
 
 

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
-MODELS = ("include", "model")  # elements whose file is MJCF again
+WITH_MODELS = ("include", "model")  # elements whose file is MJCF again
 DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 
 
-def parts_of(path: Path) -> tuple[Path, ...]:
+def needed_by(path: Path) -> tuple[Path, ...]:
     """The files that an MJCF file needs, itself first; those that are not there, or not in XML that can be read, are left out."""
     found, read, files, stated = {os.path.abspath(path): path}, set(), [], {""}
     waiting = [path]
@@ -27,7 +27,7 @@ def parts_of(path: Path) -> tuple[Path, ...]:
             stated |= {element.get(name) for name in DIRECTORIES if element.get(name)}
             names = [value for key, value in element.attrib.items() if key.startswith("file") and value]
             files += names
-            for part in there(names, places, [""]) if element.tag in MODELS else ():
+            for part in there(names, places, [""]) if element.tag in WITH_MODELS else ():
                 found.setdefault(os.path.abspath(part), part)
                 waiting.append(part)
                 places += [part.parent] * (part.parent not in places)
@@ -40,7 +40,7 @@ def parts_of(path: Path) -> tuple[Path, ...]:
 def there(names: Iterable[str], places: Iterable[Path], folders: Iterable[str]) -> Iterator[Path]:
     """The files of these names that are in folders of places."""
     tried = (place / folder / name for name in names for place in places for folder in folders)
-    return (part for part in tried if is_file(part))
+    return (part for part in tried if is_a_file(part))
 
 
 def elements_of(path: Path) -> Iterator[ElementTree.Element]:
@@ -52,7 +52,7 @@ def elements_of(path: Path) -> Iterator[ElementTree.Element]:
         return
 
 
-def is_file(path: Path) -> bool:
+def is_a_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):  # a name that no file can have

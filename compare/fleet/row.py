@@ -5,14 +5,14 @@ from collections.abc import Sequence
 from ..judge.check import ENDS, Check
 from ..report.verdict import Section, failures, unstable_in_words, worst
 
-COLUMNS = (
+FLEET_COLUMNS = (
     "file", "sha256", "verdict", "reason", "joints", "worst_ratio",
     "file_integrator", "file_dt_s", "stable_at_file_dt", "limit_s", "seconds",
 )  # fmt: skip
 AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
 
 
-def row_of(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str]) -> dict:
+def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str]) -> dict:
     """The verdict and its reason, the largest share of a tolerance, and the step. lost: parts of the report that broke.
 
     A file whose own step is not stable agrees all the same, and the reason says where the limit is.
@@ -23,7 +23,7 @@ def row_of(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[s
     if differing:
         outcome, reason = DIFFER, causes[0]["text"] if causes else str(differing[0])
     elif broke or lost:
-        outcome, reason = BROKE, in_words(broke[0]) if broke else lost[0]
+        outcome, reason = BROKE, break_in_words(broke[0]) if broke else lost[0]
     elif not any(section.result.checks for section in sections):
         outcome, reason = REFUSED, "nothing could be compared"
     else:
@@ -34,7 +34,7 @@ def row_of(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[s
     }  # fmt: skip
 
 
-def in_words(check: Check) -> str:
+def break_in_words(check: Check) -> str:
     """What broke off."""
     what = "" if check.quantity == ENDS else f": {check.quantity}:"
     return f"{check.experiment}{what} {check.note}"

@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
-from .file_pieces import Asked, Known, computed, read_file, reported
+from .file_pieces import Asked, Known, findings, read_file, reported
 from .kept import Kept, write_report
-from .models import Model, bundle, place_of
+from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
 from .row import AGREE, BROKE, REFUSED
 
-READ, COMPUTE, TIME, REPORT = range(4)  # ranks: what comes first
-AHEAD = 12  # pieces that are handed out for each worker before one has ended: their models are in memory
+TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
+PIECES_AHEAD = 12  # pieces that are handed out for each worker before one has ended: their models are in memory
 MARK = ".fleet"  # the file in a report that says from what it was made
 
 
@@ -91,7 +91,7 @@ class Run:
             return
         known = self.kept.get(task.keys["read"])
         if known is None:
-            self.ask(task, "read", READ)
+            self.ask(task, "read", TO_READ)
         else:
             self.was_read(task, known)
 
@@ -109,10 +109,10 @@ class Run:
     def hand_out(self) -> None:
         """As many pieces as keep the workers busy; timed ones of a pool at the end, for all others wait meanwhile."""
         of_timed = sum(step in TIMED_LAST for _, step in self.under_way.values())
-        while self.waiting and len(self.under_way) - of_timed < AHEAD * self.workers:
+        while self.waiting and len(self.under_way) - of_timed < PIECES_AHEAD * self.workers:
             self.hand(self.waiting.pop(0))
-        first = self.waiting[0].rank if self.waiting else REPORT
-        while self.timed and of_timed < self.workers and (first > TIME or not self.door.times_alone):
+        first = self.waiting[0].rank if self.waiting else TO_REPORT
+        while self.timed and of_timed < self.workers and (first > TO_TIME or not self.door.times_alone):
             of_timed += self.hand(self.timed.pop(0))
 
     def hand(self, entry: Waiting) -> bool:
@@ -128,7 +128,7 @@ class Run:
         function, arguments = {
             "read": lambda: (read_file, (task.model.shown, self.asked)),
             "report": lambda: (reported, (self.found(task), task.left_out, task.seconds, task.model.shown, self.asked)),
-        }.get(step, lambda: (computed, (step, step in TIMED_LAST, task.model.shown, self.asked)))()
+        }.get(step, lambda: (findings, (step, step in TIMED_LAST, task.model.shown, self.asked)))()
         piece = Piece(
             f"{step} of {task.model.shown}", function, arguments, task.model.hash, rank, -entry.lighter,
             step in TIMED_LAST, task.packed,
@@ -160,7 +160,7 @@ class Run:
             self.was_read(task, outcome.returned)
         elif step == "report":
             row, written = outcome.returned
-            write_report(self.out / place_of(task.model.shown), written | {MARK: task.keys[step].encode()})
+            write_report(self.out / place_of_report(task.model.shown), written | {MARK: task.keys[step].encode()})
             if not task.lost:
                 self.kept.put(task.keys[step], row)
             self.ended(task, **row)
@@ -198,14 +198,14 @@ class Run:
                 task.seconds += value[1]
             elif name in task.keys:
                 task.expected.add(name)
-                timed_rank = TIME if self.door.times_alone else READ
-                self.ask(task, name, timed_rank if name in TIMED_LAST else COMPUTE)
+                timed_rank = TO_TIME if self.door.times_alone else TO_READ
+                self.ask(task, name, timed_rank if name in TIMED_LAST else TO_COMPUTE)
         self.has_ended(task, "")
 
     def is_written(self, task: Task) -> bool:
         """Whether the report of a file that is there is the one that is asked for."""
         try:
-            return (self.out / place_of(task.model.shown) / MARK).read_bytes() == task.keys["report"].encode()
+            return (self.out / place_of_report(task.model.shown) / MARK).read_bytes() == task.keys["report"].encode()
         except OSError:
             return False
 
@@ -214,7 +214,7 @@ class Run:
         task.expected.discard(name)
         if not task.expected:
             after_timed = self.door.times_alone and any(name in TIMED_LAST for name in task.keys)
-            self.ask(task, "report", REPORT if after_timed else COMPUTE)
+            self.ask(task, "report", TO_REPORT if after_timed else TO_COMPUTE)
 
     def ended(self, task: Task, verdict: str, reason: str | None, **more: object) -> None:
         """A file is done."""

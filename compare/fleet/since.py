@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..process.streams import in_one_line
 from .piece import FleetError
-from .row import COLUMNS
+from .row import FLEET_COLUMNS
 
 MOVED = 0.01  # relative, of a limit: what is less is not worth a word
 
@@ -19,8 +19,8 @@ def earlier(folder: str) -> dict[str, dict]:
         with path.open(encoding="utf-8", newline="") as file:
             table = csv.DictReader(file)
             rows = list(table)
-            if not set(COLUMNS) <= set(table.fieldnames or ()):
-                raise FleetError(f"{shown} is not of a fleet: it has not the columns {', '.join(COLUMNS)}")
+            if not set(FLEET_COLUMNS) <= set(table.fieldnames or ()):
+                raise FleetError(f"{shown} is not of a fleet: it has not the columns {', '.join(FLEET_COLUMNS)}")
             return {row["file"]: row | {"limit_s": float(row["limit_s"]) if row["limit_s"] else None} for row in rows}
     except FleetError:
         raise

@@ -10,13 +10,13 @@ from ..report.files import csv
 from ..report.provenance import commit
 from ..version import OURS, installed, own_version
 from .kept import write
-from .models import place_of
-from .page import page
-from .row import AGREE, BROKE, COLUMNS, DIFFER, REFUSED, order
+from .models import place_of_report
+from .page import fleet_page
+from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order
 from .run import Run
 from .times import time_of_workers
 
-WORDS = {DIFFER: ("differs", "differ"), BROKE: ("broke off", "broke off"), REFUSED: ("was refused", "were refused"),
+VERDICT_WORDS = {DIFFER: ("differs", "differ"), BROKE: ("broke off", "broke off"), REFUSED: ("was refused", "were refused"),
          AGREE: ("agrees", "agree")}  # fmt: skip
 
 
@@ -26,9 +26,9 @@ def write_table(
     """Write fleet.csv and index.html; the sentences at the top. changed: since an earlier fleet, None: that was not asked."""
     rows, left_out = sorted(run.rows, key=order), [*left_out, *run.parts]
     for row in rows:
-        row["has_report"] = (out / place_of(row["file"]) / "index.html").is_file() and row["verdict"] != REFUSED
+        row["has_report"] = (out / place_of_report(row["file"]) / "index.html").is_file() and row["verdict"] != REFUSED
     spent = time_of_workers(run.took, run.workers, took, run.door.times_alone)
-    said = sentences(rows, left_out, run)
+    said = sentences_of(rows, left_out, run)
     origin = {
         "command": command,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -41,14 +41,14 @@ def write_table(
         OURS: own_version(),
         "mujoco": installed("mujoco"),
     }
-    columns = [{name: row[name] for name in COLUMNS} for row in rows]
+    columns = [{name: row[name] for name in FLEET_COLUMNS} for row in rows]
     write(out / "fleet.csv", csv(columns).encode("utf-8", "backslashreplace"))
-    text = page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture(rows))
+    text = fleet_page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture_of_steps(rows))
     write(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return [*said, spent.words(run.workers, took)] if run.took else said
 
 
-def picture(rows: Sequence[dict]) -> tuple[bytes, str, tuple[int, int]] | None:
+def picture_of_steps(rows: Sequence[dict]) -> tuple[bytes, str, tuple[int, int]] | None:
     """The picture of the page, see figures_fleet; None: there is nothing to draw, or it could not be drawn."""
     if not any(row["limit_s"] for row in rows):
         return None
@@ -60,10 +60,10 @@ def picture(rows: Sequence[dict]) -> tuple[bytes, str, tuple[int, int]] | None:
         return None  # the table says the same
 
 
-def sentences(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: Run) -> list[str]:
+def sentences_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: Run) -> list[str]:
     """How many have which verdict; whose own step is not stable; what is left out; what is known from before."""
     counted = run.verdicts()
-    many = [f"{counted[v]} {WORDS[v][counted[v] > 1]}" for v in (DIFFER, BROKE, REFUSED, AGREE) if counted[v]]
+    many = [f"{counted[v]} {VERDICT_WORDS[v][counted[v] > 1]}" for v in (DIFFER, BROKE, REFUSED, AGREE) if counted[v]]
     said = [f"{len(rows)} file{'s' if len(rows) != 1 else ''}: {', '.join(many)}."]
     unstable = [row["file"] for row in rows if row["stable_at_file_dt"] is False]
     if unstable:
