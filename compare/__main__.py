@@ -20,14 +20,13 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from .command_line import PROGRAM, request
+from .command_line import FLEET, PROGRAM, request
 from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import in_one_line
 
 COMPUTING = ("compare.experiment", "scipy.optimize", "tmt.kernels")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
-FLEET = "fleet"  # the word that is no experiment
 LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a word
 
 
@@ -52,7 +51,7 @@ def fleet(arguments: Sequence[str]) -> int:
     from .fleet.piece import FleetError
 
     try:
-        return command.fleet(arguments)
+        return command.fleet_status(arguments)
     except FleetError as error:
         raise Refused(error) from None
 

@@ -13,6 +13,7 @@ from .experiments import EXPERIMENTS, NOT_OF_OWN
 from .process.streams import in_one_line
 
 PROGRAM = "python -m compare"
+FLEET = "fleet"  # the word that is no experiment: it is of many files
 FOLDER = Path(__file__).resolve().parent / "experiments"
 LONGEST_ASKED = 5.0  # s, that can be asked about
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
@@ -24,7 +25,7 @@ SHORT = f"""\
   {PROGRAM} all                    all of it, for the assignment's arm
   {PROGRAM} all --quick            the same in seconds: fewer states
   {PROGRAM} all --mjcf robot.xml   your robot
-  {PROGRAM} speed --help           what one experiment asks and finds
+  {PROGRAM} fleet models           every model in a folder, in a table
   {PROGRAM} --help                 all options; equations of your own
 
 """
@@ -41,6 +42,8 @@ EXAMPLES = """examples:
   python -m compare speed --scenes my.toml    scenes of your own
   python -m compare speed --growth            a chain of 1 to 64 joints
   python -m compare speed --help              what one experiment asks and finds
+  python -m compare fleet models              every model in a folder, one table
+                                              (its options: fleet --help)
 
 output: a line for each experiment; seconds are CPU time of the experiment, not
 waiting
@@ -209,8 +212,11 @@ def refuse_unknown(whole: Parser, options: argparse.Namespace, unknown: Sequence
     name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
     if name is None and not (options.help or options.version):
         whole.error(f"no experiment is named; one of {choices} is expected, as in {PROGRAM} all {given}")
+    if name == FLEET:
+        whole.error(f"{FLEET} is the first word, before its options, as in {PROGRAM} {FLEET} models")
     if name is not None and name not in words:
-        whole.error(f"{name!r} is no experiment; {expected(name, words | {'help': '--help'}, choices)}")
+        near = expected(name, words | {"help": "--help", FLEET: FLEET}, choices)
+        whole.error(f"{name!r} is no experiment; {near}")
     if unknown:
         whole.error(f"{unknown[0]!r} is one word too many; one experiment, or all, is expected")
 

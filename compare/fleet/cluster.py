@@ -33,6 +33,8 @@ class Cluster:
     FleetError: there is no scheduler at the address, no worker, or workers with another version of the program.
     """
 
+    times_alone = False
+
     def __init__(self, address: str, limit: float):
         try:
             import distributed

@@ -6,17 +6,22 @@ import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tmt.cores import cores
 
-from ..command_line import PROGRAM, Parser, expected, in_lines, not_empty
+from ..command_line import FLEET, PROGRAM, Parser, expected, in_lines, not_empty
 from ..experiments import EXPERIMENTS
+from ..process.streams import in_one_line
 from ..report.remaining import in_words
 from ..report.terminal import Terminal
 
-WORD = "fleet"
+if TYPE_CHECKING:
+    from .run import Run
+
+SHOWN_CHANGES = 20  # changes, on the terminal
 LIMIT = 600.0  # s, that a piece may take
-TEXT = "\n\n".join(
+FLEET_TEXT = "\n\n".join(
     in_lines(text)
     for text in (
         "Compare every model that is found with tmt's equations for it, each with a report of its own, and list what needs a "
@@ -41,51 +46,13 @@ not be carried out, for the reason in one line
 """
 
 
-def parser() -> Parser:
-    made = Parser(
-        prog=f"{PROGRAM} {WORD}", usage=f"{PROGRAM} {WORD} PATH... [options]", description=TEXT, epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
-    )  # fmt: skip
-    made.add_argument("paths", nargs="*", type=not_empty, metavar="PATH", help=argparse.SUPPRESS)
-    made.add_argument("-h", "--help", action="store_true", help="this text")
-    made.add_argument(
-        "--out",
-        type=not_empty,
-        default=f"reports/{WORD}",
-        metavar="DIR",
-        help="where the fleet goes (default: %(default)s)",
-    )
-    made.add_argument("--full", action="store_true", help="each file as by `all`, not by `all --quick`")
-    made.add_argument("--only", type=not_empty, metavar="LIST", help="some experiments: mass,stability (default: all)")
-    made.add_argument(
-        "--workers", type=count, metavar="N", help="processes on this machine (default: one for each core)"
-    )
-    made.add_argument(
-        "--dask", type=not_empty, metavar="ADDRESS", help="the scheduler of a Dask cluster, whose workers do the work"
-    )
-    made.add_argument(
-        "--limit",
-        type=seconds,
-        default=LIMIT,
-        metavar="S",
-        help="seconds that a piece, an experiment of a file, may take (default: %(default)g)",
-    )
-    made.add_argument(
-        "--since",
-        type=not_empty,
-        metavar="DIR",
-        help="an earlier fleet: say which verdicts have changed, and which limits of the step by more than 1 %%",
-    )
-    return made
-
-
 def count(text: str) -> int:
     if not text.isdecimal() or not 0 < int(text) <= 1024:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; 1 or more are expected")
     return int(text)
 
 
-def seconds(text: str) -> float:
+def duration(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
@@ -95,6 +62,42 @@ def seconds(text: str) -> float:
     return value
 
 
+FLEET_OPTIONS = {
+    "--out": {
+        "type": not_empty, "default": f"reports/{FLEET}", "metavar": "DIR",
+        "help": "where the fleet goes (default: %(default)s)",
+    },
+    "--full": {"action": "store_true", "help": "each file as by `all`, not by `all --quick`"},
+    "--only": {"type": not_empty, "metavar": "LIST", "help": "some experiments: mass,stability (default: all)"},
+    "--workers": {
+        "type": count, "metavar": "N", "help": "processes on this machine (default: one for each core)",
+    },
+    "--dask": {
+        "type": not_empty, "metavar": "ADDRESS", "help": "the scheduler of a Dask cluster, whose workers do the work",
+    },
+    "--limit": {
+        "type": duration, "default": LIMIT, "metavar": "S",
+        "help": "seconds that a piece, an experiment of a file, may take (default: %(default)g)",
+    },
+    "--since": {
+        "type": not_empty, "metavar": "DIR",
+        "help": "an earlier fleet: say which verdicts have changed, and which limits of the step by more than 1 %%",
+    },
+}  # fmt: skip
+
+
+def fleet_parser() -> Parser:
+    made = Parser(
+        prog=f"{PROGRAM} {FLEET}", usage=f"{PROGRAM} {FLEET} PATH... [options]", description=FLEET_TEXT, epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False,
+    )  # fmt: skip
+    for name, how in FLEET_OPTIONS.items():
+        made.add_argument(name, **how)
+    made.add_argument("paths", nargs="*", type=not_empty, metavar="PATH", help=argparse.SUPPRESS)
+    made.add_argument("-h", "--help", action="store_true", help="this text")
+    return made
+
+
 def experiments_of(made: Parser, only: str | None) -> tuple[str, ...]:
     """The experiments that are asked for, in their order."""
     if only is None:
@@ -102,29 +105,36 @@ def experiments_of(made: Parser, only: str | None) -> tuple[str, ...]:
     names = [name.strip() for name in only.split(",") if name.strip()]
     for name in names:
         if name not in EXPERIMENTS:
-            choices = f"{', '.join(EXPERIMENTS)}"
-            made.error(f"--only: {name!r} is no experiment; {expected(name, {n: n for n in EXPERIMENTS}, choices)}")
+            near = expected(name, {known: known for known in EXPERIMENTS}, ", ".join(EXPERIMENTS))
+            made.error(f"--only: {name!r} is no experiment; {near}")
     if not names:
         made.error("--only names no experiment")
     return tuple(name for name in EXPERIMENTS if name in names)
 
 
-def fleet(arguments: Sequence[str]) -> int:
+def fleet_status(arguments: Sequence[str]) -> int:
     """Run the command; the exit status. SystemExit for help, and with one line for what is mistyped. FleetError, one line."""
-    made = parser()
-    options = made.parse_args(arguments)
+    made = fleet_parser()
+    options, unknown = made.parse_known_intermixed_args(arguments)
+    for word in unknown:
+        name = word.split("=")[0]
+        known = {option.strip("-"): option for option in (*FLEET_OPTIONS, "--help")}
+        made.error(f"{word!r} is no option; {expected(name.strip('-'), known, ' '.join(FLEET_OPTIONS))}")
     if options.help:
         made.print_help()
         raise SystemExit(0)
     if not options.paths:
-        made.error("no file is named; a file, a folder, a pattern or @LIST is expected")
+        made.error(
+            f"no file is named; a file, a folder, a pattern or @LIST is expected, as in {PROGRAM} {FLEET} models"
+        )
     if options.dask and options.workers:
         made.error("--workers is for processes on this machine; a cluster has its own (--dask)")
     names = experiments_of(made, options.only)
-    return carry_out(options, names, shlex.join(["python", "-m", "compare", WORD, *arguments]))
+    return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
 
-def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str) -> int:
+def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str) -> int:
+    """Find, compute, write; the exit status."""
     started = time.perf_counter()
     from .cluster import Cluster  # what is imported takes its time
     from .file_pieces import Asked
@@ -142,18 +152,24 @@ def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str)
     try:
         door = Cluster(options.dask, options.limit) if options.dask else Pool(options.workers or cores(), options.limit)
         try:
-            run = Run(found.models, Asked(names, not options.full), door, kept, out)
+            run, words = Run(found.models, Asked(names, not options.full), door, kept, out), []
             for name, why in found.left_out:
                 terminal.say(f"left out: {name}, {why}")
-            workers = door.workers()
-            terminal.tell(lambda: how_far(run, workers))
+            terminal.tell(lambda: words)
+
+            def progress() -> None:
+                words[:] = how_far_it_is(run)
+                say_new(terminal, run)
+
             with terminal.progress(""):
-                run.carry_out(lambda: say_new(terminal, run))
+                run.carry_out(progress)
+            for name, why in run.parts:
+                terminal.say(f"left out: {name}, {why}")
         finally:
             door.close()
-        changed = None if before is None else changes(before, run.rows)
+        changed = None if before is None else changes(before, sorted(run.rows, key=lambda row: row["file"]))
         took = time.perf_counter() - started
-        said = write_table(out, run, found.left_out, changed, command, took, workers)
+        said = write_table(out, run, found.left_out, changed, command, took)
         kept.forget_others()
     finally:
         kept.close()
@@ -161,27 +177,34 @@ def carry_out(options: argparse.Namespace, names: tuple[str, ...], command: str)
     terminal.say(said[0], "bold green" if run.is_good else "bold red")
     for line in said[1:]:
         terminal.say(line)
-    for line in changed or ():
+    for line in (changed or ())[:SHOWN_CHANGES]:
         terminal.say(f"changed: {line}")
+    if changed and len(changed) > SHOWN_CHANGES:
+        terminal.say(f"and {len(changed) - SHOWN_CHANGES} more have changed: in index.html")
     if changed == []:
-        terminal.say(f"nothing has changed since {options.since}")
-    terminal.say(f"Fleet: {os.path.join(options.out, 'index.html')} ({took:.1f} s)")
+        terminal.say(f"nothing has changed since {in_one_line(options.since)}")
+    terminal.say(f"Fleet: {in_one_line(os.path.join(options.out, 'index.html'))} ({took:.1f} s)")
     return 0 if run.is_good else 1
 
 
-def how_far(run, workers: int) -> list[str]:
+def how_far_it_is(run: "Run") -> list[str]:
     """How far a fleet is: files, pieces, the verdicts so far, how long still."""
+    from .times import seconds_left
+
     verdicts = ", ".join(f"{many} {verdict}" for verdict, many in sorted(run.verdicts().items()))
-    left = run.seconds_left(workers)
-    parts = [f"{run.files_done} of {len(run.tasks)} files", f"{run.pieces_done} of {run.pieces_known} pieces", verdicts]
-    return [part for part in [*parts, f"about {in_words(left)} left" if left else ""] if part]
+    still = [(step, task.joints) for task, step in run.still()]
+    left = seconds_left(run.took, still, run.workers, run.door.times_alone)
+    parts = [
+        f"{run.files_done} of {len(run.tasks)} files",
+        f"{run.pieces_done} of {run.pieces_done + len(still)} pieces",
+    ]
+    return [part for part in [*parts, verdicts, f"about {in_words(left)} left" if left else ""] if part]
 
 
-def say_new(terminal: Terminal, run) -> None:
+def say_new(terminal: Terminal, run: "Run") -> None:
     """A line for each file that has ended since the last call."""
     for row in run.take_new():
         ratio = "" if row["worst_ratio"] is None else f"{100.0 * row['worst_ratio']:.2g} % of tolerance"
-        unstable = "its own step is not stable" if row["stable_at_file_dt"] is False else ""
-        text = row["reason"] or ", ".join(filter(None, (ratio, unstable)))
         bad = row["verdict"] in ("differ", "broke")
-        terminal.say(f"{row['verdict']:<8} {row['file']}: {text}  {row['seconds']:.1f} s", "red" if bad else "")
+        text = ": ".join(filter(None, (row["file"], row["reason"] or ratio)))
+        terminal.say(f"{row['verdict']:<8} {text}  {row['seconds']:.1f} s", "red" if bad else "")

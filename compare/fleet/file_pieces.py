@@ -2,15 +2,15 @@
 
 import pickle
 import platform
+import shlex
 import shutil
+import tempfile
 import time
 import zlib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from .. import experiment
@@ -25,7 +25,7 @@ from ..report import files, folder, provenance, verdict
 from ..report.parts import Parts
 from ..setup import Setup, engines
 from .models import unpacked
-from .row import row_of
+from .row import row_of_file
 
 UNPACKED = 4  # models of which a process keeps the files
 
@@ -36,21 +36,13 @@ class Asked(NamedTuple):
     names: tuple[str, ...]  # of experiments
     is_quick: bool
 
-    def command(self, shown: str) -> list[str]:
-        """The words that make the report of one file alone, if these can."""
-        size = ["--quick"] * self.is_quick
+    def command(self, shown: str) -> str:
+        """The command that makes the report of one file alone."""
         if set(self.names) >= set(EXPERIMENTS):
-            return ["python", "-m", "compare", "all", *size, "--mjcf", shown]
-        return [
-            "python",
-            "-m",
-            "compare",
-            "fleet",
-            shown,
-            *["--full"] * (not self.is_quick),
-            "--only",
-            ",".join(self.names),
-        ]
+            words = ["all", *["--quick"] * self.is_quick, "--mjcf", shown]
+        else:
+            words = ["fleet", shown, *["--full"] * (not self.is_quick), "--only", ",".join(self.names)]
+        return shlex.join(["python", "-m", "compare", *words])
 
 
 class Known(NamedTuple):
@@ -64,22 +56,32 @@ class Known(NamedTuple):
     dt: float | None = None  # s
 
 
-@lru_cache(UNPACKED)
-def place(bundle: bytes) -> Path:
+places = {}  # where models are unpacked, by their bundles; the one that was used last at the end
+
+
+def unpacked_at(bundle: bytes) -> Path:
     """A file with what it needs, unpacked."""
-    return unpacked(pickle.loads(bundle), Path.cwd())
+    places[bundle] = path = places.pop(bundle, None) or unpacked(pickle.loads(bundle), Path.cwd())
+    while len(places) > UNPACKED:
+        shutil.rmtree(top_of(places.pop(next(iter(places)))), ignore_errors=True)
+    return path
 
 
-def compared(shown: str, bundle: bytes) -> Compared:
+def top_of(path: Path) -> Path:
+    """The folder in which a model was unpacked."""
+    return Path.cwd() / path.relative_to(Path.cwd()).parts[0]
+
+
+def compared_file(shown: str, bundle: bytes) -> Compared:
     """A file as it is compared. ModelError if it cannot be."""
-    return compared_with(None, str(place(bundle)), shown=shown)
+    return compared_with(None, str(unpacked_at(bundle)), shown=shown)
 
 
 def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
     """What is known of a file, and which experiments serve it."""
     try:
-        known = compared(shown, bundle)
-        reading = known.reading or read(place(bundle))
+        known = compared_file(shown, bundle)
+        reading = known.reading or read(unpacked_at(bundle))
     except ModelError as error:
         return Known(as_given(str(error), shown, bundle))
     reasons = {name: reason for name in asked.names if (reason := skipped(name, known.robot))}
@@ -89,7 +91,7 @@ def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
 
 def as_given(text: str, shown: str, bundle: bytes) -> str:
     """A text in which a file is called as it was given, not by where it was unpacked."""
-    return text.replace(str(place(bundle)), shown).replace(f"{place(bundle).parent}/", "")
+    return text.replace(str(unpacked_at(bundle)), shown).replace(f"{unpacked_at(bundle).parent}/", "")
 
 
 def setup_of(known: Compared, asked: Asked) -> Setup:
@@ -97,9 +99,9 @@ def setup_of(known: Compared, asked: Asked) -> Setup:
     return make(known.robot, engines(known.mujoco), reading=known.reading)
 
 
-def computed(name: str, timed: bool, shown: str, asked: Asked, bundle: bytes) -> bytes:
+def findings(name: str, timed: bool, shown: str, asked: Asked, bundle: bytes) -> bytes:
     """What an experiment finds, or that it broke off: see experiment.computed, packed."""
-    setup = setup_of(compared(shown, bundle), asked)
+    setup = setup_of(compared_file(shown, bundle), asked)
     found = experiment.computed(name, module(name), setup)
     for result in filter(None, found):
         result.notes = [as_given(note, shown, bundle) for note in result.notes]
@@ -126,30 +128,30 @@ def reported(
 ) -> tuple[dict, dict[str, bytes]]:
     """The row of a file, and its own report: {path: content}.
 
-    found: what experiments found, see `computed`, or in words why one gave nothing; left_out: others, with the reason; seconds:
+    found: what experiments found, see `findings`, or in words why one gave nothing; left_out: others, with the reason; seconds:
     what they took.
     """
     began = time.process_time()
-    known = compared(shown, bundle)
+    known = compared_file(shown, bundle)
     setup, names = setup_of(known, asked), [name for name in asked.names if name in found or name == "diagnosis"]
     have = {
         name: broken(name, value) if isinstance(value, str) else pickle.loads(zlib.decompress(value))
         for name, value in found.items()
     }
-    with TemporaryDirectory(dir=Path.cwd()) as place_of_report:
+    with tempfile.TemporaryDirectory(dir=Path.cwd()) as place_of_report:
         out, clock = Path(place_of_report), Clock()
         sections, causes, needless = experiment.examine(names, setup, out, Silent(), Here(), clock, have)
         parts, count = Parts(), len(EXPERIMENTS) - len(needless)
         outcome = sections, count, causes, known.reference.compared, known.robot.name
         words = parts.made("the verdict", "No verdict could be made.", verdict.verdict, *outcome)
-        origin = provenance.provenance(" ".join(asked.command(shown)), known.robot.mjcf, shown, SEED)
+        origin = provenance.provenance(asked.command(shown), known.robot.mjcf, shown, SEED)
         seconds += time.process_time() - began
         origin["seconds"] = round(seconds, 1)
         skips = [*left_out, *needless.items()]
         files.write(out, verdict.Report(sections, known.robot, origin, words, causes, skips, known.reference), parts)
         written = {name: (out / name).read_bytes() for name in folder.files(out)}
         shutil.rmtree(out / "figures", ignore_errors=True)
-    return row_of(sections, causes, parts.lines) | {"seconds": round(seconds, 2)}, written
+    return row_of_file(sections, causes, parts.lines) | {"seconds": round(seconds, 2)}, written
 
 
 class Silent:

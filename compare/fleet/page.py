@@ -1,12 +1,13 @@
 """The table of a fleet as a page: what needs a look first, each row with the way to the file's own report."""
 
+import base64
 import html
 from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
-from .models import place_of
+from .models import place_of_report
 from .row import BROKE, DIFFER, REFUSED
 
 HEADS = {
@@ -14,63 +15,91 @@ HEADS = {
     "verdict": "verdict",
     "reason": "reason or cause",
     "joints": "joints",
-    "worst_ratio": "largest share of a tolerance",
+    "worst_ratio": "share of tolerance",
     "file_integrator": "integrator",
-    "file_dt_s": "dt, s",
-    "stable_at_file_dt": "stable at its own dt",
-    "limit_s": "limit of dt, s",
+    "file_dt_s": "step, ms",
+    "stable_at_file_dt": "stable",
+    "limit_s": "limit, ms",
     "seconds": "processor, s",
 }
-MARKS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
+ROW_KINDS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
+WHAT_COMES_FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
+MEANINGS = {
+    "agree": "MuJoCo and what the file is compared with differ by rounding alone",
+    "differ": "a check that compares them fails; the reason is the cause, where one is found",
+    "broke": "something did not come to its end, so that nothing can be said",
+    "refused": "the file cannot be compared",
+    "share of tolerance": "the largest difference, as a share of its tolerance of rounding; above 1 it is more than rounding",
+    "step, integrator": "the file's own",
+    "stable": "whether that step is, with that integrator under the file's own servos, at each posture where this is known",
+    "limit": "the largest stable step with that integrator, at the posture where it is least",
+    "processor": "what was computed for the file, on whatever machine",
+}  # what is not known is left empty
 
 
-def page(
+def fleet_page(
     title: str,
     said: Sequence[str],
     rows: Sequence[dict],
     left_out: Sequence[tuple[str, str]],
     changed: Sequence[str] | None,
     origin: dict,
+    picture: tuple[bytes, str, tuple[int, int]] | None = None,
 ) -> str:
-    """The whole page. said: sentences below the title; changed: since an earlier fleet, None: that was not asked."""
+    """The whole page. said: sentences below the title; changed: since an earlier fleet, None: that was not asked; picture: a PNG,
+    its caption, width and height."""
     parts = []
     if changed is not None:
-        texts = "".join(f"<li>{html.escape(text)}</li>" for text in changed) or "<li>Nothing.</li>"
-        parts.append(f"<h2>What has changed</h2><ul>{texts}</ul>")
+        parts.append("<h2>What has changed</h2>" + list_of(changed or ["Nothing."]))
     head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in HEADS.values())
     body = "\n".join(row_in_html(row) for row in rows)
-    parts.append(f'<h2>Files</h2><div class="scroll" role="region" tabindex="0" aria-label="Files"><table><thead><tr>{head}</tr>'
-                 f"</thead><tbody>\n{body}\n</tbody></table></div>")  # fmt: skip
-    parts.append('<p>The same with all digits: <a href="fleet.csv">fleet.csv</a>.</p>')
-    if left_out:
-        texts = "".join(f"<li>{html.escape(name)}: {html.escape(why)}.</li>" for name, why in left_out)
-        parts.append(f"<h2>Left out</h2><ul>{texts}</ul>")
-    lines = "".join(
-        f"<tr><th>{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>" for name, value in origin.items()
+    meanings = "".join(f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in MEANINGS.items())
+    parts.append(
+        f'<h2 id="files">Files</h2>\n<p class="quiet">{html.escape(WHAT_COMES_FIRST)} <a href="fleet.csv">fleet.csv</a>.</p>'
     )
-    parts.append(f"<h2>Where this comes from</h2><table class='text'>{lines}</table>")
-    bad = any(row["verdict"] in (DIFFER, BROKE) for row in rows)
+    parts.append(f"<details><summary>What the words mean</summary><dl>{meanings}</dl></details>")
+    parts.append(f'<div class="scroll" role="region" tabindex="0" aria-labelledby="files"><table class="files"><thead><tr>{head}'
+                 f"</tr></thead><tbody>\n{body}\n</tbody></table></div>")  # fmt: skip
+    if picture:
+        data, caption, (width, height) = picture
+        source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
+        parts.append(f'<h2>Steps</h2>\n<figure><img src="{source}" width="{width // 2}" height="{height // 2}" '
+                     f'alt="{html.escape(caption)}"><figcaption>{html.escape(caption)}</figcaption></figure>')  # fmt: skip
+    if left_out:
+        parts.append("<h2>Left out</h2>" + list_of([f"{name}: {why}." for name, why in left_out]))
+    lines = "".join(
+        f'<tr><th scope="row">{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>'
+        for name, value in origin.items()
+    )
+    parts.append(f'<h2>Where this comes from</h2>\n<table class="origin">{lines}</table>')
+    kind = "bad" if any(row["verdict"] in (DIFFER, BROKE) for row in rows) else "good"
     return Template((Path(__file__).parent / "fleet.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title), kind="bad" if bad else "good",
-        said="".join(f"<p>{html.escape(text)}</p>" for text in said), body="\n".join(parts),
+        title=html.escape(title), kind=kind, said="".join(f"<p>{html.escape(text)}</p>" for text in said), body="\n".join(parts)
     )  # fmt: skip
 
 
+def list_of(texts: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>{html.escape(text)}</li>' for text in texts)}</ul>"
+
+
 def row_in_html(row: dict) -> str:
+    """A row of the table, its file a link if there is a report."""
     cells = [cell_in_html(name, row[name]) for name in HEADS if name != "file"]
-    name = html.escape(row["file"])
+    name = html.escape(row["file"]).replace("/", "/<wbr>")
     if row["has_report"]:
-        address = html.escape(quote(f"{place_of(row['file'])}/index.html"))
+        address = html.escape(quote(f"{place_of_report(row['file'])}/index.html"))
         name = f'<a href="{address}">{name}</a>'
-    kind = MARKS.get(row["verdict"], "bad" if row["stable_at_file_dt"] is False else "good")
-    return f'<tr class="{kind}"><td>{name}</td>{"".join(cells)}</tr>'
+    kind = ROW_KINDS.get(row["verdict"], "bad" if row["stable_at_file_dt"] is False else "good")
+    return f'<tr class="{kind}"><th scope="row">{name}</th>{"".join(cells)}</tr>'
 
 
 def cell_in_html(name: str, value: object) -> str:
+    """A cell; steps are shown in ms."""
     if isinstance(value, bool):
         text = "yes" if value else "no"
     elif isinstance(value, float):
-        text = f"{value:.3g}" if name != "seconds" else f"{value:.1f}"
+        text = f"{value:.1f}" if name == "seconds" else f"{1e3 * value:.4g}" if name.endswith("_s") else f"{value:.2g}"
     else:
         text = "" if value is None else str(value)
-    return f'<td class="{"text" if isinstance(value, str) else "number"}">{html.escape(text)}</td>'
+    kind = "number" if isinstance(value, int | float) else "text"
+    return f'<td class="{kind} {name}" data-name="{HEADS[name]}">{html.escape(text)}</td>'

@@ -5,32 +5,42 @@ every folder that the compiler may, and takes what is there.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
-MODELS = ("include", "model")  # elements whose file is MJCF again
+WITH_MODELS = ("include", "model")  # elements whose file is MJCF again
 DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 
 
-def parts_of(path: Path) -> tuple[Path, ...]:
+def needed_by(path: Path) -> tuple[Path, ...]:
     """The files that an MJCF file needs, itself first; those that are not there, or not in XML that can be read, are left out."""
-    found, read, folders = {path.resolve(): path}, {}, {path.parent}
+    found, read, files, stated = {os.path.abspath(path): path}, set(), [], {""}
     waiting = [path]
+    places = [path.parent]  # of files: what is relative is so to one of them
     while waiting:  # all XML first: a folder that one part states is that of all
         file = waiting.pop()
-        read[file.resolve()] = elements = list(elements_of(file))
-        folders.add(file.parent)
-        for element in elements:
-            folders |= {base / element.get(name) for base in set(folders) for name in DIRECTORIES if element.get(name)}
-            for part in files_of(element, folders) if element.tag in MODELS else ():
-                if part.resolve() not in found:
-                    found[part.resolve()] = part
-                    waiting.append(part)
-    for element in (element for elements in read.values() for element in elements):
-        for part in files_of(element, folders):
-            found.setdefault(part.resolve(), part)
-    return path, *sorted(part for whole, part in found.items() if whole != path.resolve())
+        if (whole := os.path.realpath(file)) in read:  # a file that includes itself
+            continue
+        read.add(whole)
+        for element in elements_of(file):
+            stated |= {element.get(name) for name in DIRECTORIES if element.get(name)}
+            names = [value for key, value in element.attrib.items() if key.startswith("file") and value]
+            files += names
+            for part in there(names, places, [""]) if element.tag in WITH_MODELS else ():
+                found.setdefault(os.path.abspath(part), part)
+                waiting.append(part)
+                places += [part.parent] * (part.parent not in places)
+    files += [os.path.basename(name.replace("\\", "/")) for name in files]  # strippath
+    for part in there(dict.fromkeys(files), places, sorted(stated)):
+        found.setdefault(os.path.abspath(part), part)
+    return path, *sorted(part for part in found.values() if part is not path)
+
+
+def there(names: Iterable[str], places: Iterable[Path], folders: Iterable[str]) -> Iterator[Path]:
+    """The files of these names that are in folders of places."""
+    tried = (place / folder / name for name in names for place in places for folder in folders)
+    return (part for part in tried if is_a_file(part))
 
 
 def elements_of(path: Path) -> Iterator[ElementTree.Element]:
@@ -38,19 +48,11 @@ def elements_of(path: Path) -> Iterator[ElementTree.Element]:
     try:
         for _, element in ElementTree.iterparse(path, events=("start",)):
             yield element
-    except (ElementTree.ParseError, OSError, ValueError):
+    except (ElementTree.ParseError, LookupError, OSError, ValueError):
         return
 
 
-def files_of(element: ElementTree.Element, folders: set[Path]) -> list[Path]:
-    """The files that an element names, in each folder in which they are."""
-    names = [value for key, value in element.attrib.items() if key.startswith("file") and value]
-    names += [os.path.basename(name.replace("\\", "/")) for name in names]  # strippath
-    tried = (folder / name for name in dict.fromkeys(names) for folder in sorted(folders))
-    return [part for part in tried if is_file(part)]
-
-
-def is_file(path: Path) -> bool:
+def is_a_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):  # a name that no file can have

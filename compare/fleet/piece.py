@@ -56,6 +56,7 @@ class Outcome(NamedTuple):
 class Door(Protocol):
     """Where pieces go: the pool of this machine, or a cluster."""
 
+    times_alone: bool  # nothing else is under way while a timed piece runs
     under_way: int  # pieces that were submitted and have not been handed back
 
     def submit(self, piece: Piece) -> None: ...

@@ -20,6 +20,8 @@ class Pool:
     those of the group that it had before, then those of a group that no other has.
     """
 
+    times_alone = True
+
     def __init__(self, count: int, limit: float, memory: int | None = None):
         whole = memory_of_machine()
         self.count, self.limit = count, limit

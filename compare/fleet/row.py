@@ -2,51 +2,51 @@
 
 from collections.abc import Sequence
 
-from ..judge.check import ENDS
-from ..report.verdict import Section, failures, worst
+from ..judge.check import ENDS, Check
+from ..report.verdict import Section, failures, unstable_in_words, worst
 
-COLUMNS = (
+FLEET_COLUMNS = (
     "file", "sha256", "verdict", "reason", "joints", "worst_ratio",
     "file_integrator", "file_dt_s", "stable_at_file_dt", "limit_s", "seconds",
 )  # fmt: skip
 AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
 
 
-def row_of(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str]) -> dict:
-    """The verdict and its reason, the largest share of a tolerance, and the step. lost: parts of the report that broke."""
-    differing, broke, _ = failures(sections)
+def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str]) -> dict:
+    """The verdict and its reason, the largest share of a tolerance, and the step. lost: parts of the report that broke.
+
+    A file whose own step is not stable agrees all the same, and the reason says where the limit is.
+    """
+    differing, broke, unstable = failures(sections)
     top = worst(sections)
     stable, limit = own_step(sections)
     if differing:
         outcome, reason = DIFFER, causes[0]["text"] if causes else str(differing[0])
     elif broke or lost:
-        outcome, reason = BROKE, in_words(broke[0]) if broke else lost[0]
+        outcome, reason = BROKE, break_in_words(broke[0]) if broke else lost[0]
     elif not any(section.result.checks for section in sections):
         outcome, reason = REFUSED, "nothing could be compared"
     else:
-        outcome, reason = AGREE, ""
+        outcome, reason = AGREE, unstable_in_words(unstable) if unstable else ""
     return {
         "verdict": outcome, "reason": reason, "worst_ratio": None if top is None else top.over_tolerance,
         "stable_at_file_dt": stable, "limit_s": limit,
     }  # fmt: skip
 
 
-def in_words(check) -> str:
+def break_in_words(check: Check) -> str:
     """What broke off."""
-    return (
-        f"{check.experiment} {check.note}"
-        if check.quantity == ENDS
-        else f"{check.experiment}: {check.quantity}: {check.note}"
-    )
+    what = "" if check.quantity == ENDS else f": {check.quantity}:"
+    return f"{check.experiment}{what} {check.note}"
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
     """Whether the file's own step is stable under its own servos wherever that is known, and the least limit, s."""
     rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
     own = [row for row in rows if row["integrator"] == row["file_integrator"] and row["base"] != "locked"]
-    told = [row["stable_at_file_dt"] for row in own if row["stable_at_file_dt"] is not None]
+    known = [row["stable_at_file_dt"] for row in own if row["stable_at_file_dt"] is not None]
     limits = [row["predicted_dt_s"] for row in own if row["limit"] == "finite"]
-    return (all(told) if told else None), min(limits, default=None)
+    return (all(known) if known else None), min(limits, default=None)
 
 
 def order(row: dict) -> tuple:

@@ -1,29 +1,24 @@
 """A fleet is run: what is missing is handed out, what comes back is kept, and each file's report follows."""
 
 import pickle
+from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
-from .file_pieces import Asked, Known, computed, read_file, reported
+from .file_pieces import Asked, Known, findings, read_file, reported
 from .kept import Kept, write_report
-from .models import Model, bundle, place_of
+from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
 from .row import AGREE, BROKE, REFUSED
 
-READ, COMPUTE, TIME, REPORT = range(4)  # ranks: timed experiments wait for the others, and with them for nothing
-
-EXPECTED = {
-    "trajectory": 5.0,
-    "stability": 3.0,
-    "speed": 8.0,
-    "reduction": 3.0,
-    "report": 3.0,
-}  # s, before one has ended
-FEW_SECONDS = 0.4  # of any other
+TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
+PIECES_AHEAD = 12  # pieces that are handed out for each worker before one has ended: their models are in memory
+MARK = ".fleet"  # the file in a report that says from what it was made
 
 
 @dataclass
@@ -32,13 +27,28 @@ class Task:
 
     model: Model
     known: Known | None = None
-    found: dict = field(default_factory=dict)  # what experiments found, by name; in words why one gave nothing
-    keys: dict = field(default_factory=dict)
+    keys: dict = field(default_factory=dict)  # under which results are kept, by their kind
+    lost: dict = field(default_factory=dict)  # experiments that gave nothing, and why
     expected: set = field(default_factory=set)  # experiments that have not come back
     left_out: list = field(default_factory=list)
-    broke: bool = False
     seconds: float = 0.0
+    in_door: int = 0  # pieces that are handed out
+    packed: bytes = b""  # the model with what it needs, while pieces are handed out
     row: dict | None = None
+
+    @property
+    def joints(self) -> int | None:
+        return self.known.joints if self.known else None
+
+
+class Waiting(NamedTuple):
+    """A piece that is not handed out yet; they are in this order."""
+
+    rank: int
+    lighter: float
+    number: int
+    task: Task
+    step: str
 
 
 class Run:
@@ -47,133 +57,172 @@ class Run:
     def __init__(self, models: Sequence[Model], asked: Asked, door: Door, kept: Kept, out: Path):
         self.asked, self.door, self.kept, self.out = asked, door, kept, out
         self.tasks = [Task(model) for model in models]
-        self.rows, self.parts, self.under_way = [], [], {}
-        self.took, self.done_before, self.new, self.machines = (
-            {},
-            0,
-            [],
-            set(),
-        )  # s by a watch of pieces that ended, by their kind
+        self.rows, self.new, self.parts, self.machines = [], [], [], set()
+        self.waiting, self.timed, self.under_way, self.count = [], [], {}, 0
+        self.took = {}  # joints and s by a watch of the pieces that ended, by their kind
+        self.done_before = 0
         self.no_timing = door.no_timing()
+        self.workers = max(1, door.workers())
 
     def carry_out(self, progress: Callable[[], object]) -> None:
         """All of it. progress is called when something has changed."""
         for task in self.tasks:
             self.begin(task)
+            self.hand_out()
         while self.door.under_way:
             progress()
             if done := self.door.next():
                 piece, outcome = done
                 task, step = self.under_way.pop(piece.name)
-                self.took.setdefault(step, []).append(outcome.wall)
-                self.machines.add(outcome.machine)
+                task.in_door -= 1
+                self.took.setdefault(step, []).append((task.joints or 0, outcome.wall))
+                self.machines |= {outcome.machine} - {""}
                 task.seconds += outcome.seconds
                 self.came(task, step, outcome)
+            self.hand_out()
         progress()
 
     def begin(self, task: Task) -> None:
         """The file is read, if that is not known."""
-        task.keys["read"] = self.key(task, "read", self.asked)
+        try:
+            task.keys["read"] = self.key(task, "read", self.asked)
+        except OSError as error:
+            self.ended(task, REFUSED, f"it cannot be read: {error.strerror}")
+            return
         known = self.kept.get(task.keys["read"])
         if known is None:
-            self.hand_out(task, "read", Piece("", read_file, (task.model.shown, self.asked), rank=READ))
+            self.ask(task, "read", TO_READ)
         else:
             self.was_read(task, known)
 
     def key(self, task: Task, *what: object) -> str:
-        return self.kept.key(task.model.hash, task.model.shown, *what)
+        return self.kept.key(task.model.hash, task.model.sha256, task.model.shown, *what)
 
-    def hand_out(self, task: Task, step: str, piece: Piece) -> None:
-        piece = piece._replace(
-            name=f"{step} of {task.model.shown}", group=task.model.hash, shared=pickle.dumps(bundle(task.model)),
-            weight=float(task.known.joints or 0) if task.known else 0.0,
+    def ask(self, task: Task, step: str, rank: int) -> None:
+        """A piece waits until it is handed out."""
+        self.count += 1
+        insort(
+            self.timed if step in TIMED_LAST else self.waiting,
+            Waiting(rank, -(task.joints or 0), self.count, task, step),
+        )
+
+    def hand_out(self) -> None:
+        """As many pieces as keep the workers busy; timed ones of a pool at the end, for all others wait meanwhile."""
+        of_timed = sum(step in TIMED_LAST for _, step in self.under_way.values())
+        while self.waiting and len(self.under_way) - of_timed < PIECES_AHEAD * self.workers:
+            self.hand(self.waiting.pop(0))
+        first = self.waiting[0].rank if self.waiting else TO_REPORT
+        while self.timed and of_timed < self.workers and (first > TO_TIME or not self.door.times_alone):
+            of_timed += self.hand(self.timed.pop(0))
+
+    def hand(self, entry: Waiting) -> bool:
+        """Hand out a piece, if its file is still what it was when the fleet began."""
+        rank, _, _, task, step = entry
+        if task.row is not None:
+            return False
+        try:
+            task.packed = task.packed or pickle.dumps(bundle(task.model))
+        except OSError as error:
+            self.ended(task, BROKE, error.strerror)
+            return False
+        function, arguments = {
+            "read": lambda: (read_file, (task.model.shown, self.asked)),
+            "report": lambda: (reported, (self.found(task), task.left_out, task.seconds, task.model.shown, self.asked)),
+        }.get(step, lambda: (findings, (step, step in TIMED_LAST, task.model.shown, self.asked)))()
+        piece = Piece(
+            f"{step} of {task.model.shown}", function, arguments, task.model.hash, rank, -entry.lighter,
+            step in TIMED_LAST, task.packed,
         )  # fmt: skip
         self.under_way[piece.name] = task, step
+        task.in_door += 1
         self.door.submit(piece)
+        return True
+
+    def found(self, task: Task) -> dict:
+        """What the experiments of a file found, or in words why one gave nothing."""
+        names = [name for name in EXPERIMENTS if name in task.keys and name not in task.lost]
+        kept = {name: self.kept.get(task.keys[name]) for name in names}
+        return task.lost | {name: value[0] if value else "what was kept of it is gone" for name, value in kept.items()}
 
     def came(self, task: Task, step: str, outcome: Outcome) -> None:
         """What a piece has found is kept, and what follows from it begins."""
-        if outcome.broke:
-            task.broke = True
-            if step in ("read", "report"):
-                self.ended(
-                    task, {"verdict": BROKE, "reason": f"{step}: {outcome.broke}", "seconds": round(task.seconds, 2)}
-                )
-                return
-            task.found[step] = outcome.broke
+        if task.in_door == 0:
+            task.packed = b""
+        if task.row is not None:
+            return
+        if outcome.broke and step in ("read", "report"):
+            self.ended(task, BROKE, f"{step}: {outcome.broke}")
+        elif outcome.broke:
+            task.lost[step] = outcome.broke
+            self.has_ended(task, step)
+        elif step == "read":
+            self.kept.put(task.keys[step], outcome.returned)
+            self.was_read(task, outcome.returned)
+        elif step == "report":
+            row, written = outcome.returned
+            write_report(self.out / place_of_report(task.model.shown), written | {MARK: task.keys[step].encode()})
+            if not task.lost:
+                self.kept.put(task.keys[step], row)
+            self.ended(task, **row)
         else:
-            value = outcome.returned
-            if step == "report":
-                row, written = value
-                write_report(self.out / place_of(task.model.shown), written)
-                if not task.broke:
-                    self.kept.put(task.keys[step], row)
-                self.ended(task, row)
-                return
-            self.kept.put(task.keys[step], value if step == "read" else (value, outcome.seconds))
-            if step == "read":
-                self.was_read(task, value)
-                return
-            task.found[step] = value
-        task.expected.discard(step)
-        self.report_if_whole(task)
+            self.kept.put(task.keys[step], (outcome.returned, outcome.seconds))
+            self.has_ended(task, step)
 
     def was_read(self, task: Task, known: Known) -> None:
         """Its experiments are asked for, but for those that are known; a file without a model of its own is left out."""
         task.known = known
+        if known.refused and task.model.included_by:
+            task.row = {}
+            self.parts.append((task.model.shown, f"no model of its own, and included by {task.model.included_by}"))
+            return
         if known.refused:
-            if task.model.included_by:
-                self.parts.append(
-                    (task.model.shown, f"it is no model of its own, and included by {task.model.included_by}")
-                )
-                task.row = {}
-            else:
-                self.ended(task, {"verdict": REFUSED, "reason": known.refused, "seconds": round(task.seconds, 2)})
+            self.ended(task, REFUSED, known.refused)
             return
-        task.left_out = list(known.reasons)
-        for name in known.experiments:
-            timed = name in TIMED_LAST
-            if name == "diagnosis":  # it is made with the report, if something fails
-                continue
-            if timed and self.no_timing:
-                task.left_out.append((name, f"it measures time: {self.no_timing}"))
-                continue
-            task.keys[name] = self.key(task, name, self.asked.is_quick)
-            task.expected.add(name)
-        self.report_key(task)
+        timed = [name for name in known.experiments if name in TIMED_LAST] if self.no_timing else []
+        task.left_out = [*known.reasons, *((name, f"it measures time: {self.no_timing}") for name in timed)]
+        names = [name for name in known.experiments if name not in timed]
+        if not names:
+            self.ended(task, REFUSED, f"nothing can be compared: {'; '.join(map(': '.join, task.left_out))}")
+            return
+        for name in names:
+            if name != "diagnosis":  # it is made with the report, if something fails
+                task.keys[name] = self.key(task, name, self.asked.is_quick)
+        task.keys["report"] = self.key(task, "report", self.asked, names, task.left_out)
         row = self.kept.get(task.keys["report"])
-        if row is not None and (self.out / place_of(task.model.shown) / "index.html").is_file():
+        if row is not None and self.is_written(task):
             self.done_before += 1
-            self.ended(task, row)
+            self.ended(task, **row)
             return
-        for name in tuple(task.expected):
-            value = self.kept.get(task.keys[name])
-            if value is not None:
-                task.found[name], seconds = value
-                task.seconds += seconds
-                task.expected.discard(name)
-        for name in sorted(task.expected, key=list(EXPERIMENTS).index):
-            timed = name in TIMED_LAST
-            arguments = (name, timed, task.model.shown, self.asked)
-            self.hand_out(task, name, Piece("", computed, arguments, rank=TIME if timed else COMPUTE, timed=timed))
-        self.report_if_whole(task)
+        for name in names:
+            if name in task.keys and (value := self.kept.get(task.keys[name])) is not None:
+                task.seconds += value[1]
+            elif name in task.keys:
+                task.expected.add(name)
+                timed_rank = TO_TIME if self.door.times_alone else TO_READ
+                self.ask(task, name, timed_rank if name in TIMED_LAST else TO_COMPUTE)
+        self.has_ended(task, "")
 
-    def report_key(self, task: Task) -> None:
-        task.keys["report"] = self.key(task, "report", self.asked, sorted(task.expected), task.left_out)
+    def is_written(self, task: Task) -> bool:
+        """Whether the report of a file that is there is the one that is asked for."""
+        try:
+            return (self.out / place_of_report(task.model.shown) / MARK).read_bytes() == task.keys["report"].encode()
+        except OSError:
+            return False
 
-    def report_if_whole(self, task: Task) -> None:
+    def has_ended(self, task: Task, name: str) -> None:
+        """An experiment has come back; after the last one comes the report, but not between timed ones that all wait for."""
+        task.expected.discard(name)
         if not task.expected:
-            arguments = (task.found, task.left_out, task.seconds, task.model.shown, self.asked)
-            self.hand_out(task, "report", Piece("", reported, arguments, rank=REPORT))
-            task.found = {}
+            after_timed = self.door.times_alone and any(name in TIMED_LAST for name in task.keys)
+            self.ask(task, "report", TO_REPORT if after_timed else TO_COMPUTE)
 
-    def ended(self, task: Task, row: dict) -> None:
+    def ended(self, task: Task, verdict: str, reason: str | None, **more: object) -> None:
         """A file is done."""
         known = task.known or Known("")
-        about = {"file": task.model.shown, "sha256": task.model.sha256, "joints": known.joints}
-        about |= {"file_integrator": known.integrator, "file_dt_s": known.dt}
+        about = {"file": task.model.shown, "sha256": task.model.sha256, "verdict": verdict, "reason": reason or ""}
+        about |= {"joints": known.joints, "file_integrator": known.integrator, "file_dt_s": known.dt}
         about |= dict.fromkeys(("worst_ratio", "stable_at_file_dt", "limit_s"))
-        task.row = about | row
+        task.row = about | {"seconds": round(task.seconds, 2)} | more
         self.rows.append(task.row)
         self.new.append(task.row)
 
@@ -183,32 +232,18 @@ class Run:
         return new
 
     @property
-    def work(self) -> float:
-        """Seconds by a watch in all pieces."""
-        return sum(sum(each) for each in self.took.values())
-
-    @property
     def pieces_done(self) -> int:
         return sum(len(each) for each in self.took.values())
 
-    def still(self) -> list[str]:
-        """The kinds of the pieces that have not ended, as far as they are known: a file that is not read has all of them."""
-        under_way = [step for _, step in self.under_way.values()]
-        waiting = [task for task in self.tasks if task.row is None]
-        later = [name for task in waiting if task.known is None for name in self.asked.names]
-        return under_way + later + ["report"] * (len(waiting) - under_way.count("report"))
-
-    @property
-    def pieces_known(self) -> int:
-        return self.pieces_done + len(self.still())
-
-    def seconds_left(self, workers: int) -> float | None:
-        """How long it takes still, at what pieces of each kind took so far; None where no piece has ended."""
-        if not self.took:
-            return None
-        means = EXPECTED | {step: sum(each) / len(each) for step, each in self.took.items()}
-        left = [(means.get(step, FEW_SECONDS), step in TIMED_LAST) for step in self.still()]
-        return sum(took if timed else took / workers for took, timed in left)
+    def still(self) -> list[tuple[Task, str]]:
+        """The pieces that have not ended, as far as they are known: a file that is not read has all of them."""
+        asked = [*self.under_way.values(), *((entry.task, entry.step) for entry in [*self.waiting, *self.timed])]
+        asked = [(task, step) for task, step in asked if task.row is None]
+        reports = {id(task) for task, step in asked if step == "report"}
+        for task in (task for task in self.tasks if task.row is None):
+            asked += [(task, name) for name in self.asked.names if task.known is None and name != "diagnosis"]
+            asked += [(task, "report")] * (id(task) not in reports)
+        return asked
 
     @property
     def files_done(self) -> int:

@@ -10,67 +10,70 @@ from ..report.files import csv
 from ..report.provenance import commit
 from ..version import OURS, installed, own_version
 from .kept import write
-from .models import place_of
-from .page import page
-from .row import AGREE, BROKE, COLUMNS, DIFFER, REFUSED, order
+from .models import place_of_report
+from .page import fleet_page
+from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order
 from .run import Run
+from .times import time_of_workers
 
-WORDS = {DIFFER: ("differs", "differ"), BROKE: ("broke off", "broke off"), REFUSED: ("was refused", "were refused"),
+VERDICT_WORDS = {DIFFER: ("differs", "differ"), BROKE: ("broke off", "broke off"), REFUSED: ("was refused", "were refused"),
          AGREE: ("agrees", "agree")}  # fmt: skip
 
 
 def write_table(
-    out: Path,
-    run: Run,
-    left_out: Sequence[tuple[str, str]],
-    changed: Sequence[str] | None,
-    command: str,
-    took: float,
-    workers: int,
+    out: Path, run: Run, left_out: Sequence[tuple[str, str]], changed: Sequence[str] | None, command: str, took: float
 ) -> list[str]:
-    """Write fleet.csv and index.html; the sentences at the top."""
-    rows = sorted(run.rows, key=order)
+    """Write fleet.csv and index.html; the sentences at the top. changed: since an earlier fleet, None: that was not asked."""
+    rows, left_out = sorted(run.rows, key=order), [*left_out, *run.parts]
     for row in rows:
-        row["has_report"] = (out / place_of(row["file"]) / "index.html").is_file() and row["verdict"] != REFUSED
-    said = sentences(rows, [*left_out, *run.parts], run, took, workers)
+        row["has_report"] = (out / place_of_report(row["file"]) / "index.html").is_file() and row["verdict"] != REFUSED
+    spent = time_of_workers(run.took, run.workers, took, run.door.times_alone)
+    said = sentences_of(rows, left_out, run)
     origin = {
         "command": command,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "seconds": round(took, 1),
-        "workers": workers,
+        "workers": run.workers,
+        "their time": spent.words(run.workers, took),
         "machine of the command": f"{platform.node()}, {vectors()}",
-        "machines": ", ".join(sorted(run.machines)) or "none was needed",
+        "machines of the workers": ", ".join(sorted(run.machines)) or "none was needed",
         "commit": commit(),
         OURS: own_version(),
         "mujoco": installed("mujoco"),
     }
-    columns = [{name: row[name] for name in COLUMNS} for row in rows]
+    columns = [{name: row[name] for name in FLEET_COLUMNS} for row in rows]
     write(out / "fleet.csv", csv(columns).encode("utf-8", "backslashreplace"))
-    text = page("A fleet compared with MuJoCo", said, rows, [*left_out, *run.parts], changed, origin)
+    text = fleet_page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture_of_steps(rows))
     write(out / "index.html", text.encode("utf-8", "backslashreplace"))
-    return said
+    return [*said, spent.words(run.workers, took)] if run.took else said
 
 
-def sentences(
-    rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: Run, took: float, workers: int
-) -> list[str]:
-    """How many have which verdict; whose own step is not stable; what is left out; what the workers did."""
+def picture_of_steps(rows: Sequence[dict]) -> tuple[bytes, str, tuple[int, int]] | None:
+    """The picture of the page, see figures_fleet; None: there is nothing to draw, or it could not be drawn."""
+    if not any(row["limit_s"] for row in rows):
+        return None
+    try:
+        from .figures_fleet import picture_of  # what draws takes its time to be imported
+
+        return picture_of(rows)
+    except Exception:
+        return None  # the table says the same
+
+
+def sentences_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: Run) -> list[str]:
+    """How many have which verdict; whose own step is not stable; what is left out; what is known from before."""
     counted = run.verdicts()
-    many = [f"{counted[v]} {WORDS[v][counted[v] > 1]}" for v in (AGREE, DIFFER, BROKE, REFUSED) if counted[v]]
+    many = [f"{counted[v]} {VERDICT_WORDS[v][counted[v] > 1]}" for v in (DIFFER, BROKE, REFUSED, AGREE) if counted[v]]
     said = [f"{len(rows)} file{'s' if len(rows) != 1 else ''}: {', '.join(many)}."]
     unstable = [row["file"] for row in rows if row["stable_at_file_dt"] is False]
     if unstable:
         more = f" and {len(unstable) - 3} more" if len(unstable) > 3 else ""
-        said.append(
-            f"Not stable at {'their' if len(unstable) > 1 else 'its'} own step: {', '.join(unstable[:3])}{more}."
-        )
+        whose = "their" if len(unstable) > 1 else "its"
+        said.append(f"Not stable at {whose} own step: {', '.join(unstable[:3])}{more}.")
     if left_out:
-        said.append(f"Left out, for they are parts of others: {len(left_out)}.")
+        said.append(f"Left out: {len(left_out)} file{'s' if len(left_out) != 1 else ''}, each with its reason below.")
     if run.no_timing:
         said.append(f"Experiments that measure time are left out: {run.no_timing}.")
     if run.done_before:
         said.append(f"Known from before: {run.done_before}.")
-    if run.work:
-        share = min(run.work / (workers * took), 1.0)
-        said.append(f"{workers} worker{'s' if workers != 1 else ''} computed {100.0 * share:.0f} % of {took:.0f} s.")
     return said
