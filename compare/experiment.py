@@ -108,8 +108,8 @@ def found_by(name: str, experiment: ModuleType, setup: Setup, crashed: Result | 
 
 
 def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:
-    """Set an experiment's long work going, if it has any; a failed check if that breaks off."""
-    if not hasattr(experiment, "begin"):
+    """Set an experiment's long work going, if it has any that is not under way; a failed check if that breaks off."""
+    if not hasattr(experiment, "begin") or name in setup.background:
         return None
     with clock.of(name):
         return attempt(name, experiment.begin, setup)[1]

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import time
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from .. import experiment
 from ..case import SEED
+from ..drawing import quiet
 from ..engines.mujoco import ModelError, read
 from ..experiments import EXPERIMENTS, module, skipped
 from ..judge.check import ENDS, Result
@@ -99,14 +100,29 @@ def setup_of(known: Compared, asked: Asked) -> Setup:
     return make(known.robot, engines(known.mujoco), reading=known.reading)
 
 
-def findings(name: str, timed: bool, shown: str, asked: Asked, bundle: bytes) -> bytes:
-    """What an experiment finds, or that it broke off: see experiment.computed, packed."""
+def untimed(name: str, shown: str, asked: Asked, bundle: bytes) -> bytes:
+    """What of an experiment is no timing, packed."""
     setup = setup_of(compared_file(shown, bundle), asked)
+    with quiet(setup.robot):
+        module(name).begin(setup)
+        return zlib.compress(pickle.dumps(done(setup.background[name])), 1)
+
+
+def done(work: object) -> object:
+    """Work under way, come to its end."""
+    return tuple(map(done, work)) if isinstance(work, tuple) else list(work) if isinstance(work, Iterator) else work
+
+
+def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: bytes) -> bytes:
+    """What an experiment finds, or that it broke off: see experiment.computed, packed. work: what was `untimed` of it."""
+    setup = setup_of(compared_file(shown, bundle), asked)
+    if work:
+        setup.background[name] = pickle.loads(zlib.decompress(work))
     found = experiment.computed(name, module(name), setup)
     for result in filter(None, found):
         result.notes = [as_given(note, shown, bundle) for note in result.notes]
         result.checks = [replace(check, note=as_given(check.note, shown, bundle)) for check in result.checks]
-    if timed and found[0]:
+    if work and found[0]:
         found[0].notes.append(f"Timed on {platform.node()} ({vectors()}), by a worker that did nothing else.")
     return zlib.compress(pickle.dumps(found), 1)
 

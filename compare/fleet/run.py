@@ -10,13 +10,14 @@ from typing import NamedTuple
 
 from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
-from .file_pieces import Asked, Known, findings, read_file, reported
+from .file_pieces import Asked, Known, findings, read_file, reported, untimed
 from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
 from .row import AGREE, BROKE, REFUSED
 
 TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
+UNTIMED = ", untimed"  # of a timed experiment, the step before it
 PIECES_AHEAD = 12  # pieces that are handed out for each worker before one has ended: their models are in memory
 MARK = ".fleet"  # the file in a report that says from what it was made
 
@@ -128,7 +129,7 @@ class Run:
         function, arguments = {
             "read": lambda: (read_file, (task.model.shown, self.asked)),
             "report": lambda: (reported, (self.found(task), task.left_out, task.seconds, task.model.shown, self.asked)),
-        }.get(step, lambda: (findings, (step, step in TIMED_LAST, task.model.shown, self.asked)))()
+        }.get(step, lambda: self.computing(task, step))()
         piece = Piece(
             f"{step} of {task.model.shown}", function, arguments, task.model.hash, rank, -entry.lighter,
             step in TIMED_LAST, task.packed,
@@ -137,6 +138,14 @@ class Run:
         task.in_door += 1
         self.door.submit(piece)
         return True
+
+    def computing(self, task: Task, step: str) -> tuple[Callable, tuple]:
+        """The call of an experiment, or of what of it is no timing."""
+        about = task.model.shown, self.asked
+        if step.endswith(UNTIMED):
+            return untimed, (step.removesuffix(UNTIMED), *about)
+        work = self.kept.get(task.keys[step + UNTIMED]) if step in TIMED_LAST else None
+        return findings, (step, work and work[0], *about)
 
     def found(self, task: Task) -> dict:
         """What the experiments of a file found, or in words why one gave nothing."""
@@ -153,8 +162,9 @@ class Run:
         if outcome.broke and step in ("read", "report"):
             self.ended(task, BROKE, f"{step}: {outcome.broke}")
         elif outcome.broke:
-            task.lost[step] = outcome.broke
-            self.has_ended(task, step)
+            name = step.removesuffix(UNTIMED)
+            task.lost[name] = outcome.broke
+            self.has_ended(task, name)
         elif step == "read":
             self.kept.put(task.keys[step], outcome.returned)
             self.was_read(task, outcome.returned)
@@ -166,7 +176,7 @@ class Run:
             self.ended(task, **row)
         else:
             self.kept.put(task.keys[step], (outcome.returned, outcome.seconds))
-            self.has_ended(task, step)
+            self.go_on(task, step)
 
     def was_read(self, task: Task, known: Known) -> None:
         """Its experiments are asked for, but for those that are known; a file without a model of its own is left out."""
@@ -187,20 +197,33 @@ class Run:
         for name in names:
             if name != "diagnosis":  # it is made with the report, if something fails
                 task.keys[name] = self.key(task, name, self.asked.is_quick)
+                task.keys[name + UNTIMED] = self.key(task, name + UNTIMED, self.asked.is_quick)
         task.keys["report"] = self.key(task, "report", self.asked, names, task.left_out)
         row = self.kept.get(task.keys["report"])
         if row is not None and self.is_written(task):
             self.done_before += 1
             self.ended(task, **row)
             return
-        for name in names:
-            if name in task.keys and (value := self.kept.get(task.keys[name])) is not None:
-                task.seconds += value[1]
-            elif name in task.keys:
+        for name in (name for name in names if name in task.keys):
+            steps = [name + UNTIMED, name] if name in TIMED_LAST else [name]
+            have = {step: value[1] for step in steps if (value := self.kept.get(task.keys[step]))}
+            task.seconds += sum(have.values())
+            if name not in have:
                 task.expected.add(name)
-                timed_rank = TO_TIME if self.door.times_alone else TO_READ
-                self.ask(task, name, timed_rank if name in TIMED_LAST else TO_COMPUTE)
+                self.ask_next(task, next(step for step in steps if step not in have))
         self.has_ended(task, "")
+
+    def ask_next(self, task: Task, step: str) -> None:
+        """A step of an experiment is asked for."""
+        when_timed = TO_TIME if self.door.times_alone else TO_READ
+        self.ask(task, step, when_timed if step in TIMED_LAST else TO_COMPUTE)
+
+    def go_on(self, task: Task, step: str) -> None:
+        """After what of an experiment is no timing come its times; after the last one the report."""
+        if step.endswith(UNTIMED):
+            self.ask_next(task, step.removesuffix(UNTIMED))
+        else:
+            self.has_ended(task, step)
 
     def is_written(self, task: Task) -> bool:
         """Whether the report of a file that is there is the one that is asked for."""
@@ -239,6 +262,7 @@ class Run:
         """The pieces that have not ended, as far as they are known: a file that is not read has all of them."""
         asked = [*self.under_way.values(), *((entry.task, entry.step) for entry in [*self.waiting, *self.timed])]
         asked = [(task, step) for task, step in asked if task.row is None]
+        asked += [(task, step.removesuffix(UNTIMED)) for task, step in asked if step.endswith(UNTIMED)]
         reports = {id(task) for task, step in asked if step == "report"}
         for task in (task for task in self.tasks if task.row is None):
             asked += [(task, name) for name in self.asked.names if task.known is None and name != "diagnosis"]
