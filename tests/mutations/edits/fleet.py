@@ -1,0 +1,23 @@
+"""A fleet that says of many files what is not so, or computes what it should not."""
+
+from ..edit import Edit
+
+EDITS = (
+    Edit("fleet.row", "row_of_file", 'outcome, reason = DIFFER, causes[0]["text"] if causes else str(differing[0])',
+         'outcome, reason = AGREE, ""', "a file that differs agrees"),
+    Edit("fleet.row", "row_of_file", "outcome, reason = BROKE, _1", 'outcome, reason = AGREE, ""', "what broke off agrees"),
+    Edit("fleet.row", "own_step", "all(known)", "any(known)", "one posture at which the step is stable is enough"),
+    Edit("fleet.row", "own_step", "min(limits, default=None)", "max(limits, default=None)", "the largest of the limits"),
+    Edit("fleet.row", "own_step", 'row["integrator"] == row["file_integrator"]', "True", "limits of any integrator"),
+    Edit("fleet.row", "order", "(DIFFER, BROKE, REFUSED, AGREE)", "(AGREE, REFUSED, BROKE, DIFFER)", "what agrees comes first"),
+    Edit("fleet.since", "has_moved", "abs(new - old) > MOVED * abs(old)", "False", "no limit has moved"),
+    Edit("fleet.since", "changed_parts", 'old["verdict"] != row["verdict"]', "False", "no verdict has changed"),
+    Edit("fleet.run", "Run.is_good", "set(self.verdicts()) <= {AGREE, REFUSED}", "True", "always good"),
+    Edit("fleet.models", "Model.hash", "self.contents().items()", '[("", self.path.read_bytes())]', "meshes are forgotten"),
+    Edit("fleet.program", "program", 'path.suffix in (".py", ".xml", ".html", ".js")', "False", "any program is the same"),
+    Edit("fleet.file_pieces", "broken", 'result.check("", ENDS, None, 0.0, "", why, rule="equal")', "pass",
+         "an experiment that gave nothing counts for nothing"),
+    Edit("fleet.pool", "Pool.choice", "any(piece.timed for piece in running)", "False", "others begin beside a timed piece"),
+    Edit("fleet.pool", "Pool.choice", "found.timed and running", "False", "a timed piece begins beside others"),
+    Edit("fleet.pool", "Pool.work", "range(1, TRIES + 1)", "range(1, 2)", "nothing is tried again"),
+)  # fmt: skip
