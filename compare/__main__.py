@@ -91,7 +91,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     from tmt.cache import cache_folder, size_of_cache
 
     from .engines.mujoco import ModelError
-    from .fleet.calls import opened
+    from .fleet.calls import door_opened
     from .fleet.piece import FleetError
     from .own_file import OwnFileError
     from .process.workers import WorkerEnded, load_modules, start_workers
@@ -110,7 +110,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             raise Refused(f"{options.experiment} cannot serve {robot.name}: {reason}")
         asked = known.asked_step(options.dt, options.integrator)
         before = made_by(options.out)
-        with opened(options.dask, options.workers) as door, new_report(options.out) as folder:
+        with door_opened(options.dask, options.workers) as door, new_report(options.out) as folder:
             for line in compared.lines:
                 terminal.say(line)
             with start_workers() as workers, terminal.progress("imports"):

@@ -39,7 +39,7 @@ class Calls:
 
 
 @contextmanager
-def opened(address: str | None, workers: int | None) -> Iterator[Calls | None]:
+def door_opened(address: str | None, workers: int | None) -> Iterator[Calls | None]:
     """Yields the door that is asked for: a Dask cluster, by the address of its scheduler, or so many processes; None: neither.
 
     FleetError: there is no such cluster, or none that can be used.

@@ -6,14 +6,14 @@ import platform
 
 import pytest
 
-from compare.fleet.calls import Calls, opened
+from compare.fleet.calls import Calls, door_opened
 from compare.fleet.piece import FleetError
 from compare.process.workers import WorkerEnded
 
 
 def test_outcomes_come_in_the_order_of_the_items_and_none_is_lost_with_another():
     ended = []
-    with opened(None, 2) as door:
+    with door_opened(None, 2) as door:
         found = door.outcomes(math.sqrt, [4.0, -1.0, 9.0], progress=ended.append)
         gone, here = door.outcomes(os._exit, [3]) + door.outcomes(math.sqrt, [16.0])
     assert [found[0].returned, found[2].returned, here.returned] == [2.0, 3.0, 4.0] and ended == [1, 2, 3]
@@ -22,7 +22,7 @@ def test_outcomes_come_in_the_order_of_the_items_and_none_is_lost_with_another()
 
 
 def test_without_a_cluster_or_processes_there_is_no_door():
-    with opened(None, None) as door:
+    with door_opened(None, None) as door:
         assert door is None
 
 

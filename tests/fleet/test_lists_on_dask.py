@@ -8,7 +8,7 @@ from mutations.edit import Edit
 from compare.experiments.diagnosis.fault_table import made_faults, rows_by_pieces, rows_in_parts
 from compare.experiments.speed.growth import Extent
 from compare.experiments.speed.growth_elsewhere import timed_chain
-from compare.fleet.calls import opened
+from compare.fleet.calls import door_opened
 from compare.judge.check import Result
 
 distributed = pytest.importorskip("distributed")
@@ -29,7 +29,7 @@ def without_seconds(table):
 
 def test_faults_have_the_same_rows_and_chains_are_timed(address):
     faults, result = [fault for fault in made_faults() if fault.kind == "sign"][:3], Result("diagnosis")
-    with opened(address, None) as door:
+    with door_opened(address, None) as door:
         table = rows_by_pieces(result, faults, door, lambda done: None)
         assert door.no_timing() is None
         (outcome,) = door.outcomes(timed_chain, [Extent((1,), 1, most=0.0)], timed=True)

@@ -11,7 +11,7 @@ from compare.engines.mujoco import load
 from compare.experiments.speed import growth
 from compare.experiments.speed.growth import Extent, costs_of_growth, made_chains
 from compare.experiments.speed.growth_elsewhere import add_growth_elsewhere
-from compare.fleet.calls import opened
+from compare.fleet.calls import door_opened
 from compare.fleet.piece import Outcome
 from compare.judge.check import ENDS, Result
 from compare.robots.arm import ARM
@@ -57,7 +57,7 @@ def keys(rows):
 
 
 def test_the_table_is_the_same_in_a_process_of_its_own(grown):
-    with opened(None, 2) as door:
+    with door_opened(None, 2) as door:
         result = grown(door)
     rows, reasons = costs_of_growth(made_chains(SHORT, lambda _: None), lambda _: None)
     assert keys(result.tables["growth"]) == keys(rows) and not result.checks

@@ -69,6 +69,8 @@ AGREEMENTS = (
     ("acceleration", "rows", '"energy"'),
     ("acceleration", "rows", 'f"dE/dt - {work} at {_1} qdd"'),
     ("acceleration", "rows", "quantity"),
+    ("fault_table", "rows_by_pieces", "ENDS"),
+    ("growth_elsewhere", "add_growth_elsewhere", "ENDS"),
 )
 EDITS = (
     *(
