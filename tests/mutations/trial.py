@@ -21,7 +21,6 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import cache_from_source
 from pathlib import Path
 
-from compare.fleet.child import descendants
 from tmt.cache import cache_folder
 
 OF_TESTS = (
@@ -30,16 +29,41 @@ OF_TESTS = (
     "sympy",
     "gymnasium",
 )  # without them, or with others, tests fail that have noticed nothing
-# the process that starts it hears no signal of the terminal, and the tests are to hear theirs; it ends with that process
-PYTEST = """
-import ctypes, signal, sys
-try:
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)
-except (OSError, AttributeError, TypeError):  # there is no such call on this system
-    pass
-signal.pthread_sigmask(signal.SIG_SETMASK, ())
-import pytest
-sys.exit(pytest.main())
+# a process that starts pytest, with the arguments that it is given, and ends it with all that it has started when its stdin is
+# closed, as it is when the process that started this one ends: tests may have put theirs in other groups
+GUARD = """
+import os, signal, subprocess, sys, threading
+from pathlib import Path
+
+
+def descendants():
+    parents = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+        except OSError:  # it has ended meanwhile
+            pass
+    found = [os.getpid()]
+    for parent in found:
+        found += [child for child, of in parents.items() if of == parent]
+    return found[1:]
+
+
+def end_with_stdin():
+    os.read(0, 1)
+    for number in descendants():
+        try:
+            os.kill(number, signal.SIGKILL)
+        except OSError:
+            pass
+    os.killpg(0, signal.SIGKILL)
+
+
+signal.pthread_sigmask(signal.SIG_SETMASK, ())  # who starts this hears no signal of the terminal; tests are to hear theirs
+run = subprocess.Popen([sys.executable, "-m", "pytest", *sys.argv[1:]], stdin=subprocess.DEVNULL)
+threading.Thread(target=end_with_stdin, daemon=True).start()
+status = run.wait()
+os._exit(status if status >= 0 else 128 - status)
 """
 
 
@@ -146,7 +170,7 @@ def stamps(folder) -> dict[str, tuple]:
 
 def run(folder, cache, files, options, limit) -> tuple[str, str]:
     """What failed first, empty if nothing did, and the end of the output."""
-    command = [sys.executable, "-c", PYTEST, "-x", "-q", "-rfE", f"--basetemp={folder / 'tests'}", *options, *files]
+    command = [sys.executable, "-c", GUARD, "-x", "-q", "-rfE", f"--basetemp={folder / 'tests'}", *options, *files]
     project = folder / "project"
     environment = os.environ | {"TMT_CACHE": str(cache), "TMPDIR": str(folder / "scratch"), "COLUMNS": "200"}
     others = (entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry)
@@ -155,16 +179,21 @@ def run(folder, cache, files, options, limit) -> tuple[str, str]:
     ]  # nothing is taken from the unedited one
     environment["PYTHONPATH"] = os.pathsep.join([str(project), *others])
     environment.pop("PYTEST_ADDOPTS", None)
+    reading, writing = os.pipe()
     process = subprocess.Popen(
-        command, cwd=project, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        command, cwd=project, env=environment, stdin=reading, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True,
     )  # fmt: skip
+    os.close(reading)
     try:
         output, _ = process.communicate(timeout=limit)
     except subprocess.TimeoutExpired:
         return f"no end after {limit:.0f} s", ""
     finally:
-        end(process.pid)  # what a failed test has left, too
+        os.close(writing)
+        if process.poll() is not None:  # what a failed test has left, too
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
     return failure(process.returncode, output), "\n".join(output.splitlines()[-30:])
 
@@ -182,15 +211,3 @@ def write(file, text) -> None:
     """Write a source, and forget its byte code: of the same size within a second it would pass for the new one."""
     file.write_text(text, encoding="utf-8")
     Path(cache_from_source(file)).unlink(missing_ok=True)
-
-
-def end(pid) -> None:
-    """End a process, its group, and its descendants in other groups."""
-    for number in descendants(pid):
-        ended(os.kill, number)
-    ended(os.killpg, pid)
-
-
-def ended(kill, pid) -> None:
-    with suppress(ProcessLookupError, PermissionError):
-        kill(pid, signal.SIGKILL)
