@@ -143,8 +143,7 @@ OPTIONS_OF_ALL = {
         "help": "speed: what a chain costs as it grows to 64 joints, not to 8 as in a whole run for the arm",
     }),
     "--workers": (WITH_LISTS, {
-        "type": process_count, "metavar": "N",
-        "help": "the made faults of diagnosis, or with --growth the chains of speed, in N processes of their own",
+        "type": process_count, "metavar": "N", "help": "the made faults of diagnosis, or the chains of --growth, in N processes",
     }),
     "--dask": (WITH_LISTS, {
         "type": not_empty, "metavar": "ADDRESS",
@@ -250,9 +249,8 @@ def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace)
     given = "--dask" if options.dask else "--workers" if options.workers else None
     if options.dask and options.workers:
         whole.error("--workers is for processes on this machine; a cluster has its own (--dask)")
-    if given and name not in WITH_LISTS:
-        whole.error(f"{given} is for diagnosis, speed --growth and fleet; it does not go with {name}")
-    if given and name == "speed" and not options.growth:
-        whole.error(f"{given} goes with speed only beside --growth: nothing else of it is done elsewhere")
-    if given and name == "diagnosis" and (options.mjcf or options.reference):
-        whole.error(f"{given} is for the made faults of diagnosis, which it tries without --mjcf and --reference")
+    of_itself = name == "diagnosis" and not (options.mjcf or options.reference)
+    if given and not (of_itself or options.growth):
+        whole.error(
+            f"{given} is for speed --growth, for diagnosis without --mjcf and --reference, and for fleet; no other work is in pieces"
+        )

@@ -132,11 +132,18 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
         (["all", "--growth"], "--growth is for speed; it does not go with all"),
         (
             ["mass", "--dask", "tcp://x:1"],
-            "--dask is for diagnosis, speed --growth and fleet; it does not go with mass",
+            "--dask is for speed --growth, for diagnosis without --mjcf and --reference,",
         ),
-        (["all", "--workers", "2"], "--workers is for diagnosis, speed --growth and fleet; it does not go with all"),
-        (["speed", "--dask", "tcp://x:1"], "--dask goes with speed only beside --growth: nothing else of it is done"),
-        (["diagnosis", "--mjcf", "a.xml", "--dask", "tcp://x:1"], "--dask is for the made faults of diagnosis, which"),
+        (["all", "--workers", "2"], "--workers is for speed --growth, for diagnosis without --mjcf"),
+        (["speed", "--dask", "tcp://x:1"], "--dask is for speed --growth, for diagnosis"),
+        (
+            ["diagnosis", "--mjcf", "a.xml", "--dask", "tcp://x:1"],
+            "--dask is for speed --growth, for diagnosis without --mjcf",
+        ),
+        (
+            ["diagnosis", "--reference", "model", "--workers", "2"],
+            "for diagnosis without --mjcf and --reference, and for fleet",
+        ),
         (
             ["diagnosis", "--workers", "2", "--dask", "tcp://x:1"],
             "--workers is for processes on this machine; a cluster",
