@@ -251,6 +251,4 @@ def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace)
         whole.error("--workers is for processes on this machine; a cluster has its own (--dask)")
     of_itself = name == "diagnosis" and not (options.mjcf or options.reference)
     if given and not (of_itself or options.growth):
-        whole.error(
-            f"{given} is for speed --growth, for diagnosis without --mjcf and --reference, and for fleet; no other work is in pieces"
-        )
+        whole.error(f"{given} is for speed --growth, for diagnosis without --mjcf and --reference, and for fleet")
