@@ -23,12 +23,8 @@ from pathlib import Path
 
 from tmt.cache import cache_folder
 
-OF_TESTS = (
-    "pytest",
-    "hypothesis",
-    "sympy",
-    "gymnasium",
-)  # without them, or with others, tests fail that have noticed nothing
+# what tests need besides the program: without it, or with other versions, they fail and have noticed nothing
+OF_TESTS = ("pytest", "hypothesis", "sympy", "gymnasium")
 # a process that starts pytest, with the arguments that it is given, and ends it with all that it has started when its stdin is
 # closed, as it is when the process that started this one ends: tests may have put theirs in other groups
 GUARD = """
