@@ -90,6 +90,8 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     from tmt.cache import cache_folder, size_of_cache
 
     from .engines.mujoco import ModelError
+    from .fleet.calls import door_opened
+    from .fleet.piece import FleetError
     from .own_file import OwnFileError
     from .process.workers import WorkerEnded, load_modules, start_workers
     from .reference import compared_with  # imports are here, so that --help and a wrong word answer at once
@@ -107,7 +109,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             raise Refused(f"{options.experiment} cannot serve {robot.name}: {reason}")
         asked = known.asked_step(options.dt, options.integrator)
         before = made_by(options.out)
-        with new_report(options.out) as folder:
+        with door_opened(options.dask, options.workers) as door, new_report(options.out) as folder:
             for line in compared.lines:
                 terminal.say(line)
             with start_workers() as workers, terminal.progress("imports"):
@@ -124,6 +126,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference
                 of_run |= {"alone": options.experiment != "all", "asked": asked, "growth": options.growth}
+                of_run |= {"door": door}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():
@@ -140,7 +143,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             origin |= provenance.durations(workers.clock)
             report = verdict.Report(sections, robot, origin, words, causes, list(reasons.items()), compared)
             files.write(folder, report, parts)
-    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
+    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded, FleetError) as error:
         raise Refused(error) from None
     terminal.say()
     good = verdict.passed(sections) and not parts.broken

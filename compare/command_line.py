@@ -16,6 +16,7 @@ PROGRAM = "python -m compare"
 FLEET = "fleet"  # the word that is no experiment: it is of many files
 FOLDER = Path(__file__).resolve().parent / "experiments"
 LONGEST_ASKED = 5.0  # s, that can be asked about
+WITH_LISTS = ("diagnosis", "speed")  # which have long lists, that go to other processes
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 OF_OWN = tuple(name for name in EXPERIMENTS if name not in NOT_OF_OWN)  # which can serve equations of one's own
 LINE_WIDTH = 80
@@ -93,6 +94,12 @@ def step_in_seconds(text: str) -> float:
     return dt
 
 
+def process_count(text: str) -> int:
+    if not text.isdecimal() or not 0 < int(text) <= 1024:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; 1 or more are expected")
+    return int(text)
+
+
 def stated_reference(text: str) -> str:
     """What a model is compared with: what has a colon is read later."""
     if text in ("arm", "model") or ":" in text:
@@ -137,6 +144,13 @@ OPTIONS_OF_ALL = {
     "--growth": (("speed",), {
         "action": "store_true",
         "help": "speed: what a chain costs as it grows to 64 joints, not to 8 as in a whole run for the arm",
+    }),
+    "--workers": (WITH_LISTS, {
+        "type": process_count, "metavar": "N", "help": "the made faults of diagnosis, or the chains of --growth, in N processes",
+    }),
+    "--dask": (WITH_LISTS, {
+        "type": not_empty, "metavar": "ADDRESS",
+        "help": "the same on the Dask cluster of this scheduler; chains by a worker of one thread with the resource timing=1",
     }),
 }  # fmt: skip
 
@@ -238,3 +252,9 @@ def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace)
         whole.error(f"--dt and --integrator are for stability; {name} answers for no other step")
     if options.growth and name != "speed":
         whole.error(f"--growth is for speed; it does not go with {name}")
+    given = "--dask" if options.dask else "--workers" if options.workers else None
+    if options.dask and options.workers:
+        whole.error("--workers is for processes on this machine; a cluster has its own (--dask)")
+    of_itself = name == "diagnosis" and not (options.mjcf or options.reference)
+    if given and not (of_itself or options.growth):
+        whole.error(f"{given} is for speed --growth, for diagnosis without --mjcf and --reference, and for fleet")

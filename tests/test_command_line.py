@@ -130,6 +130,26 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
         ),
         (["mass", "--growth"], "--growth is for speed; it does not go with mass"),
         (["all", "--growth"], "--growth is for speed; it does not go with all"),
+        (
+            ["mass", "--dask", "tcp://x:1"],
+            "--dask is for speed --growth, for diagnosis without --mjcf and --reference,",
+        ),
+        (["all", "--workers", "2"], "--workers is for speed --growth, for diagnosis without --mjcf"),
+        (["speed", "--dask", "tcp://x:1"], "--dask is for speed --growth, for diagnosis"),
+        (
+            ["diagnosis", "--mjcf", "a.xml", "--dask", "tcp://x:1"],
+            "--dask is for speed --growth, for diagnosis without --mjcf",
+        ),
+        (
+            ["diagnosis", "--reference", "model", "--workers", "2"],
+            "for diagnosis without --mjcf and --reference, and for fleet",
+        ),
+        (
+            ["diagnosis", "--workers", "2", "--dask", "tcp://x:1"],
+            "--workers is for processes on this machine; a cluster",
+        ),
+        (["diagnosis", "--workers", "0"], "--workers: '0' is no number of processes; 1 or more are expected"),
+        (["diagnosis", "--dask", "nowhere"], "no scheduler answers at nowhere: "),
         (["speed", "--scenes", ""], "--scenes: it is empty"),
         (["speed", "--scenes", "my.toml"], "cannot read my.toml: No such file or directory"),
         (["mass", "--mjcf", "missing.xml"], "cannot read missing.xml: No such file or directory"),

@@ -90,7 +90,7 @@ def test_the_version_is_that_of_a_report(arguments, capsys):
 
 TAKEN = {"--scenes": {"trajectory", "speed", "reduction"}, "--dt": {"stability"}, "--growth": {"speed"},
          "--joints": {"kinematics", "mass", "gravity", "acceleration", "trajectory", "diagnosis"},
-         "--integrator": {"stability"}}  # fmt: skip
+         "--integrator": {"stability"}, "--workers": {"diagnosis", "speed"}, "--dask": {"diagnosis", "speed"}}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)

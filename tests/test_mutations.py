@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from mutations import campaign
+from mutations import campaign, trial
 from mutations.__main__ import main
 from mutations.campaign import Stage
 from mutations.edit import DoesNotApply, Edit, applied
@@ -42,8 +42,9 @@ def test_every_test_is_in_one_stage_but_those_that_judge_nothing():
 
 
 @pytest.fixture
-def toy(tmp_path):
-    """A project of one judge, one model and their tests."""
+def toy(tmp_path, monkeypatch):
+    """A project of one judge, one model and their tests; nothing is compiled yet."""
+    monkeypatch.setenv("TMT_CACHE", str(tmp_path / "compiled"))
     files = {
         "compare/rules.py": '''
             """Verdicts."""
@@ -188,9 +189,10 @@ def test_an_interrupt_ends_it_at_once_and_leaves_nothing(toy, tmp_path, number):
     began = time.monotonic()
     run.send_signal(number)
     assert run.communicate(timeout=30)[0].strip() == "interrupted" and run.returncode == 2
-    assert time.monotonic() - began < 5.0
-    assert list((tmp_path / "scratch").iterdir()) == []
-    assert not any(map(runs, asleep.read_text().split()))
+    while any(map(runs, asleep.read_text().split())):
+        assert time.monotonic() - began < 5.0
+        time.sleep(0.02)
+    assert list((tmp_path / "scratch").iterdir()) == [] and time.monotonic() - began < 5.0
 
 
 def test_one_edit_is_caught_and_one_survives(toy, capfd, monkeypatch):
@@ -217,3 +219,34 @@ def test_one_edit_is_caught_and_one_survives(toy, capfd, monkeypatch):
     assert out.index("+    width = (4)") < out.index("(harmless: nobody uses it)")
     assert out.endswith("5 edits: 3 caught, 1 declared harmless, 1 survived\n")
     assert {path: path.read_text() for path in toy.rglob("*.py")} == before
+
+
+def test_other_packages_for_tests_are_no_finding():
+    expected = trial.versions()
+    assert expected["pytest"] and trial.check_versions(expected) is None
+    with pytest.raises(RuntimeError, match="other packages for tests are installed"):
+        trial.check_versions(expected | {"hypothesis": None})
+
+
+def test_an_edit_that_could_not_be_tried_is_neither_caught_nor_survives(toy, capfd, monkeypatch):
+    """The disk is full, but was not yet when the unedited copy was tried."""
+    text = Path(trial.__file__).read_text(encoding="utf-8")
+    full = text.replace(
+        "    folder, started, caught =", "    raise OSError('the disk is full')\n    folder, started, caught ="
+    )
+    (toy.parent / "trial.py").write_text(full, encoding="utf-8")
+    monkeypatch.setattr(trial, "__file__", str(toy.parent / "trial.py"))
+    edits = [Edit("rules", "WIDTH", "0.5", "5", "wide", harmless="nobody uses it")]
+    assert main(["--jobs", "1"], toy, edits, lambda project: two_stages(project)[:1]) == 2
+    out = capfd.readouterr().out
+    assert "wide: could not be tried: OSError: the disk is full" in out
+    assert out.endswith("1 edits: 0 caught, 0 declared harmless, 0 survived, 1 could not be tried\n")
+
+
+def test_what_cannot_start_gets_a_line_and_status_2(toy, capfd):
+    edits = [Edit("rules", "WIDTH", "0.5", "5", "wide")]
+    assert main(["--dask", "nowhere"], toy, edits, two_stages) == 2
+    assert "no scheduler answers at nowhere: " in capfd.readouterr().out
+    with pytest.raises(SystemExit) as ended:
+        main(["--dask", "nowhere", "--jobs", "2"], toy, edits, two_stages)
+    assert ended.value.code == 2 and "--jobs is for runs on this machine" in capfd.readouterr().err

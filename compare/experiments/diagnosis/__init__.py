@@ -9,7 +9,10 @@ zero or unit). What explains all of the difference is named, with the stated and
 the found value: "h[0], coefficient of qd1^2: yours is -1 times the right one".
 In `all` it is made where mass, gravity, acceleration or trajectory has failed.
 Alone and without a file it tries itself: hundreds of made faults, each of
-which must be found.
+which must be found. They go to other processes with --workers N, and with
+--dask ADDRESS to a Dask cluster: the same rows, but for the seconds; a fault
+whose process ends three times more, or that takes ten minutes, is a failed
+check.
 
 Equations of your own are a file or a module with functions mass_matrix(q) and
 bias(q, qd) of M(q) q'' + h(q, q') = tau, by themselves or in an object (also a
@@ -48,6 +51,7 @@ Examples:
     python -m compare diagnosis --mjcf robot.xml --reference my_equations.py:
     python -m compare diagnosis --mjcf my_arm.xml
     python -m compare diagnosis
+    python -m compare diagnosis --dask tcp://10.0.0.5:8786
 """
 
 from collections.abc import Iterator

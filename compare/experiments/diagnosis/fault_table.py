@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from tmt import literal
 
 from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.places import OF_ZERO
-from ...judge.check import Result
+from ...judge.check import ENDS, Result
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots.arm import ARM
@@ -40,13 +40,39 @@ def rows_of_faults(setup: Setup) -> Result:
     faults = made_faults()
     if setup.size != "full":
         faults = sampled(faults, setup.of(0, SAMPLE, SAMPLE // 4))
-    parts = [faults[k : k + PART] for k in range(0, len(faults), PART)]
-    table = []
-    for k, part in enumerate(setup.map(rows_of_part, parts)):
-        setup.progress(f"diagnosis: {min(PART * (k + 1), len(faults))} of {len(faults)} faults")
-        table += part
+
+    def progress(done: int) -> None:
+        setup.progress(f"diagnosis: {done} of {len(faults)} faults")
+
+    table = (
+        rows_by_pieces(result, faults, setup.door, progress)
+        if setup.door
+        else rows_in_parts(faults, setup.map, progress)
+    )
     judge_faults(result, table)
     return result
+
+
+def rows_in_parts(faults: Sequence[Fault], spread: Callable, progress: Callable[[int], object]) -> list[dict]:
+    """The rows of faults, some of which are handed out at once."""
+    table = []
+    for part in spread(rows_of_part, [faults[k : k + PART] for k in range(0, len(faults), PART)]):
+        table += part
+        progress(len(table))
+    return table
+
+
+def rows_by_pieces(
+    result: Result, faults: Sequence[Fault], door: object, progress: Callable[[int], object]
+) -> list[dict]:
+    """The rows of faults, each a call of its own, see Setup.door; a failed check for each that was not tried to its end."""
+    table = []
+    for fault, outcome in zip(faults, door.outcomes(row_of, faults, progress=progress)):
+        if outcome.broke:
+            result.check(f"{fault.robot}, {fault.name}", ENDS, None, 0.0, "", outcome.broke, rule="equal")
+        else:
+            table.append(outcome.returned)
+    return table
 
 
 def made_faults() -> list[Fault]:

@@ -21,7 +21,9 @@ speed_targets.csv, the missed ones too.
 
 How cost grows with the joints: a chain of hinges, none along a coordinate axis,
 of 1 to 8 joints in a whole run for the arm, and to 64 with --growth:
-straight-line code, loops over any tree, side by side, MuJoCo's calls.
+straight-line code, loops over any tree, side by side, MuJoCo's calls. With
+--dask ADDRESS, or --workers N, each number of joints is timed by a worker that
+does nothing else meanwhile, and the notes say on which machine.
 
 A robot with servos answers to a step of their targets: which integrator and
 step come to 1e-3 rad (not with --quick).
@@ -59,7 +61,7 @@ from ...judge.words import scene_begins
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import has_no_reference
-from . import accuracy, advice, evaluations, growth, targets, tumbling
+from . import accuracy, advice, evaluations, growth, growth_elsewhere, targets, tumbling
 from .accuracy import reference_in_words
 from .affordable import forms_in_words
 from .runs import measured
@@ -186,6 +188,8 @@ def add_times(result: Result, setup: Setup, of_scenes: Mapping[str, list[dict]])
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup, ways)
     result.notes += [*sentences, *spread_in_words(spread), PARTS]
+    if setup.growth and setup.door:
+        growth_elsewhere.add_growth_elsewhere(result, setup)
     growth.add_growth(result, chains, setup.progress)
     if not setup.robot.is_read:  # of a file nothing was aimed at
         aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)

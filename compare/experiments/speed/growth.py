@@ -55,34 +55,41 @@ def extent_of(setup: Setup) -> Extent | None:
 
 
 class Chains(NamedTuple):
-    """What is made and not yet timed: (joints, implementation): Made; who has no time and where, by why; who is not there."""
+    """What is made and not yet timed: (joints, implementation): Made.
+
+    left_out: by (label, why), with how many joints an implementation has no time; absent: {label: why it is not there}.
+    """
 
     extent: Extent
     taking: Sequence[Implementation]
     made: Mapping[tuple[int, Implementation], Made]
-    left_out: Mapping[tuple[Implementation, str], Sequence[int]]
-    absent: Mapping[Implementation, str]
+    left_out: Mapping[tuple[str, str], Sequence[int]]
+    absent: Mapping[str, str]
 
 
 def chains_of(setup: Setup) -> Chains | None:
-    """The chains of a run, their code compiled; None if none is asked."""
-    extent = extent_of(setup)
+    """The chains of a run, their code compiled; None if none is asked, or they are made elsewhere."""
+    extent = None if setup.door else extent_of(setup)
     return made_chains(extent, setup.progress) if extent else None
 
 
 def add_growth(result: Result, chains: Chains | None, progress: Callable) -> None:
     """The table of costs against joints in a result, their exponents, and what is said of both; nothing if none is asked."""
     if chains:
-        rows, reasons = costs_of_growth(chains, progress)
-        found = exponents(rows)
-        result.tables["growth"], result.curves["exponents"] = rows, found
-        result.notes += chain_in_words(rows, found, reasons)
+        add_costs(result, *costs_of_growth(chains, progress))
+
+
+def add_costs(result: Result, rows: list[dict], reasons: Mapping[str, str]) -> None:
+    """The same of costs that are known, see `costs_of_growth`."""
+    found = exponents(rows)
+    result.tables["growth"], result.curves["exponents"] = rows, found
+    result.notes += chain_in_words(rows, found, reasons)
 
 
 def made_chains(extent: Extent, progress: Callable, known: Sequence[Implementation] = IMPLEMENTATIONS) -> Chains:
     """Each implementation that is there, made for each number of joints."""
-    absent = {one: why for one in known if (why := one.unavailable())}
-    taking = [one for one in known if one not in absent]
+    absent = {one.label: why for one in known if (why := one.unavailable())}
+    taking = [one for one in known if one.label not in absent]
     made, left_out = {}, {}
     for n in extent.numbers:
         progress(f"speed: a chain of {n}")
@@ -92,7 +99,7 @@ def made_chains(extent: Extent, progress: Callable, known: Sequence[Implementati
             if isinstance(found, Made):
                 made[n, one] = found
             else:
-                left_out.setdefault((one, found), []).append(n)
+                left_out.setdefault((one.label, found), []).append(n)
     return Chains(extent, taking, made, left_out, absent)
 
 
@@ -109,10 +116,15 @@ def costs_of_growth(chains: Chains, progress: Callable) -> tuple[list[dict], dic
         found = made.get((n, one), Made(None))
         values = {"ns_per_state": times.get((n, one)), "compile_s": found.compile_s, "operations": found.operations}
         rows.append({"n": n, "implementation": one.name} | values)
-    reasons = {f"{one.label} takes no part": why for one, why in absent.items()}
-    for (one, why), numbers in left_out.items():
-        reasons[f"{one.label} is not timed with {number_in_words(numbers)}"] = why
-    return rows, reasons
+    return rows, reasons_in_words(left_out, absent)
+
+
+def reasons_in_words(left_out: Mapping[tuple[str, str], Sequence[int]], absent: Mapping[str, str]) -> dict[str, str]:
+    """{who has no time, and where: why}, see Chains."""
+    reasons = {f"{label} takes no part": why for label, why in absent.items()}
+    for (label, why), numbers in left_out.items():
+        reasons[f"{label} is not timed with {number_in_words(numbers)}"] = why
+    return reasons
 
 
 def nanoseconds(
