@@ -5,6 +5,7 @@ from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
@@ -52,7 +53,7 @@ class Waiting(NamedTuple):
 
 
 class Run:
-    """A fleet under way. after it `rows` has a row for each model, and `parts` the files that are only included by others."""
+    """A fleet under way. After it `rows` has a row for each model, and `parts` the files that are only included by others."""
 
     def __init__(self, models: Sequence[Model], asked: Asked, door: Door, kept: Kept, out: Path):
         self.asked, self.door, self.kept, self.out = asked, door, kept, out
@@ -101,9 +102,10 @@ class Run:
     def ask(self, task: Task, step: str, rank: int) -> None:
         """A piece waits until it is handed out."""
         self.count += 1
+        weight = inf if step == "report" else task.joints or 0  # what ends a file comes before what begins another
         insort(
             self.timed if step in TIMED_LAST else self.waiting,
-            Waiting(rank, -(task.joints or 0), self.count, task, step),
+            Waiting(rank, -weight, self.count, task, step),
         )
 
     def hand_out(self) -> None:
