@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .run import Run
 
 SHOWN_CHANGES = 20  # changes, on the terminal
+BETWEEN = 0.3  # s, after which it is said anew how far it is
 LIMIT = 600.0  # s, that a piece may take
 FLEET_TEXT = "\n\n".join(
     in_lines(text)
@@ -157,9 +158,13 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
                 terminal.say(f"left out: {name}, {why}")
             terminal.tell(lambda: words)
 
+            said_at = 0.0
+
             def progress() -> None:
-                words[:] = how_far_it_is(run)
+                nonlocal said_at
                 say_new(terminal, run)
+                if time.perf_counter() - said_at > BETWEEN:  # of many files there is much to count
+                    words[:], said_at = how_far_it_is(run), time.perf_counter()
 
             with terminal.progress(""):
                 run.carry_out(progress)

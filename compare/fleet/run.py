@@ -18,7 +18,10 @@ from .piece import Door, Outcome, Piece
 from .row import AGREE, BROKE, REFUSED
 
 TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
-PIECES_AHEAD = 12  # pieces that are handed out for each worker before one has ended: their models are in memory
+AHEAD_FOR_EACH, AHEAD_FOR_ALL = (
+    4,
+    16,
+)  # pieces that are handed out beforehand, for each worker and besides: they are in memory
 MARK = ".fleet"  # the file in a report that says from what it was made
 
 
@@ -64,12 +67,14 @@ class Run:
         self.done_before = 0
         self.no_timing = door.no_timing()
         self.workers = max(1, door.workers())
+        self.most = AHEAD_FOR_EACH * self.workers + AHEAD_FOR_ALL
 
     def carry_out(self, progress: Callable[[], object]) -> None:
         """All of it. progress is called when something has changed."""
         for task in self.tasks:
             self.begin(task)
             self.hand_out()
+            progress()
         while self.door.under_way:
             progress()
             if done := self.door.next():
@@ -111,7 +116,7 @@ class Run:
     def hand_out(self) -> None:
         """As many pieces as keep the workers busy; timed ones of a pool at the end, for all others wait meanwhile."""
         of_timed = sum(step in TIMED_LAST for _, step in self.under_way.values())
-        while self.waiting and len(self.under_way) - of_timed < PIECES_AHEAD * self.workers:
+        while self.waiting and len(self.under_way) - of_timed < self.most:
             self.hand(self.waiting.pop(0))
         first = self.waiting[0].rank if self.waiting else TO_REPORT
         while self.timed and of_timed < self.workers and (first > TO_TIME or not self.door.times_alone):

@@ -5,16 +5,16 @@ import pytest
 from compare.fleet.piece import FleetError
 from compare.fleet.row import FLEET_COLUMNS
 from compare.fleet.since import changes, earlier
-from compare.report.files import csv
+from compare.fleet.table import csv_of_fleet
 
 ROW = {
-    "file": "a b.xml", "sha256": "1", "verdict": "agree", "reason": "", "joints": 3, "worst_ratio": 0.1, "file_integrator": "Euler",
-    "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.0,
+    "file": "a b.xml", "sha256": "1", "verdict": "agree", "reason": "", "joints": 3, "worst_ratio": 0.1,
+    "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.0,
 }  # fmt: skip
 
 
 def since(tmp_path, before, now):
-    (tmp_path / "fleet.csv").write_text(csv([ROW | row for row in before]), encoding="utf-8")
+    (tmp_path / "fleet.csv").write_text(csv_of_fleet([ROW | row for row in before]), encoding="utf-8")
     return changes(earlier(tmp_path), [ROW | row for row in now])
 
 
