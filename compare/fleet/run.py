@@ -4,10 +4,8 @@ import pickle
 from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import NamedTuple
 
 from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
@@ -16,6 +14,7 @@ from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
 from .row import AGREE, BROKE, REFUSED
+from .task import Task, Waiting
 
 TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
 AHEAD_FOR_EACH, AHEAD_FOR_ALL = (
@@ -23,36 +22,6 @@ AHEAD_FOR_EACH, AHEAD_FOR_ALL = (
     16,
 )  # pieces that are handed out beforehand, for each worker and besides: they are in memory
 MARK = ".fleet"  # the file in a report that says from what it was made
-
-
-@dataclass
-class Task:
-    """One file, as far as it is done."""
-
-    model: Model
-    known: Known | None = None
-    keys: dict = field(default_factory=dict)  # under which results are kept, by their kind
-    lost: dict = field(default_factory=dict)  # experiments that gave nothing, and why
-    expected: set = field(default_factory=set)  # experiments that have not come back
-    left_out: list = field(default_factory=list)
-    seconds: float = 0.0
-    in_door: int = 0  # pieces that are handed out
-    packed: bytes = b""  # the model with what it needs, while pieces are handed out
-    row: dict | None = None
-
-    @property
-    def joints(self) -> int | None:
-        return self.known.joints if self.known else None
-
-
-class Waiting(NamedTuple):
-    """A piece that is not handed out yet; they are in this order."""
-
-    rank: int
-    lighter: float
-    number: int
-    task: Task
-    step: str
 
 
 class Run:
@@ -224,12 +193,12 @@ class Run:
             self.ask(task, "report", TO_REPORT if after_timed else TO_COMPUTE)
 
     def ended(self, task: Task, verdict: str, reason: str | None, **more: object) -> None:
-        """A file is done."""
+        """A file is done. more: what else its row has, if there is a report."""
         known = task.known or Known("")
         about = {"file": task.model.shown, "sha256": task.model.sha256, "verdict": verdict, "reason": reason or ""}
         about |= {"joints": known.joints, "file_integrator": known.integrator, "file_dt_s": known.dt}
         about |= dict.fromkeys(("worst_ratio", "stable_at_file_dt", "limit_s"))
-        task.row = about | {"seconds": round(task.seconds, 2)} | more
+        task.row = about | {"seconds": round(task.seconds, 2), "has_report": bool(more)} | more
         self.rows.append(task.row)
         self.new.append(task.row)
 

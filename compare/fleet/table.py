@@ -11,7 +11,6 @@ from ..judge.timing import vectors
 from ..report.provenance import commit
 from ..version import OURS, installed, own_version
 from .kept import write
-from .models import place_of_report
 from .page import fleet_page
 from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order
 from .run import Run
@@ -26,8 +25,6 @@ def write_table(
 ) -> list[str]:
     """Write fleet.csv and index.html; the sentences at the top. changed: since an earlier fleet, None: that was not asked."""
     rows, left_out = sorted(run.rows, key=order), [*left_out, *run.parts]
-    for row in rows:
-        row["has_report"] = (out / place_of_report(row["file"]) / "index.html").is_file() and row["verdict"] != REFUSED
     spent = time_of_workers(run.took, run.workers, took, run.door.times_alone)
     said = sentences_of(rows, left_out, run)
     origin = {

@@ -12,8 +12,9 @@ import pytest
 from runs import compare, on_terminal, readable_lines, words
 
 from compare.__main__ import main
-from compare.fleet.command import FLEET_OPTIONS
+from compare.fleet.command import FLEET_OPTIONS, MOST_SAID, say_some
 from compare.fleet.row import FLEET_COLUMNS
+from compare.report.terminal import Terminal
 
 ROOT = Path(__file__).resolve().parents[2]
 ARM, BALL = ROOT / "mjcf" / "arm.xml", ROOT / "tests" / "models" / "pendulum_ball.xml"
@@ -153,6 +154,14 @@ def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, says, 
     out, err = capsys.readouterr()
     assert out == "" and err.startswith(f"python -m compare: {says}") and len(err.splitlines()) == 1
     assert not os.path.exists("reports")
+
+
+@pytest.mark.parametrize("count", [1, MOST_SAID, MOST_SAID + 1, MOST_SAID + 300])
+def test_of_many_lines_of_a_kind_the_first_are_said(count, capsys):
+    say_some(Terminal(), [f"line {k}" for k in range(count)])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:MOST_SAID] == [f"line {k}" for k in range(min(count, MOST_SAID))]
+    assert lines[MOST_SAID:] == [f"and {count - MOST_SAID} more, in index.html"] * (count > MOST_SAID)
 
 
 def test_the_help_names_every_option(capsys):

@@ -171,8 +171,10 @@ def test_a_file_of_which_nothing_comes_back_breaks_off_with_the_reason(step, fle
             Outcome(ended="took longer than 1 s", is_late=True) if piece.name.startswith(step) else None
         )
     )
-    row = fleet({"a.xml": PENDULUM.format(0.1)}, door=door).rows["a.xml"]
+    assert fleet({"a.xml": PENDULUM.format(0.1)}).rows["a.xml"]["has_report"]
+    row = fleet({"a.xml": PENDULUM.format(0.2)}, door=door).rows["a.xml"]
     assert (row["verdict"], row["reason"]) == (BROKE, f"{step}: took longer than 1 s")
+    assert not row["has_report"]  # the one in the folder is an earlier one
 
 
 def test_few_pieces_and_their_models_are_in_memory_at_a_time(fleet):
