@@ -18,6 +18,8 @@ from compare.report.terminal import Terminal
 
 ROOT = Path(__file__).resolve().parents[2]
 ARM, BALL = ROOT / "mjcf" / "arm.xml", ROOT / "tests" / "models" / "pendulum_ball.xml"
+PENDULUM = ("<mujoco><worldbody><body><joint name='j' axis='0 1 0'/><inertial pos='0 0 0.1' mass='1' "
+            "diaginertia='1 1 1'/></body></worldbody></mujoco>")  # fmt: skip
 NAME = "a b#ü.xml"  # of a file that agrees
 
 
@@ -94,7 +96,7 @@ def test_the_same_command_goes_on_and_says_what_has_changed(first, folder):
     assert rows_of(folder / "later") == first.rows
     shutil.copytree(folder / "m", folder / "n" / "m")
     (folder / "n" / "m" / "heavy.xml").unlink()
-    shutil.copy(BALL, folder / "n" / "m" / "broken.xml")
+    (folder / "n" / "m" / "broken.xml").write_text(PENDULUM)
     shutil.move(folder / "later", folder / "n" / "later")
     changed = compare(*command, cwd=folder / "n")
     assert changed.returncode == 0 and "2 files: 2 agree." in changed.stdout
@@ -107,7 +109,7 @@ def test_the_same_command_goes_on_and_says_what_has_changed(first, folder):
 
 @pytest.mark.parametrize("columns, term", [(30, "xterm"), (100, "dumb")])
 def test_a_terminal_shows_how_far_it_is_and_then_what_has_come_out(columns, term, folder, first, tmp_path):
-    shutil.copy(BALL, tmp_path / "a.xml")
+    (tmp_path / "a.xml").write_text(PENDULUM)
     shutil.copytree(first.out, tmp_path / "out")
     run = on_terminal(["fleet", "a.xml", "--only", "mass", "--out", "out", "--workers", "1"], columns, term, tmp_path)
     assert run.status == 0
