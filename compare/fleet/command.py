@@ -19,7 +19,8 @@ from ..report.terminal import Terminal
 if TYPE_CHECKING:
     from .run import Run
 
-SHOWN_CHANGES = 20  # changes, on the terminal
+MOST_SAID = 20  # lines of one kind, on the terminal
+BETWEEN = 0.3  # s, after which it is said anew how far it is
 LIMIT = 600.0  # s, that a piece may take
 FLEET_TEXT = "\n\n".join(
     in_lines(text)
@@ -153,18 +154,20 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
         door = Cluster(options.dask, options.limit) if options.dask else Pool(options.workers or cores(), options.limit)
         try:
             run, words = Run(found.models, Asked(names, not options.full), door, kept, out), []
-            for name, why in found.left_out:
-                terminal.say(f"left out: {name}, {why}")
+            say_some(terminal, [f"left out: {name}, {why}" for name, why in found.left_out])
             terminal.tell(lambda: words)
 
+            said_at = 0.0
+
             def progress() -> None:
-                words[:] = how_far_it_is(run)
+                nonlocal said_at
                 say_new(terminal, run)
+                if time.perf_counter() - said_at > BETWEEN:  # of many files there is much to count
+                    words[:], said_at = how_far_it_is(run), time.perf_counter()
 
             with terminal.progress(""):
                 run.carry_out(progress)
-            for name, why in run.parts:
-                terminal.say(f"left out: {name}, {why}")
+            say_some(terminal, [f"left out: {name}, {why}" for name, why in run.parts])
         finally:
             door.close()
         changed = None if before is None else changes(before, sorted(run.rows, key=lambda row: row["file"]))
@@ -177,10 +180,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     terminal.say(said[0], "bold green" if run.is_good else "bold red")
     for line in said[1:]:
         terminal.say(line)
-    for line in (changed or ())[:SHOWN_CHANGES]:
-        terminal.say(f"changed: {line}")
-    if changed and len(changed) > SHOWN_CHANGES:
-        terminal.say(f"and {len(changed) - SHOWN_CHANGES} more have changed: in index.html")
+    say_some(terminal, [f"changed: {line}" for line in changed or ()])
     if changed == []:
         terminal.say(f"nothing has changed since {in_one_line(options.since)}")
     terminal.say(f"Fleet: {in_one_line(os.path.join(options.out, 'index.html'))} ({took:.1f} s)")
@@ -199,6 +199,13 @@ def how_far_it_is(run: "Run") -> list[str]:
         f"{run.pieces_done} of {run.pieces_done + len(still)} pieces",
     ]
     return [part for part in [*parts, verdicts, f"about {in_words(left)} left" if left else ""] if part]
+
+
+def say_some(terminal: Terminal, lines: Sequence[str]) -> None:
+    """The first of many lines; the page has them all."""
+    more = len(lines) - MOST_SAID
+    for line in [*lines[:MOST_SAID], *[f"and {more} more, in index.html"] * (more > 0)]:
+        terminal.say(line)
 
 
 def say_new(terminal: Terminal, run: "Run") -> None:

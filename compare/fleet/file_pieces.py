@@ -57,20 +57,18 @@ class Known(NamedTuple):
     dt: float | None = None  # s
 
 
-places = {}  # where models are unpacked, by their bundles; the one that was used last at the end
+places = {}  # where models are unpacked, and in which folder, by their bundles; the one that was used last at the end
 
 
 def unpacked_at(bundle: bytes) -> Path:
     """A file with what it needs, unpacked."""
-    places[bundle] = path = places.pop(bundle, None) or unpacked(pickle.loads(bundle), Path.cwd())
+    if bundle not in places:
+        top = Path(tempfile.mkdtemp(dir=Path.cwd()))
+        places[bundle] = unpacked(pickle.loads(bundle), top), top
+    places[bundle] = places.pop(bundle)
     while len(places) > UNPACKED:
-        shutil.rmtree(top_of(places.pop(next(iter(places)))), ignore_errors=True)
-    return path
-
-
-def top_of(path: Path) -> Path:
-    """The folder in which a model was unpacked."""
-    return Path.cwd() / path.relative_to(Path.cwd()).parts[0]
+        shutil.rmtree(places.pop(next(iter(places)))[1], ignore_errors=True)
+    return places[bundle][0]
 
 
 def compared_file(shown: str, bundle: bytes) -> Compared:

@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from glob import glob, has_magic
@@ -191,12 +190,11 @@ def bundle(model: Model) -> dict[str, bytes]:
 
 
 def unpacked(files: dict[str, bytes], folder: Path) -> Path:
-    """The model of a bundle as a file, in a new folder inside one."""
-    place = Path(tempfile.mkdtemp(dir=folder))
+    """The model of a bundle as a file, unpacked in an empty folder."""
     for name, content in files.items():
-        (place / name).parent.mkdir(parents=True, exist_ok=True)
-        (place / name).write_bytes(content)
-    return place / next(iter(files))
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    return folder / next(iter(files))
 
 
 def place_of_report(shown: str) -> str:

@@ -4,9 +4,8 @@ import pickle
 from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
-from typing import NamedTuple
 
 from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
@@ -15,45 +14,16 @@ from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
 from .row import AGREE, BROKE, REFUSED
+from .task import Task, Waiting
 
 TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
 UNTIMED = ", untimed"  # of a timed experiment, the step before it
-PIECES_AHEAD = 12  # pieces that are handed out for each worker before one has ended: their models are in memory
+AHEAD_FOR_EACH, AHEAD_FOR_ALL = 4, 16  # pieces that are handed out beforehand, for each worker and besides: they are in memory
 MARK = ".fleet"  # the file in a report that says from what it was made
 
 
-@dataclass
-class Task:
-    """One file, as far as it is done."""
-
-    model: Model
-    known: Known | None = None
-    keys: dict = field(default_factory=dict)  # under which results are kept, by their kind
-    lost: dict = field(default_factory=dict)  # experiments that gave nothing, and why
-    expected: set = field(default_factory=set)  # experiments that have not come back
-    left_out: list = field(default_factory=list)
-    seconds: float = 0.0
-    in_door: int = 0  # pieces that are handed out
-    packed: bytes = b""  # the model with what it needs, while pieces are handed out
-    row: dict | None = None
-
-    @property
-    def joints(self) -> int | None:
-        return self.known.joints if self.known else None
-
-
-class Waiting(NamedTuple):
-    """A piece that is not handed out yet; they are in this order."""
-
-    rank: int
-    lighter: float
-    number: int
-    task: Task
-    step: str
-
-
 class Run:
-    """A fleet under way. after it `rows` has a row for each model, and `parts` the files that are only included by others."""
+    """A fleet under way. After it `rows` has a row for each model, and `parts` the files that are only included by others."""
 
     def __init__(self, models: Sequence[Model], asked: Asked, door: Door, kept: Kept, out: Path):
         self.asked, self.door, self.kept, self.out = asked, door, kept, out
@@ -64,12 +34,14 @@ class Run:
         self.done_before = 0
         self.no_timing = door.no_timing()
         self.workers = max(1, door.workers())
+        self.most = AHEAD_FOR_EACH * self.workers + AHEAD_FOR_ALL
 
     def carry_out(self, progress: Callable[[], object]) -> None:
         """All of it. progress is called when something has changed."""
         for task in self.tasks:
             self.begin(task)
             self.hand_out()
+            progress()
         while self.door.under_way:
             progress()
             if done := self.door.next():
@@ -102,15 +74,16 @@ class Run:
     def ask(self, task: Task, step: str, rank: int) -> None:
         """A piece waits until it is handed out."""
         self.count += 1
+        weight = inf if step == "report" else task.joints or 0  # what ends a file comes before what begins another
         insort(
             self.timed if step in TIMED_LAST else self.waiting,
-            Waiting(rank, -(task.joints or 0), self.count, task, step),
+            Waiting(rank, -weight, self.count, task, step),
         )
 
     def hand_out(self) -> None:
         """As many pieces as keep the workers busy; timed ones of a pool at the end, for all others wait meanwhile."""
         of_timed = sum(step in TIMED_LAST for _, step in self.under_way.values())
-        while self.waiting and len(self.under_way) - of_timed < PIECES_AHEAD * self.workers:
+        while self.waiting and len(self.under_way) - of_timed < self.most:
             self.hand(self.waiting.pop(0))
         first = self.waiting[0].rank if self.waiting else TO_REPORT
         while self.timed and of_timed < self.workers and (first > TO_TIME or not self.door.times_alone):
@@ -240,12 +213,12 @@ class Run:
             self.ask(task, "report", TO_REPORT if after_timed else TO_COMPUTE)
 
     def ended(self, task: Task, verdict: str, reason: str | None, **more: object) -> None:
-        """A file is done."""
+        """A file is done. more: what else its row has, if there is a report."""
         known = task.known or Known("")
         about = {"file": task.model.shown, "sha256": task.model.sha256, "verdict": verdict, "reason": reason or ""}
         about |= {"joints": known.joints, "file_integrator": known.integrator, "file_dt_s": known.dt}
         about |= dict.fromkeys(("worst_ratio", "stable_at_file_dt", "limit_s"))
-        task.row = about | {"seconds": round(task.seconds, 2)} | more
+        task.row = about | {"seconds": round(task.seconds, 2), "has_report": bool(more)} | more
         self.rows.append(task.row)
         self.new.append(task.row)
 

@@ -1,16 +1,16 @@
 """The table of a fleet: fleet.csv, index.html, and its sentences."""
 
+import csv
+import io
 import platform
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from ..judge.timing import vectors
-from ..report.files import csv
 from ..report.provenance import commit
 from ..version import OURS, installed, own_version
 from .kept import write
-from .models import place_of_report
 from .page import fleet_page
 from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order
 from .run import Run
@@ -25,8 +25,6 @@ def write_table(
 ) -> list[str]:
     """Write fleet.csv and index.html; the sentences at the top. changed: since an earlier fleet, None: that was not asked."""
     rows, left_out = sorted(run.rows, key=order), [*left_out, *run.parts]
-    for row in rows:
-        row["has_report"] = (out / place_of_report(row["file"]) / "index.html").is_file() and row["verdict"] != REFUSED
     spent = time_of_workers(run.took, run.workers, took, run.door.times_alone)
     said = sentences_of(rows, left_out, run)
     origin = {
@@ -41,11 +39,20 @@ def write_table(
         OURS: own_version(),
         "mujoco": installed("mujoco"),
     }
-    columns = [{name: row[name] for name in FLEET_COLUMNS} for row in rows]
-    write(out / "fleet.csv", csv(columns).encode("utf-8", "backslashreplace"))
+    write(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
     text = fleet_page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture_of_steps(rows))
     write(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return [*said, spent.words(run.workers, took)] if run.took else said
+
+
+def csv_of_fleet(rows: Sequence[dict]) -> str:
+    """The table with all digits, true and false in small letters, empty what is not known."""
+    text = io.StringIO()
+    table = csv.DictWriter(text, FLEET_COLUMNS, extrasaction="ignore", lineterminator="\n")
+    table.writeheader()
+    for row in rows:
+        table.writerow({name: str(value).lower() if isinstance(value, bool) else value for name, value in row.items()})
+    return text.getvalue()
 
 
 def picture_of_steps(rows: Sequence[dict]) -> tuple[bytes, str, tuple[int, int]] | None:

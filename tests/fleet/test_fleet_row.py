@@ -1,0 +1,107 @@
+"""The row of a file: its verdict and reason, the largest share of a tolerance, its own step; and which row comes first."""
+
+import itertools
+
+import pytest
+
+from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order, row_of_file
+from compare.judge.check import AT_OWN_STEP, ENDS, Result
+from compare.report.verdict import Section
+
+CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
+
+
+def sections(*checks, limits=()):
+    """One section with checks: (quantity, value, tolerance, note, rule); all of rounding but those of other rules."""
+    result = Result("stability", tables={"step_limits": list(limits)})
+    for quantity, value, tolerance, note, rule in checks:
+        result.check("home", quantity, value, tolerance, "s", note, rule == "at most" and quantity != AT_OWN_STEP, rule)
+    return [Section("stability", "", "", "", result)]
+
+
+def good(share=0.5):
+    return "M", share, 1.0, "", "at most"
+
+
+def broke(quantity=ENDS):
+    return quantity, None, 0.0, "ended by SIGKILL, 4 times", "equal"
+
+
+def unstable(dt=0.002, limit=0.001):
+    return AT_OWN_STEP, dt, limit, "with Euler", "at most"
+
+
+def limit(dt, stable, integrator="Euler", base="fixed", kind="finite"):
+    return {"integrator": integrator, "file_integrator": "Euler", "base": base, "limit": kind, "predicted_dt_s": dt,
+            "stable_at_file_dt": stable}  # fmt: skip
+
+
+def verdict(*arguments, causes=(), lost=(), **more):
+    row = row_of_file(sections(*arguments, **more), causes, lost)
+    return row["verdict"], row["reason"]
+
+
+def test_a_file_agrees_differs_breaks_off_or_is_refused():
+    assert verdict(good(1.0)) == (AGREE, "")
+    assert verdict(good(1.0 + 1e-9), causes=CAUSES) == (DIFFER, CAUSES[0]["text"])
+    assert verdict(good(2.0)) == (DIFFER, "stability: M, home: 2 s, must be at most 1 s")
+    assert verdict(good(), broke()) == (BROKE, "stability ended by SIGKILL, 4 times")
+    assert verdict(good(), broke("figure a is drawn")) == (
+        BROKE,
+        "stability: figure a is drawn: ended by SIGKILL, 4 times",
+    )
+    assert verdict(good(), lost=["the table could not be made"]) == (BROKE, "the table could not be made")
+    assert verdict() == (REFUSED, "nothing could be compared")
+
+
+def test_what_differs_weighs_more_than_what_breaks_and_that_more_than_a_step():
+    assert verdict(good(2.0), broke(), unstable(), causes=CAUSES)[0] == DIFFER
+    assert verdict(good(), broke(), unstable())[0] == BROKE
+
+
+def test_a_file_whose_own_step_is_not_stable_agrees_and_says_where_the_limit_is():
+    said = "not stable at its own step of 2 ms at home: the limit is 1 ms with Euler"
+    assert verdict(good(), unstable()) == (AGREE, said)
+    assert verdict(good(), unstable(0.001)) == (AGREE, "")
+
+
+def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
+    row = row_of_file(sections(good(0.2), good(3.0), unstable(9.0)), CAUSES, [])
+    assert row["worst_ratio"] == 3.0
+    diverged = row_of_file(sections(good(0.2), ("M", None, 1.0, "", "at most")), [], [])
+    assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
+    assert row_of_file(sections(broke()), [], [])["worst_ratio"] is None
+
+
+@pytest.mark.parametrize("limits, stable, least", [
+    ([], None, None),
+    ([limit(0.004, True), limit(0.003, True)], True, 0.003),
+    ([limit(0.004, True), limit(0.001, False)], False, 0.001),
+    ([limit(0.004, True), limit(0.001, None)], True, 0.001),  # at one posture it is not known
+    ([limit(0.004, None)], None, 0.004),
+    ([limit(0.004, True), limit(0.001, False, integrator="RK4")], True, 0.004),  # another integrator
+    ([limit(0.004, True, base="free"), limit(0.001, False, base="locked")], True, 0.004),  # that is no base of its own
+    ([limit(None, True, kind="always stable"), limit(None, None, kind="saddle")], True, None),
+])  # fmt: skip
+def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stable, least):
+    row = row_of_file(sections(good(), limits=limits), [], [])
+    assert (row["stable_at_file_dt"], row["limit_s"]) == (stable, least)
+
+
+def test_what_needs_a_look_comes_first():
+    def row(verdict, stable, ratio, file="a"):
+        return {"verdict": verdict, "stable_at_file_dt": stable, "worst_ratio": ratio, "file": file}
+
+    right = [
+        row(DIFFER, None, 1e9), row(DIFFER, True, 2.0), row(BROKE, None, None), row(REFUSED, None, None),
+        row(AGREE, False, 0.1), row(AGREE, None, 0.9), row(AGREE, True, 0.9, "b"), row(AGREE, True, 0.0, "c"),
+        row(AGREE, None, None, "d"),
+    ]  # fmt: skip
+    for mixed in itertools.islice(itertools.permutations(right), 0, None, 9973):
+        assert sorted(mixed, key=order) == right
+
+
+def test_the_columns_are_those_that_are_promised():
+    assert ",".join(FLEET_COLUMNS) == (
+        "file,sha256,verdict,reason,joints,worst_ratio,file_integrator,file_dt_s,stable_at_file_dt,limit_s,seconds"
+    )
