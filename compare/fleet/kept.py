@@ -4,6 +4,7 @@ import hashlib
 import os
 import pickle
 import shutil
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from .piece import FleetError
 from .program import program
 
 FOLDER = "kept"
+DIGEST = 32  # bytes at the beginning of a file, by which it is known to be whole
+INTERRUPTED = "interrupted; what is done is kept, and the same command goes on from there"
 
 
 class Kept:
@@ -23,6 +26,8 @@ class Kept:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self.number = lock(out / FOLDER, wait=False)
+            with tempfile.TemporaryFile(dir=self.folder):
+                pass
         except OSError as error:
             text = f"cannot write to {out}: {what_is_wrong(out, error)}"
             raise FleetError(f"{text}; a folder that can be written is expected") from None
@@ -30,6 +35,7 @@ class Kept:
             raise FleetError(
                 f"another fleet is writing to {out}; another folder (--out) is expected, or wait until it has ended"
             )
+        interrupt.Now.line = INTERRUPTED
 
     def key(self, *what: object) -> str:
         """Of what a value follows from, besides the program."""
@@ -39,12 +45,15 @@ class Kept:
         """A value, or None: there is none that can be read."""
         self.asked.add(key)
         with suppress(Exception):
-            return pickle.loads((self.folder / key).read_bytes())
+            content = (self.folder / key).read_bytes()
+            if content[:DIGEST] == hashlib.sha256(content[DIGEST:]).digest():
+                return pickle.loads(content[DIGEST:])
         return None
 
     def put(self, key: str, value: object) -> None:
         self.asked.add(key)
-        write(self.folder / key, pickle.dumps(value))
+        content = pickle.dumps(value)
+        write(self.folder / key, hashlib.sha256(content).digest() + content)
 
     def forget_others(self) -> None:
         """Delete what other versions of the program have left."""
