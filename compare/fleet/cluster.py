@@ -167,13 +167,18 @@ class Cluster:
     def came(self, handed: Handed) -> None:
         """A piece has come back: it is done, or runs again."""
         worker, outcome = self.outcome_of(handed)
-        if outcome.ended and not outcome.is_late and handed.times < TRIES:
+        if outcome is None:
+            self.wait(handed.piece, handed.times, None)
+        elif outcome.ended and not outcome.is_late and handed.times < TRIES:
             self.wait(handed.piece, handed.times + 1, worker)
         else:
             self.given_up.append((handed.piece, outcome.tried(handed.times)))
 
-    def outcome_of(self, handed: Handed) -> tuple[str | None, Outcome]:
-        """The outcome of a future that is done, and the worker that is to be avoided then."""
+    def outcome_of(self, handed: Handed) -> tuple[str | None, Outcome | None]:
+        """The outcome of a future that is done, and the worker that is to be avoided then.
+
+        None: it only waited on workers that others took down; Dask does not know them apart.
+        """
         status, error = handed.future.status, None
         if status not in ("finished", "error"):
             self.look_after()
@@ -193,8 +198,7 @@ class Cluster:
         if type(error).__name__ != "KilledWorker":
             return None, Outcome(error=described(error)) if error else Outcome(ended="its result was lost")
         why = f"its workers were lost, the last one {error.last_worker.address}"
-        # a piece that only waited on those workers has not begun there
-        return None, Outcome(error=why) if self.begun(handed.piece) >= TRIES else Outcome(ended=why)
+        return None, Outcome(error=why) if self.begun(handed.piece) >= TRIES else None
 
     def begun(self, piece: Piece) -> int:
         """How many times a piece has begun on a worker."""

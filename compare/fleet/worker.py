@@ -1,11 +1,14 @@
 """What a worker of a Dask cluster does with a piece: it has a process carry it out (see child), as the pool does."""
 
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 from .child import SHARE, Child, memory_of_machine
 from .piece import Outcome
 from .program import program
+
+TELLING = 10.0  # s in which the scheduler hears that a piece begins
 
 idle, lock = [], threading.Lock()  # processes that wait for a piece
 
@@ -22,11 +25,13 @@ def on_worker(
     topic: under which the scheduler is told that it begins.
     """
     from distributed import get_worker
+    from distributed.utils import sync
 
     worker = get_worker()
     if program() != expected:
         return worker.address, None
-    worker.log_event(topic, name)
+    with suppress(Exception):  # the answer is waited for: the piece may take this worker down at once
+        sync(worker.loop, worker.scheduler.log_event, topic=topic, msg=name, callback_timeout=TELLING)
     key = worker.get_current_task()
     with lock:
         child = idle.pop() if idle else None
