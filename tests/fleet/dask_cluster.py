@@ -1,5 +1,6 @@
 """A Dask cluster of this machine, started as a user starts one: with Dask's own commands."""
 
+import json
 import os
 import signal
 import subprocess
@@ -8,7 +9,6 @@ import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-import distributed
 from runs import ROOT
 
 HERE = Path(__file__).resolve().parent
@@ -24,16 +24,12 @@ class Machines:
         while not self.file.exists():
             assert self.scheduler.poll() is None
             time.sleep(0.02)
-        self.address = distributed.Client  # set below
-        import json
-
         self.address = json.loads(self.file.read_text())["address"]
 
     def start(self, what, *options, root=None):
         """One of Dask's commands, in a session of its own."""
         environment = os.environ | {
             "PYTHONPATH": os.pathsep.join(map(str, (root or self.root, HERE))),
-            "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "10s",
         }
         log = (self.folder / f"{what}-{len(self.processes)}.log").open("wb")
         words = [sys.executable, "-m", "dask", what, *options, "--scheduler-file", str(self.file)]

@@ -110,7 +110,7 @@ def test_nothing_is_left_of_a_pool(tmp_path, way, monkeypatch):
     pool = Pool(2, limit=60.0)
     for _ in range(4):
         pool.submit(Piece("", toy.for_ever, (str(tmp_path / "notes"),)))
-    pids = sum(notes(tmp_path / "notes", 2), [])
+    pids = [pid for note in notes(tmp_path / "notes", 2) for pid in note]
     with pool.change:  # an early end does not wait for who has this
         if way == "stop":
             pool.stop()
@@ -130,7 +130,7 @@ def test_a_process_leaves_nothing_when_its_owner_is_killed(tmp_path):
     environment = ENVIRONMENT | {"TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": f"{ROOT}:{Path(__file__).parent}"}
     owner = subprocess.Popen([sys.executable, "-c", text], env=environment)
     try:
-        pids = sum(notes(tmp_path / "notes", 2), [])
+        pids = [pid for note in notes(tmp_path / "notes", 2) for pid in note]
     finally:
         owner.kill()
         owner.wait()

@@ -93,3 +93,8 @@ def waits(folder, opened):
     while not Path(opened).exists():
         time.sleep(0.02)
     return "opened"
+
+
+def waits_with(folder, opened, shared):
+    waits(folder, opened)
+    return len(shared)
