@@ -142,7 +142,7 @@ def name_of_signal(number: int) -> str:
 # in the process itself
 
 
-def serve(memory: int) -> None:
+def carry_out_calls(memory: int) -> None:
     """Carry out what comes in on stdin; what becomes of it goes out on stdout."""
     calls, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)  # nor does a piece read the calls of others
@@ -199,4 +199,4 @@ def most_memory() -> int:
 
 
 if __name__ == "__main__":
-    serve(int(sys.argv[1]))
+    carry_out_calls(int(sys.argv[1]))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ..process import interrupt
 from ..process.crash import described
-from .piece import PAUSE, TRIES, FleetError, Outcome, Piece
+from .piece import NOTHING_NEW, MOST_TRIES, FleetError, Outcome, Piece
 from .program import program
 from .worker import as_it_is, on_worker
 
@@ -151,7 +151,7 @@ class Cluster:
     def next(self) -> tuple[Piece, Outcome] | None:
         if not self.given_up:
             try:
-                future = self.ended.get(timeout=PAUSE)
+                future = self.ended.get(timeout=NOTHING_NEW)
             except Empty:
                 self.look_after()
                 self.hand_out()
@@ -169,7 +169,7 @@ class Cluster:
         worker, outcome = self.outcome_of(handed)
         if outcome is None:
             self.wait(handed.piece, handed.times, None)
-        elif outcome.ended and not outcome.is_late and handed.times < TRIES:
+        elif outcome.ended and not outcome.is_late and handed.times < MOST_TRIES:
             self.wait(handed.piece, handed.times + 1, worker)
         else:
             self.given_up.append((handed.piece, outcome.tried(handed.times)))
@@ -198,7 +198,7 @@ class Cluster:
         if type(error).__name__ != "KilledWorker":
             return None, Outcome(error=described(error)) if error else Outcome(ended="its result was lost")
         why = f"its workers were lost, the last one {error.last_worker.address}"
-        return None, Outcome(error=why) if self.begun(handed.piece) >= TRIES else None
+        return None, Outcome(error=why) if self.begun(handed.piece) >= MOST_TRIES else None
 
     def begun(self, piece: Piece) -> int:
         """How many times a piece has begun on a worker."""

@@ -13,7 +13,7 @@ from ..report.folder import lock, what_is_wrong
 from .piece import FleetError
 from .program import program
 
-FOLDER = "kept"
+KEPT = "kept"
 DIGEST = 32  # bytes at the beginning of a file, by which it is known to be whole
 INTERRUPTED = "interrupted; what is done is kept, and the same command goes on from there"
 
@@ -22,14 +22,14 @@ class Kept:
     """Values by key, each in a file of its own. FleetError: the folder cannot be written, or another fleet is there."""
 
     def __init__(self, out: Path):
-        self.out, self.folder, self.number, self.asked = out, out / FOLDER / program()[:16], None, set()
+        self.out, self.folder, self.number, self.asked = out, out / KEPT / program()[:16], None, set()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            self.number = lock(out / FOLDER, wait=False)
+            self.number = lock(out / KEPT, wait=False)
             with tempfile.TemporaryFile(dir=self.folder):
                 pass
         except OSError as error:
-            text = f"cannot write to {out}: {what_is_wrong(out, error)}"
+            text = f"cannot write_whole to {out}: {what_is_wrong(out, error)}"
             raise FleetError(f"{text}; a folder that can be written is expected") from None
         if self.number is None and os.name == "posix":
             raise FleetError(
@@ -53,11 +53,11 @@ class Kept:
     def put(self, key: str, value: object) -> None:
         self.asked.add(key)
         content = pickle.dumps(value)
-        write(self.folder / key, hashlib.sha256(content).digest() + content)
+        write_whole(self.folder / key, hashlib.sha256(content).digest() + content)
 
     def forget_others(self) -> None:
         """Delete what other versions of the program have left."""
-        for folder in (self.out / FOLDER).iterdir():
+        for folder in (self.out / KEPT).iterdir():
             if folder != self.folder:
                 shutil.rmtree(folder, ignore_errors=True)
 
@@ -67,7 +67,7 @@ class Kept:
             self.number = None
 
 
-def write(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """A file that is whole or not there. FleetError if it cannot be written."""
     part = path.with_name(f".{path.name}.part")
     try:
@@ -77,7 +77,7 @@ def write(path: Path, content: bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             part.unlink()
-        raise FleetError(f"cannot write {path}: {error.strerror}; what is done is kept") from None
+        raise FleetError(f"cannot write_whole {path}: {error.strerror}; what is done is kept") from None
 
 
 def write_report(place: Path, written: dict[str, bytes]) -> None:
@@ -93,4 +93,4 @@ def write_report(place: Path, written: dict[str, bytes]) -> None:
             part.rename(place)
     except OSError as error:
         shutil.rmtree(part, ignore_errors=True)
-        raise FleetError(f"cannot write {place}: {error.strerror}; what is done is kept") from None
+        raise FleetError(f"cannot write_whole {place}: {error.strerror}; what is done is kept") from None

@@ -4,8 +4,8 @@ import pickle
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-TRIES = 4  # of a piece whose process ended: it runs again at most three times
-PAUSE = 0.5  # s after which a door says that nothing has ended
+MOST_TRIES = 4  # of a piece whose process ended: it runs again at most three times
+NOTHING_NEW = 0.5  # s after which a door says that nothing has ended
 
 
 class FleetError(ValueError):

@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from ..process import interrupt
 from ..process.crash import described
 from .child import SHARE, Child, memory_of_machine
-from .piece import PAUSE, TRIES, Outcome, Piece
+from .piece import NOTHING_NEW, MOST_TRIES, Outcome, Piece
 
 ATTEMPTS = 20  # to delete the folder of processes that are about to end and still write
 
@@ -47,7 +47,7 @@ class Pool:
 
     def next(self) -> tuple[Piece, Outcome] | None:
         try:
-            done = self.ended.get(timeout=PAUSE)
+            done = self.ended.get(timeout=NOTHING_NEW)
         except Empty:
             return None
         self.under_way -= 1
@@ -87,7 +87,7 @@ class Pool:
         group = ""
         while (piece := self.take(number, group)) is not None:
             group = piece.group
-            for times in range(1, TRIES + 1):
+            for times in range(1, MOST_TRIES + 1):
                 outcome = self.carried_out(number, piece).tried(times)
                 if self.closed or not outcome.ended or outcome.is_late:
                     break

@@ -93,7 +93,7 @@ def test_a_folder_that_cannot_be_one(tmp_path, what):
 def test_a_folder_that_may_not_be_written(kept):
     kept.close()
     kept.folder.chmod(0o500)
-    with pytest.raises(FleetError, match="^cannot write to .*: Permission denied; a folder that can be written"):
+    with pytest.raises(FleetError, match=r"^cannot write to .*: Permission denied; a folder that can be written"):
         Kept(kept.out)
     kept.folder.chmod(0o700)
 
@@ -107,7 +107,7 @@ def test_a_full_disk(kept):
     write_report(kept.out / "report", {"index.html": b"old"})
     with (
         small_files(4096),
-        pytest.raises(FleetError, match="^cannot write .*report: File too large; what is done is kept$"),
+        pytest.raises(FleetError, match=r"^cannot write .*report: File too large; what is done is kept$"),
     ):
         write_report(kept.out / "report", {"index.html": bytes(10**5)})
     assert (kept.out / "report" / "index.html").read_bytes() == b"old"
