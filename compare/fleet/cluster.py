@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ..process import interrupt
 from ..process.crash import described
-from .piece import NOTHING_NEW, MOST_TRIES, FleetError, Outcome, Piece
+from .piece import MOST_TRIES, NOTHING_NEW, FleetError, Outcome, Piece
 from .program import program
 from .worker import as_it_is, on_worker
 

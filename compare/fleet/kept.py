@@ -13,7 +13,7 @@ from ..report.folder import lock, what_is_wrong
 from .piece import FleetError
 from .program import program
 
-KEPT = "kept"
+KEPT_IN = "kept"
 DIGEST = 32  # bytes at the beginning of a file, by which it is known to be whole
 INTERRUPTED = "interrupted; what is done is kept, and the same command goes on from there"
 
@@ -22,14 +22,14 @@ class Kept:
     """Values by key, each in a file of its own. FleetError: the folder cannot be written, or another fleet is there."""
 
     def __init__(self, out: Path):
-        self.out, self.folder, self.number, self.asked = out, out / KEPT / program()[:16], None, set()
+        self.out, self.folder, self.number, self.asked = out, out / KEPT_IN / program()[:16], None, set()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            self.number = lock(out / KEPT, wait=False)
+            self.number = lock(out / KEPT_IN, wait=False)
             with tempfile.TemporaryFile(dir=self.folder):
                 pass
         except OSError as error:
-            text = f"cannot write_whole to {out}: {what_is_wrong(out, error)}"
+            text = f"cannot write to {out}: {what_is_wrong(out, error)}"
             raise FleetError(f"{text}; a folder that can be written is expected") from None
         if self.number is None and os.name == "posix":
             raise FleetError(
@@ -57,7 +57,7 @@ class Kept:
 
     def forget_others(self) -> None:
         """Delete what other versions of the program have left."""
-        for folder in (self.out / KEPT).iterdir():
+        for folder in (self.out / KEPT_IN).iterdir():
             if folder != self.folder:
                 shutil.rmtree(folder, ignore_errors=True)
 
@@ -77,7 +77,7 @@ def write_whole(path: Path, content: bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             part.unlink()
-        raise FleetError(f"cannot write_whole {path}: {error.strerror}; what is done is kept") from None
+        raise FleetError(f"cannot write {path}: {error.strerror}; what is done is kept") from None
 
 
 def write_report(place: Path, written: dict[str, bytes]) -> None:
@@ -93,4 +93,4 @@ def write_report(place: Path, written: dict[str, bytes]) -> None:
             part.rename(place)
     except OSError as error:
         shutil.rmtree(part, ignore_errors=True)
-        raise FleetError(f"cannot write_whole {place}: {error.strerror}; what is done is kept") from None
+        raise FleetError(f"cannot write {place}: {error.strerror}; what is done is kept") from None

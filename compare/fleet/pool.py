@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from ..process import interrupt
 from ..process.crash import described
 from .child import SHARE, Child, memory_of_machine
-from .piece import NOTHING_NEW, MOST_TRIES, Outcome, Piece
+from .piece import MOST_TRIES, NOTHING_NEW, Outcome, Piece
 
 ATTEMPTS = 20  # to delete the folder of processes that are about to end and still write
 

@@ -9,7 +9,7 @@ from ..judge.timing import vectors
 from ..report.files import csv
 from ..report.provenance import commit
 from ..version import OURS, installed, own_version
-from .kept import write
+from .kept import write_whole
 from .models import place_of
 from .page import page
 from .row import AGREE, BROKE, COLUMNS, DIFFER, REFUSED, order
@@ -45,9 +45,9 @@ def write_table(
         "mujoco": installed("mujoco"),
     }
     columns = [{name: row[name] for name in COLUMNS} for row in rows]
-    write(out / "fleet.csv", csv(columns).encode("utf-8", "backslashreplace"))
+    write_whole(out / "fleet.csv", csv(columns).encode("utf-8", "backslashreplace"))
     text = page("A fleet compared with MuJoCo", said, rows, [*left_out, *run.parts], changed, origin)
-    write(out / "index.html", text.encode("utf-8", "backslashreplace"))
+    write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return said
 
 
