@@ -68,6 +68,7 @@ DIRECTIONS = {
         "tmt",
         "case",
         "command_line",
+        "drawing",
         "engines",
         "experiment",
         "experiments",
@@ -157,7 +158,7 @@ def test_libraries_are_imported_where_they_belong(path):
     assert "pandas" not in outer or name.startswith("compare.report")
     assert "matplotlib" not in outer or path.stem.startswith("figures") or name == "compare.report.style"
     assert "PIL" not in outer or path.stem.startswith("figures") or name == "compare.report.images"
-    assert "distributed" not in outer or name == "compare.fleet.cluster"
+    assert "distributed" not in outer or name in ("compare.fleet.cluster", "compare.fleet.worker")
     assert "rich" not in outer or name == "compare.report.terminal"
 
 

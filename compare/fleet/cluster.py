@@ -1,36 +1,47 @@
-"""A Dask cluster: its workers carry out the pieces, each in a process of its own (see child)."""
+"""A Dask cluster: its workers carry out the pieces (see worker)."""
 
-import atexit
 import hashlib
+import heapq
 import logging
-import shutil
-import tempfile
-import threading
 import time
 import warnings
-from contextlib import suppress
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from itertools import count
 from queue import Empty, SimpleQueue
+from typing import NamedTuple
 
 from ..process import interrupt
 from ..process.crash import described
-from .child import SHARE, Child, memory_of_machine
-from .piece import TRIES, FleetError, Outcome, Piece
+from .piece import MOST_TRIES, NOTHING_NEW, FleetError, Outcome, Piece
 from .program import program
+from .worker import as_it_is, on_worker
 
-PAUSE = 0.5  # s after which it is said that nothing has ended
 CONNECTING = 10.0  # s in which a scheduler answers, and its first worker is there
+FRESH = 1.0  # s for which the list of the workers is taken as it was
 TIMING = "timing"  # the resource of a worker that takes timed pieces, of one thread
 AHEAD = 3  # pieces that a worker is handed beforehand, for each of its threads
+BEGUN = "fleet-{}"  # under which the scheduler is told of each piece that begins; {}: whose pieces
+LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio")
 EXTRA = "the extra `fleet` is needed for a cluster: python -m pip install -e '.[fleet]'"
-OTHER = "runs another version of the program or of MuJoCo"
+OTHER = "the worker {} has not the same program and MuJoCo as this machine; the same is expected everywhere"
 GONE = "the scheduler {} is gone; what is done is kept, and the same command goes on from there"
+
+
+class Handed(NamedTuple):
+    """A piece that was handed to the scheduler."""
+
+    piece: Piece
+    times: int  # how often, this one among them
+    future: object
+    shared: object  # what it needs too, for as long as it does
 
 
 class Cluster:
     """The workers of a scheduler; see piece.Door. limit: s that a piece may take.
 
-    FleetError: there is no scheduler at the address, no worker, or workers with another version of the program.
+    FleetError: there is no scheduler at the address, no worker, or one with another version of the program; later, from any
+    method: the scheduler has gone, or for longer than the limit all workers.
     """
 
     times_alone = False
@@ -40,14 +51,17 @@ class Cluster:
             import distributed
         except ImportError:
             raise FleetError(EXTRA) from None
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it says is said here, in a line
+        for name in LOGGERS:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what they say is said here, in a line
         warnings.filterwarnings("ignore", module="distributed")
         self.address, self.limit, self.under_way = address, limit, 0
-        self.waiting, self.running, self.ended = [], {}, SimpleQueue()
-        self.alone_since = None  # s at which no worker was left
+        self.waiting = {False: [], True: []}  # heaps, of pieces that are timed and of others
+        self.running, self.ended, self.given_up = {}, SimpleQueue(), []
+        self.seen, self.seen_at, self.number = {}, -FRESH, count()
+        self.none_since = {False: None, True: None}  # s at which no worker was left, for timed pieces and for others
         try:
             self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
-        except (OSError, TimeoutError, ValueError, TypeError) as error:
+        except Exception as error:
             why = " ".join(str(error).split()) or type(error).__name__
             raise FleetError(f"no scheduler answers at {address}: {why}") from None
         interrupt.undo.append(self.close)
@@ -63,144 +77,157 @@ class Cluster:
         if not self.known():
             raise FleetError(f"the scheduler {self.address} has no worker")
         for worker, found in self.client.run(program, on_error="return").items():
-            if found != program():
-                what = (
-                    "has not this program"
-                    if isinstance(found, Exception)
-                    else "runs another version of the program or of MuJoCo"
-                )
-                raise FleetError(f"the worker {worker} {what}; the same is expected everywhere")
+            if found != program() and not isinstance(found, OSError):  # one that has gone meanwhile
+                raise FleetError(OTHER.format(worker))
+
+    @contextmanager
+    def speaking(self) -> Iterator[None]:
+        """FleetError where the scheduler does not answer in this block."""
+        try:
+            yield
+        except Exception:
+            raise FleetError(GONE.format(self.address)) from None
 
     def known(self) -> dict:
-        """The workers, by their addresses, as the scheduler knows them."""
-        return self.client.scheduler_info(n_workers=-1)["workers"]
+        """The workers, by their addresses, as the scheduler knows them, or did a second ago."""
+        if time.monotonic() - self.seen_at > FRESH:
+            with self.speaking():
+                self.seen = self.client.scheduler_info(n_workers=-1)["workers"]
+            self.seen_at = time.monotonic()
+        return self.seen
 
     def workers(self) -> int:
         return sum(worker["nthreads"] for worker in self.known().values())
 
+    def timing_workers(self) -> list[dict]:
+        return [worker for worker in self.known().values() if worker["resources"].get(TIMING, 0) >= 1]
+
     def no_timing(self) -> str | None:
-        able = [worker for worker in self.known().values() if worker["resources"].get(TIMING)]
-        if any(worker["nthreads"] == 1 for worker in able):
-            return None
-        if able:
-            return f"the worker with the resource {TIMING} has {able[0]['nthreads']} threads; one, which times alone, is expected"
-        return f"no worker of the cluster has the resource {TIMING} (dask worker ... --nthreads 1 --resources '{TIMING}=1')"
+        able = self.timing_workers()
+        if not able:
+            return f"no worker of the cluster has the resource {TIMING} (dask worker ... --nthreads 1 --resources '{TIMING}=1')"
+        threads = max(worker["nthreads"] for worker in able)
+        if threads > 1:
+            return f"a worker with the resource {TIMING} has {threads} threads; one, which times alone, is expected"
+        return None
 
     def submit(self, piece: Piece) -> None:
         self.under_way += 1
-        self.waiting.append((piece, 1, None))
+        self.wait(piece, 1, None)
         self.hand_out()
+
+    def wait(self, piece: Piece, times: int, avoided: str | None) -> None:
+        """A piece waits here until it is handed out for the so-manieth time; avoided: the worker on which it ended."""
+        order = piece.rank, times == 1, -piece.weight, next(self.number)
+        heapq.heappush(self.waiting[piece.timed], (*order, piece, times, avoided))
 
     def hand_out(self) -> None:
         """Hand out as many pieces as keep the workers busy: what waits here costs the scheduler nothing."""
-        threads = max(1, self.workers())
-        self.waiting.sort(key=lambda entry: (entry[0].rank, -entry[0].weight))
-        while self.waiting and len(self.running) < AHEAD * threads:
-            self.hand(*self.waiting.pop(0))
+        if not any(self.waiting.values()):
+            return
+        for timed, able in ((True, len(self.timing_workers())), (False, self.workers())):
+            room = AHEAD * able - sum(handed.piece.timed == timed for handed in self.running.values())
+            for _ in range(min(room, len(self.waiting[timed]))):
+                self.hand(*heapq.heappop(self.waiting[timed])[-3:])
 
     def hand(self, piece: Piece, times: int, avoided: str | None) -> None:
-        """Hand a piece to the scheduler, for the so-manieth time; avoided: the worker on which it ended."""
+        try:
+            call = piece.call
+        except Exception as error:  # it cannot be sent
+            self.given_up.append((piece, Outcome(error=described(error))))
+            return
         others = [worker for worker in self.known() if worker != avoided] if avoided else []
-        shared = piece.shared
-        if shared:  # a task of its own, that can be done again where its worker is lost
-            key = f"shared-{hashlib.sha256(shared).hexdigest()}"
-            shared = self.client.submit(as_it_is, shared, key=key, pure=True)
-        future = self.client.submit(
-            on_worker, piece._replace(shared=b""), shared, self.limit, program(), pure=False, retries=0, priority=-piece.rank,
-            resources={TIMING: 1} if piece.timed else None, workers=others or None, allow_other_workers=bool(others),
-        )  # fmt: skip
-        self.running[future.key] = piece, times, future, shared
-        future.add_done_callback(self.ended.put)
+        with self.speaking():
+            shared = piece.shared
+            if shared:  # a task of its own, that can be done again where its worker is lost
+                key = f"shared-{hashlib.sha256(shared).hexdigest()}"
+                shared = self.client.submit(as_it_is, shared, key=key, pure=True)
+            future = self.client.submit(
+                on_worker, piece.name, call, shared, self.limit, program(), BEGUN.format(self.client.id), pure=False,
+                retries=0, priority=0 if piece.timed else -piece.rank, resources={TIMING: 1} if piece.timed else None,
+                workers=others or None, allow_other_workers=bool(others),
+            )  # fmt: skip
+            self.running[future.key] = Handed(piece, times, future, shared)
+            future.add_done_callback(self.ended.put)
 
     def next(self) -> tuple[Piece, Outcome] | None:
-        try:
-            future = self.ended.get(timeout=PAUSE)
-        except Empty:
-            self.look_after()
+        if not self.given_up:
+            try:
+                future = self.ended.get(timeout=NOTHING_NEW)
+            except Empty:
+                self.look_after()
+                self.hand_out()
+            else:
+                if future.key in self.running:
+                    self.came(self.running.pop(future.key))
+                    self.hand_out()
+        if not self.given_up:
             return None
-        if future.key not in self.running:
-            return None
-        piece, times, _, _ = self.running.pop(future.key)
-        worker, outcome = self.outcome_of(future)
-        if outcome is None or (outcome.ended and not outcome.is_late and worker and times < TRIES):
-            self.waiting.insert(0, (piece, times + (outcome is not None), worker))
-            self.hand_out()
-            return None
-        self.hand_out()
         self.under_way -= 1
-        return piece, outcome.tried(times)
+        return self.given_up.pop(0)
 
-    def outcome_of(self, future) -> tuple[str, Outcome | None]:
-        """The worker and the outcome of a future that is done; None: it was lost, and is to be asked for again."""
-        if future.status == "finished":
-            with suppress(Exception):
-                return future.result(timeout=CONNECTING)
+    def came(self, handed: Handed) -> None:
+        """A piece has come back: it is done, or runs again."""
+        worker, outcome = self.outcome_of(handed)
+        if outcome is None:
+            self.wait(handed.piece, handed.times, None)
+        elif outcome.ended and not outcome.is_late and handed.times < MOST_TRIES:
+            self.wait(handed.piece, handed.times + 1, worker)
+        else:
+            self.given_up.append((handed.piece, outcome.tried(handed.times)))
+
+    def outcome_of(self, handed: Handed) -> tuple[str | None, Outcome | None]:
+        """The outcome of a future that is done, and the worker that is to be avoided then.
+
+        None: it only waited on workers that others took down; Dask does not know them apart.
+        """
+        status, error = handed.future.status, None
+        if status not in ("finished", "error"):
             self.look_after()
-            return "", None
-        if future.status == "error":
-            error = future.exception(timeout=CONNECTING)
-            if type(error).__name__ == "KilledWorker":
-                return "", Outcome(ended=f"its workers were lost, the last one {error.last_worker.address}")
-            return "", Outcome(error=described(error))
-        self.look_after()
-        return "", None
+        with suppress(Exception):
+            if status == "finished":
+                worker, outcome = handed.future.result(timeout=CONNECTING)
+                if outcome is None:
+                    error = OTHER.format(worker)
+                else:
+                    return worker, outcome
+            elif status == "error":
+                error = handed.future.exception(timeout=CONNECTING)
+        if isinstance(error, ImportError | AttributeError):
+            error = f"a worker has not the same program as this machine, {described(error)}"
+        if isinstance(error, str):
+            raise FleetError(f"{error}; what is done is kept")
+        if type(error).__name__ != "KilledWorker":
+            return None, Outcome(error=described(error)) if error else Outcome(ended="its result was lost")
+        why = f"its workers were lost, the last one {error.last_worker.address}"
+        return None, Outcome(error=why) if self.begun(handed.piece) >= MOST_TRIES else None
+
+    def begun(self, piece: Piece) -> int:
+        """How many times a piece has begun on a worker."""
+        with self.speaking():
+            return [name for _, name in self.client.get_events(BEGUN.format(self.client.id))].count(piece.name)
 
     def look_after(self) -> None:
-        """FleetError: the scheduler has gone, or its last worker, and with it hope."""
+        """FleetError: the scheduler has gone, or its last worker, and with it hope. Timed pieces may be without hope alone."""
         if self.client.status != "running":
             raise FleetError(GONE.format(self.address))
-        if self.known():
-            self.alone_since = None
-            self.hand_out()
-            return
-        self.alone_since = self.alone_since or time.perf_counter()
-        if time.perf_counter() - self.alone_since > self.limit:
-            raise FleetError(f"the scheduler {self.address} has no worker any more; what is done is kept")
+        now = time.monotonic()
+        for timed, able in ((False, self.workers()), (True, len(self.timing_workers()))):
+            mine = [key for key, handed in self.running.items() if handed.piece.timed == timed]
+            if able or not (mine or self.waiting[timed]):
+                self.none_since[timed] = None
+                continue
+            self.none_since[timed] = self.none_since[timed] or now
+            if now - self.none_since[timed] <= self.limit:
+                continue
+            if not timed:
+                raise FleetError(f"the scheduler {self.address} has no worker any more; what is done is kept")
+            pieces = [self.running.pop(key).piece for key in mine] + [entry[-3] for entry in self.waiting[timed]]
+            self.waiting[timed].clear()
+            self.given_up += [(piece, Outcome(error=self.no_timing())) for piece in pieces]
 
     def close(self) -> None:
-        if self.close in interrupt.undo:
+        with suppress(ValueError):  # it is closed already
             interrupt.undo.remove(self.close)
         with suppress(Exception):
             self.client.close(timeout=1)
-
-
-# on a worker
-
-idle, lock = [], threading.Lock()  # processes that wait for a piece
-
-
-def as_it_is(shared: bytes) -> bytes:
-    return shared
-
-
-def on_worker(piece: Piece, shared: bytes, limit: float, expected: str) -> tuple[str, Outcome]:
-    """The worker's address, and what becomes of a piece in a process of its own."""
-    from distributed import get_worker
-
-    worker = get_worker()
-    if program() != expected:
-        return "", Outcome(error=f"the worker {worker.address} {OTHER}")
-    with lock:
-        child = idle.pop() if idle else None
-    if child is None or not child.alive:
-        child = Child(folder_of(worker), memory_of(worker))
-    outcome = child.ask(piece._replace(shared=shared), limit)
-    if child.alive and not child.is_full(outcome) and not outcome.error.startswith("out of memory"):
-        with lock:
-            idle.append(child)
-    else:
-        child.close()
-    return worker.address, outcome
-
-
-def folder_of(worker) -> Path:
-    """A folder for the processes of a worker, which goes with it."""
-    folder = Path(tempfile.mkdtemp(prefix="fleet-", dir=worker.local_directory))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
-def memory_of(worker) -> int | None:
-    """Bytes that a piece may have: what Dask allows the worker, or its share of the machine's."""
-    limit = worker.memory_manager.memory_limit or memory_of_machine()
-    return int(SHARE * limit / worker.state.nthreads) if limit else None

@@ -98,7 +98,7 @@ def setup_of(known: Compared, asked: Asked) -> Setup:
     return make(known.robot, engines(known.mujoco), reading=known.reading)
 
 
-def untimed(name: str, shown: str, asked: Asked, bundle: bytes) -> bytes:
+def untimed_part(name: str, shown: str, asked: Asked, bundle: bytes) -> bytes:
     """What of an experiment is no timing, packed."""
     setup = setup_of(compared_file(shown, bundle), asked)
     with quiet(setup.robot):
@@ -112,7 +112,7 @@ def done(work: object) -> object:
 
 
 def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: bytes) -> bytes:
-    """What an experiment finds, or that it broke off: see experiment.computed, packed. work: what was `untimed` of it."""
+    """What an experiment finds, or that it broke off: see experiment.computed, packed. work: its `untimed_part`."""
     setup = setup_of(compared_file(shown, bundle), asked)
     if work:
         setup.background[name] = pickle.loads(zlib.decompress(work))

@@ -4,6 +4,7 @@ import hashlib
 import os
 import pickle
 import shutil
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -12,17 +13,21 @@ from ..report.folder import lock, what_is_wrong
 from .piece import FleetError
 from .program import program
 
-FOLDER = "kept"
+KEPT_IN = "kept"
+DIGEST = 32  # bytes at the beginning of a file, by which it is known to be whole
+INTERRUPTED = "interrupted; what is done is kept, and the same command goes on from there"
 
 
 class Kept:
     """Values by key, each in a file of its own. FleetError: the folder cannot be written, or another fleet is there."""
 
     def __init__(self, out: Path):
-        self.out, self.folder, self.number, self.asked = out, out / FOLDER / program()[:16], None, set()
+        self.out, self.folder, self.number, self.asked = out, out / KEPT_IN / program()[:16], None, set()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            self.number = lock(out / FOLDER, wait=False)
+            self.number = lock(out / KEPT_IN, wait=False)
+            with tempfile.TemporaryFile(dir=self.folder):
+                pass
         except OSError as error:
             text = f"cannot write to {out}: {what_is_wrong(out, error)}"
             raise FleetError(f"{text}; a folder that can be written is expected") from None
@@ -30,6 +35,7 @@ class Kept:
             raise FleetError(
                 f"another fleet is writing to {out}; another folder (--out) is expected, or wait until it has ended"
             )
+        interrupt.Now.line = INTERRUPTED
 
     def key(self, *what: object) -> str:
         """Of what a value follows from, besides the program."""
@@ -39,16 +45,19 @@ class Kept:
         """A value, or None: there is none that can be read."""
         self.asked.add(key)
         with suppress(Exception):
-            return pickle.loads((self.folder / key).read_bytes())
+            content = (self.folder / key).read_bytes()
+            if content[:DIGEST] == hashlib.sha256(content[DIGEST:]).digest():
+                return pickle.loads(content[DIGEST:])
         return None
 
     def put(self, key: str, value: object) -> None:
         self.asked.add(key)
-        write(self.folder / key, pickle.dumps(value))
+        content = pickle.dumps(value)
+        write_whole(self.folder / key, hashlib.sha256(content).digest() + content)
 
     def forget_others(self) -> None:
         """Delete what other versions of the program have left."""
-        for folder in (self.out / FOLDER).iterdir():
+        for folder in (self.out / KEPT_IN).iterdir():
             if folder != self.folder:
                 shutil.rmtree(folder, ignore_errors=True)
 
@@ -58,7 +67,7 @@ class Kept:
             self.number = None
 
 
-def write(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """A file that is whole or not there. FleetError if it cannot be written."""
     part = path.with_name(f".{path.name}.part")
     try:

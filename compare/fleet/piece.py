@@ -4,7 +4,8 @@ import pickle
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-TRIES = 4  # of a piece whose process ended: it runs again at most three times
+MOST_TRIES = 4  # of a piece whose process ended: it runs again at most three times
+NOTHING_NEW = 0.5  # s after which a door says that nothing has ended
 
 
 class FleetError(ValueError):
@@ -22,6 +23,11 @@ class Piece(NamedTuple):
     weight: float = 0.0  # of one rank those of a heavy group begin first
     timed: bool = False  # it measures time, and takes a worker for itself
     shared: bytes = b""  # the last argument of all pieces of a group, which is sent to a machine once
+
+    @property
+    def call(self) -> bytes:
+        """What is sent of it, besides what is shared. Any exception if that cannot be sent."""
+        return pickle.dumps((self.function, self.arguments))
 
 
 class Outcome(NamedTuple):

@@ -2,12 +2,11 @@
 
 import hashlib
 from functools import cache
-from pathlib import Path
 
+from ..process.crash import ROOT
 from ..version import installed
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("mujoco", "numpy", "scipy", "numba", "mpmath")  # whose versions may change what is found
+COMPUTE_WITH = ("mujoco", "numpy", "scipy", "numba", "mpmath")  # whose versions may change what is found
 
 
 @cache
@@ -18,5 +17,5 @@ def program() -> str:
         for path in sorted((ROOT / name).rglob("*")):
             if path.is_file() and path.suffix in (".py", ".xml", ".html", ".js"):
                 found.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    found.update(repr([(name, installed(name)) for name in PACKAGES]).encode())
+    found.update(repr([(name, installed(name)) for name in COMPUTE_WITH]).encode())
     return found.hexdigest()

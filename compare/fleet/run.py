@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
-from .file_pieces import Asked, Known, findings, read_file, reported, untimed
+from .file_pieces import Asked, Known, findings, read_file, reported, untimed_part
 from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
@@ -18,7 +18,10 @@ from .task import Task, Waiting
 
 TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
 UNTIMED = ", untimed"  # of a timed experiment, the step before it
-AHEAD_FOR_EACH, AHEAD_FOR_ALL = 4, 16  # pieces that are handed out beforehand, for each worker and besides: they are in memory
+AHEAD_FOR_EACH, AHEAD_FOR_ALL = (
+    4,
+    16,
+)  # pieces that are handed out beforehand, for each worker and besides: they are in memory
 MARK = ".fleet"  # the file in a report that says from what it was made
 
 
@@ -116,7 +119,7 @@ class Run:
         """The call of an experiment, or of what of it is no timing."""
         about = task.model.shown, self.asked
         if step.endswith(UNTIMED):
-            return untimed, (step.removesuffix(UNTIMED), *about)
+            return untimed_part, (step.removesuffix(UNTIMED), *about)
         work = self.kept.get(task.keys[step + UNTIMED]) if step in TIMED_LAST else None
         return findings, (step, work and work[0], *about)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..judge.timing import vectors
 from ..report.provenance import commit
 from ..version import OURS, installed, own_version
-from .kept import write
+from .kept import write_whole
 from .page import fleet_page
 from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order
 from .run import Run
@@ -39,9 +39,9 @@ def write_table(
         OURS: own_version(),
         "mujoco": installed("mujoco"),
     }
-    write(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
+    write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
     text = fleet_page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture_of_steps(rows))
-    write(out / "index.html", text.encode("utf-8", "backslashreplace"))
+    write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return [*said, spent.words(run.workers, took)] if run.took else said
 
 

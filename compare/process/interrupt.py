@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-LINE = "interrupted; a report that was there is unchanged"
 
 undo = []  # what is to be done before an early end, the last first: each a function without arguments
 turn = threading.RLock()  # who has it decides how the run ends
@@ -25,6 +24,7 @@ class Now:
     asked = False  # an interrupt has come
     held = 0  # the main thread is in so many blocks of `held`
     settled = False  # how the run ends is decided
+    line = "interrupted; a report that was there is unchanged"
 
 
 def listen() -> None:
@@ -79,5 +79,5 @@ def end() -> None:
         with suppress(Exception):
             act()
     with suppress(OSError):
-        os.write(2, ("\r" * os.isatty(2) + LINE + "\n").encode())  # over what a terminal shows of Ctrl-C
+        os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # over what a terminal shows of Ctrl-C
     os._exit(2)

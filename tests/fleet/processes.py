@@ -1,0 +1,34 @@
+"""Which processes live, and what pieces have noted of themselves."""
+
+import time
+from pathlib import Path
+
+SOON = 60.0  # s, far more than anything here takes
+
+
+def is_there(pid):
+    """Whether a process lives."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def soon(question):
+    """Whether something holds before long."""
+    until = time.monotonic() + SOON
+    while time.monotonic() < until:
+        if question():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def gone_soon(*pids):
+    return soon(lambda: not any(map(is_there, pids)))
+
+
+def notes(folder, count=1):
+    """What so many pieces have noted, as soon as they have."""
+    assert soon(lambda: sum(bool(note.read_text()) for note in Path(folder).iterdir()) >= count)
+    return [note.read_text().split() for note in sorted(Path(folder).iterdir())]

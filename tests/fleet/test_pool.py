@@ -1,0 +1,149 @@
+"""The pool: whatever a piece does, it gets an outcome, and the others theirs."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+import faults
+import pytest
+import toy_pieces as toy
+from processes import gone_soon, notes
+from runs import ENVIRONMENT, ROOT
+
+from compare.fleet.piece import Piece, outcomes
+from compare.fleet.pool import Pool
+from compare.process import interrupt
+
+
+@pytest.fixture
+def pool():
+    made = Pool(2, limit=60.0)
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def tried(tmp_path_factory):
+    """What becomes of all that can happen to a piece, and where they took notes."""
+    folder, made = tmp_path_factory.mktemp("notes"), Pool(2, faults.LIMIT, faults.MEMORY)
+    try:
+        yield faults.tried(made, folder), folder
+    finally:
+        made.close()
+
+
+@pytest.mark.parametrize("name", [*faults.VALUES, *faults.ENDS])
+def test_what_becomes_of_a_piece(tried, name):
+    found, folder = tried
+    faults.check(found[name], name, folder)
+
+
+def test_every_fault_is_tried(tried):
+    assert set(tried[0]) == {*faults.VALUES, *faults.ENDS}
+
+
+def test_what_takes_too_long_ends_with_all_that_it_has_started(tried):
+    (pids,) = notes(tried[1] / "for_ever")
+    assert len(pids) == 2 and gone_soon(*pids)
+
+
+def test_a_process_that_is_killed_between_two_pieces_costs_no_try(pool, tmp_path):
+    for number in (signal.SIGKILL, signal.SIGSEGV):
+        idle = {found.returned for found in outcomes(pool, [Piece("", toy.own_process)] * 4)}
+        for pid in idle:
+            os.kill(pid, number)
+        assert gone_soon(*idle)
+    (tmp_path / "notes").mkdir()
+    always = Piece("", toy.killed, (signal.SIGKILL, str(tmp_path / "notes")))
+    found = outcomes(pool, [Piece("", toy.twice, (1,)), Piece("", toy.twice, (2,)), always])
+    assert [each.returned for each in found[:2]] == [2, 4]
+    assert found[2].broke == "ended by SIGKILL, 4 times" and len(list((tmp_path / "notes").iterdir())) == 4
+
+
+def test_nothing_runs_beside_what_is_timed(pool, tmp_path):
+    places = {timed: tmp_path / str(timed) for timed in (True, False)}
+    for folder in places.values():
+        folder.mkdir()
+    asked = [Piece("", toy.in_time, (str(places[k % 3 == 0]), 0.05), timed=k % 3 == 0, rank=k % 2) for k in range(12)]
+    assert not any(found.broke for found in outcomes(pool, asked))
+
+    def times(timed):
+        return sorted(tuple(map(int, note)) for note in notes(places[timed]))
+
+    assert len(times(True)) == 4 and len(times(False)) == 8
+    assert all(end <= begin for (_, end), (begin, _) in pairwise(times(True)))
+    for begin, end in times(True):
+        assert not any(other < end and begin < other_end for other, other_end in times(False))
+
+
+def test_a_process_keeps_to_its_group_and_heavy_groups_begin_first(tmp_path):
+    pool = Pool(1, limit=60.0)
+    try:
+        for k, (group, rank, weight) in enumerate(
+            [("a", 1, 1.0), ("b", 1, 2.0), ("a", 1, 1.0), ("b", 1, 2.0), ("c", 0, 0.0), ("a", 2, 9.0)]
+        ):
+            with pool.change:  # all are there before one begins
+                pool.running[-1] = Piece("", None, timed=True)
+            pool.submit(Piece(f"{k}{group}{rank}", toy.twice, (k,), group=group, rank=rank, weight=weight))
+        with pool.change:
+            del pool.running[-1]
+            pool.change.notify_all()
+        order = []
+        while pool.under_way:
+            if done := pool.next():
+                order.append(done[0].name)
+    finally:
+        pool.close()
+    assert order == ["4c0", "1b1", "3b1", "0a1", "2a1", "5a2"]
+
+
+@pytest.mark.parametrize("way", ["close", "stop"])
+def test_nothing_is_left_of_a_pool(tmp_path, way, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    (tmp_path / "notes").mkdir()
+    before = list(interrupt.undo)
+    pool = Pool(2, limit=60.0)
+    for _ in range(4):
+        pool.submit(Piece("", toy.for_ever, (str(tmp_path / "notes"),)))
+    pids = [pid for note in notes(tmp_path / "notes", 2) for pid in note]
+    with pool.change:  # an early end does not wait for who has this
+        if way == "stop":
+            pool.stop()
+    pool.close()
+    assert len(pids) == 4 and gone_soon(*pids)
+    assert not list((tmp_path / "temporary").iterdir()) and interrupt.undo == before
+
+
+def test_a_process_leaves_nothing_when_its_owner_is_killed(tmp_path):
+    text = (
+        "import toy_pieces as toy; from compare.fleet.pool import Pool; from compare.fleet.piece import Piece; import time\n"
+        f"pool = Pool(2, 60.0)\nfor _ in range(2): pool.submit(Piece('', toy.for_ever, ({str(tmp_path / 'notes')!r},)))\n"
+        "time.sleep(60)"
+    )
+    for name in ("notes", "temporary"):
+        (tmp_path / name).mkdir()
+    environment = ENVIRONMENT | {"TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": f"{ROOT}:{Path(__file__).parent}"}
+    owner = subprocess.Popen([sys.executable, "-c", text], env=environment)
+    try:
+        pids = [pid for note in notes(tmp_path / "notes", 2) for pid in note]
+    finally:
+        owner.kill()
+        owner.wait()
+    assert len(pids) == 4 and gone_soon(*pids)
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+def test_a_folder_that_is_gone_is_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    pool = Pool(1, limit=60.0)
+    try:
+        pool.scratch.rmdir()
+        (found,) = outcomes(pool, [Piece("", toy.twice, (1,))])
+    finally:
+        pool.close()
+    assert found.broke == "cannot start a process: No such file or directory"
