@@ -19,6 +19,6 @@ EDITS = (
          'result.check("", ENDS, 0.0, 0.0, "", why, rule="equal")',
          "an experiment that gave nothing counts for nothing"),
     Edit("fleet.pool", "Pool.choice", "any(piece.timed for piece in running)", "False", "others begin beside a timed piece"),
-    Edit("fleet.pool", "Pool.choice", "found.timed and running", "False", "a timed piece begins beside others"),
-    Edit("fleet.pool", "Pool.work", "range(1, TRIES + 1)", "range(1, 2)", "nothing is tried again"),
+    Edit("fleet.pool", "Pool.choice", "groups[name][0].timed and running", "False", "a timed piece begins beside others"),
+    Edit("fleet.pool", "Pool.work", "range(1, MOST_TRIES + 1)", "range(1, 2)", "nothing is tried again"),
 )  # fmt: skip
