@@ -9,7 +9,7 @@ import toy_pieces as toy
 
 from compare.fleet.piece import Piece, outcomes
 
-LIMIT = 8.0  # s that a piece may take here
+LIMIT = 5.0  # s that a piece may take here
 MEMORY = 10**9  # bytes that it may have
 TIMES = {"SIGKILL": 4, "SIGSEGV": 4, "SIGKILL once": 2, "exits": 4, "for ever": 1}  # how many times each begins
 
@@ -73,7 +73,7 @@ ENDS = {
     "SIGSEGV": "ended by SIGSEGV, 4 times",
     "exits": "ended with status 3, no hope, 4 times",
     "leaves": rf"SystemExit: 3 {PLACE}",
-    "for ever": "took longer than 8 s",
+    "for ever": "took longer than 5 s",
     "eats": "out of memory: more than the 1 GB that a piece may have",
     "unsendable": rf"TypeError: cannot pickle '_thread.lock' object {PLACE}",
     "asked with a lock": rf"TypeError: cannot pickle '_thread.lock' object {PLACE}",

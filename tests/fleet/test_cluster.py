@@ -204,7 +204,7 @@ def test_who_may_time(bare, ways):
 
 
 def test_a_scheduler_without_workers(bare, ways, monkeypatch):
-    monkeypatch.setattr(module, "CONNECTING", 3.0)
+    monkeypatch.setattr(module, "CONNECTING", 2.0)
     with pytest.raises(FleetError, match=r"^the scheduler tcp://\S+ has no worker$"):
         ways.append(Cluster(bare.address, 60.0))
 
