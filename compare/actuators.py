@@ -137,9 +137,8 @@ class Drive:
     lifted: tuple[int, ...] = ()
     unlifted: tuple[int, ...] = ()
     unknown: Mapping[str, str] = field(default_factory=dict)
-    discrete_is_euler: bool = (
-        False  # the file's solver is PGS, with which MuJoCo's discrete has no servo implicit (measured)
-    )
+    # the file's solver is PGS, with which MuJoCo's discrete has springs and damping of joints implicit and no more (measured)
+    joints_alone: bool = False
     explicit_damping: bool = False  # the file switches off that Euler has the damping of joints implicit
 
     @property

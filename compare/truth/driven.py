@@ -8,7 +8,7 @@ import numpy as np
 
 import tmt
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
-from tmt.methods import lone_speeds
+from tmt.methods import by_speed, lone_speeds
 
 from ..actuators import Cut
 from .servos import Driven
@@ -116,8 +116,10 @@ class Posture:
             D=slopes.D,
             damping=speeds,
             uncut=slopes.uncut,
-            springs=slopes.springs * (not drive.discrete_is_euler),
-            brakes=np.diag(speeds) if drive.discrete_is_euler else slopes.brakes,
+            springs=np.diag(by_speed(tree, tree.stiffness or [0.0] * len(tree.kind)))
+            if drive.joints_alone
+            else slopes.springs,
+            brakes=np.diag(speeds) if drive.joints_alone else slopes.brakes,
             on_path=on_one_path(tree),
             poles=tuple((one.name, one.time_constant, one.dynamics == "filterexact") for one in filters),
         )

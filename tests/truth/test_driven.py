@@ -300,3 +300,14 @@ def test_with_pgs_discrete_has_the_limit_of_euler():
             np.abs(np.linalg.eigvals(run.transition(posture.q, posture.u, dt, "discrete"))).max() for dt in steps
         )
         assert below < 1.0 < above
+
+
+def test_with_pgs_discrete_has_springs_of_joints_implicit_and_neither_those_of_tendons_nor_gains():
+    rod = '<inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/>'
+    assert_the_same_map(
+        f"""<mujoco><option solver="PGS" timestep="0.01"/><worldbody>
+        <body><joint name="hip" axis="0 1 0" stiffness="200" damping="0.5"/>{rod}
+        <body pos="0 0 -1"><joint name="knee" axis="0 1 0" damping="0.3" stiffness="30"/>{rod}</body></body></worldbody>
+        <tendon><fixed name="belt" stiffness="50" damping="0.2"><joint joint="hip" coef="1"/><joint joint="knee" coef="-0.5"/>
+        </fixed></tendon><actuator><position joint="knee" kp="40" kv="2"/></actuator></mujoco>"""
+    )

@@ -42,7 +42,7 @@ def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequenc
         },
         **{"lifted" if on(model, "ACTUATION") else "unlifted": tuple(by_actuators)},
         unknown=unknown_springs(model),
-        discrete_is_euler=model.opt.solver == mujoco.mjtSolver.mjSOL_PGS,
+        joints_alone=model.opt.solver == mujoco.mjtSolver.mjSOL_PGS,
         explicit_damping=not on(model, "EULERDAMP"),
     )
 
