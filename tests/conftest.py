@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from aside import Aside, is_waiting
 from hypothesis import settings
 from small_runs import Beside, jobs, of_arm
 
@@ -10,6 +11,44 @@ from compare.robots.arm import ARM
 # no example database in the checkout; the same examples in every run
 settings.register_profile("project", database=None, derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("project")
+
+
+ALL_RUN = {"test_agreement.py", "test_second_robot.py", "test_judge_check.py"}  # where these run, all do
+
+
+def are_all(items) -> bool:
+    return {item.path.name for item in items} >= ALL_RUN
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items):
+    if are_all(items):
+        items.sort(key=is_waiting)
+
+
+def pytest_collection_finish(session):
+    if are_all(session.items) and not session.config.option.collectonly:
+        session.config.aside = Aside(session.config, session.items, session.config._tmp_path_factory.mktemp("aside"))
+
+
+def pytest_runtest_protocol(item, nextitem):
+    """Of a test that runs in the further pytest: what that reports; of any other: what pytest does."""
+    aside = getattr(item.config, "aside", None)
+    if aside is None:
+        return None
+    if not is_waiting(item):
+        aside.one_begins()
+        return None
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for report in aside.reports(item):
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def pytest_sessionfinish(session):
+    if aside := getattr(session.config, "aside", None):
+        aside.end()
 
 
 @pytest.fixture(scope="session")
@@ -26,9 +65,8 @@ def engines(mujoco):
 @pytest.fixture(scope="session", autouse=True)
 def beside(request, tmp_path_factory):
     """Where all tests are run, what takes long is computed beside them from the start."""
-    files, folder = {item.path.name for item in request.session.items}, tmp_path_factory.mktemp("beside")
-    all_run = {"test_agreement.py", "test_second_robot.py", "test_judge_check.py"} <= files
-    beside = Beside(folder, jobs(folder) if all_run else ())
+    folder = tmp_path_factory.mktemp("beside")
+    beside = Beside(folder, jobs(folder) if are_all(request.session.items) else ())
     yield beside
     beside.end()
 
