@@ -184,14 +184,16 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
 
 
 @pytest.mark.parametrize("verdict, status", [("agree", 0), ("refused", 0), ("broke", 1), ("differ", 1)])
-def test_the_status_is_1_where_a_file_differs_or_broke_off(verdict, status, folder, monkeypatch):
+def test_the_status_is_1_where_a_file_differs_or_broke_off(verdict, status, folder, monkeypatch, capsys):
     def carry_out(self, progress):
         for task in self.tasks:
             self.ended(task, verdict, "no reason")
+        self.parts.append(("late.xml", "no model of its own"))
 
     monkeypatch.chdir(folder)
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     assert main(["fleet", "m/x", "--only", "mass", "--out", "status", "--workers", "1"]) == status
+    assert "left out: late.xml, no model of its own\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("count", [1, MOST_SAID, MOST_SAID + 1, MOST_SAID + 300])

@@ -285,6 +285,19 @@ def test_what_was_computed_in_an_earlier_run_counts_as_time_of_the_file(fleet):
     assert took == [3.0, 3.0]  # read, mass and what is not timed; then mass, that, and what is
 
 
+def test_a_timed_experiment_whose_untimed_part_breaks_off_has_that_reason_and_is_not_timed(fleet):
+    said = []
+
+    def before(piece):
+        if step_of(piece.name) == "report":
+            said.append(piece.arguments[0]["speed"])
+        return Outcome(error="out of luck") if step_of(piece.name) == "speed, untimed" else answered(piece)
+
+    door = Inside(before=before)
+    fleet({"a.xml": PENDULUM.format(0.1)}, door=door)
+    assert said == ["out of luck"] and "speed of m/a.xml" not in door.names
+
+
 def test_what_was_kept_and_is_gone_before_the_report_is_said_in_it(fleet, tmp_path):
     said = []
 

@@ -46,6 +46,10 @@ def test_what_becomes_of_a_piece(tried, name):
     faults.check(found[name], name, folder)
 
 
+def test_what_was_ended_has_taken_its_time_too(tried):
+    assert faults.LIMIT <= tried[0]["for ever"].wall < 60.0 and tried[0]["exits"].wall > 0.0
+
+
 def test_every_fault_is_tried(tried):
     assert set(tried[0]) == {*faults.VALUES, *faults.ENDS}
 
