@@ -70,7 +70,7 @@ class Child:
 
         wanted: asked now and then whether anybody waits for it still; if not, the process is ended.
         """
-        over = threading.Event()
+        over, began = threading.Event(), time.perf_counter()
         watch = threading.Thread(target=self.watch, args=(over, limit, wanted), daemon=True)
         watch.start()
         try:
@@ -79,7 +79,8 @@ class Child:
             self.process.stdin.flush()
             return pickle.load(self.process.stdout)
         except Exception:  # nobody is there, or no longer
-            return Outcome(ended=self.how_it_ended(limit), is_late=self.late, machine=platform.node())
+            why = self.how_it_ended(limit)
+            return Outcome(ended=why, is_late=self.late, wall=time.perf_counter() - began, machine=platform.node())
         finally:
             over.set()
             watch.join()

@@ -21,10 +21,10 @@ class Machines:
         self.folder, self.root, self.processes = folder, root, []
         self.file = folder / "scheduler.json"
         self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-        while not self.file.exists():
+        while not (written := about_scheduler(self.file)):
             assert self.scheduler.poll() is None
             time.sleep(0.02)
-        self.address = json.loads(self.file.read_text())["address"]
+        self.address = written["address"]
 
     def start(self, what, *options, root=None):
         """One of Dask's commands, in a session of its own."""
@@ -61,6 +61,12 @@ class Machines:
     def end(self):
         for process in self.processes:
             self.kill(process)
+
+
+def about_scheduler(file):
+    """What a scheduler says of itself, as soon as it has said all."""
+    with suppress(OSError, ValueError):
+        return json.loads(file.read_text())
 
 
 @contextmanager

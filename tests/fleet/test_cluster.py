@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import threading
+from types import SimpleNamespace
 
 import faults
 import pytest
@@ -19,6 +20,7 @@ from dask_cluster import machines
 from compare.fleet import cluster as module
 from compare.fleet.cluster import Cluster
 from compare.fleet.piece import FleetError, Piece, outcomes
+from compare.fleet.worker import memory_of
 from compare.process import interrupt
 
 
@@ -201,6 +203,15 @@ def test_who_may_time(bare, ways):
     with pytest.raises(FleetError, match=f"^{expected}$"):
         Cluster(bare.address, 60.0)
     bare.kill(workers[2])
+
+
+@pytest.mark.parametrize(
+    "allowed, threads, memory", [(10**10, 1, 9 * 10**9), (10**10, 3, 3 * 10**9), (None, 2, 9 * 10**8)]
+)
+def test_the_threads_of_a_worker_share_its_memory(allowed, threads, memory, monkeypatch):
+    monkeypatch.setattr("compare.fleet.worker.memory_of_machine", lambda: 2 * 10**9)
+    manager, state = SimpleNamespace(memory_limit=allowed), SimpleNamespace(nthreads=threads)
+    assert memory_of(SimpleNamespace(memory_manager=manager, state=state)) == memory
 
 
 def test_a_scheduler_without_workers(bare, ways, monkeypatch):

@@ -13,6 +13,7 @@ from runs import compare, on_terminal, readable_lines, words
 
 from compare.__main__ import main
 from compare.fleet.command import FLEET_OPTIONS, MOST_SAID, say_some
+from compare.fleet.piece import FleetError
 from compare.fleet.row import FLEET_COLUMNS
 from compare.report.terminal import Terminal
 
@@ -156,6 +157,43 @@ def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, says, 
     out, err = capsys.readouterr()
     assert out == "" and err.startswith(f"python -m compare: {says}") and len(err.splitlines()) == 1
     assert not os.path.exists("reports")
+
+
+@pytest.mark.parametrize("words, asked", [
+    (["--workers", "3", "--limit", "7"], ("pool", 3, 7.0, True)),
+    (["--limit", "0.5", "--workers", "1", "--full"], ("pool", 1, 0.5, False)),
+    (["--dask", "tcp://x:1", "--limit", "9", "--full"], ("cluster", "tcp://x:1", 9.0, False)),
+    (["--dask", "tcp://x:1"], ("cluster", "tcp://x:1", 600.0, True)),
+])  # fmt: skip
+def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
+    seen = []
+
+    def door(kind):
+        return lambda where, limit: seen.extend((kind, where, limit)) or SimpleNamespace(close=lambda: None)
+
+    def run(models, given, *_):
+        seen.append(given.is_quick)
+        assert given.names == ("mass", "gravity")
+        raise FleetError("seen")
+
+    monkeypatch.chdir(folder)
+    for name, made in (("pool.Pool", door("pool")), ("cluster.Cluster", door("cluster")), ("run.Run", run)):
+        monkeypatch.setattr(f"compare.fleet.{name}", made)
+    assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words]) == 2
+    assert tuple(seen) == asked and "seen" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verdict, status", [("agree", 0), ("refused", 0), ("broke", 1), ("differ", 1)])
+def test_the_status_is_1_where_a_file_differs_or_broke_off(verdict, status, folder, monkeypatch, capsys):
+    def carry_out(self, progress):
+        for task in self.tasks:
+            self.ended(task, verdict, "no reason")
+        self.parts.append(("late.xml", "no model of its own"))
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
+    assert main(["fleet", "m/x", "--only", "mass", "--out", "status", "--workers", "1"]) == status
+    assert "left out: late.xml, no model of its own\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("count", [1, MOST_SAID, MOST_SAID + 1, MOST_SAID + 300])

@@ -73,6 +73,21 @@ def test_what_changed_and_what_is_left_out_stand_in_lists():
     assert "What has changed" not in plain and "Left out" not in plain and "<img" not in plain
 
 
+def test_nothing_that_is_said_is_taken_for_html():
+    words = ["t1", "s1", "n1", "v1", "c1", "w1", "r1"]
+    title, said, name, value, caption, why, reason = (f'<{word}>&"' for word in words)
+    text = fleet_page(
+        title, [said], [ROW | {"reason": reason}], [("a", why)], None, {name: value}, (b"", caption, (2, 2))
+    )
+    for word in words:
+        assert f"<{word}>" not in text and f"&lt;{word}&gt;&amp;&quot;" in text
+
+
+def test_what_differs_or_broke_off_stands_out_and_what_was_refused_does_not():
+    text = page_of([ROW | {"verdict": verdict} for verdict in ("differ", "broke", "refused", "agree")])
+    assert re.findall(r'<tr class="(\w+)">', text) == ["bad", "bad", "none", "good"]
+
+
 def many(count):
     return [
         ROW | {"file": f"robots_of_a_long_collection/robot_{k}/$robot_{k}.xml", "limit_s": 1.5e-3 + 1e-3 * k}

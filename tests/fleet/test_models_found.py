@@ -103,6 +103,23 @@ def test_parts_are_left_out_with_the_reason(here):
     assert {model.shown: model.included_by for model in asked_for.models}["settings.xml"] == "scene.xml"
 
 
+def test_a_part_that_is_named_is_a_model_also_where_its_folder_is_named_too(here):
+    here("m/part.xml", "<mujocoinclude/>")
+    for asked in (["m", "m/part.xml"], ["m/part.xml", "m"], ["./m/part.xml", "m/*", "m"]):
+        (model,) = found_models(asked).models
+        assert model.path.name == "part.xml" and found_models(asked).left_out == []
+
+
+def test_a_file_that_may_not_be_read_is_a_model_so_that_it_is_refused_and_not_passed_over(here, monkeypatch):
+    def refuses(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    here("m/a.xml")
+    monkeypatch.setattr("compare.fleet.models.ElementTree.iterparse", refuses)
+    monkeypatch.setattr("compare.fleet.models.needed_by", lambda path: (path,))
+    assert names("m") == ["m/a.xml"]
+
+
 def test_of_files_that_include_each_other_none_is_a_part(here):
     here("a.xml", "<mujoco><include file='b.xml'/></mujoco>")
     here("b.xml", "<mujoco><include file='a.xml'/><include file='b.xml'/></mujoco>")

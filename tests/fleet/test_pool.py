@@ -1,6 +1,7 @@
 """The pool: whatever a piece does, it gets an outcome, and the others theirs."""
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import tempfile
 import threading
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import faults
 import pytest
@@ -15,7 +17,8 @@ import toy_pieces as toy
 from processes import SOON, gone_soon, notes
 from runs import ENVIRONMENT, ROOT
 
-from compare.fleet.piece import Piece, outcomes
+from compare.fleet.child import LARGEST_FILE, OUT_OF_MEMORY, Child
+from compare.fleet.piece import Outcome, Piece, outcomes
 from compare.fleet.pool import Pool
 from compare.process import interrupt
 
@@ -41,6 +44,10 @@ def tried(tmp_path_factory):
 def test_what_becomes_of_a_piece(tried, name):
     found, folder = tried
     faults.check(found[name], name, folder)
+
+
+def test_what_was_ended_has_taken_its_time_too(tried):
+    assert faults.LIMIT <= tried[0]["for ever"].wall < 60.0 and tried[0]["exits"].wall > 0.0
 
 
 def test_every_fault_is_tried(tried):
@@ -149,6 +156,29 @@ def test_a_folder_that_is_gone_is_said(tmp_path, monkeypatch):
     finally:
         pool.close()
     assert found.broke == "cannot start a process: No such file or directory"
+
+
+def test_processes_share_the_memory_of_the_machine_and_write_no_file_without_end(monkeypatch):
+    monkeypatch.setattr("compare.fleet.pool.memory_of_machine", lambda: 4 * 10**10)
+    pool = Pool(4, limit=60.0)
+    try:
+        asked = [Piece("", resource.getrlimit, (getattr(resource, name),)) for name in ("RLIMIT_DATA", "RLIMIT_FSIZE")]
+        found = [outcome.returned for outcome in outcomes(pool, asked)]
+    finally:
+        pool.close()
+    assert found == [(9 * 10**9,) * 2, (LARGEST_FILE,) * 2] and pool.memory == 9 * 10**9
+
+
+@pytest.mark.parametrize("alive, memory, outcome, is_spent", [
+    (True, 1000, Outcome(memory=500), False),
+    (True, 1000, Outcome(memory=501), True),
+    (True, None, Outcome(memory=501), False),
+    (True, 1000, Outcome(error=f"{OUT_OF_MEMORY}: more"), True),
+    (True, 1000, Outcome(error="ValueError: out of memory"), False),
+    (False, 1000, Outcome(), True),
+])  # fmt: skip
+def test_a_process_that_has_ended_or_has_little_memory_left_gets_no_other_piece(alive, memory, outcome, is_spent):
+    assert Child.is_spent(SimpleNamespace(alive=alive, memory=memory), outcome) == is_spent
 
 
 def test_where_there_are_no_limits_of_resources():

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from compare.fleet import kept as module
 from compare.fleet.kept import Kept, write_report
 from compare.fleet.piece import FleetError
 
@@ -119,3 +120,13 @@ def test_other_programs_are_forgotten(kept):
     (kept.out / "kept" / "another").mkdir()
     kept.forget_others()
     assert list((kept.out / "kept").iterdir()) == [kept.folder] and kept.get("a") == 1
+
+
+def test_another_program_finds_nothing_of_this_one(kept, monkeypatch):
+    key = kept.key("file")
+    kept.put(key, 1)
+    kept.close()
+    monkeypatch.setattr(module, "program", lambda: "0" * 64)
+    other = Kept(kept.out)
+    assert other.get(other.key("file")) is None is other.get(key) and other.key("file") != key
+    other.close()
