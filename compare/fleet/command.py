@@ -192,6 +192,8 @@ def how_far_it_is(run: "Run") -> list[str]:
     from .times import seconds_left
 
     verdicts = ", ".join(f"{many} {verdict}" for verdict, many in sorted(run.verdicts().items()))
+    so_far = sum(task.row is None and bool(task.differs) for task in run.tasks)
+    verdicts = ", ".join(filter(None, (verdicts, f"{so_far} differ so far" * bool(so_far))))
     still = [(step, task.joints) for task, step in run.still()]
     left = seconds_left(run.took, still, run.workers, run.door.times_alone)
     parts = [
@@ -209,7 +211,9 @@ def say_some(terminal: Terminal, lines: Sequence[str]) -> None:
 
 
 def say_new(terminal: Terminal, run: "Run") -> None:
-    """A line for each file that has ended since the last call."""
+    """A line for each file that has ended since the last call, or is known to differ before it has."""
+    for task in run.take_early():
+        terminal.say(f"{'differ':<8} {task.model.shown}: {task.differs}, so far", "red")
     for row in run.take_new():
         ratio = "" if row["worst_ratio"] is None else f"{100.0 * row['worst_ratio']:.2g} % of tolerance"
         bad = row["verdict"] in ("differ", "broke")

@@ -55,6 +55,7 @@ class Known(NamedTuple):
     joints: int | None = None
     integrator: str | None = None
     dt: float | None = None  # s
+    reference: str = ""  # what it is compared with, of reference.REFERENCES
 
 
 places = {}  # where models are unpacked, and in which folder, by their bundles; the one that was used last at the end
@@ -82,10 +83,11 @@ def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
         known = compared_file(shown, bundle)
         reading = known.reading or read(unpacked_at(bundle))
     except ModelError as error:
-        return Known(as_given(str(error), shown, bundle))
+        return Known(as_given(str(error), shown, bundle).removeprefix(f"{shown} ").replace(f" {shown}:", " it:"))
     reasons = {name: reason for name in asked.names if (reason := skipped(name, known.robot))}
     serving = tuple(name for name in asked.names if name not in reasons)
-    return Known("", serving, tuple(reasons.items()), len(known.robot.joints), reading.integrator, reading.dt)
+    about = len(known.robot.joints), reading.integrator, reading.dt, known.reference.kind
+    return Known("", serving, tuple(reasons.items()), *about)
 
 
 def as_given(text: str, shown: str, bundle: bytes) -> str:
@@ -111,8 +113,11 @@ def done(work: object) -> object:
     return tuple(map(done, work)) if isinstance(work, tuple) else list(work) if isinstance(work, Iterator) else work
 
 
-def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: bytes) -> bytes:
-    """What an experiment finds, or that it broke off: see experiment.computed, packed. work: its `untimed_part`."""
+def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: bytes) -> tuple[bytes, str]:
+    """What an experiment finds, or that it broke off: see experiment.computed, packed; and the first check that differs, or "".
+
+    work: its `untimed_part`.
+    """
     setup = setup_of(compared_file(shown, bundle), asked)
     if work:
         setup.background[name] = pickle.loads(zlib.decompress(work))
@@ -122,7 +127,8 @@ def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: by
         result.checks = [replace(check, note=as_given(check.note, shown, bundle)) for check in result.checks]
     if work and found[0]:
         found[0].notes.append(f"Timed on {platform.node()} ({vectors()}), by a worker that did nothing else.")
-    return zlib.compress(pickle.dumps(found), 1)
+    section = verdict.Section(name, "", "", "", found[0] or found[1])
+    return zlib.compress(pickle.dumps(found), 1), next(map(str, verdict.failures([section])[0]), "")
 
 
 def broken(name: str, why: str) -> tuple[None, Result]:

@@ -82,6 +82,9 @@ def found_models(asked: Sequence[str]) -> Found:
             parts.append(path)
         elif kind == MODEL_ELEMENT:
             models[shown] = Model(path, needed_by(path))
+        else:
+            what = f"its outermost element is <{in_one_line(kind)}>" if kind else "it is no XML"
+            left_out.append((shown, f"it is no MJCF, {what}"))
     needed = {model.shown: {os.path.realpath(part) for part in model.parts[1:]} for model in models.values()}
     by = {}  # who includes a file
     for model in models.values():

@@ -14,6 +14,7 @@ HEADS = {
     "file": "file",
     "verdict": "verdict",
     "reason": "reason or cause",
+    "reference": "compared with",
     "joints": "joints",
     "worst_ratio": "share of tolerance",
     "file_integrator": "integrator",
@@ -22,6 +23,7 @@ HEADS = {
     "limit_s": "limit, ms",
     "seconds": "processor, s",
 }
+COMPARED_WITH = {"arm": "stated numbers", "model": "itself as compiled"}
 ROW_KINDS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
 WHAT_COMES_FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
 MEANINGS = {
@@ -29,9 +31,11 @@ MEANINGS = {
     "differ": "a check that compares them fails; the reason is the cause, where one is found",
     "broke": "something did not come to its end, so that nothing can be said",
     "refused": "the file cannot be compared",
+    "compared with": "the stated numbers of the arm, where a file has exactly its hinges, or itself as MuJoCo compiled it",
     "share of tolerance": "the largest difference, as a share of its tolerance of rounding; above 1 it is more than rounding",
     "step, integrator": "the file's own",
-    "stable": "whether that step is, with that integrator under the file's own servos, at each posture where this is known",
+    "stable": "whether that step is, with that integrator under the file's own servos, at each posture where this is known; empty where no actuator "
+    "feeds back or nothing rests",
     "limit": "the largest stable step with that integrator, at the posture where it is least",
     "processor": "what was computed for the file, on whatever machine",
 }  # what is not known is left empty
@@ -95,6 +99,7 @@ def row_in_html(row: dict) -> str:
 
 def cell_in_html(name: str, value: object) -> str:
     """A cell; steps are shown in ms."""
+    value = COMPARED_WITH.get(value, value) if name == "reference" else value
     if isinstance(value, bool):
         text = "yes" if value else "no"
     elif isinstance(value, float):

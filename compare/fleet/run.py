@@ -34,7 +34,7 @@ class Run:
         self.rows, self.new, self.parts, self.machines = [], [], [], set()
         self.waiting, self.timed, self.under_way, self.count = [], [], {}, 0
         self.took = {}  # joints and s by a watch of the pieces that ended, by their kind
-        self.done_before = 0
+        self.done_before, self.pieces_before, self.early = 0, 0, []
         self.no_timing = door.no_timing()
         self.workers = max(1, door.workers())
         self.most = AHEAD_FOR_EACH * self.workers + AHEAD_FOR_ALL
@@ -127,7 +127,9 @@ class Run:
         """What the experiments of a file found, or in words why one gave nothing."""
         names = [name for name in EXPERIMENTS if name in task.keys and name not in task.lost]
         kept = {name: self.kept.get(task.keys[name]) for name in names}
-        return task.lost | {name: value[0] if value else "what was kept of it is gone" for name, value in kept.items()}
+        return task.lost | {
+            name: value[0][0] if value else "what was kept of it is gone" for name, value in kept.items()
+        }
 
     def came(self, task: Task, step: str, outcome: Outcome) -> None:
         """What a piece has found is kept, and what follows from it begins."""
@@ -152,7 +154,7 @@ class Run:
             self.ended(task, **row)
         else:
             self.kept.put(task.keys[step], (outcome.returned, outcome.seconds))
-            self.go_on(task, step)
+            self.go_on(task, step, outcome.returned)
 
     def was_read(self, task: Task, known: Known) -> None:
         """Its experiments are asked for, but for those that are known; a file without a model of its own is left out."""
@@ -184,6 +186,7 @@ class Run:
             steps = [name + UNTIMED, name] if name in TIMED_LAST else [name]
             have = {step: value[1] for step in steps if (value := self.kept.get(task.keys[step]))}
             task.seconds += sum(have.values())
+            self.pieces_before += len(have)
             if name not in have:
                 task.expected.add(name)
                 self.ask_next(task, next(step for step in steps if step not in have))
@@ -194,12 +197,15 @@ class Run:
         when_timed = TO_TIME if self.door.times_alone else TO_READ
         self.ask(task, step, when_timed if step in TIMED_LAST else TO_COMPUTE)
 
-    def go_on(self, task: Task, step: str) -> None:
+    def go_on(self, task: Task, step: str, value: object) -> None:
         """After what of an experiment is no timing come its times; after the last one the report."""
         if step.endswith(UNTIMED):
             self.ask_next(task, step.removesuffix(UNTIMED))
-        else:
-            self.has_ended(task, step)
+            return
+        if value[1] and not task.differs:
+            task.differs = value[1]
+            self.early.append(task)
+        self.has_ended(task, step)
 
     def is_written(self, task: Task) -> bool:
         """Whether the report of a file that is there is the one that is asked for."""
@@ -219,11 +225,21 @@ class Run:
         """A file is done. more: what else its row has, if there is a report."""
         known = task.known or Known("")
         about = {"file": task.model.shown, "sha256": task.model.sha256, "verdict": verdict, "reason": reason or ""}
-        about |= {"joints": known.joints, "file_integrator": known.integrator, "file_dt_s": known.dt}
+        about |= {
+            "joints": known.joints,
+            "reference": known.reference,
+            "file_integrator": known.integrator,
+            "file_dt_s": known.dt,
+        }
         about |= dict.fromkeys(("worst_ratio", "stable_at_file_dt", "limit_s"))
         task.row = about | {"seconds": round(task.seconds, 2), "has_report": bool(more)} | more
         self.rows.append(task.row)
         self.new.append(task.row)
+
+    def take_early(self) -> list[Task]:
+        """The files without a row of which it is known since the last call that they differ."""
+        early, self.early = [task for task in self.early if task.row is None], []
+        return early
 
     def take_new(self) -> list[dict]:
         """The rows of files that have ended since the last call."""

@@ -42,7 +42,7 @@ def write_table(
     write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
     text = fleet_page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture_of_steps(rows))
     write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
-    return [*said, spent.words(run.workers, took)] if run.took else said
+    return [*said, spent.words(run.workers, took)] if round(spent.computing, 2) else said
 
 
 def csv_of_fleet(rows: Sequence[dict]) -> str:
@@ -78,9 +78,18 @@ def sentences_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run:
         whose = "their" if len(unstable) > 1 else "its"
         said.append(f"Not stable at {whose} own step: {', '.join(unstable[:3])}{more}.")
     if left_out:
-        said.append(f"Left out: {len(left_out)} file{'s' if len(left_out) != 1 else ''}, each with its reason below.")
+        said.append(
+            f"Left out: {len(left_out)} file{'s' if len(left_out) != 1 else ''}, each with its reason in index.html."
+        )
     if run.no_timing:
         said.append(f"Experiments that measure time are left out: {run.no_timing}.")
-    if run.done_before:
-        said.append(f"Known from before: {run.done_before}.")
+    stated = sum(row["reference"] == "arm" for row in rows)
+    if 0 < stated < len(rows):
+        said.append(
+            f"Compared with the arm's stated numbers: {stated}; the others, which have other joints, with themselves."
+        )
+    if before := [
+        f"{many} {what}" for many, what in ((run.done_before, "files"), (run.pieces_before, "pieces of others")) if many
+    ]:
+        said.append(f"Known from before: {' and '.join(before)}.")
     return said

@@ -20,6 +20,7 @@ class Task:
     seconds: float = 0.0
     in_door: int = 0  # pieces that are handed out
     packed: bytes = b""  # the model with what it needs, while pieces are handed out
+    differs: str = ""  # the first check that does not hold, before there is a row
     row: dict | None = None
 
     @property

@@ -13,6 +13,7 @@ from ..process.streams import readable
 from ..version import OURS, installed, own_version
 
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich", "heyoka")
+PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # what beside them has changed is no other program
 
 
 def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
@@ -52,7 +53,7 @@ def commit() -> str | None:
     try:
         said = [
             subprocess.run(["git", "-C", root, *words], capture_output=True, check=True).stdout.decode().strip()
-            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", ":/", ":!/reports"])
+            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", *PROGRAM_FILES])
         ]
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
