@@ -83,7 +83,11 @@ def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
         known = compared_file(shown, bundle)
         reading = known.reading or read(unpacked_at(bundle))
     except ModelError as error:
-        return Known(as_given(str(error), shown, bundle).removeprefix(f"{shown} ").replace(f" {shown}:", " it:"))
+        return Known(
+            as_given(str(error), shown, bundle)
+            .removeprefix(f"{shown} cannot be compared: ")
+            .replace(f" {shown}:", " it:")
+        )
     reasons = {name: reason for name in asked.names if (reason := skipped(name, known.robot))}
     serving = tuple(name for name in asked.names if name not in reasons)
     about = len(known.robot.joints), reading.integrator, reading.dt, known.reference.kind

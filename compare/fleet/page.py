@@ -34,8 +34,8 @@ MEANINGS = {
     "compared with": "the stated numbers of the arm, where a file has exactly its hinges, or itself as MuJoCo compiled it",
     "share of tolerance": "the largest difference, as a share of its tolerance of rounding; above 1 it is more than rounding",
     "step, integrator": "the file's own",
-    "stable": "whether that step is, with that integrator under the file's own servos, at each posture where this is known; empty where no actuator "
-    "feeds back or nothing rests",
+    "stable": "whether that step is, with that integrator under the file's own servos, at each posture "
+    "where this is known; empty where no actuator feeds back or nothing rests",
     "limit": "the largest stable step with that integrator, at the posture where it is least",
     "processor": "what was computed for the file, on whatever machine",
 }  # what is not known is left empty

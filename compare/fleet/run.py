@@ -2,7 +2,6 @@
 
 import pickle
 from bisect import insort
-from collections import Counter
 from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
@@ -13,28 +12,24 @@ from .file_pieces import Asked, Known, findings, read_file, reported, untimed_pa
 from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
-from .row import AGREE, BROKE, REFUSED
+from .row import BROKE, REFUSED
+from .standing import Standing
 from .task import Task, Waiting
 
 TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
 UNTIMED = ", untimed"  # of a timed experiment, the step before it
-AHEAD_FOR_EACH, AHEAD_FOR_ALL = (
-    4,
-    16,
-)  # pieces that are handed out beforehand, for each worker and besides: they are in memory
+# pieces that are handed out beforehand, for each worker and besides: they are in memory
+AHEAD_FOR_EACH, AHEAD_FOR_ALL = 4, 16
 MARK = ".fleet"  # the file in a report that says from what it was made
 
 
-class Run:
+class Run(Standing):
     """A fleet under way. After it `rows` has a row for each model, and `parts` the files that are only included by others."""
 
     def __init__(self, models: Sequence[Model], asked: Asked, door: Door, kept: Kept, out: Path):
+        super().__init__([Task(model) for model in models])
         self.asked, self.door, self.kept, self.out = asked, door, kept, out
-        self.tasks = [Task(model) for model in models]
-        self.rows, self.new, self.parts, self.machines = [], [], [], set()
         self.waiting, self.timed, self.under_way, self.count = [], [], {}, 0
-        self.took = {}  # joints and s by a watch of the pieces that ended, by their kind
-        self.done_before, self.pieces_before, self.early = 0, 0, []
         self.no_timing = door.no_timing()
         self.workers = max(1, door.workers())
         self.most = AHEAD_FOR_EACH * self.workers + AHEAD_FOR_ALL
@@ -202,9 +197,7 @@ class Run:
         if step.endswith(UNTIMED):
             self.ask_next(task, step.removesuffix(UNTIMED))
             return
-        if value[1] and not task.differs:
-            task.differs = value[1]
-            self.early.append(task)
+        self.differs(task, value[1])
         self.has_ended(task, step)
 
     def is_written(self, task: Task) -> bool:
@@ -221,35 +214,6 @@ class Run:
             after_timed = self.door.times_alone and any(name in TIMED_LAST for name in task.keys)
             self.ask(task, "report", TO_REPORT if after_timed else TO_COMPUTE)
 
-    def ended(self, task: Task, verdict: str, reason: str | None, **more: object) -> None:
-        """A file is done. more: what else its row has, if there is a report."""
-        known = task.known or Known("")
-        about = {"file": task.model.shown, "sha256": task.model.sha256, "verdict": verdict, "reason": reason or ""}
-        about |= {
-            "joints": known.joints,
-            "reference": known.reference,
-            "file_integrator": known.integrator,
-            "file_dt_s": known.dt,
-        }
-        about |= dict.fromkeys(("worst_ratio", "stable_at_file_dt", "limit_s"))
-        task.row = about | {"seconds": round(task.seconds, 2), "has_report": bool(more)} | more
-        self.rows.append(task.row)
-        self.new.append(task.row)
-
-    def take_early(self) -> list[Task]:
-        """The files without a row of which it is known since the last call that they differ."""
-        early, self.early = [task for task in self.early if task.row is None], []
-        return early
-
-    def take_new(self) -> list[dict]:
-        """The rows of files that have ended since the last call."""
-        new, self.new = self.new, []
-        return new
-
-    @property
-    def pieces_done(self) -> int:
-        return sum(len(each) for each in self.took.values())
-
     def still(self) -> list[tuple[Task, str]]:
         """The pieces that have not ended, as far as they are known: a file that is not read has all of them."""
         asked = [*self.under_way.values(), *((entry.task, entry.step) for entry in [*self.waiting, *self.timed])]
@@ -260,16 +224,3 @@ class Run:
             asked += [(task, name) for name in self.asked.names if task.known is None and name != "diagnosis"]
             asked += [(task, "report")] * (id(task) not in reports)
         return asked
-
-    @property
-    def files_done(self) -> int:
-        return sum(task.row is not None for task in self.tasks)
-
-    def verdicts(self) -> Counter:
-        """How many files have which verdict, so far."""
-        return Counter(row["verdict"] for row in self.rows)
-
-    @property
-    def is_good(self) -> bool:
-        """Whether none differs, and none broke."""
-        return set(self.verdicts()) <= {AGREE, REFUSED}

@@ -88,8 +88,7 @@ def sentences_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run:
         said.append(
             f"Compared with the arm's stated numbers: {stated}; the others, which have other joints, with themselves."
         )
-    if before := [
-        f"{many} {what}" for many, what in ((run.done_before, "files"), (run.pieces_before, "pieces of others")) if many
-    ]:
+    known = (run.done_before, "file", ""), (run.pieces_before, "piece", " of others")
+    if before := [f"{many} {what}{'s' * (many != 1)}{of}" for many, what, of in known if many]:
         said.append(f"Known from before: {' and '.join(before)}.")
     return said

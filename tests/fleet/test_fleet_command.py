@@ -55,7 +55,7 @@ def test_a_fleet_says_which_file_differs_and_why(first):
     said = {line.split()[0]: line for line in lines if line.split()[:1] in (["agree"], ["differ"], ["refused"])}
     assert f"m/x/{NAME}: " in said["agree"] and "% of tolerance" in said["agree"]
     assert "m/heavy.xml: mass of upper arm: stated 1.9 kg, compiled 9 kg" in said["differ"]
-    assert "m/broken.xml: MuJoCo cannot compile m/broken.xml: XML" in said["refused"]
+    assert "m/broken.xml: MuJoCo cannot compile it: XML" in said["refused"]
     assert "3 files: 1 differs, 1 was refused, 1 agrees." in lines and lines[-1].startswith("Fleet: out/index.html (")
     assert re.fullmatch(r"Of 2 x \d+ s (\d+ % were [a-z ]+(, |\.))+", lines[-2])
     assert "\x1b" not in first.run.stdout and "\r" not in first.run.stdout  # nothing moves in a pipe
@@ -89,7 +89,7 @@ def test_the_same_command_goes_on_and_says_what_has_changed(first, folder):
     shutil.copytree(first.out, folder / "later")
     command = ("fleet", "m", "--only", "mass", "--out", "later", "--since", "later")
     again = compare(*command, cwd=folder)
-    assert again.returncode == 1 and "Known from before: 2." in again.stdout
+    assert again.returncode == 1 and "Known from before: 2 files." in again.stdout
     assert (
         "nothing has changed since later" in again.stdout
         and "<li>Nothing.</li>" in (folder / "later" / "index.html").read_text()

@@ -12,7 +12,7 @@ from compare.fleet.table import picture_of_steps
 ROW = {
     "file": "a.xml", "sha256": "1", "verdict": "agree", "reason": "", "joints": 3, "worst_ratio": 0.123456,
     "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.0123456, "seconds": 1.26,
-    "has_report": True,
+    "has_report": True, "reference": "model",
 }  # fmt: skip
 EMPTY = dict.fromkeys(("joints", "worst_ratio", "file_integrator", "file_dt_s", "stable_at_file_dt", "limit_s"))
 NAMES = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "&amp;.xml", "q?x=1.xml",

@@ -62,7 +62,7 @@ def fleet(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m").mkdir()
 
-    def run(files, names=("mass",), door=None, found=None, is_quick=True):
+    def run(files, names=("mass",), door=None, found=None, is_quick=True, take=lambda run: None):
         for name, text in files.items():
             (tmp_path / "m" / name).parent.mkdir(exist_ok=True)
             (tmp_path / "m" / name).write_text(text)
@@ -70,7 +70,7 @@ def fleet(tmp_path, monkeypatch):
         try:
             found = found or found_models(["m"])
             of = Run(found.models, Asked(tuple(names), is_quick), door, kept, tmp_path / "out")
-            of.carry_out(lambda: None)
+            of.carry_out(lambda: take(of))
         finally:
             kept.close()
         return SimpleNamespace(of=of, door=door, rows={os.path.basename(row["file"]): row for row in of.rows})
@@ -91,10 +91,8 @@ def test_files_agree_or_are_refused_with_the_reason_and_parts_are_left_out(fleet
     verdicts = {name: row["verdict"] for name, row in found.rows.items()}
     assert verdicts == {"good.xml": AGREE, "scene.xml": AGREE, "broken.xml": REFUSED, "none.xml": REFUSED}
     assert found.of.parts == [("m/part.xml", "no model of its own, and included by m/scene.xml")]
-    assert found.rows["broken.xml"]["reason"].startswith("MuJoCo cannot compile m/broken.xml: ")
-    assert (
-        found.rows["none.xml"]["reason"] == "m/none.xml cannot be compared: it has no joint; at least one is expected"
-    )
+    assert found.rows["broken.xml"]["reason"].startswith("MuJoCo cannot compile it: ")
+    assert found.rows["none.xml"]["reason"] == "it has no joint; at least one is expected"
     assert found.rows["good.xml"]["joints"] == 1 and found.rows["good.xml"]["seconds"] > 2.0
     assert found.of.is_good and found.of.files_done == len(found.of.tasks) == 5 and found.of.still() == []
     assert (report(tmp_path, "good.xml") / "index.html").is_file() and not report(tmp_path, "none.xml").exists()
@@ -209,13 +207,30 @@ def test_timed_pieces_of_a_pool_come_after_all_others_and_those_of_a_cluster_at_
 
 def answered(piece):
     """What a piece returns, without computing it: an experiment the piece's name."""
+    name = piece.name.encode()
     values = {
+        "speed, untimed": name,
         "read": Known("", ("mass", "speed"), (("gravity", "no reason"),), 1, "Euler", 0.002),
         "report": ({"verdict": AGREE, "reason": "", "seconds": 1.0}, {"index.html": piece.name.encode()}),
     }
-    return Outcome(
-        pickle.dumps(values.get(step_of(piece.name), piece.name.encode())), seconds=1.0, wall=2.0, machine="far"
+    return Outcome(pickle.dumps(values.get(step_of(piece.name), (name, ""))), seconds=1.0, wall=2.0, machine="far")
+
+
+def test_a_file_that_differs_is_named_before_it_is_done(fleet):
+    """The first check that does not hold, once."""
+    early = []
+
+    def before(piece):
+        is_mass = step_of(piece.name) == "mass"
+        return Outcome(pickle.dumps((b"", f"{piece.name} differs"))) if is_mass else answered(piece)
+
+    found = fleet(
+        {"a.xml": PENDULUM.format(0.1)},
+        ["mass"],
+        Inside(before=before),
+        take=lambda run: early.extend(run.take_early()),
     )
+    assert [task.differs for task in early] == ["mass of m/a.xml differs"] and found.rows["a.xml"]["verdict"] == AGREE
 
 
 STEPS = ["read", "mass", "speed, untimed", "speed", "report"]

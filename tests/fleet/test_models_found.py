@@ -34,7 +34,11 @@ def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
     here("m/no.xml", "")
     (os.mkfifo if hasattr(os, "mkfifo") else os.mkdir)("m/pipe.xml")
     assert names("m") == ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml"]
-    assert found_models(["m"]).left_out == []
+    assert found_models(["m"]).left_out == [
+        ("m/no.xml", "it is no MJCF, it is no XML"),
+        ("m/package.xml", "it is no MJCF, its outermost element is <package>"),
+        ("m/robot.urdf.xml", "it is no MJCF, its outermost element is <robot>"),
+    ]
 
 
 def test_a_pattern_that_no_shell_expanded(here):

@@ -9,13 +9,13 @@ from compare.fleet.table import csv_of_fleet, sentences_of, write_table
 ROW = {
     "file": "a.xml", "sha256": "1", "verdict": "agree", "reason": "", "joints": 3, "worst_ratio": 0.1,
     "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": None, "limit_s": None, "seconds": 1.0,
-    "has_report": True,
+    "has_report": True, "reference": "model",
 }  # fmt: skip
 
 
 def run_of(rows, **more):
     given = {"rows": rows, "parts": [], "took": {"mass": [(3, 5.0)]}, "workers": 2, "machines": {"b", "a"}, "no_timing": None,
-             "done_before": 0, "door": SimpleNamespace(times_alone=True)}  # fmt: skip
+             "done_before": 0, "pieces_before": 0, "door": SimpleNamespace(times_alone=True)}  # fmt: skip
     return SimpleNamespace(**given | {"verdicts": lambda: Counter(row["verdict"] for row in rows)} | more)
 
 
@@ -33,10 +33,18 @@ def test_the_sentences_count_verdicts_and_name_whose_own_step_is_not_stable():
 
 def test_the_sentences_say_what_is_left_out_not_timed_and_known_from_before():
     assert said_of([ROW], [("p.xml", "it is a part")], no_timing="nobody may", done_before=1)[1:] == [
-        "Left out: 1 file, each with its reason below.",
+        "Left out: 1 file, each with its reason in index.html.",
         "Experiments that measure time are left out: nobody may.",
-        "Known from before: 1.",
+        "Known from before: 1 file.",
     ]
+    assert said_of([ROW], done_before=2, pieces_before=1)[1:] == ["Known from before: 2 files and 1 piece of others."]
+
+
+def test_the_sentences_say_which_are_compared_with_stated_numbers():
+    stated = ROW | {"reference": "arm"}
+    words = "Compared with the arm's stated numbers: 1; the others, which have other joints, with themselves."
+    assert said_of([stated, ROW, ROW])[1:] == [words]
+    assert said_of([ROW, ROW])[1:] == [] == said_of([stated, stated])[1:]
 
 
 def test_rows_are_in_their_order_and_parts_and_machines_are_in_the_page(tmp_path):
@@ -56,7 +64,7 @@ def test_rows_are_in_their_order_and_parts_and_machines_are_in_the_page(tmp_path
 
 def test_what_is_known_from_before_needed_no_machine(tmp_path):
     said = write_table(tmp_path, run_of([ROW], took={}, machines=set(), done_before=1), [], [], "the command", 1.0)
-    assert said == ["1 file: 1 agrees.", "Known from before: 1."]
+    assert said == ["1 file: 1 agrees.", "Known from before: 1 file."]
     assert "<td>none was needed</td>" in (tmp_path / "index.html").read_text()
 
 

@@ -12,7 +12,7 @@ EDITS = (
     Edit("fleet.row", "order", "(DIFFER, BROKE, REFUSED, AGREE)", "(AGREE, REFUSED, BROKE, DIFFER)", "what agrees comes first"),
     Edit("fleet.since", "has_moved", "abs(new - old) > MOVED * abs(old)", "False", "no limit has moved"),
     Edit("fleet.since", "changed_parts", 'old["verdict"] != row["verdict"]', "False", "no verdict has changed"),
-    Edit("fleet.run", "Run.is_good", "set(self.verdicts()) <= {AGREE, REFUSED}", "True", "always good"),
+    Edit("fleet.standing", "Standing.is_good", "set(self.verdicts()) <= {AGREE, REFUSED}", "True", "always good"),
     Edit("fleet.models", "Model.hash", "self.contents()", '{"": self.path.read_bytes()}', "meshes are forgotten"),
     Edit("fleet.program", "program", 'path.suffix in (".py", ".xml", ".html", ".js")', "False", "any program is the same"),
     Edit("fleet.file_pieces", "broken", 'result.check("", ENDS, None, 0.0, "", why, rule="equal")',

@@ -1,0 +1,66 @@
+"""How a fleet stands: which files are done, with what verdict, and what its pieces took."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from .file_pieces import Known
+from .row import AGREE, REFUSED
+from .task import Task
+
+
+class Standing:
+    """The files, and what is known of them so far. rows: of those that are done; parts: those that others include, and why."""
+
+    def __init__(self, tasks: Sequence[Task]):
+        self.tasks = tasks
+        self.rows, self.new, self.early, self.parts, self.machines = [], [], [], [], set()
+        self.took = {}  # joints and s by a watch of the pieces that ended, by their kind
+        self.done_before, self.pieces_before = 0, 0  # files and further pieces that were known when this run began
+
+    def differs(self, task: Task, check: str) -> None:
+        """A check of a file does not hold; "": all do."""
+        if check and not task.differs:
+            task.differs = check
+            self.early.append(task)
+
+    def ended(self, task: Task, verdict: str, reason: str | None, **more: object) -> None:
+        """A file is done. more: what else its row has, if there is a report."""
+        known = task.known or Known("")
+        about = {"file": task.model.shown, "sha256": task.model.sha256, "verdict": verdict, "reason": reason or ""}
+        about |= {
+            "joints": known.joints,
+            "reference": known.reference,
+            "file_integrator": known.integrator,
+            "file_dt_s": known.dt,
+        }
+        about |= dict.fromkeys(("worst_ratio", "stable_at_file_dt", "limit_s"))
+        task.row = about | {"seconds": round(task.seconds, 2), "has_report": bool(more)} | more
+        self.rows.append(task.row)
+        self.new.append(task.row)
+
+    def take_early(self) -> list[Task]:
+        """The files without a row of which it is known since the last call that they differ."""
+        early, self.early = [task for task in self.early if task.row is None], []
+        return early
+
+    def take_new(self) -> list[dict]:
+        """The rows of files that have ended since the last call."""
+        new, self.new = self.new, []
+        return new
+
+    @property
+    def files_done(self) -> int:
+        return sum(task.row is not None for task in self.tasks)
+
+    def verdicts(self) -> Counter:
+        """How many files have which verdict, so far."""
+        return Counter(row["verdict"] for row in self.rows)
+
+    @property
+    def is_good(self) -> bool:
+        """Whether none differs, and none broke."""
+        return set(self.verdicts()) <= {AGREE, REFUSED}
+
+    @property
+    def pieces_done(self) -> int:
+        return sum(len(each) for each in self.took.values())
