@@ -13,14 +13,15 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 WAITING = HERE / "fleet"  # the folder of these tests
 REPORTS = "REPORTS_OF_TESTS"  # the environment's name for the file of reports
+BEGINS = 4  # it begins when one in so many of the other tests has begun
 
 
 class Aside:
-    """The further pytest. It begins when half of the other tests have begun, for at first there is enough to do beside them."""
+    """The further pytest. It begins when a part of the other tests has begun: at first there is enough to do beside them."""
 
     def __init__(self, config, items, folder):
         self.config, self.items, self.file = config, [item for item in items if is_waiting(item)], folder / "reports"
-        self.left, self.process = (len(items) - len(self.items)) // 2, None
+        self.left, self.process = (len(items) - len(self.items)) // BEGINS, None
 
     def one_begins(self):
         """A test begins here."""
