@@ -55,6 +55,18 @@ def test_a_pendulum_that_shows_nothing_is_left_out_with_the_reason(engines, scen
     assert len(result.notes) == len(expected) and all(map(str.startswith, result.notes, expected))
 
 
+@pytest.mark.parametrize("start, order", [(90, 2), (90.5, None), (60, 1)])
+def test_the_error_of_euler_has_order_2_where_a_swing_begins_without_force_and_none_where_there_is_little(
+    engines, start, order
+):
+    result = section()
+    case = ARM.case("mine", locked=("alpha", "beta"), posture=(0, 0, start), speed=(0, 0, 100))
+    exact_motion.swings(result, experiment.Setup.small(ARM, engines), [case])
+    assert result.curves["swings"]["mine"]["stated"] == {"RK4": 4, "Euler": order}
+    assert all(check.passed for check in result.checks) and len(result.checks) == (5 if order else 3)
+    assert sum("has no order" in note for note in result.notes) == (0 if order else 2)
+
+
 # small oscillations
 
 
