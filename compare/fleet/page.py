@@ -23,7 +23,7 @@ HEADS = {
     "limit_s": "limit, ms",
     "seconds": "processor, s",
 }
-COMPARED_WITH = {"arm": "stated numbers", "model": "itself as compiled"}
+COMPARED_WITH = {"arm": "stated numbers", "model": "itself"}
 ROW_KINDS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
 WHAT_COMES_FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
 MEANINGS = {
