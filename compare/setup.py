@@ -44,9 +44,8 @@ class Setup:
     faults: bool = False  # diagnosis: of made faults, in place of the robot's own differences
     alone: bool = False  # whether an experiment is asked for by itself, and may take longer than in `all`
     growth: bool = False  # speed: whether a chain is to grow to the most joints
-    door: object | None = (
-        None  # where the calls of a long list go, see fleet.calls.Calls; None: wherever `map` has them made
-    )
+    # where the calls of a long list go, see fleet.calls.Calls; None: wherever `map` has them made
+    door: object | None = None
     asked: tuple[float, str] | None = None  # stability: a step, s, and an integrator of MuJoCo that are asked about
     size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
 

@@ -19,6 +19,7 @@ from runs import in_shell, on_terminal
 from compare import drawing, experiment
 from compare.engines.mujoco import load, parse
 from compare.experiments import EXPERIMENTS, module, skipped
+from compare.fleet.file_pieces import Here
 from compare.report import files, overview, verdict
 from compare.robots.arm import ARM
 
@@ -34,14 +35,6 @@ def on_the_moon(name):
     text = ARM.mjcf.read_text(encoding="utf-8").replace("0 0 -9.81", "0 0 -1.62")
     result = module(name).rows(experiment.Setup.small(ARM, experiment.engines(parse(text, ARM.tree))))
     return result, [draw()[2] for draw in module(name).figures(result, ARM)]
-
-
-class Here:
-    """Workers that do what they are asked in this process, at once."""
-
-    def submit(self, function, *arguments):
-        value = function(*arguments)
-        return SimpleNamespace(result=lambda: value)
 
 
 class Lines(list):

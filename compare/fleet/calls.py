@@ -4,9 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from ..process.workers import WorkerEnded
-from .piece import Door, FleetError, Outcome, Piece, outcomes
-
-LONGEST_CALL = 600.0  # s
+from .piece import LONGEST_PIECE, Door, FleetError, Outcome, Piece, outcomes
 
 
 class Calls:
@@ -50,7 +48,7 @@ def door_opened(address: str | None, workers: int | None) -> Iterator[Calls | No
     from .cluster import Cluster  # imports are here, for a run that asks for neither
     from .pool import Pool
 
-    door = Cluster(address, LONGEST_CALL) if address else Pool(workers, LONGEST_CALL)
+    door = Cluster(address, LONGEST_PIECE) if address else Pool(workers, LONGEST_PIECE)
     try:
         yield Calls(door)
     finally:

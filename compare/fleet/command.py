@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING
 
 from tmt.cores import cores
 
-from ..command_line import FLEET, PROGRAM, Parser, expected, in_lines, not_empty
+from ..command_line import FLEET, PROGRAM, Parser, expected, in_lines, not_empty, process_count
 from ..experiments import EXPERIMENTS
 from ..process.streams import in_one_line
 from ..report.remaining import in_words
 from ..report.terminal import Terminal
+from .piece import LONGEST_PIECE
 
 if TYPE_CHECKING:
     from .run import Run
 
 MOST_SAID = 20  # lines of one kind, on the terminal
 BETWEEN = 0.3  # s, after which it is said anew how far it is
-LIMIT = 600.0  # s, that a piece may take
 FLEET_TEXT = "\n\n".join(
     in_lines(text)
     for text in (
@@ -47,12 +47,6 @@ not be carried out, for the reason in one line
 """
 
 
-def count(text: str) -> int:
-    if not text.isdecimal() or not 0 < int(text) <= 1024:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; 1 or more are expected")
-    return int(text)
-
-
 def duration(text: str) -> float:
     try:
         value = float(text)
@@ -71,13 +65,13 @@ FLEET_OPTIONS = {
     "--full": {"action": "store_true", "help": "each file as by `all`, not by `all --quick`"},
     "--only": {"type": not_empty, "metavar": "LIST", "help": "some experiments: mass,stability (default: all)"},
     "--workers": {
-        "type": count, "metavar": "N", "help": "processes on this machine (default: one for each core)",
+        "type": process_count, "metavar": "N", "help": "processes on this machine (default: one for each core)",
     },
     "--dask": {
         "type": not_empty, "metavar": "ADDRESS", "help": "the scheduler of a Dask cluster, whose workers do the work",
     },
     "--limit": {
-        "type": duration, "default": LIMIT, "metavar": "S",
+        "type": duration, "default": LONGEST_PIECE, "metavar": "S",
         "help": "seconds that a piece, an experiment of a file, may take (default: %(default)g)",
     },
     "--since": {

@@ -22,7 +22,7 @@ class Kept:
     """Values by key, each in a file of its own. FleetError: the folder cannot be written, or another fleet is there."""
 
     def __init__(self, out: Path):
-        self.out, self.folder, self.number, self.asked = out, out / KEPT_IN / program()[:16], None, set()
+        self.out, self.folder, self.number = out, out / KEPT_IN / program()[:16], None
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self.number = lock(out / KEPT_IN, wait=False)
@@ -43,7 +43,6 @@ class Kept:
 
     def get(self, key: str) -> object | None:
         """A value, or None: there is none that can be read."""
-        self.asked.add(key)
         with suppress(Exception):
             content = (self.folder / key).read_bytes()
             if content[:DIGEST] == hashlib.sha256(content[DIGEST:]).digest():
@@ -51,7 +50,6 @@ class Kept:
         return None
 
     def put(self, key: str, value: object) -> None:
-        self.asked.add(key)
         content = pickle.dumps(value)
         write_whole(self.folder / key, hashlib.sha256(content).digest() + content)
 

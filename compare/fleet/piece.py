@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 MOST_TRIES = 4  # of a piece whose process ended: it runs again at most three times
+LONGEST_PIECE = 600.0  # s that a piece may take, where nothing else is asked for
 NOTHING_NEW = 0.5  # s after which a door says that nothing has ended
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from files import EVERYTHING, PLAIN, TENDON, TWO, assert_the_same, case_of, mjcf, random_mjcf
 
-from compare.engines.mujoco import ModelError, engine, known, read, unknown
+from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.inventory import REASONS
 
 
@@ -191,100 +191,6 @@ def test_keyframes_keep_their_names():
     keys = '<keyframe><key name="a" qpos="1"/><key qpos="2"/><key name="c" qpos="3"/></keyframe>'
     found = read(mjcf(after=keys)).keyframes
     assert {name: q.tolist() for name, q in found.items()} == {"a": [1.0], "key 1": [2.0], "c": [3.0]}
-
-
-REFUSED = {
-    "tendon armature": (mjcf(TWO, after=TENDON.format('armature="1"')), "tendon 't' has armature"),
-    "armature along a tendon": (
-        mjcf(TWO, after=TENDON.format("") + '<actuator><general name="a" tendon="t" armature="1"/></actuator>'),
-        "actuator 'a' has armature and acts on no joint",
-    ),
-    "flex": (
-        mjcf(PLAIN + '<flexcomp name="soft" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" radius="0.01" dim="2" mass="1"/>'),
-        "flex 'soft'",
-    ),
-    "plugin": (
-        mjcf(PLAIN.replace("</body>", '<plugin plugin="mujoco.elasticity.cable"/></body>'),
-             '<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'),
-        "a plugin in the passive force acts on 'b'",
-    ),
-    "no joint": (mjcf('<body><geom size="0.1"/></body>'), "it has no joint; at least one is expected"),
-    "empty": ("<mujoco/>", "it has no joint; at least one is expected"),
-    "no mass": (mjcf('<body><joint/></body>'), "mass and inertia of moving bodies must be larger"),
-    "not a number": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="nan"')), "the damping of joint 'j' is nan; a finite"),
-    "no axis": (mjcf(PLAIN.replace('name="j"', 'axis="nan 0 1"')), "the axis of joint 'joint 0' is nan"),
-    "infinite": (mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN), "the pos of body 'far' is inf 0 0"),
-    "negative damping": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')), "the damping of joint 'j' is -1; a finite"),
-    "gravity": (mjcf(before='<option gravity="0 nan 0"/>'), "its gravity has a number that is not finite"),
-    "posture": (mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'), "its keyframe 'up' has a number that is not"),
-    "same axis twice": (mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "turn together"),
-    "a column taken": (
-        mjcf('<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'),
-        "two of its joints are called 'w x'",
-    ),
-    "a name taken": (
-        mjcf('<body><freejoint name="r"/><geom size="0.1"/><body><joint name="r x"/><geom size="0.1"/></body></body>'),
-        "two of its joints are called 'r x'",
-    ),
-    "broken": ("<mujoco><worldb", "MuJoCo cannot compile the text: XML parse error"),
-    "something else": ("hello", "the text is not MJCF: MuJoCo says"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_compared_is_refused_in_one_line(name, capfd):
-    text, why = REFUSED[name]
-    if name == "plugin" and mujoco.__version__ >= "4":
-        pytest.skip("this MuJoCo's package brings no plugin with a passive force")
-    with pytest.raises(ModelError, match=r"^(the text|MuJoCo)") as error:
-        read(text)
-    assert why in str(error.value) and "\n" not in str(error.value)
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize(
-    ("content", "why"),
-    [
-        (None, "No such file"),
-        ("<mujoco><worldbody><body><geom type='mesh' mesh='m'/></body></worldbody></mujoco>", "mesh 'm' not found"),
-        ("<mujoco><asset><mesh name='m' file='gone.stl'/></asset></mujoco>", "gone.stl"),
-        ("<mujoco><include file='gone.xml'/></mujoco>", "gone.xml"),
-    ],
-)
-def test_a_file_that_cannot_be_read_is_named_in_one_line(content, why, tmp_path):
-    path = tmp_path / "robot.xml"
-    if content:
-        path.write_text(content)
-    with pytest.raises(ModelError, match=r"robot\.xml") as error:
-        read(path)
-    assert why in str(error.value) and "\n" not in str(error.value)
-
-
-def test_a_callback_is_refused():
-    mujoco.set_mjcb_passive(lambda model, data: None)
-    try:
-        with pytest.raises(ModelError, match="the callback mjcb_passive is set"):
-            read(mjcf())
-    finally:
-        mujoco.set_mjcb_passive(None)
-
-
-@pytest.mark.parametrize(
-    ("text", "names", "name", "found"),
-    [
-        (mjcf(TWO, after=TENDON.format("")), "KNOWN_COUNTS", "ntendon", "ntendon"),
-        (mjcf(PLAIN.replace('name="j"', 'name="j" stiffness="1"')), "KNOWN_FIELDS", "jnt_stiffness", "jnt_stiffness"),
-        (mjcf(before='<option wind="1 0 0"/>'), "KNOWN_OPTIONS", "wind", "the option wind"),
-        (mjcf(before='<option><flag spring="disable"/></option>'), "KNOWN_DISABLING", "SPRING", "the flag spring"),
-        (mjcf(before='<option><flag energy="enable"/></option>'), "KNOWN_ENABLING", "ENERGY", "the flag energy"),
-    ],
-)
-def test_what_a_newer_mujoco_brings_is_refused_by_name_where_it_is_used(text, names, name, found, monkeypatch):
-    read(text)
-    monkeypatch.setattr(unknown, names, getattr(known, names) - {name})
-    with pytest.raises(ModelError, match=f"it uses {found}, which is not known here"):
-        read(text)
-    read(mjcf())
 
 
 def test_what_the_compiler_warns_of_is_one_line(capfd):
