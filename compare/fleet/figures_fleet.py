@@ -12,8 +12,8 @@ from ..report.style import BLUE, GREY, RED, WIDTH, pixels, plain
 
 MOST_NAMED_FILES, LONGEST_FILE = 40, 40  # files with a name beside their points; letters of a name
 STEP_CAPTION = (
-    "Each file's own step as a share of the largest step that is stable under its own servos, with its own integrator, at the "
-    "posture where that is least: right of the line it is not stable. {} of {} files have such a limit."
+    "Each file's own step as a share of the largest step that is stable with its own integrator, under its own servos, springs "
+    "and damping, at the posture where that is least: right of the line it is not stable. {} of {} files have such a limit."
 )
 
 
