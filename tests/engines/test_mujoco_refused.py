@@ -60,7 +60,11 @@ def test_what_cannot_be_compared_is_refused_in_one_line(name, capfd):
     [
         (None, "No such file"),
         ("<mujoco><worldbody><body><geom type='mesh' mesh='m'/></body></worldbody></mujoco>", "mesh 'm' not found"),
-        ("<mujoco><asset><mesh name='m' file='gone.stl'/></asset></mujoco>", "gone.stl"),
+        (
+            "<mujoco><asset><mesh name='m' file='gone.stl'/></asset>"
+            "<worldbody><body><joint/><geom type='mesh' mesh='m'/></body></worldbody></mujoco>",
+            "gone.stl",
+        ),
         ("<mujoco><include file='gone.xml'/></mujoco>", "gone.xml"),
     ],
 )

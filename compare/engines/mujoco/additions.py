@@ -10,6 +10,7 @@ from .engine import Mujoco
 from .flags import FLAGS, bit
 from .inventory import take_away
 from .joints import joint_name, kind_of
+from .light import without_geoms
 from .lock import clear, editable, with_names
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
@@ -108,7 +109,7 @@ def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     """The engine's model from its file, its contact and constraint stages off, with an edit."""
     spec = editable(engine.source)
     if engine.bare:
-        bare(spec)
+        bare(without_geoms(spec))
     spec.option.disableflags |= LEFT_OUT
     edit(spec)
     model = spec.compile()
@@ -119,11 +120,8 @@ def edited(engine: Mujoco, edit: Callable) -> Mujoco:
 
 def bare(spec: mujoco.MjSpec) -> None:
     """Take out of a spec what a Tree has not: of its own things none may touch, act, or limit a joint."""
-    spec.compiler.fusestatic = False
     with_names(spec)
     clear(spec, set(), bare=True)
-    for pair in list(spec.pairs):
-        spec.delete(pair)
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
     for joint in spec.joints:

@@ -53,7 +53,7 @@ def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
 
 
 METHODS = methods_for()
-MODELS = 64  # that are kept: those of the cases that were asked for last
+MODELS, BYTES = 64, 1e8  # that are kept: those of the cases that were asked for last, so many and so large together
 
 
 class Mujoco:
@@ -101,7 +101,7 @@ class Mujoco:
         changes += (case.controller.controls,) if case.controller else ()
         dynamics = self.known.pop(changes, None) or self.dynamics(case)
         self.known[changes] = dynamics
-        if len(self.known) > MODELS:
+        if len(self.known) > max(1.0, min(MODELS, BYTES / mujoco.mj_sizeModel(self.model))):
             del self.known[next(iter(self.known))]
         return dynamics
 

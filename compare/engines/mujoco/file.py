@@ -1,6 +1,5 @@
 """From a file to an engine: MJCF is read, compiled, and refused in one line where it does not have a robot's joints."""
 
-import os
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,15 +9,14 @@ import mujoco
 import tmt
 
 from .engine import Mujoco
+from .light import without_visuals
 from .lock import ModelError, editable, name_of
 
 
 def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
     """The engine for an MJCF file; ModelError if it cannot be read or does not have exactly the hinges of the Tree."""
     path = Path(path)
-    model, warned = compiled(
-        path, lambda: mujoco.MjModel.from_xml_path(os.fsencode(path))
-    )  # bytes: any name, in any locale
+    model, warned = compiled(path, lambda: without_visuals(editable(path)).compile())
     return with_hinges(model, path, tree, warned)
 
 

@@ -103,3 +103,12 @@ def moved(model: mujoco.MjModel) -> np.ndarray:
 def resting(model: mujoco.MjModel) -> np.ndarray:
     """The numbers of the bodies that no joint moves."""
     return np.flatnonzero(~moved(model))
+
+
+def aligns(joint) -> bool:
+    """Whether the compiler turns the frame of a free joint's body into its inertial frame."""
+    if mujoco.mjtJoint(joint.type) != mujoco.mjtJoint.mjJNT_FREE:
+        return False
+    align = mujoco.mjtAlignFree(joint.align)
+    by_compiler = align == mujoco.mjtAlignFree.mjALIGNFREE_AUTO and bool(joint.compiler.alignfree)
+    return by_compiler or align == mujoco.mjtAlignFree.mjALIGNFREE_TRUE

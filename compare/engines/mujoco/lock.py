@@ -14,7 +14,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from .joints import joint_name, kind_of, parts_of
+from .joints import aligns, joint_name, kind_of, parts_of
+from .light import without_geoms, without_visuals
 from .rotors import rotors
 
 NO_DEFAULTS = {  # of a joint that is added: a class of the file may have others
@@ -24,7 +25,6 @@ NO_DEFAULTS = {  # of a joint that is added: a class of the file may have others
     "limited": mujoco.mjtLimited.mjLIMITED_FALSE,
     "range": np.zeros(2),
 }
-ALIGNED, BY_COMPILER = mujoco.mjtAlignFree.mjALIGNFREE_TRUE, mujoco.mjtAlignFree.mjALIGNFREE_AUTO
 
 
 class ModelError(ValueError):
@@ -66,7 +66,7 @@ def locked_model(source: Path | str | None, positions: Mapping, bare: bool = Fal
 
 def compiled_without(spec: mujoco.MjSpec, positions: Mapping, bare: bool) -> mujoco.MjModel:
     """The model of a spec whose joints at these positions have been taken out."""
-    spec.compiler.fusestatic = False
+    spec = without_geoms(spec) if bare else without_visuals(spec)
     whole = with_names(spec)  # anchors, axes and frames as they are after defaults, degrees and nested frames
     parted = {name: parts_of(name) for name in free_joints(whole) if set(parts_of(name)) & set(positions)}
     clear(spec, {*positions, *parted}, bare)
@@ -213,11 +213,3 @@ def conjugate(quat: np.ndarray) -> np.ndarray:
     result = np.zeros(4)
     mujoco.mju_negQuat(result, quat)
     return result
-
-
-def aligns(joint) -> bool:
-    """Whether the compiler turns the frame of a free joint's body into its inertial frame."""
-    if mujoco.mjtJoint(joint.type) != mujoco.mjtJoint.mjJNT_FREE:
-        return False
-    align = mujoco.mjtAlignFree(joint.align)
-    return align == ALIGNED or (align == BY_COMPILER and bool(joint.compiler.alignfree))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -16,6 +17,7 @@ from .file import compiled
 from .flags import NAMES
 from .inventory import Feature, features, open_equalities, refuse, refuse_callbacks, take_away
 from .joints import Place, joint_places, kind_of, moved, others_apart, own_name, reference_qpos
+from .light import moves_the_same, without_geoms, without_visuals
 from .lock import ModelError, editable, name_of
 from .rotors import rotors
 from .values import refuse_values
@@ -40,7 +42,15 @@ class Reading:
     dt: float  # s, of the file
     bodies: tuple[int, ...]  # the numbers of the Tree's bodies in the model
     drive: Drive  # actuators, tendons, gravity compensation; controls by the names of `keyframes`
-    model: mujoco.MjModel = field(repr=False, compare=False)
+    model: mujoco.MjModel = field(repr=False, compare=False)  # without what only contacts and pictures need, see light
+
+    @cached_property
+    def full_model(self) -> mujoco.MjModel:
+        """The model with its contacts, compiled when it is first asked for, and once."""
+        return self.model if self.source is None else compiled_whole(self.source)[0]
+
+    def __getstate__(self):
+        return {name: value for name, value in self.__dict__.items() if name != "full_model"}
 
 
 def read(source: Path | str | mujoco.MjModel) -> Reading:
@@ -53,7 +63,7 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         if isinstance(source, mujoco.MjModel):
             model, warnings, source = mujoco.MjModel.__copy__(source), (), None
         elif isinstance(source, Path | str):
-            model, warnings = compiled(source, lambda: without_fusing(editable(source)))
+            model, warnings = compiled_whole(source)
         else:
             raise ModelError(f"a {type(source).__name__} cannot be read; a path, MJCF text or an MjModel is expected")
         if not model.njnt:
@@ -81,8 +91,24 @@ def read(source: Path | str | mujoco.MjModel) -> Reading:
         dt=float(model.opt.timestep),
         bodies=tuple(bodies),
         drive=drive_of(model, source, bodies, list(keyframes(model))),
-        model=model,
+        model=light_model(source, model),
     )
+
+
+def compiled_whole(source: Path | str) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """The model with everything but what is only drawn, and what the compiler warns of, see file.compiled."""
+    return compiled(source, lambda: without_visuals(editable(source)).compile())
+
+
+def light_model(source: Path | str | None, whole: mujoco.MjModel) -> mujoco.MjModel:
+    """The model without geoms, where it moves the same; else the whole one. Of a compiled model nothing can be taken out."""
+    if source is None:
+        return whole
+    try:
+        model, _ = compiled(source, lambda: without_geoms(editable(source)).compile())
+    except ModelError:
+        return whole
+    return model if moves_the_same(whole, model) else whole
 
 
 def engine(reading: Reading) -> Mujoco:
@@ -97,12 +123,6 @@ def engine(reading: Reading) -> Mujoco:
         warnings=reading.warnings,
         methods=methods_for(tree),
     )
-
-
-def without_fusing(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The compiled model with every body of the file: fusing changes nothing that moves, and renumbers bodies."""
-    spec.compiler.fusestatic = False
-    return spec.compile()
 
 
 def moving_bodies(model: mujoco.MjModel) -> list[int]:

@@ -11,9 +11,10 @@ import mujoco
 import numpy as np
 
 from .engine import FROM_4
-from .joints import joint_name, kind_of, own_name
-from .lock import aligns, editable, placed, turned
-from .reading import Reading, without_fusing
+from .joints import aligns, joint_name, kind_of, own_name
+from .light import without_geoms
+from .lock import editable, placed, turned
+from .reading import Reading
 
 TRUE = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 # how exactly a `fullinertia` is turned to its principal axes: up to 5e-7 off was seen before 4.0, 1.4e-14 from there on
@@ -36,7 +37,7 @@ def stated_numbers(reading: Reading) -> list[Stated]:
     spec, numbered, model = editable(reading.source), editable(reading.source), reading.model
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the reading has them
-        without_fusing(numbered)  # elements have their numbers in the model only once compiled
+        without_geoms(numbered).compile()  # elements have their numbers in the model only once compiled
     rows = []
     for body, known in zip(spec.bodies, numbered.bodies):
         if known.id:

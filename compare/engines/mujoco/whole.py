@@ -35,7 +35,8 @@ def whole_run(
 
     u stands in controls, and in activations. Where MuJoCo resets, the controls and the speed are given anew.
     """
-    m = mujoco.MjModel.__copy__(model)
+    m = model
+    own = m.opt.timestep, m.opt.integrator
     m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
     data, controls = mujoco.MjData(m), np.zeros(m.nu)
     data.qpos[:], data.qvel[:] = q, speed
@@ -58,4 +59,5 @@ def whole_run(
         warnings, seen = warnings + number - seen, number
         if step >= judged:
             squares.append(data.qvel @ data.qvel / m.nv)
+    m.opt.timestep, m.opt.integrator = own
     return WholeRun(float(np.sqrt(np.mean(squares))), warnings, resets)

@@ -120,7 +120,7 @@ def full_at(one: Predicted, reading: Reading) -> list[dict]:
     """What the full model does at the file's step, with each integrator."""
     base = one.at.bases[0]
     stable = {name: one.is_stable(base, name, reading.dt) for name in INTEGRATORS}
-    return full_model.rows(reading.model, one.at, reading.dt, stable)
+    return full_model.rows(reading.full_model, one.at, reading.dt, stable)
 
 
 # in the main process
