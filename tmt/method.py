@@ -117,10 +117,13 @@ def bodies(tree, q, qd=None) -> list[Body]:
 def mass_matrix(parts, armature=()) -> list:
     """Mbar (nv rows of nv, kg m2) of the bodies: sum_b T' m T + B' I B, and the armature on its diagonal."""
     n = len(parts[0].T)
-    M = [
-        [total(b.T[i].dot(b.mass * b.T[j]) + b.B[i].dot(b.inertia @ b.B[j]) for b in parts) for j in range(n)]
-        for i in range(n)
-    ]
+    M = [[0.0] * n for _ in range(n)]
+    for b in parts:
+        moving = [k for k in range(n) if b.T[k] is not ZERO]  # the columns of all other joints are zero
+        for j in moving:
+            force, moment = b.mass * b.T[j], b.inertia @ b.B[j]
+            for i in moving:
+                M[i][j] = M[i][j] + (b.T[i].dot(force) + b.B[i].dot(moment))
     for i, rotor in enumerate(armature):
         M[i][i] = M[i][i] + rotor if rotor else M[i][i]
     return M
@@ -132,7 +135,10 @@ def bias(parts, gravity) -> list:
     n = len(parts[0].T)
     newton = [b.mass * (b.v_conv - g) for b in parts]
     euler = [b.inertia @ b.w_conv + b.omega.cross(b.inertia @ b.omega) for b in parts]
-    return [total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in zip(parts, newton, euler)) for i in range(n)]
+    return [
+        total(b.T[i].dot(f) + b.B[i].dot(m) for b, f, m in zip(parts, newton, euler) if b.T[i] is not ZERO)
+        for i in range(n)
+    ]
 
 
 def mass_matrix_and_bias(tree, q, qd) -> tuple[list, list]:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import tmt
-from tmt import literal
+from tmt import literal, method
+from tmt.literal import gather
 
 EPS = float(np.finfo(float).eps)
 FACTOR = 64
@@ -39,9 +40,11 @@ def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndar
 
 def bias_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """Convective + Euler + gravity terms of the bias, each by its absolute value, N m, (states,)."""
-    T, B = literal.jacobians(q, tree)
-    v_conv, w_conv = literal.convective_terms(q, qd, tree)
-    omega = literal.angular_velocities(q, qd, tree)
+    parts, shape = method.bodies(tree, list(q.T), list(qd.T)), q.shape[:1]
+    T, B = (gather((zip(*columns) for columns in both), shape) for both in zip(*((b.T, b.B) for b in parts)))
+    v_conv, w_conv, omega = (
+        gather(map(list, vectors), shape) for vectors in zip(*((b.v_conv, b.w_conv, b.omega) for b in parts))
+    )
     inertia = np.array(tree.inertia)
     moments = np.abs(np.einsum("bij,sbj->sbi", inertia, w_conv))
     moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
