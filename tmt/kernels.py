@@ -19,12 +19,9 @@ from .trace import Code
 from .tree import Tree
 from .values import shown
 
-LONGEST, LONGEST_EVALUATED = (
-    3_000,
-    1_700,
-)  # lines of straight-line code: of a run, of a slope that is evaluated; beyond, loops run
+LONGEST = 3_000  # lines of straight-line code that are compiled; beyond, the loops of loops.py are
 INLINED = 0.15  # what a line of a slope counts each time it is called, beside 1 where it stands
-LARGEST = 24  # speeds: larger trees are not even traced
+LARGEST = 12  # speeds: larger trees are not even traced
 QUANTITIES, SINES = ("forward_dynamics", "mass_matrix_and_bias"), ("sincos", "library_sincos")
 
 
@@ -184,7 +181,7 @@ def is_evaluator_on_disk(tree: Tree, quantity: str) -> bool:
 
 def is_evaluated_straight(tree: Tree) -> bool:
     """Whether `evaluator` compiles straight-line code for a tree: some four times as it stands, in loops of their own."""
-    return len(tree.axis) <= LARGEST and _slope_lines(tree) <= LONGEST_EVALUATED
+    return len(tree.axis) <= LARGEST and 1.7 * _slope_lines(tree) <= LONGEST
 
 
 @lru_cache(maxsize=64)
