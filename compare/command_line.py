@@ -100,14 +100,21 @@ def process_count(text: str) -> int:
     return int(text)
 
 
+def is_solution(reference: str | None) -> bool:
+    """Whether what is stated as a reference is another MJCF file."""
+    return (reference or "").lower().endswith((".xml", ".mjcf"))
+
+
 def stated_reference(text: str) -> str:
     """What a model is compared with: what has a colon is read later."""
-    if text in ("arm", "model") or ":" in text:
+    if text in ("arm", "model") or ":" in text or is_solution(text):
         return text
     if text.endswith(".py"):
         hint = f"a colon is missing: {text}:OBJECT, or {text}: for the file itself"
     else:
-        hint = expected(text, {name: name for name in ("arm", "model")}, "arm, model, FILE.py:OBJECT or MODULE:OBJECT")
+        hint = expected(
+            text, {name: name for name in ("arm", "model")}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT"
+        )
     raise argparse.ArgumentTypeError(f"{text!r} is no reference; {hint}")
 
 
@@ -122,7 +129,8 @@ OPTIONS_OF_ALL = {
     "--reference": (None, {
         "type": stated_reference, "metavar": "WHAT",
         "help": "what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); "
-        "model, tmt's equations for the model as MuJoCo compiled it (default for any other); or your own equations, "
+        "FILE.xml, the numbers of a solution; model, tmt's equations for the model as MuJoCo compiled it (default for "
+        "any other); or your own equations, "
         "FILE.py:OBJECT or MODULE:OBJECT, with mass_matrix(q) and bias(q, qd) (nothing after the colon: the module itself)",
     }),
     "--joints": (OF_OWN, {
