@@ -10,22 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt import Tree
-
-from .actuators import Drive
 from .case import SEED
-from .command_line import is_solution
 from .engines import Engine
 from .engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
 from .engines.mujoco.flags import integrator_by_name
 from .engines.own import Own, OwnEquations, OwnError
 from .joint_map import JointsError, joint_map
-from .matching import Unmatched, matched_joints
 from .own_file import OwnFileError, aside, own_object
 from .process.streams import in_one_line
 from .robots import Robot
 from .robots.arm import ARM
-from .robots.file import robot_of
+from .robots.file import robot_of, robot_of_solution
+from .robots.matching import Unmatched, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file
@@ -45,7 +41,7 @@ class Reference(NamedTuple):
     warnings: tuple[str, ...] = ()  # of MuJoCo's compiler, one line each
     asked: str = ""  # the solution, or where equations of one's own come from, as it is given, in one line
     own: Engine | None = None  # of these equations
-    renamed: tuple[str, ...] = ()  # "wrist as gamma": joints that are not matched by their names
+    renamed: tuple[str, ...] = ()  # "wrist as hand": joints that are not matched by their names
 
     @property
     def name(self) -> str:
@@ -129,39 +125,37 @@ def compared_with(
     return Compared(Reference("own", *of_file, in_one_line(asked), own), robot, mujoco, reading)
 
 
+def is_solution(asked: str | None) -> bool:
+    """Whether a reference that is asked for is another MJCF file."""
+    return (asked or "").lower().endswith((".xml", ".mjcf"))
+
+
 def with_arm(file: str | Path, shown: str) -> Compared:
     """A file and the arm's stated numbers."""
     robot, renamed = ARM, ()
     if not has_hinges(file, ARM.joints):
-        names, renamed = matched(ARM.tree, read(Path(file)), shown, "the arm")
+        names, renamed = joints_matched(ARM, read(Path(file)), shown, "the arm")
         robot = ARM.with_joints(names)
     mujoco = load(file, robot.tree)
     return Compared(Reference("arm", shown, warnings=mujoco.warnings, renamed=renamed), robot, mujoco, None)
 
 
 def with_solution(reading: Reading, of_file: tuple, asked: str, solution: Reading) -> Compared:
-    """A file and the numbers of a solution, whose postures and scenes are taken; of actuators only how many there are."""
-    names, renamed = matched(solution.tree, reading, of_file[0], asked)
-    tree = dataclasses.replace(solution.tree, hinge_names=names)
-    solution = dataclasses.replace(solution, tree=tree, drive=Drive())
-    robot = dataclasses.replace(
-        robot_of(solution, of_file[0]),
-        mjcf=reading.source,
-        features=tuple(reading.features),
-        stated_in=asked,
-        features_stated=tuple(solution.features),
-    )
-    reference = Reference(SOLUTION, *of_file, asked, renamed=renamed)
-    return Compared(reference, robot, engine(reading, solution), reading)
+    """A file and the numbers of a solution."""
+    names, renamed = joints_matched(solution, reading, of_file[0], asked)
+    robot, solution = robot_of_solution(reading, of_file[0], solution, asked, names)
+    return Compared(Reference(SOLUTION, *of_file, asked, renamed=renamed), robot, engine(reading, solution), reading)
 
 
-def matched(stated: Tree, reading: Reading, shown: str, whose: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def joints_matched(
+    stated: Robot | Reading, reading: Reading, shown: str, whose: str
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The file's joints in the order of the stated ones, and those that are matched by something else than their names.
 
     JointsDiffer, if there are others.
     """
     try:
-        return matched_joints(stated, reading.tree, whose)
+        return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:
         raise JointsDiffer(f"{shown} cannot be compared with {whose}: {error}") from None
 

@@ -38,7 +38,7 @@ DIRECTIONS = {
     "joint_map": {"coordinates", "judge"},
     "diagnosis": {"tmt", "coordinates", "joint_map", "judge"},
     "states": {"tmt", "robots", "case"},
-    "robots": {"tmt", "case", "actuators", "controller"},
+    "robots": {"tmt", "case", "actuators", "controller", "given"},
     "scene_file": {"case", "given", "robots"},
     "own_file": {"process", "judge"},
     "reference": {"robots", "engines", "process", "case", "joint_map", "own_file"},

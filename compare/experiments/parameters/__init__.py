@@ -93,7 +93,7 @@ EXPLAINED = {  # forces, by the quantities that say why they act
 def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
     if robot.stated_in:
-        return solution.CLAIM.format(robot.stated_in)
+        return solution.CLAIM_OF_SOLUTION.format(robot.stated_in)
     if robot.is_read:
         return file.CLAIM
     return (
@@ -107,7 +107,7 @@ def claim(robot: Robot) -> str:
 def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
     if robot.stated_in:
-        return solution.TOLERANCE
+        return solution.TOLERANCE_OF_SOLUTION
     if robot.is_read:
         return file.TOLERANCE
     return (
@@ -167,7 +167,7 @@ def rows(setup: Setup) -> Result:
         names = owners(tree, quantity)
         for owner, e, f in zip(names, expected.reshape(len(names), -1), found.reshape(len(names), -1)):
             size = np.abs(expected if robot.stated_in else e).max()
-            off, tolerance, unit = np.abs(e - f), FACTOR * EPS * size, unit_of(tree, owner, quantity)
+            off, tolerance, unit = np.abs(e - f), FACTOR * EPS * size, unit_of_number(tree, owner, quantity)
             whole = quantity in WHOLE_NUMBERS and not (quantity == "ref" and robot.stated_in)
             value, bound, rule = (f[0], e[0], "equal") if whole else (off.max(), tolerance, "at most")
             result.check(owner, quantity, value, bound, unit, rounding=not whole, rule=rule)
@@ -202,7 +202,7 @@ def causes_of_other_forces(result: Result, setup: Setup, known: Sequence[dict]) 
     return causes
 
 
-def unit_of(tree: tmt.Tree, owner: str, quantity: str) -> str:
+def unit_of_number(tree: tmt.Tree, owner: str, quantity: str) -> str:
     """The unit of a quantity, of a slide its own."""
     of_slide = dict(zip(tree.hinge_names, tree.kind)).get(owner) == "slide" and quantity not in OF_BODIES
     return OF_SLIDES.get(quantity, QUANTITIES[quantity]) if of_slide else QUANTITIES[quantity]
@@ -223,7 +223,7 @@ def causes_in(
         if not difference <= tolerance:
             place = " ".join(filter(None, (quantity, component(k, len(stated))))) + of
             share = difference / tolerance if tolerance else np.inf
-            unit = unit_of(tree, owner, quantity)
+            unit = unit_of_number(tree, owner, quantity)
             causes.append(cause(tree, rank, quantity, unit, place, a, b, share, " (the opposite sign)" * flipped))
     return causes
 

@@ -10,12 +10,12 @@ from ...engines.mujoco.inventory import MODELLED
 from ...judge.check import Result
 from ...setup import Setup
 
-CLAIM = (
+CLAIM_OF_SOLUTION = (
     "The model as MuJoCo compiled it has the numbers of {}, joint by joint and body by body: parent, axis, anchor, zero, "
     "damping, armature and spring of each joint; mass, centre of mass and inertia tensor of each body; gravity. Of what the "
     "equations do not have, limits and actuators for example, it has as many; of contacts only whether there are any."
 )
-TOLERANCE = (
+TOLERANCE_OF_SOLUTION = (
     "64 eps x the largest entry of the quantity in the solution, of any joint or body. Counts, and forces of what is switched "
     "off: exactly."
 )
@@ -26,10 +26,10 @@ def compared_numbers(setup: Setup) -> tuple[dict, dict]:
     tree, reading = setup.robot.tree, setup.reading
     joints = [reading.tree.hinge_names.index(name) for name in tree.hinge_names]
     bodies = [reading.bodies.index(body) for body in setup.engines["mujoco"].bodies]
-    return numbers_of(tree, range(len(joints)), range(len(bodies))), numbers_of(reading.tree, joints, bodies)
+    return ordered_numbers(tree, range(len(joints)), range(len(bodies))), ordered_numbers(reading.tree, joints, bodies)
 
 
-def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
+def ordered_numbers(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
     """The numbers of a Tree, by quantity. joints, bodies: in which order."""
     anchors = []
     for parent, offset in zip(tree.parent, tree.offset):

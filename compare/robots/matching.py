@@ -8,12 +8,12 @@ from scipy.optimize import linear_sum_assignment
 
 import tmt
 
-from .given import some
+from ..given import some
 
 OTHER_TYPE = 1e6  # what keeps two joints from being matched: a hinge is no slide
 # what speaks against a match: the angle of the axes (1 if upright on each other), joints between it and the world, the place as
 # a share of the robot's size, an axis of the opposite sense, and, between equal ones, the order
-AXIS, DEPTH, PLACE, SENSE, ORDER = 4.0, 1.5, 1.0, 0.5, 1e-3
+OF_AXIS, OF_DEPTH, OF_PLACE, OF_SENSE, OF_ORDER = 4.0, 1.5, 1.0, 0.5, 1e-3
 
 
 class Unmatched(ValueError):
@@ -24,7 +24,7 @@ class Matched(NamedTuple):
     """The joints of a file."""
 
     names: tuple[str, ...]  # in the order of the reference's joints
-    renamed: tuple[str, ...]  # "wrist as gamma": those that are not matched by their names
+    renamed: tuple[str, ...]  # "wrist as hand": those that are not matched by their names
 
 
 def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
@@ -57,10 +57,12 @@ def costs_of(reference: tmt.Tree, tree: tmt.Tree) -> np.ndarray:
     along = np.einsum("id,jd->ij", axes, other_axes)
     apart = np.linalg.norm(anchors[:, None] - other_anchors, axis=-1)
     costs = (
-        AXIS * (1.0 - np.abs(along)) + SENSE * (along < 0.0) + DEPTH * np.abs(np.subtract.outer(depths, other_depths))
+        OF_AXIS * (1.0 - np.abs(along))
+        + OF_SENSE * (along < 0.0)
+        + OF_DEPTH * np.abs(np.subtract.outer(depths, other_depths))
     )
-    costs += PLACE * apart / max(np.ptp(anchors, axis=0).max(), np.ptp(other_anchors, axis=0).max(), 1e-9)
-    costs += ORDER * np.abs(np.subtract.outer(np.arange(len(depths)), np.arange(len(other_depths))))
+    costs += OF_PLACE * apart / max(np.ptp(anchors, axis=0).max(), np.ptp(other_anchors, axis=0).max(), 1e-9)
+    costs += OF_ORDER * np.abs(np.subtract.outer(np.arange(len(depths)), np.arange(len(other_depths))))
     return np.where(np.array(reference.kind)[:, None] == np.array(tree.kind), costs, OTHER_TYPE)
 
 
