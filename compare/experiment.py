@@ -8,7 +8,7 @@ from types import ModuleType
 
 from .drawing import FIRST, HALVES, draw, quiet
 from .experiments import EXPERIMENTS, module
-from .judge.check import DRAWN, ENDS, Result
+from .judge.check import ENDS, About, Result
 from .process.clock import Clock
 from .process.crash import described
 from .process.workers import WorkerEnded, Workers
@@ -195,7 +195,7 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
         raise
     except Exception as error:
         result = Result(name, shown=[])
-        result.check("", ENDS, None, 0.0, "", described(error), rule="equal")
+        result.check("", ENDS, None, 0.0, "", described(error), rule="equal", about=About.PROGRAM)
         return None, result
 
 
@@ -218,8 +218,9 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:
-        quantity = f"{DRAWN} {name} is drawn"
-        terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
+        quantity = f"figure {name} is drawn"
+        check = section.result.check("", quantity, None, 0.0, "", line, rule="equal", about=About.PROGRAM)
+        terminal.say(f"  FAIL {check}", "red")
 
 
 def largest_share_in_words(share: float) -> str:

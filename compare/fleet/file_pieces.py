@@ -18,7 +18,7 @@ from ..case import SEED
 from ..drawing import quiet
 from ..engines.mujoco import ModelError, read
 from ..experiments import EXPERIMENTS, module, skipped
-from ..judge.check import ENDS, Result
+from ..judge.check import ENDS, About, Result
 from ..judge.timing import vectors
 from ..process.clock import Clock
 from ..reference import Compared, compared_with
@@ -138,7 +138,7 @@ def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: by
 def broken(name: str, why: str) -> tuple[None, Result]:
     """What stands for an experiment that gave nothing: one failed check."""
     result = Result(name, shown=[])
-    result.check("", ENDS, None, 0.0, "", why, rule="equal")
+    result.check("", ENDS, None, 0.0, "", why, rule="equal", about=About.PROGRAM)
     return None, result
 
 

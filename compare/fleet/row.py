@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..judge.check import ENDS, Check
-from ..report.verdict import Section, failures, unstable_in_words, worst
+from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_in_words, worst
 
 FLEET_COLUMNS = (
     "file", "sha256", "verdict", "reason", "joints", "worst_ratio",
@@ -15,9 +15,10 @@ AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
 def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str]) -> dict:
     """The verdict and its reason, the largest share of a tolerance, and the step. lost: parts of the report that broke.
 
-    A file whose own step is not stable agrees all the same, and the reason says where the limit is.
+    A file whose own step is not stable agrees all the same, and the reason says where the limit is; so with predictions that
+    no run confirms.
     """
-    differing, broke, unstable = failures(sections)
+    differing, broke, unstable, unconfirmed = failures(sections)
     top = worst(sections)
     stable, limit = own_step(sections)
     if differing:
@@ -27,7 +28,9 @@ def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Seque
     elif not any(section.result.checks for section in sections):
         outcome, reason = REFUSED, "nothing could be compared"
     else:
-        outcome, reason = AGREE, unstable_in_words(unstable) if unstable else ""
+        reasons = [unconfirmed_in_words(unconfirmed)] if unconfirmed else []
+        reasons += [unstable_in_words(unstable)] if unstable else []
+        outcome, reason = AGREE, "; ".join(reasons)
     return {
         "verdict": outcome, "reason": reason, "worst_ratio": None if top is None else top.over_tolerance,
         "stable_at_file_dt": stable, "limit_s": limit,

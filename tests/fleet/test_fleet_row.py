@@ -5,30 +5,32 @@ import itertools
 import pytest
 
 from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order, row_of_file
-from compare.judge.check import AT_OWN_STEP, ENDS, Result
+from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
 from compare.report.verdict import Section
 
 CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
 
 
 def sections(*checks, limits=()):
-    """One section with checks: (quantity, value, tolerance, note, rule); all of rounding but those of other rules."""
+    """One section with checks: (quantity, value, tolerance, note, rule, about); all of rounding but those of other rules."""
     result = Result("stability", tables={"step_limits": list(limits)})
-    for quantity, value, tolerance, note, rule in checks:
-        result.check("home", quantity, value, tolerance, "s", note, rule == "at most" and quantity != AT_OWN_STEP, rule)
+    for quantity, value, tolerance, note, rule, about in checks:
+        result.check(
+            "home", quantity, value, tolerance, "s", note, about == About.MODELS and rule == "at most", rule, about
+        )
     return [Section("stability", "", "", "", result)]
 
 
 def good(share=0.5):
-    return "M", share, 1.0, "", "at most"
+    return "M", share, 1.0, "", "at most", About.MODELS
 
 
 def broke(quantity=ENDS):
-    return quantity, None, 0.0, "ended by SIGKILL, 4 times", "equal"
+    return quantity, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
 
 
 def unstable(dt=0.002, limit=0.001):
-    return AT_OWN_STEP, dt, limit, "with Euler", "at most"
+    return AT_OWN_STEP, dt, limit, "with Euler", "at most", About.STEP
 
 
 def limit(dt, stable, integrator="Euler", base="fixed", kind="finite"):
@@ -51,6 +53,8 @@ def test_a_file_agrees_differs_breaks_off_or_is_refused():
         "stability: figure a is drawn: ended by SIGKILL, 4 times",
     )
     assert verdict(good(), lost=["the table could not be made"]) == (BROKE, "the table could not be made")
+    off = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
+    assert verdict(good(), off)[0] == AGREE and "one prediction is not confirmed" in verdict(good(), off)[1]
     assert verdict() == (REFUSED, "nothing could be compared")
 
 
@@ -68,7 +72,7 @@ def test_a_file_whose_own_step_is_not_stable_agrees_and_says_where_the_limit_is(
 def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
     row = row_of_file(sections(good(0.2), good(3.0), unstable(9.0)), CAUSES, [])
     assert row["worst_ratio"] == 3.0
-    diverged = row_of_file(sections(good(0.2), ("M", None, 1.0, "", "at most")), [], [])
+    diverged = row_of_file(sections(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS)), [], [])
     assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
     assert row_of_file(sections(broke()), [], [])["worst_ratio"] is None
 
