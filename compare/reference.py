@@ -15,6 +15,7 @@ from .engines import Engine
 from .engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
 from .engines.mujoco.flags import integrator_by_name
 from .engines.own import Own, OwnEquations, OwnError
+from .given import some
 from .joint_map import JointsError, joint_map
 from .own_file import OwnFileError, aside, own_object
 from .process.streams import in_one_line
@@ -29,7 +30,11 @@ OWN_FILE = "mjcf/arm.xml"  # what is compared where no file is given
 
 
 class JointsDiffer(ModelError):
-    """A file whose joints are not those of the reference."""
+    """A file whose joints are not those of the reference; why: which are missing, or too many."""
+
+    def __init__(self, shown: str, whose: str, why: str):
+        super().__init__(f"{shown} cannot be compared with {whose}: {why}")
+        self.why = why
 
 
 class Reference(NamedTuple):
@@ -42,6 +47,7 @@ class Reference(NamedTuple):
     asked: str = ""  # the solution, or where equations of one's own come from, as it is given, in one line
     own: Engine | None = None  # of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints that are not matched by their names
+    why_itself: str = ""  # why it is compared with its own compiled model, where that was not asked for
 
     @property
     def name(self) -> str:
@@ -108,9 +114,7 @@ def compared_with(
     reference; OwnFileError for equations that cannot be used.
     """
     file, shown = path or ARM.mjcf, in_one_line(shown or path or OWN_FILE)
-    if asked is None:
-        asked = "arm" if path is None or has_hinges(path, ARM.joints) else "model"
-    if asked == "arm":
+    if asked == "arm" or (asked is None and (path is None or has_hinges(path, ARM.joints))):
         return with_arm(file, shown)
     reading = read(Path(file))
     of_file = shown, reading.open_tree, reading.warnings
@@ -118,8 +122,9 @@ def compared_with(
         return with_solution(reading, of_file, in_one_line(asked), read(Path(solution or asked)))
     robot = robot_of(reading, shown)
     mujoco = engine(reading)
-    if asked == "model":
-        return Compared(Reference("model", *of_file), robot, mujoco, reading)
+    if asked in (None, "model"):
+        why = "" if asked else f"joints {some(robot.joints)} are not the arm's {some(ARM.joints)}"
+        return Compared(Reference("model", *of_file, why_itself=why), robot, mujoco, reading)
     own = own_engine(asked, robot, mujoco, joints)
     robot = dataclasses.replace(robot, own=tuple(own.equations.functions))
     return Compared(Reference("own", *of_file, in_one_line(asked), own), robot, mujoco, reading)
@@ -157,7 +162,7 @@ def joints_matched(
     try:
         return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:
-        raise JointsDiffer(f"{shown} cannot be compared with {whose}: {error}") from None
+        raise JointsDiffer(shown, whose, str(error)) from None
 
 
 def own_engine(asked: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:

@@ -41,7 +41,7 @@ DIRECTIONS = {
     "robots": {"tmt", "case", "actuators", "controller", "given"},
     "scene_file": {"case", "given", "robots"},
     "own_file": {"process", "judge"},
-    "reference": {"robots", "engines", "process", "case", "joint_map", "own_file"},
+    "reference": {"robots", "engines", "process", "case", "given", "joint_map", "own_file"},
     "engines": {"tmt", "case", "coordinates", "joint_map", "actuators", "controller"},
     "truth": {"tmt", "case", "actuators"},
     "judge": {"tmt", "case"},

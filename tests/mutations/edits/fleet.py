@@ -3,16 +3,20 @@
 from ..edit import Edit
 
 EDITS = (
-    Edit("fleet.row", "row_of_file", 'outcome, reason = DIFFER, causes[0]["text"] if causes else str(differing[0])',
+    Edit("fleet.row", "row_of_file", 'outcome, reason = DIFFER, first_cause(causes) if causes else str(differing[0])',
          'outcome, reason = AGREE, ""', "a file that differs agrees"),
     Edit("fleet.row", "row_of_file", "outcome, reason = BROKE, _1", 'outcome, reason = AGREE, ""', "what broke off agrees"),
     Edit("fleet.row", "own_step", "all(known)", "any(known)", "one posture at which the step is stable is enough"),
     Edit("fleet.row", "own_step", "min(limits, default=None)", "max(limits, default=None)", "the largest of the limits"),
     Edit("fleet.row", "own_step", 'row["integrator"] == row["file_integrator"]', "True", "limits of any integrator"),
-    Edit("fleet.row", "order", "(DIFFER, BROKE, REFUSED, AGREE)", "(AGREE, REFUSED, BROKE, DIFFER)", "what agrees comes first"),
+    Edit("fleet.row", "order", "VERDICTS.index", "VERDICTS[::-1].index", "what agrees comes first"),
+    Edit("fleet.row", "row_of_file", 'reference.kind == "model"', "False", "what was compared with itself agrees"),
+    Edit("fleet.row", "row_of_file", "UNCONFIRMED if unconfirmed else _1", "_1", "what no run confirms agrees"),
+    Edit("fleet.models", "Model.is_copy_of", "needs(self) == needs(other)", "True", "meshes of copies are forgotten"),
+    Edit("fleet.file_pieces", "Asked.alike", "self.solution_hash", '""', "another solution is the same"),
     Edit("fleet.since", "has_moved", "abs(new - old) > MOVED * abs(old)", "False", "no limit has moved"),
     Edit("fleet.since", "changed_parts", 'old["verdict"] != row["verdict"]', "False", "no verdict has changed"),
-    Edit("fleet.standing", "Standing.is_good", "set(self.verdicts()) <= {AGREE, REFUSED}", "True", "always good"),
+    Edit("fleet.standing", "Standing.is_good", "set(self.verdicts()) & set(BAD_VERDICTS)", "False", "always good"),
     Edit("fleet.models", "Model.hash", "self.contents()", '{"": self.path.read_bytes()}', "meshes are forgotten"),
     Edit("fleet.program", "program", 'path.suffix in (".py", ".xml", ".html", ".js")', "False", "any program is the same"),
     Edit("fleet.file_pieces", "broken", 'result.check("", ENDS, None, *_1)',
