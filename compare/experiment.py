@@ -32,18 +32,8 @@ ASKED_BY = {
 DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
 # the numbers that Mbar and h follow from, as `parameters` calls them
 IN_EQUATIONS = (
-    "order",
-    "parent",
-    "ref",
-    "axis",
-    "anchor",
-    "mass",
-    "com",
-    "inertia",
-    "gravity",
-    "armature",
-    "flag gravity",
-)
+    "order", "parent", "ref", "axis", "anchor", "mass", "com", "inertia", "gravity", "armature", "flag gravity",
+)  # fmt: skip
 TIMED_LAST = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
