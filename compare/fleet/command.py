@@ -161,11 +161,11 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     terminal, out = Terminal(), Path(options.out)
     before = earlier(options.since) if options.since else None
     found = found_models(options.paths)
+    asked, sent = with_reference(Asked(names, not options.full), options.reference)
     kept = Kept(out)
     try:
         door = Cluster(options.dask, options.limit) if options.dask else Pool(options.workers or cores(), options.limit)
         try:
-            asked, sent = with_reference(Asked(names, not options.full), options.reference)
             run, words = Run(found.models, asked, door, kept, out, sent), []
             say_some(terminal, [f"left out: {name}, {why}" for name, why in found.left_out])
             terminal.tell(lambda: words)
