@@ -102,12 +102,12 @@ def process_count(text: str) -> int:
 
 def stated_reference(text: str) -> str:
     """What a model is compared with: what has a colon is read later."""
-    if text in ("arm", "model") or ":" in text:
+    if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf")):
         return text
     if text.endswith(".py"):
         hint = f"a colon is missing: {text}:OBJECT, or {text}: for the file itself"
     else:
-        hint = expected(text, {name: name for name in ("arm", "model")}, "arm, model, FILE.py:OBJECT or MODULE:OBJECT")
+        hint = expected(text, {"arm": "arm", "model": "model"}, "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT")
     raise argparse.ArgumentTypeError(f"{text!r} is no reference; {hint}")
 
 
@@ -121,8 +121,8 @@ OPTIONS_OF_ALL = {
     "--mjcf": (None, {"type": not_empty, "metavar": "FILE", "help": "your model, an MJCF file"}),
     "--reference": (None, {
         "type": stated_reference, "metavar": "WHAT",
-        "help": "what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); "
-        "model, tmt's equations for the model as MuJoCo compiled it (default for any other); or your own equations, "
+        "help": "what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); FILE.xml, "
+        "a solution; model, tmt's equations for it as MuJoCo compiled it (default for any other); or equations of your own, "
         "FILE.py:OBJECT or MODULE:OBJECT, with mass_matrix(q) and bias(q, qd) (nothing after the colon: the module itself)",
     }),
     "--joints": (OF_OWN, {

@@ -8,7 +8,7 @@ from types import ModuleType
 
 from .drawing import FIRST, HALVES, draw, quiet
 from .experiments import EXPERIMENTS, module
-from .judge.check import DRAWN, ENDS, Result
+from .judge.check import ENDS, About, Result
 from .process.clock import Clock
 from .process.crash import described
 from .process.workers import WorkerEnded, Workers
@@ -30,6 +30,10 @@ ASKED_BY = {
     "gravity": ("gravity", "bias", "energy"),
 }
 DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
+# the numbers that Mbar and h follow from, as `parameters` calls them
+IN_EQUATIONS = (
+    "order", "parent", "ref", "axis", "anchor", "mass", "com", "inertia", "gravity", "armature", "flag gravity",
+)  # fmt: skip
 TIMED_LAST = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
@@ -138,7 +142,8 @@ def own_words(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
 def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict]) -> list[dict]:
     """The causes that are sought because the last of these sections is the first that fails, or the first of DIAGNOSED.
 
-    Where numbers are stated, a number that is read back as another one is the cause, and nothing else is sought.
+    Where numbers are stated, those that are read back as others are the causes, or what explains several of them at once;
+    nothing else is sought then.
     """
     failed = [section.name for section in sections if failures([section])[0]]
     if not failed or failed[-1] != sections[-1].name:
@@ -147,9 +152,23 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict])
     asks = failed[-1] in DIAGNOSED and not any(name in DIAGNOSED for name in failed[:-1])
     if failed[-1] == "diagnosis":
         asks = not known
-    if not asks or ((known or of_numbers) and not setup.robot.is_read) or setup.faults:
+    if (known or of_numbers) and setup.robot.is_stated:
+        return in_one(setup, of_numbers)
+    if not asks or setup.faults:
         return of_numbers
     return of_values(setup, [cause["place"] for cause in known]) + of_numbers
+
+
+def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
+    """The causes, in which one option, convention, number or slip stands for all numbers of Mbar and h where it explains them."""
+    if sum(cause["quantity"] in IN_EQUATIONS for cause in of_numbers) < 2 or setup.faults:
+        return list(of_numbers)
+    diagnosis = module("diagnosis")
+    found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
+    explaining = [diagnosis.record(cause) for cause in found.diagnosis.causes if cause.rank < 3] if found else []
+    if not explaining:
+        return list(of_numbers)
+    return [explaining[0], *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
 
 
 def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
@@ -178,7 +197,7 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
         raise
     except Exception as error:
         result = Result(name, shown=[])
-        result.check("", ENDS, None, 0.0, "", described(error), rule="equal")
+        result.check("", ENDS, None, 0.0, "", described(error), rule="equal", about=About.PROGRAM)
         return None, result
 
 
@@ -201,8 +220,9 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:
-        quantity = f"{DRAWN} {name} is drawn"
-        terminal.say(f"  FAIL {section.result.check('', quantity, None, 0.0, '', line, rule='equal')}", "red")
+        quantity = f"figure {name} is drawn"
+        check = section.result.check("", quantity, None, 0.0, "", line, rule="equal", about=About.PROGRAM)
+        terminal.say(f"  FAIL {check}", "red")
 
 
 def largest_share_in_words(share: float) -> str:

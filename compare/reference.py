@@ -1,6 +1,7 @@
 """The reference: what a file is compared with.
 
-The arm's stated numbers, tmt's equations for the compiled model, or equations of a user's own: FILE.py:OBJECT, MODULE:OBJECT.
+The arm's stated numbers, those of a solution, another MJCF file, tmt's equations for the compiled model, or equations of a
+user's own: FILE.py:OBJECT, MODULE:OBJECT.
 """
 
 import dataclasses
@@ -14,41 +15,60 @@ from .engines import Engine
 from .engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
 from .engines.mujoco.flags import integrator_by_name
 from .engines.own import Own, OwnEquations, OwnError
+from .given import some
 from .joint_map import JointsError, joint_map
 from .own_file import OwnFileError, aside, own_object
 from .process.streams import in_one_line
 from .robots import Robot
 from .robots.arm import ARM
-from .robots.file import robot_of
+from .robots.file import robot_of, robot_of_solution
+from .robots.matching import Unmatched, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
+SOLUTION = "solution"  # the kind of reference that is another file
 OWN_FILE = "mjcf/arm.xml"  # what is compared where no file is given
+
+
+class JointsDiffer(ModelError):
+    """A file whose joints are not those of the reference; why: which are missing, or too many."""
+
+    def __init__(self, shown: str, whose: str, why: str):
+        super().__init__(f"{shown} cannot be compared with {whose}: {why}")
+        self.why = why
 
 
 class Reference(NamedTuple):
     """What a file is compared with."""
 
-    kind: str  # of REFERENCES, or "own"
+    kind: str  # of REFERENCES, "solution" or "own"
     file: str  # as it is given, in one line
     open_tree: tuple[str, ...] = ()  # equalities of the file that are off
     warnings: tuple[str, ...] = ()  # of MuJoCo's compiler, one line each
-    asked: str = ""  # where equations of one's own come from, as it is given, in one line
+    asked: str = ""  # the solution, or where equations of one's own come from, as it is given, in one line
     own: Engine | None = None  # of these equations
+    renamed: tuple[str, ...] = ()  # "wrist as hand": joints that are not matched by their names
+    why_itself: str = ""  # why it is compared with its own compiled model, where that was not asked for
 
     @property
     def name(self) -> str:
-        """The arm, or the file; or where one's own equations come from."""
-        return {"arm": "arm", "own": self.asked}.get(self.kind, self.file)
+        """The arm, or the file; the solution, or where one's own equations come from."""
+        return "arm" if self.kind == "arm" else self.asked or self.file
 
     @property
     def compared(self) -> str:
         """What agrees or does not."""
-        return {"arm": "The two models", "own": "Your equations and MuJoCo"}.get(self.kind, "TMT and MuJoCo")
+        return {"model": "TMT and MuJoCo", "own": "Your equations and MuJoCo"}.get(self.kind, "The two models")
+
+    @property
+    def matched(self) -> str:
+        """Which joints are matched by something else than their names, in words; "": none is."""
+        return f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
 
     @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the output and of the report."""
         said = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.asked)}"]
+        said += [self.matched] * bool(self.renamed)
         if self.open_tree:
             said.append(f"open tree: {len(self.open_tree)} equalities off: {', '.join(self.open_tree)}")
         return tuple(map(in_one_line, (*said, *(f"MuJoCo warns: {line}" for line in self.warnings))))
@@ -79,26 +99,70 @@ class Compared(NamedTuple):
         return (self.reading.dt if dt is None else dt), name
 
 
-def compared_with(asked: str | None, path: str | None, joints: str | None = None, shown: str | None = None) -> Compared:
+def compared_with(
+    asked: str | None,
+    path: str | None,
+    joints: str | None = None,
+    shown: str | None = None,
+    solution: str | None = None,
+) -> Compared:
     """A file (None: the arm's own) and the reference that is asked for; None: the arm, if the file has exactly its hinges.
 
-    joints: of equations of one's own, separated by commas, see joint_map; shown: what the file is called, if not by its path.
-    ModelError, in one line, for a file that cannot be compared so; OwnFileError for equations that cannot be used.
+    joints: of equations of one's own, separated by commas, see joint_map; shown: what the file is called, if not by its path;
+    solution: where the solution is, if not where it is asked for.
+    ModelError, in one line, for a file that cannot be compared so, JointsDiffer where its joints are others than those of the
+    reference; OwnFileError for equations that cannot be used.
     """
     file, shown = path or ARM.mjcf, in_one_line(shown or path or OWN_FILE)
-    if asked is None:
-        asked = "arm" if path is None or has_hinges(path, ARM.joints) else "model"
-    if asked == "arm":
-        mujoco = load(file, ARM.tree)
-        return Compared(Reference("arm", shown, warnings=mujoco.warnings), ARM, mujoco, None)
+    if asked == "arm" or (asked is None and (path is None or has_hinges(path, ARM.joints))):
+        return with_arm(file, shown)
     reading = read(Path(file))
-    robot, of_file = robot_of(reading, shown), (shown, reading.open_tree, reading.warnings)
-    if asked == "model":
-        return Compared(Reference("model", *of_file), robot, engine(reading), reading)
+    of_file = shown, reading.open_tree, reading.warnings
+    if is_solution(asked):
+        return with_solution(reading, of_file, in_one_line(asked), read(Path(solution or asked)))
+    robot = robot_of(reading, shown)
     mujoco = engine(reading)
+    if asked in (None, "model"):
+        why = "" if asked else f"joints {some(robot.joints)} are not the arm's {some(ARM.joints)}"
+        return Compared(Reference("model", *of_file, why_itself=why), robot, mujoco, reading)
     own = own_engine(asked, robot, mujoco, joints)
     robot = dataclasses.replace(robot, own=tuple(own.equations.functions))
     return Compared(Reference("own", *of_file, in_one_line(asked), own), robot, mujoco, reading)
+
+
+def is_solution(asked: str | None) -> bool:
+    """Whether a reference that is asked for is another MJCF file."""
+    return (asked or "").lower().endswith((".xml", ".mjcf"))
+
+
+def with_arm(file: str | Path, shown: str) -> Compared:
+    """A file and the arm's stated numbers."""
+    robot, renamed = ARM, ()
+    if not has_hinges(file, ARM.joints):
+        names, renamed = joints_matched(ARM, read(Path(file)), shown, "the arm")
+        robot = ARM.with_joints(names)
+    mujoco = load(file, robot.tree)
+    return Compared(Reference("arm", shown, warnings=mujoco.warnings, renamed=renamed), robot, mujoco, None)
+
+
+def with_solution(reading: Reading, of_file: tuple, asked: str, solution: Reading) -> Compared:
+    """A file and the numbers of a solution."""
+    names, renamed = joints_matched(solution, reading, of_file[0], asked)
+    robot, solution = robot_of_solution(reading, of_file[0], solution, asked, names)
+    return Compared(Reference(SOLUTION, *of_file, asked, renamed=renamed), robot, engine(reading, solution), reading)
+
+
+def joints_matched(
+    stated: Robot | Reading, reading: Reading, shown: str, whose: str
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The file's joints in the order of the stated ones, and those that are matched by something else than their names.
+
+    JointsDiffer, if there are others.
+    """
+    try:
+        return matched_joints(stated.tree, reading.tree, whose)
+    except Unmatched as error:
+        raise JointsDiffer(shown, whose, str(error)) from None
 
 
 def own_engine(asked: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:

@@ -51,7 +51,7 @@ def test_who_asks_nothing_is_told_what_can_be_asked_in_ten_lines(tmp_path, capsy
     (["--quick"], "no experiment is named; one of parameters, "),
     (["--mjcf", "my robot.xml"], "or all is expected, as in python -m compare all --mjcf 'my robot.xml'"),
     (["mass", "--reference", "modle"], "argument --reference: 'modle' is no reference; did you mean model?"),
-    (["mass", "--reference", "x"], "'x' is no reference; one of arm, model, FILE.py:OBJECT or MODULE:OBJECT is expected"),
+    (["mass", "--reference", "x"], "'x' is no reference; one of arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT"),
     (["mass", "--reference", "my.py"],
      "'my.py' is no reference; a colon is missing: my.py:OBJECT, or my.py: for the file itself"),
     (["mass", "--out"], "argument --out: expected one argument"),

@@ -4,13 +4,15 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from models import PATHS
 from sections import GOOD, section
 
+import tmt
 from compare.engines.mujoco import ModelError
 from compare.process.streams import in_one_line
-from compare.reference import Reference, compared_with
+from compare.reference import JointsDiffer, Reference, compared_with
 from compare.report.files import write
 from compare.report.verdict import Report, verdict
 from compare.robots.arm import ARM
@@ -43,15 +45,62 @@ def test_any_other_and_whoever_asks_for_it_with_tmts_equations(asked, path):
     assert robot.is_read and mujoco.bare and reading.tree == robot.tree
 
 
-@pytest.mark.parametrize("text", [
-    XML.replace('name="gamma"', 'name="wrist"'), XML.replace("<worldbody>", f"<worldbody>{BALL}"),
+def written(tmp_path, text, name="other.xml"):
+    (tmp_path / name).write_text(text)
+    return str(tmp_path / name)
+
+
+RENAMED = XML.replace('"alpha"', '"Alpha"').replace(' name="beta"', "").replace('"gamma"', '"wrist"')
+ORDER = [f'<joint name="{name}" type="hinge" axis="{axis}"/>' for name, axis in (("alpha", "0 1 0"), ("beta", "1 0 0"))]
+EXCHANGED = RENAMED.replace('<joint name="Alpha" type="hinge" axis="0 1 0"/>', "X").replace(
+    '<joint type="hinge" axis="1 0 0"/>', '<joint name="second" type="hinge" axis="0 1 0"/>'
+).replace("X", '<joint name="first" type="hinge" axis="1 0 0"/>')  # fmt: skip
+
+
+@pytest.mark.parametrize("text, names", [
+    (RENAMED, ("Alpha", "joint 1", "wrist")),
+    (EXCHANGED, ("second", "first", "wrist")),
+    (RENAMED.replace('axis="0 1 0"', 'axis="0 -1 0"'), ("Alpha", "joint 1", "wrist")),  # which is wrong, and matched
+    (XML.replace('"gamma" type="hinge" axis="0 1 0"', '"elbow" type="hinge" axis="1 0 0"'), ("alpha", "beta", "elbow")),
 ])  # fmt: skip
-def test_one_other_joint_makes_another_robot(tmp_path, text):
-    path = tmp_path / "other.xml"
-    path.write_text(text)
-    assert compared_with(None, str(path))[0].kind == "model"
-    with pytest.raises(ModelError, match="hinges alpha, beta, gamma and no others are expected"):
-        compared_with("arm", str(path))
+@pytest.mark.parametrize("asked", ["arm", str(ARM.mjcf)])
+def test_joints_of_other_names_are_matched_by_place_axis_and_type(tmp_path, text, names, asked):
+    path = written(tmp_path, text)
+    assert compared_with(None, path)[0].kind == "model"
+    reference, robot, mujoco, _ = compared_with(asked, path)
+    assert robot.joints == names and reference.lines[1].startswith("joints matched: ")
+    assert reference.renamed == tuple(f"{b} as {a}" for a, b in zip(ARM.joints, names) if a != b)
+    right = text in (RENAMED, EXCHANGED)
+    q, qd = np.array([0.3, -0.2, 0.9]), np.array([1.0, 2.0, -3.0])
+    theirs = mujoco.of(robot.case()).bias(q, qd)
+    assert (np.abs(theirs - tmt.bias(q, qd)).max() < 1e-12) == (right and text != EXCHANGED)
+    assert robot.stated_in == (asked if asked != "arm" else "") and robot.is_stated
+
+
+@pytest.mark.parametrize("text, says", [
+    (XML.replace(ORDER[1], ""), r"joint beta \(hinge\) of .* is missing"),
+    (XML.replace("<worldbody>", f"<worldbody>{BALL}"), r"joint joint 0 \(ball\) is not in"),
+    (XML.replace('"gamma" type="hinge"', '"gamma" type="slide"'), r"joint gamma is a slide, that of .* a hinge"),
+    (RENAMED.replace('"wrist" type="hinge"', '"wrist" type="slide"'), r"gamma .* missing; joint wrist \(slide\) is not in"),
+])  # fmt: skip
+@pytest.mark.parametrize("asked", ["arm", str(ARM.mjcf)])
+def test_joints_without_a_counterpart_are_named(tmp_path, text, says, asked):
+    with pytest.raises(JointsDiffer, match=f"^.*other.xml cannot be compared with .*: .*{says}"):
+        compared_with(asked, written(tmp_path, text))
+
+
+def test_bodies_of_a_solution_are_found_on_their_joints(tmp_path):
+    reference, robot, mujoco, reading = compared_with(str(PATHS["gripper"]), str(PATHS["gripper"]))
+    assert (reference.kind, reference.name, reference.renamed) == ("solution", str(PATHS["gripper"]), ())
+    assert mujoco.bodies == list(reading.bodies) and not robot.drive.actuators
+    hand = '<body><inertial pos="0.3 0 0" mass="1" diaginertia="1 1 1"/></body></body>'
+    with pytest.raises(ModelError, match="body by body: joint gamma moves 2 bodies with mass, and 1 in the solution"):
+        compared_with(str(ARM.mjcf), written(tmp_path, XML.replace("</body>", hand, 1)))
+
+
+def test_an_empty_file_is_said_to_be_one(tmp_path):
+    with pytest.raises(ModelError, match=r"other\.xml is empty; an MJCF file is expected"):
+        compared_with(None, written(tmp_path, "\n"))
 
 
 def test_equalities_that_are_off_and_warnings_follow():

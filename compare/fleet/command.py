@@ -15,12 +15,14 @@ from ..experiments import EXPERIMENTS
 from ..process.streams import in_one_line
 from ..report.remaining import in_words
 from ..report.terminal import Terminal
-from .piece import LONGEST_PIECE
+from .piece import LONGEST_PIECE, FleetError
 
 if TYPE_CHECKING:
+    from .file_pieces import Asked
     from .run import Run
 
 MOST_SAID = 20  # lines of one kind, on the terminal
+SENT = "reference of the fleet"  # the folder of a solution among the files that are sent
 BETWEEN = 0.3  # s, after which it is said anew how far it is
 FLEET_TEXT = "\n\n".join(
     in_lines(text)
@@ -36,14 +38,19 @@ FLEET_TEXT = "\n\n".join(
 EPILOG = """examples:
   python -m compare fleet models              every model below models
   python -m compare fleet models --only mass,stability
+  python -m compare fleet class --reference solution.xml
   python -m compare fleet @release.txt --since reports/last_release
   python -m compare fleet models --dask tcp://10.0.0.5:8786
 
 a piece that ends its process runs again, at most three times; a fleet without
 --dask has a process for each core, and timed experiments run alone at its end
 
-exit status: 0 no file differs or broke off; 1 one does; 2 the request could
-not be carried out, for the reason in one line
+verdicts: agree (with stated numbers, or a solution), self-consistent (compared
+with its own compiled model only), differ, broke, refused, unconfirmed (the
+models agree, a prediction is not confirmed by runs)
+
+exit status: 0 no file differs, broke off or is unconfirmed; 1 one is; 2 the
+request could not be carried out, for the reason in one line
 """
 
 
@@ -57,12 +64,23 @@ def duration(text: str) -> float:
     return value
 
 
+def fleet_reference(text: str) -> str:
+    if text in ("arm", "model") or text.lower().endswith((".xml", ".mjcf")):
+        return text
+    raise argparse.ArgumentTypeError(f"{text!r} is no reference of a fleet; arm or FILE.xml is expected")
+
+
 FLEET_OPTIONS = {
     "--out": {
         "type": not_empty, "default": f"reports/{FLEET}", "metavar": "DIR",
         "help": "where the fleet goes (default: %(default)s)",
     },
     "--full": {"action": "store_true", "help": "each file as by `all`, not by `all --quick`"},
+    "--reference": {
+        "type": fleet_reference, "metavar": "WHAT",
+        "help": "what all files are compared with: arm, the stated numbers, or FILE.xml, a solution; joints are matched by name, "
+        "else by place, axis and type (default: the arm where a file has exactly its hinges, else itself as compiled)",
+    },
     "--only": {"type": not_empty, "metavar": "LIST", "help": "some experiments: mass,stability (default: all)"},
     "--workers": {
         "type": process_count, "metavar": "N", "help": "processes on this machine (default: one for each core)",
@@ -143,11 +161,12 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     terminal, out = Terminal(), Path(options.out)
     before = earlier(options.since) if options.since else None
     found = found_models(options.paths)
+    asked, sent = with_reference(Asked(names, not options.full), options.reference)
     kept = Kept(out)
     try:
         door = Cluster(options.dask, options.limit) if options.dask else Pool(options.workers or cores(), options.limit)
         try:
-            run, words = Run(found.models, Asked(names, not options.full), door, kept, out), []
+            run, words = Run(found.models, asked, door, kept, out, sent), []
             say_some(terminal, [f"left out: {name}, {why}" for name, why in found.left_out])
             terminal.tell(lambda: words)
 
@@ -181,6 +200,24 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     return 0 if run.is_good else 1
 
 
+def with_reference(asked: "Asked", reference: str | None) -> tuple["Asked", dict[str, bytes]]:
+    """What is asked of each file with a reference, and the files of a solution. FleetError if that cannot be read."""
+    from ..engines.mujoco import ModelError, read  # what is imported takes its time
+    from ..reference import is_solution
+    from .models import Model, bundle
+    from .parts import needed_by
+
+    if not is_solution(reference):
+        return asked._replace(reference=reference), {}
+    try:
+        read(Path(reference))
+        model = Model(Path(reference), needed_by(Path(reference)))
+        files = {f"{SENT}/{name}": content for name, content in bundle(model).items()}
+    except ModelError as error:
+        raise FleetError(f"--reference: {error}") from None
+    return asked._replace(reference=reference, solution=next(iter(files)), solution_hash=model.hash), files
+
+
 def how_far_it_is(run: "Run") -> list[str]:
     """How far a fleet is: files, pieces, the verdicts so far, how long still."""
     from .times import seconds_left
@@ -191,7 +228,7 @@ def how_far_it_is(run: "Run") -> list[str]:
     still = [(step, task.joints) for task, step in run.still()]
     left = seconds_left(run.took, still, run.workers, run.door.times_alone)
     parts = [
-        f"{run.files_done} of {len(run.tasks)} files",
+        f"{run.files_done} of {run.files} files",
         f"{run.pieces_done} of {run.pieces_done + len(still)} pieces",
     ]
     return [part for part in [*parts, verdicts, f"about {in_words(left)} left" if left else ""] if part]
@@ -206,10 +243,12 @@ def say_some(terminal: Terminal, lines: Sequence[str]) -> None:
 
 def say_new(terminal: Terminal, run: "Run") -> None:
     """A line for each file that has ended since the last call, or is known to differ before it has."""
+    from .row import BAD_VERDICTS, DIFFER, ITSELF
+
     for task in run.take_early():
-        terminal.say(f"{'differ':<8} {task.model.shown}: {task.differs}, so far", "red")
+        terminal.say(f"{DIFFER:<{len(ITSELF)}} {task.model.shown}: {task.differs}, so far", "red")
     for row in run.take_new():
         ratio = "" if row["worst_ratio"] is None else f"{100.0 * row['worst_ratio']:.2g} % of tolerance"
-        bad = row["verdict"] in ("differ", "broke")
+        bad = row["verdict"] in BAD_VERDICTS
         text = ": ".join(filter(None, (row["file"], row["reason"] or ratio)))
-        terminal.say(f"{row['verdict']:<8} {text}  {row['seconds']:.1f} s", "red" if bad else "")
+        terminal.say(f"{row['verdict']:<{len(ITSELF)}} {text}  {row['seconds']:.1f} s", "red" if bad else "")

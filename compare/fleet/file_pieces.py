@@ -18,10 +18,10 @@ from ..case import SEED
 from ..drawing import quiet
 from ..engines.mujoco import ModelError, read
 from ..experiments import EXPERIMENTS, module, skipped
-from ..judge.check import ENDS, Result
+from ..judge.check import ENDS, About, Result
 from ..judge.timing import vectors
 from ..process.clock import Clock
-from ..reference import Compared, compared_with
+from ..reference import SOLUTION, Compared, JointsDiffer, compared_with
 from ..report import files, folder, provenance, verdict
 from ..report.parts import Parts
 from ..setup import Setup, engines
@@ -36,6 +36,14 @@ class Asked(NamedTuple):
 
     names: tuple[str, ...]  # of experiments
     is_quick: bool
+    reference: str | None = None  # arm, model or a solution, as it is given; None: the arm where a file has its hinges
+    solution: str = ""  # where the solution is among the files that are sent
+    solution_hash: str = ""
+
+    @property
+    def alike(self) -> tuple:
+        """What a result follows from, besides the file and the experiment."""
+        return self.is_quick, self.reference, self.solution_hash
 
     def command(self, shown: str) -> str:
         """The command that makes the report of one file alone."""
@@ -43,6 +51,7 @@ class Asked(NamedTuple):
             words = ["all", *["--quick"] * self.is_quick, "--mjcf", shown]
         else:
             words = ["fleet", shown, *["--full"] * (not self.is_quick), "--only", ",".join(self.names)]
+        words += ["--reference", self.reference] if self.reference else []
         return shlex.join(["python", "-m", "compare", *words])
 
 
@@ -55,7 +64,9 @@ class Known(NamedTuple):
     joints: int | None = None
     integrator: str | None = None
     dt: float | None = None  # s
-    reference: str = ""  # what it is compared with, of reference.REFERENCES
+    reference: str = ""  # what it is compared with, the kind of a Reference
+    differs: str = ""  # which joints are not those of the reference, so that nothing else can be compared
+    why_itself: str = ""  # see Reference
 
 
 places = {}  # where models are unpacked, and in which folder, by their bundles; the one that was used last at the end
@@ -72,26 +83,31 @@ def unpacked_at(bundle: bytes) -> Path:
     return places[bundle][0]
 
 
-def compared_file(shown: str, bundle: bytes) -> Compared:
+def compared_file(shown: str, asked: Asked, bundle: bytes) -> Compared:
     """A file as it is compared. ModelError if it cannot be."""
-    return compared_with(None, str(unpacked_at(bundle)), shown=shown)
+    file = str(unpacked_at(bundle))
+    solution = str(places[bundle][1] / asked.solution) if asked.solution else None
+    return compared_with(asked.reference, file, shown=shown, solution=solution)
 
 
 def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
     """What is known of a file, and which experiments serve it."""
     try:
-        known = compared_file(shown, bundle)
+        known = compared_file(shown, asked, bundle)
         reading = known.reading or read(unpacked_at(bundle))
+    except JointsDiffer as error:
+        return Known("", differs=error.why, reference="arm" if asked.reference == "arm" else SOLUTION)
     except ModelError as error:
         return Known(
             as_given(str(error), shown, bundle)
             .removeprefix(f"{shown} cannot be compared: ")
             .replace(f" {shown}:", " it:")
+            .replace(f"{shown} is ", "it is ")
         )
     reasons = {name: reason for name in asked.names if (reason := skipped(name, known.robot))}
     serving = tuple(name for name in asked.names if name not in reasons)
     about = len(known.robot.joints), reading.integrator, reading.dt, known.reference.kind
-    return Known("", serving, tuple(reasons.items()), *about)
+    return Known("", serving, tuple(reasons.items()), *about, why_itself=known.reference.why_itself)
 
 
 def as_given(text: str, shown: str, bundle: bytes) -> str:
@@ -106,7 +122,7 @@ def setup_of(known: Compared, asked: Asked) -> Setup:
 
 def untimed_part(name: str, shown: str, asked: Asked, bundle: bytes) -> bytes:
     """What of an experiment is no timing, packed."""
-    setup = setup_of(compared_file(shown, bundle), asked)
+    setup = setup_of(compared_file(shown, asked, bundle), asked)
     with quiet(setup.robot):
         module(name).begin(setup)
         return zlib.compress(pickle.dumps(done(setup.background[name])), 1)
@@ -122,7 +138,7 @@ def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: by
 
     work: its `untimed_part`.
     """
-    setup = setup_of(compared_file(shown, bundle), asked)
+    setup = setup_of(compared_file(shown, asked, bundle), asked)
     if work:
         setup.background[name] = pickle.loads(zlib.decompress(work))
     found = experiment.computed(name, module(name), setup)
@@ -138,7 +154,7 @@ def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: by
 def broken(name: str, why: str) -> tuple[None, Result]:
     """What stands for an experiment that gave nothing: one failed check."""
     result = Result(name, shown=[])
-    result.check("", ENDS, None, 0.0, "", why, rule="equal")
+    result.check("", ENDS, None, 0.0, "", why, rule="equal", about=About.PROGRAM)
     return None, result
 
 
@@ -156,7 +172,7 @@ def reported(
     what they took.
     """
     began = time.process_time()
-    known = compared_file(shown, bundle)
+    known = compared_file(shown, asked, bundle)
     setup, names = setup_of(known, asked), [name for name in asked.names if name in found or name == "diagnosis"]
     have = {
         name: broken(name, value) if isinstance(value, str) else pickle.loads(zlib.decompress(value))
@@ -175,7 +191,7 @@ def reported(
         files.write(out, verdict.Report(sections, known.robot, origin, words, causes, skips, known.reference), parts)
         written = {name: (out / name).read_bytes() for name in folder.files(out)}
         shutil.rmtree(out / "figures", ignore_errors=True)
-    return row_of_file(sections, causes, parts.lines) | {"seconds": round(seconds, 2)}, written
+    return row_of_file(sections, causes, parts.lines, known.reference) | {"seconds": round(seconds, 2)}, written
 
 
 class Silent:

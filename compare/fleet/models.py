@@ -42,6 +42,14 @@ class Model:
         """Of the file with everything that it includes and loads, by their places relative to it. OSError: it cannot be read."""
         return hash_of(self.contents())
 
+    def is_copy_of(self, other: "Model") -> bool:
+        """Whether it has the same content under another name, and all that it includes and loads too. OSError: one is gone."""
+
+        def needs(model: Model) -> dict[str, bytes]:
+            return {name: content for name, content in model.contents().items() if name != os.path.basename(model.path)}
+
+        return self.sha256 == other.sha256 and needs(self) == needs(other)
+
     def contents(self) -> dict[str, bytes]:
         """The files that it needs, by their paths relative to its folder."""
         folder = os.path.dirname(os.path.abspath(self.path))
@@ -160,7 +168,10 @@ def lines_of(name: str) -> list[str]:
 
 
 def outermost(path: Path) -> str:
-    """The name of the outermost element of a file; of broken XML, or what cannot be read, that it seems to have, or ""."""
+    """The name of the outermost element of a file; of broken XML, or what cannot be read, that it seems to have, or "".
+
+    A file without any element, an empty one, is taken for a model: it is refused with this reason, and not passed over.
+    """
     try:
         for _, element in ElementTree.iterparse(path, events=("start",)):
             return element.tag
@@ -175,7 +186,8 @@ def outermost(path: Path) -> str:
     except OSError:
         return MODEL_ELEMENT
     is_text = b"\0" not in text
-    return MODEL_ELEMENT if is_text and b"<mujoco" in text and b"<mujocoinclude" not in text else ""
+    is_model = b"<mujoco" in text and b"<mujocoinclude" not in text
+    return MODEL_ELEMENT if is_text and (is_model or b"<" not in text) else ""
 
 
 def bundle(model: Model) -> dict[str, bytes]:

@@ -8,7 +8,7 @@ from string import Template
 from urllib.parse import quote
 
 from .models import place_of_report
-from .row import BROKE, DIFFER, REFUSED
+from .row import BAD_VERDICTS, ITSELF, REFUSED
 
 HEADS = {
     "file": "file",
@@ -23,15 +23,19 @@ HEADS = {
     "limit_s": "limit, ms",
     "seconds": "processor, s",
 }
-COMPARED_WITH = {"arm": "stated numbers", "model": "itself"}
-ROW_KINDS = {DIFFER: "bad", BROKE: "bad", REFUSED: "none"}
+COMPARED_WITH = {"arm": "stated numbers", "solution": "the solution", "model": "itself"}
+ROW_KINDS = dict.fromkeys(BAD_VERDICTS, "bad") | {REFUSED: "none", ITSELF: "none"}
 WHAT_COMES_FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
 MEANINGS = {
-    "agree": "MuJoCo and what the file is compared with differ by rounding alone",
+    "agree": "the file and the stated numbers, or the solution, that it is compared with differ by rounding alone",
+    "self-consistent": "tmt and MuJoCo agree on the file as MuJoCo compiled it; its numbers are compared with no others, and may "
+    "be wrong",
     "differ": "a check that compares them fails; the reason is the cause, where one is found",
     "broke": "something did not come to its end, so that nothing can be said",
+    "unconfirmed": "the models agree; a prediction about the step is not confirmed by runs",
     "refused": "the file cannot be compared",
-    "compared with": "the stated numbers of the arm, where a file has exactly its hinges, or itself as MuJoCo compiled it",
+    "compared with": "what --reference says; without it the stated numbers of the arm, where a file has exactly its hinges, or "
+    "itself as MuJoCo compiled it",
     "share of tolerance": "the largest difference, as a share of its tolerance of rounding; above 1 it is more than rounding",
     "step, integrator": "the file's own",
     "stable": "whether that step is, with that integrator under the file's own servos, at each posture "
@@ -76,7 +80,7 @@ def fleet_page(
         for name, value in origin.items()
     )
     parts.append(f'<h2>Where this comes from</h2>\n<table class="origin">{lines}</table>')
-    kind = "bad" if any(row["verdict"] in (DIFFER, BROKE) for row in rows) else "good"
+    kind = "bad" if any(row["verdict"] in BAD_VERDICTS for row in rows) else "good"
     return Template((Path(__file__).parent / "fleet.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title), kind=kind, said="".join(f"<p>{html.escape(text)}</p>" for text in said), body="\n".join(parts)
     )  # fmt: skip
@@ -91,9 +95,9 @@ def row_in_html(row: dict) -> str:
     cells = [cell_in_html(name, row[name]) for name in HEADS if name != "file"]
     name = html.escape(row["file"]).replace("/", "/<wbr>")
     if row["has_report"]:
-        address = html.escape(quote(f"{place_of_report(row['file'])}/index.html"))
+        address = html.escape(quote(f"{place_of_report(row['report_of'])}/index.html"))
         name = f'<a href="{address}">{name}</a>'
-    kind = ROW_KINDS.get(row["verdict"], "bad" if row["stable_at_file_dt"] is False else "good")
+    kind = "bad" if row["stable_at_file_dt"] is False else ROW_KINDS.get(row["verdict"], "good")
     return f'<tr class="{kind}"><th scope="row">{name}</th>{"".join(cells)}</tr>'
 
 

@@ -2,9 +2,10 @@
 
 import pickle
 from bisect import insort
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from pathlib import Path
+from types import MappingProxyType
 
 from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
@@ -12,7 +13,7 @@ from .file_pieces import Asked, Known, findings, read_file, reported, untimed_pa
 from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report
 from .piece import Door, Outcome, Piece
-from .row import BROKE, REFUSED
+from .row import BROKE, DIFFER, REFUSED
 from .standing import Standing
 from .task import Task, Waiting
 
@@ -23,11 +24,38 @@ AHEAD_FOR_EACH, AHEAD_FOR_ALL = 4, 16
 MARK = ".fleet"  # the file in a report that says from what it was made
 
 
+def tasks_of(models: Sequence[Model]) -> list[Task]:
+    """The files that are computed, each with those that have the same content."""
+    tasks, by_content = [], {}
+    for model in models:
+        same = [] if model.included_by or not model.sha256 else by_content.setdefault(model.sha256, [])
+        try:
+            first = next((task for task in same if model.is_copy_of(task.model)), None)
+        except OSError:
+            first = None
+        if first:
+            first.copies.append(model)
+        else:
+            tasks.append(Task(model))
+            same.append(tasks[-1])
+    return tasks
+
+
 class Run(Standing):
     """A fleet under way. After it `rows` has a row for each model, and `parts` the files that are only included by others."""
 
-    def __init__(self, models: Sequence[Model], asked: Asked, door: Door, kept: Kept, out: Path):
-        super().__init__([Task(model) for model in models])
+    def __init__(
+        self,
+        models: Sequence[Model],
+        asked: Asked,
+        door: Door,
+        kept: Kept,
+        out: Path,
+        sent: Mapping = MappingProxyType({}),
+    ):
+        """sent: the files of a solution, which are sent with each model; see Asked."""
+        super().__init__(tasks_of(models))
+        self.sent = dict(sent)
         self.asked, self.door, self.kept, self.out = asked, door, kept, out
         self.waiting, self.timed, self.under_way, self.count = [], [], {}, 0
         self.no_timing = door.no_timing()
@@ -93,7 +121,7 @@ class Run(Standing):
         if task.row is not None:
             return False
         try:
-            task.packed = task.packed or pickle.dumps(bundle(task.model))
+            task.packed = task.packed or pickle.dumps(bundle(task.model) | self.sent)
         except OSError as error:
             self.ended(task, BROKE, error.strerror)
             return False
@@ -161,6 +189,9 @@ class Run(Standing):
         if known.refused:
             self.ended(task, REFUSED, known.refused)
             return
+        if known.differs:
+            self.ended(task, DIFFER, known.differs)
+            return
         timed = [name for name in known.experiments if name in TIMED_LAST] if self.no_timing else []
         task.left_out = [*known.reasons, *((name, f"it measures time: {self.no_timing}") for name in timed)]
         names = [name for name in known.experiments if name not in timed]
@@ -169,12 +200,12 @@ class Run(Standing):
             return
         for name in names:
             if name != "diagnosis":  # it is made with the report, if something fails
-                task.keys[name] = self.key(task, name, self.asked.is_quick)
-                task.keys[name + UNTIMED] = self.key(task, name + UNTIMED, self.asked.is_quick)
+                task.keys[name] = self.key(task, name, *self.asked.alike)
+                task.keys[name + UNTIMED] = self.key(task, name + UNTIMED, *self.asked.alike)
         task.keys["report"] = self.key(task, "report", self.asked, names, task.left_out)
         row = self.kept.get(task.keys["report"])
         if row is not None and self.is_written(task):
-            self.done_before += 1
+            self.done_before += task.files
             self.ended(task, **row)
             return
         for name in (name for name in names if name in task.keys):

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from .file_pieces import Known
-from .row import AGREE, REFUSED
+from .row import BAD_VERDICTS
 from .task import Task
 
 
@@ -30,13 +30,17 @@ class Standing:
         about |= {
             "joints": known.joints,
             "reference": known.reference,
+            "why_itself": known.why_itself,
             "file_integrator": known.integrator,
             "file_dt_s": known.dt,
         }
         about |= dict.fromkeys(("worst_ratio", "stable_at_file_dt", "limit_s"))
-        task.row = about | {"seconds": round(task.seconds, 2), "has_report": bool(more)} | more
-        self.rows.append(task.row)
-        self.new.append(task.row)
+        of = task.model.shown
+        task.row = about | {"seconds": round(task.seconds, 2), "has_report": bool(more), "report_of": of} | more
+        same = ": ".join(filter(None, (f"the same as {of}", reason)))
+        copies = [task.row | {"file": copy.shown, "reason": same, "seconds": 0.0} for copy in task.copies]
+        self.rows += [task.row, *copies]
+        self.new += [task.row, *copies]
 
     def take_early(self) -> list[Task]:
         """The files without a row of which it is known since the last call that they differ."""
@@ -50,7 +54,11 @@ class Standing:
 
     @property
     def files_done(self) -> int:
-        return sum(task.row is not None for task in self.tasks)
+        return sum(task.files for task in self.tasks if task.row is not None)
+
+    @property
+    def files(self) -> int:
+        return sum(task.files for task in self.tasks)
 
     def verdicts(self) -> Counter:
         """How many files have which verdict, so far."""
@@ -58,8 +66,8 @@ class Standing:
 
     @property
     def is_good(self) -> bool:
-        """Whether none differs, and none broke."""
-        return set(self.verdicts()) <= {AGREE, REFUSED}
+        """Whether no file has one of BAD_VERDICTS."""
+        return not set(self.verdicts()) & set(BAD_VERDICTS)
 
     @property
     def pieces_done(self) -> int:

@@ -8,23 +8,25 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from ..judge.timing import vectors
+from ..reference import SOLUTION
 from ..report.provenance import commit
 from ..version import OURS, installed, own_version
 from .kept import write_whole
 from .page import fleet_page
-from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, REFUSED, order
+from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, VERDICTS, order
 from .run import Run
 from .times import time_of_workers
 
 VERDICT_WORDS = {DIFFER: ("differs", "differ"), BROKE: ("broke off", "broke off"), REFUSED: ("was refused", "were refused"),
-         AGREE: ("agrees", "agree")}  # fmt: skip
+         AGREE: ("agrees", "agree"), UNCONFIRMED: ("has a prediction that is not confirmed",
+         "have predictions that are not confirmed"), ITSELF: ("is self-consistent", "are self-consistent")}  # fmt: skip
 
 
 def write_table(
     out: Path, run: Run, left_out: Sequence[tuple[str, str]], changed: Sequence[str] | None, command: str, took: float
 ) -> list[str]:
     """Write fleet.csv and index.html; the sentences at the top. changed: since an earlier fleet, None: that was not asked."""
-    rows, left_out = sorted(run.rows, key=order), [*left_out, *run.parts]
+    rows, left_out = sorted(with_why_itself(run.rows), key=order), [*left_out, *run.parts]
     spent = time_of_workers(run.took, run.workers, took, run.door.times_alone)
     said = sentences_of(rows, left_out, run)
     origin = {
@@ -43,6 +45,16 @@ def write_table(
     text = fleet_page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture_of_steps(rows))
     write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
     return [*said, spent.words(run.workers, took)] if round(spent.computing, 2) else said
+
+
+def with_why_itself(rows: Sequence[dict]) -> list[dict]:
+    """The rows; beside files that are compared with stated numbers those that are not have the reason for that."""
+    if not any(row["reference"] in ("arm", SOLUTION) for row in rows):
+        return list(rows)
+    reasons = [
+        f"{row['why_itself']}: compared with its own compiled model only" if row["why_itself"] else "" for row in rows
+    ]
+    return [row | {"reason": "; ".join(filter(None, (why, row["reason"])))} for row, why in zip(rows, reasons)]
 
 
 def csv_of_fleet(rows: Sequence[dict]) -> str:
@@ -70,7 +82,7 @@ def picture_of_steps(rows: Sequence[dict]) -> tuple[bytes, str, tuple[int, int]]
 def sentences_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: Run) -> list[str]:
     """How many have which verdict; whose own step is not stable; what is left out; what is known from before."""
     counted = run.verdicts()
-    many = [f"{counted[v]} {VERDICT_WORDS[v][counted[v] > 1]}" for v in (DIFFER, BROKE, REFUSED, AGREE) if counted[v]]
+    many = [f"{counted[v]} {VERDICT_WORDS[v][counted[v] > 1]}" for v in VERDICTS if counted[v]]
     said = [f"{len(rows)} file{'s' if len(rows) != 1 else ''}: {', '.join(many)}."]
     unstable = [row["file"] for row in rows if row["stable_at_file_dt"] is False]
     if unstable:
@@ -83,10 +95,10 @@ def sentences_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run:
         )
     if run.no_timing:
         said.append(f"Experiments that measure time are left out: {run.no_timing}.")
-    stated = sum(row["reference"] == "arm" for row in rows)
-    if 0 < stated < len(rows):
+    if counted[ITSELF]:
         said.append(
-            f"Compared with the arm's stated numbers: {stated}; the others, which have other joints, with themselves."
+            "Self-consistent: compared with the own compiled model only, not with stated numbers; --reference compares "
+            "all files with the arm or a solution."
         )
     known = (run.done_before, "file", ""), (run.pieces_before, "piece", " of others")
     if before := [f"{many} {what}{'s' * (many != 1)}{of}" for many, what, of in known if many]:

@@ -12,6 +12,7 @@ class Task:
     """One file, as far as it is done."""
 
     model: Model
+    copies: list[Model] = field(default_factory=list)  # files with the same content
     known: Known | None = None
     keys: dict = field(default_factory=dict)  # under which results are kept, by their kind
     lost: dict = field(default_factory=dict)  # experiments that gave nothing, and why
@@ -22,6 +23,11 @@ class Task:
     packed: bytes = b""  # the model with what it needs, while pieces are handed out
     differs: str = ""  # the first check that does not hold, before there is a row
     row: dict | None = None
+
+    @property
+    def files(self) -> int:
+        """How many files it stands for."""
+        return 1 + len(self.copies)
 
     @property
     def joints(self) -> int | None:

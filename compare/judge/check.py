@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from enum import Enum
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,9 +29,16 @@ RULES = {  # of a verdict: the words between a value and its tolerance, and what
 }
 
 
-# checks that fail where the program could not go on: they say nothing of an agreement
-ENDS, DRAWN, LOCKABLE = "runs to its end", "figure", "models whose hinges can be locked"
-AT_OWN_STEP = "stable at its own step"  # a check of the robot: it says nothing of an agreement either
+ENDS, AT_OWN_STEP = "runs to its end", "stable at its own step"  # names of checks
+
+
+class About(Enum):
+    """What a check is about; only those of the first kind say whether the two models agree."""
+
+    MODELS = "numbers of the two models, or of one of them and the exact or stated value"
+    PREDICTION = "what a run is predicted to do: its limit, its order, when it leaves"
+    STEP = "whether the step at which the robot is used is stable"
+    PROGRAM = "whether the program could go on"
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,7 @@ class Check:
     note: str = ""
     rounding: bool = False  # the tolerance is a bound of rounding, not a printed digit or a count
     rule: str = "at most"
+    about: About = About.MODELS
 
     def __post_init__(self):
         if self.rule not in RULES or not np.isfinite(self.tolerance):
@@ -93,10 +102,13 @@ class Result:
     top: list = field(default_factory=list)  # sentences for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that MuJoCo is compared with
 
-    def check(self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most") -> Check:
+    def check(
+        self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most", about=About.MODELS
+    ) -> Check:
         """Add a check; a value that is None or not finite stands for a run that gave no number, and fails."""
         value = None if value is None or not np.isfinite(value) else float(value)
-        self.checks.append(Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule))
+        one = Check(self.experiment, scene, quantity, value, float(tolerance), unit, note, rounding, rule, about)
+        self.checks.append(one)
         return self.checks[-1]
 
     def agree(self, sample, quantity, unit, values, mujoco_values, scale, truth=None) -> None:

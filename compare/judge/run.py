@@ -9,7 +9,7 @@ from tmt import literal
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 
 from ..case import Case, Coordinates, rates_at
-from .check import Result
+from .check import About, Result
 from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale
 
@@ -40,7 +40,7 @@ def movement_unit(coordinates: Coordinates) -> str:
 
 def check_movement(result: Result, where: str, moved: float, unit: str = "rad") -> None:
     """A run without a torque that holds moves, rad or m: one that stays shows nothing."""
-    result.check(where, "movement", moved, MOVES, unit, rule="at least")
+    result.check(where, "movement", moved, MOVES, unit, rule="at least", about=About.PREDICTION)
 
 
 def moved_from(q: np.ndarray, start: np.ndarray, coordinates: Coordinates | None = None) -> np.ndarray:

@@ -18,7 +18,7 @@ def introduction(robot) -> str:
     """What is compared, and how its tables are read."""
     named = robot.described or robot.name
     what = f"{how_many(len(robot.tree.body_names), 'rigid body', 'rigid bodies')} on {joints_in_words(robot)}"
-    return (of_file(named, what, robot.features, robot.own) if robot.is_read else of_two_models(named, what)) + (
+    return (of_file(named, what, robot) if robot.is_read else of_two_models(named, what)) + (
         " Each difference stands beside a tolerance that was "
         "fixed beforehand (column bar); 'exact' is the method in 50-digit arithmetic, and distances from it are in eps = "
         "2.2e-16 of the quantity's scale. Of the states in a row, the largest difference is the largest of all; the worst is "
@@ -34,20 +34,22 @@ def of_two_models(named: str, what: str) -> str:
     )
 
 
-def of_file(named: str, what: str, features: Sequence, own: Sequence[str] = ()) -> str:
-    """What is compared of a robot that is read from a file, and what is switched off for that.
-
-    own: what a user's own equations give, if they are compared.
-    """
-    if own:
-        compared = f"{named}: {what}. Your equations, which give {listed(own)}, are compared with MuJoCo's. "
+def of_file(named: str, what: str, robot) -> str:
+    """What is compared of a robot that is read from a file, and what is switched off for that."""
+    if robot.own:
+        compared = f"{named}: {what}. Your equations, which give {listed(robot.own)}, are compared with MuJoCo's. "
+    elif robot.stated_in:
+        compared = (
+            f"{named}: {what}. tmt's equations of motion for the numbers of {robot.stated_in} are compared with MuJoCo's for "
+            "this file. "
+        )
     else:
         compared = (
             f"{named}: {what}. The numbers are those of the model as MuJoCo compiled it; tmt's equations of motion for these "
             "numbers are compared with MuJoCo's, so that an agreement says that the equations are the same, and not that the "
             "numbers are right. "
         )
-    off = [f"{feature.feature} ({feature.count})" for feature in features if feature.treatment != "modelled"]
+    off = [f"{feature.feature} ({feature.count})" for feature in robot.features if feature.treatment != "modelled"]
     return (
         compared
         + (f"Switched off in MuJoCo, because the equations do not have it: {', '.join(off)}." if off else

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from ..judge.check import Check
+from ..judge.check import About, Check
 from ..process.crash import described
 
 Made = TypeVar("Made")
@@ -32,6 +32,6 @@ class Parts:
     def checks(self) -> list[Check]:
         """A failed check for each broken part."""
         return [
-            Check("report", "", f"{name} can be made", None, 0.0, "", why, rule="equal")
+            Check("report", "", f"{name} can be made", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
             for name, why in self.broken.items()
         ]

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ..judge.check import AT_OWN_STEP, DRAWN, ENDS, LOCKABLE, Check, Result
-from ..judge.words import listed
+from ..judge.check import ENDS, About, Check, Result
+from ..judge.words import capital, listed
 
 SEEKS_CAUSES = "diagnosis"  # the experiment in which nothing can agree or not: it says why others fail
 
@@ -45,12 +45,20 @@ class Report(NamedTuple):
         return [text for section in self.sections for text in section.result.top]
 
 
-def failures(sections: Sequence[Section]) -> tuple[list, list, list]:
-    """The checks that fail: those that compare, those that say that something broke off, and those of the robot's own step."""
+class Failures(NamedTuple):
+    """The checks that fail, by what they are about; only the first say that the two models differ."""
+
+    differing: list[Check]
+    broke: list[Check]
+    unstable: list[Check]
+    unconfirmed: list[Check]
+
+
+def failures(sections: Sequence[Section]) -> Failures:
+    """The checks that fail: of the models, of what broke off, of the step, of predictions that no run confirms."""
     failed = [check for section in sections for check in section.result.checks if not check.passed]
-    broke = [check for check in failed if check.quantity in (ENDS, LOCKABLE) or check.quantity.startswith(f"{DRAWN} ")]
-    unstable = [check for check in failed if check.quantity == AT_OWN_STEP]
-    return [check for check in failed if check not in broke and check not in unstable], broke, unstable
+    kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION
+    return Failures(*([check for check in failed if check.about == kind] for kind in kinds))
 
 
 def unstable_in_words(unstable: Sequence[Check]) -> str:
@@ -63,6 +71,13 @@ def unstable_in_words(unstable: Sequence[Check]) -> str:
     )
     step, limit = (f"{1e3 * number:.4g} ms" for number in (worst.value, worst.tolerance))
     return f"not stable at its own step of {step} at {worst.scene}{more}: the limit is {limit} {worst.note}".rstrip()
+
+
+def unconfirmed_in_words(unconfirmed: Sequence[Check]) -> str:
+    """How many predictions no run confirms, and the first."""
+    if len(unconfirmed) == 1:
+        return f"one prediction is not confirmed by the runs: {unconfirmed[0]}"
+    return f"{len(unconfirmed)} predictions are not confirmed by the runs, first {unconfirmed[0]}"
 
 
 def passed(sections: Sequence[Section]) -> bool:
@@ -93,16 +108,19 @@ def verdict(
     if not checks:
         return f"Nothing was compared in {empty}: the notes there say why."
     sections = [section for section in sections if section.result.checks]
-    differing, broke, unstable = failures(sections)
+    differing, broke, unstable, unconfirmed = failures(sections)
     failing = {check.experiment for check in differing} - {SEEKS_CAUSES}
     names = ", ".join(section.name for section in sections if not differing or section.name in failing)
     is_whole, some = len(sections) == experiments, f"{len(sections)} of {experiments} experiments"
     where = f" in {names}" if names else ""
     ran = "" if is_whole else f"{where} ({some}{' ran' if differing else ''})"
-    own = f"{robot} is {unstable_in_words(unstable)}." if unstable else ""
-    stopped = f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."
+    also = [f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."] * bool(broke)
+    also += [f"{capital(unconfirmed_in_words(unconfirmed))}."] if unconfirmed else []
+    also += [f"But {robot} is {unstable_in_words(unstable)}."] if unstable else []
+    which = "checks that compare them" if broke or unstable or unconfirmed else "checks"
+    comparing = [check for check in checks if check.about == About.MODELS] if " " in which else checks
     if differing:
-        text = f"{compared} do not agree{ran}: {len(differing)} of {len(checks)} checks fail. "
+        text = f"{compared} do not agree{ran}: {len(differing)} of {len(comparing)} {which} fail. "
         if causes:
             more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
             others = sum(check.experiment not in ("parameters", "diagnosis") for check in differing)
@@ -111,16 +129,16 @@ def verdict(
             text += f"Cause: {causes[0]['text']}{more}.{follow}"
         else:
             text += f"First: {differing[0]}."
-        return " ".join(filter(None, (text.rstrip(), stopped * bool(broke), f"Besides, {own}" * bool(own))))
-    passing = len(checks) - len(broke) - len(unstable)
+        return " ".join([text, *also])
+    if not comparing:
+        return " ".join(["Nothing was compared.", *also])
     if broke:
         left = "" if is_whole else f" ({some})"
-        text = f"Not everything could be compared{left}; the other {passing} checks pass. {stopped}"
-        return text + f" Besides, {own}" * bool(own)
-    text = f"{compared} agree{ran}: all {passing} {'checks that compare them' if own else 'checks'} pass."
+        return " ".join([f"Not everything could be compared{left}; all {len(comparing)} {which} pass.", *also])
+    text = f"{compared} agree{ran}: all {len(comparing)} {which} pass."
     text += f" In {empty} nothing was compared." * bool(empty)
-    if own:
-        return f"{text[:-1]}; but {own}"
+    if also:
+        return " ".join([text, *also])
     top = worst(sections)
     if top is None or top.value == 0.0:
         return text
@@ -134,25 +152,28 @@ def verdict(
 def outcome(section: Section) -> str:
     """Whether a section's claim holds, in words."""
     checks = section.result.checks
-    differing, broke, unstable = failures([section])
+    differing, broke, unstable, unconfirmed = failures([section])
     if differing:
         return f"It does not hold: {len(differing)} of {len(checks)} checks fail."
-    if unstable and not broke:
-        passing = len(checks) - len(unstable)
-        return f"It holds: {passing} checks that compare pass; but the robot is {unstable_in_words(unstable)}."
     if broke:
         return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
+    if unstable or unconfirmed:
+        but = [unconfirmed_in_words(unconfirmed)] if unconfirmed else []
+        but += [f"the robot is {unstable_in_words(unstable)}"] if unstable else []
+        return f"{sum(check.passed for check in checks)} checks pass; but {'; and '.join(but)}."
     return f"It holds: all {len(checks)} checks pass." if checks else "It is not decided: nothing was compared."
 
 
 def standing(section: Section) -> tuple[bool | None, str]:
     """Whether a section passes, and that in two or three words; None where nothing was compared."""
     checks = section.result.checks
-    differing, broke, unstable = failures([section])
+    differing, broke, unstable, unconfirmed = failures([section])
     if differing:
         return False, f"{len(differing)} of {len(checks)} fail"
     if broke:
         return False, "broke off" if any(check.quantity == ENDS for check in broke) else "not whole"
+    if unconfirmed:
+        return False, f"{len(unconfirmed)} not confirmed"
     if unstable:
         return False, "its step is not stable"
     return (True, "pass") if checks else (None, "nothing compared")

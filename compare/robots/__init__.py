@@ -1,6 +1,6 @@
 """What is known of one robot. Everything that only the assignment's arm has is in arm.py."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -95,6 +95,8 @@ class Robot:
     # what a file has and how it is treated, see engines.mujoco.inventory; then the numbers are those that MuJoCo compiled
     features: tuple = ()
     drive: Drive = field(default_factory=Drive)  # actuators and what else acts beside gravity and springs
+    stated_in: str = ""  # the solution, another file, whose numbers are stated of this one; "": none is
+    features_stated: tuple = ()  # of the solution, as `features`
     own: tuple[
         str, ...
     ] = ()  # what a user's own equations give, "mass_matrix" ..., where they are compared; (): tmt's are
@@ -110,8 +112,13 @@ class Robot:
 
     @property
     def is_read(self) -> bool:
-        """Whether its numbers are those of a file, as MuJoCo compiled it; else they are stated."""
+        """Whether its numbers are those of a file, as MuJoCo compiled it; else they are stated here."""
         return bool(self.features)
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether its numbers are stated apart from the file that MuJoCo runs: here, or in a solution."""
+        return not self.is_read or bool(self.stated_in)
 
     @property
     def noun(self) -> str:
@@ -152,6 +159,22 @@ class Robot:
     def with_scenes(self, scenes: tuple[Scene, ...]) -> "Robot":
         """The same robot with more scenes."""
         return replace(self, scenes=self.scenes + scenes)
+
+    def with_joints(self, names: Sequence[str]) -> "Robot":
+        """The same robot whose joints are called otherwise. names: of all, in the order of the Tree."""
+        called = dict(zip(self.joints, names, strict=True))
+
+        def renamed(joints: Sequence[str]) -> tuple[str, ...]:
+            return tuple(called[joint] for joint in joints)
+
+        return replace(
+            self,
+            tree=replace(self.tree, hinge_names=tuple(names)),
+            scenes=tuple(replace(scene, locked=renamed(scene.locked)) for scene in self.scenes),
+            symbols={called[joint]: symbol for joint, symbol in self.symbols.items()},
+            printed=tuple(item._replace(sizes=renamed(item.sizes)) for item in self.printed),
+            conditioning=self.conditioning and self.conditioning._replace(joints=renamed(self.conditioning.joints)),
+        )
 
     def symbol(self, joint: str) -> str:
         return self.symbols.get(joint, joint)

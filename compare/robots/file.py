@@ -1,6 +1,6 @@
 """A robot that is read from a file: its postures, and the scenes that any robot can play."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -60,6 +60,25 @@ def robot_of(reading: Reading, shown: str) -> Robot:
         features=tuple(reading.features),
         drive=drive,
     )
+
+
+def robot_of_solution(
+    reading: Reading, shown: str, solution: Reading, whose: str, names: Sequence[str]
+) -> tuple[Robot, Reading]:
+    """The robot of a file whose numbers are stated in a solution, called `whose`, and that as it is compared.
+
+    names: of the file's joints, in the order of the solution's. Postures and scenes are the solution's. Actuators do not act:
+    they may be others.
+    """
+    solution = replace(solution, tree=replace(solution.tree, hinge_names=tuple(names)), drive=Drive())
+    robot = replace(
+        robot_of(solution, shown),
+        mjcf=reading.source,
+        features=tuple(reading.features),
+        stated_in=whose,
+        features_stated=tuple(solution.features),
+    )
+    return robot, solution
 
 
 def names_of_keys(reading: Reading) -> dict[str, str]:

@@ -42,7 +42,7 @@ def test_a_file_that_is_not_the_arm(tmp_path, content, says):
     "old, new, says",
     [
         ('name="gamma"', 'name="elbow"', r"elbow \(hinge\)"),
-        ('name="gamma"', "", r"unnamed \(hinge\)"),
+        ('name="gamma"', "", r"joint 2 \(hinge\)"),
         ('name="gamma" type="hinge"', 'name="gamma" type="slide"', r"gamma \(slide\)"),
         (
             '<body name="upper_arm" pos="0 0 0">',

@@ -4,8 +4,9 @@ import pytest
 
 import tmt
 from compare.engines.mujoco import parse
-from compare.experiment import Setup, engines
+from compare.experiment import Setup, engines, new_causes
 from compare.experiments import parameters
+from compare.report.verdict import Section
 from compare.robots.arm import ARM
 
 XML = ARM.mjcf.read_text(encoding="utf-8")
@@ -116,3 +117,25 @@ def test_touching_is_named_by_its_force():
 def test_a_parameter_is_compared_within_64_eps(off, fails):
     mass = 1.5 * (1.0 + off * 2.220446049250313e-16)
     assert bool(causes('mass="1.5"', f'mass="{mass!r}"')) is fails
+
+
+FOREARM = '<body name="forearm" pos="0 0 -0.3"'
+
+
+@pytest.mark.parametrize("edits, places", [
+    ([(FOREARM, f'{FOREARM} euler="0 90 0"')], ["zero of gamma"]),  # 90 degrees where radians are meant
+    ([('"0.015 0.014 0.002"', '"0.002 0.014 0.015"')], ["axes x and z of the inertia of upper arm exchanged"]),
+    ([('mass="1.9"', 'mass="3.9"')], ["mass of upper arm"]),
+    ([('mass="1.9"', 'mass="3.9"'), ('pos="0.15 0 0"', 'pos="0.16 0 0"')], ["mass of upper arm", "com x of forearm"]),
+    ([(GAMMA, GAMMA.replace("type", 'damping="0.1" limited="true" range="-9 9" type'))],
+     ["damping of gamma", "limited of gamma"]),
+    ([(FOREARM, f'{FOREARM} euler="0 90 0"'), (GAMMA, GAMMA.replace("type", 'damping="0.1" type'))],
+     ["zero of gamma", "damping of gamma"]),
+])  # fmt: skip
+def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, places):
+    text = XML
+    for old, new in edits:
+        text = text.replace(old, new)
+    setup = Setup(ARM, engines(parse(text, tmt.ARM)), states=20)
+    sections = [Section("parameters", "", "", "", parameters.rows(setup))]
+    assert [cause["place"] for cause in new_causes(setup, sections, [])] == places

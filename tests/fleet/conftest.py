@@ -4,6 +4,7 @@ from types import SimpleNamespace
 import pytest
 from inside import Inside
 
+from compare.fleet.command import with_reference
 from compare.fleet.file_pieces import Asked
 from compare.fleet.kept import Kept
 from compare.fleet.models import found_models
@@ -16,14 +17,15 @@ def fleet(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m").mkdir()
 
-    def run(files, names=("mass",), door=None, found=None, is_quick=True, take=lambda run: None):
+    def run(files, names=("mass",), door=None, found=None, is_quick=True, take=lambda run: None, reference=None):
         for name, text in files.items():
             (tmp_path / "m" / name).parent.mkdir(exist_ok=True)
             (tmp_path / "m" / name).write_text(text)
         kept, door = Kept(tmp_path / "out"), door or Inside()
         try:
             found = found or found_models(["m"])
-            of = Run(found.models, Asked(tuple(names), is_quick), door, kept, tmp_path / "out")
+            asked, sent = with_reference(Asked(tuple(names), is_quick), reference)
+            of = Run(found.models, asked, door, kept, tmp_path / "out", sent)
             of.carry_out(lambda: take(of))
         finally:
             kept.close()

@@ -52,22 +52,27 @@ def test_a_fleet_says_which_file_differs_and_why(first):
     assert (first.run.returncode, first.run.stderr) == (1, "")
     lines = first.run.stdout.splitlines()
     assert lines[0] == "left out: m/part.xml, it is a part, to be included by a model"
-    said = {line.split()[0]: line for line in lines if line.split()[:1] in (["agree"], ["differ"], ["refused"])}
-    assert f"m/x/{NAME}: " in said["agree"] and "% of tolerance" in said["agree"]
+    said = {
+        line.split()[0]: line for line in lines if line.split()[:1] in (["self-consistent"], ["differ"], ["refused"])
+    }
+    assert f"m/x/{NAME}: " in said["self-consistent"] and "% of tolerance" in said["self-consistent"]
     assert "m/heavy.xml: mass of upper arm: stated 1.9 kg, compiled 9 kg" in said["differ"]
     assert "m/broken.xml: MuJoCo cannot compile it: XML" in said["refused"]
-    assert "3 files: 1 differs, 1 was refused, 1 agrees." in lines and lines[-1].startswith("Fleet: out/index.html (")
+    assert "3 files: 1 differs, 1 was refused, 1 is self-consistent." in lines and lines[-1].startswith(
+        "Fleet: out/index.html ("
+    )
     assert re.fullmatch(r"Of 2 x \d+ s (\d+ % were [a-z ]+(, |\.))+", lines[-2])
     assert "\x1b" not in first.run.stdout and "\r" not in first.run.stdout  # nothing moves in a pipe
 
 
 def test_the_table_has_what_needs_a_look_first_in_tidy_columns(first):
-    assert [row["verdict"] for row in first.rows] == ["differ", "refused", "agree"]
+    assert [row["verdict"] for row in first.rows] == ["differ", "refused", "self-consistent"]
     assert all(list(row) == list(FLEET_COLUMNS) for row in first.rows)
     differs, refused, agrees = first.rows
     assert float(differs["worst_ratio"]) > 1.0 > float(agrees["worst_ratio"]) > 0.0
     assert (agrees["joints"], agrees["file_integrator"], agrees["file_dt_s"]) == ("2", "RK4", "0.002")
-    assert [agrees[name] for name in ("reason", "stable_at_file_dt", "limit_s")] == ["", "", ""]
+    assert [agrees[name] for name in ("stable_at_file_dt", "limit_s")] == ["", ""]
+    assert agrees["reason"].endswith("are not the arm's alpha, beta, gamma: compared with its own compiled model only")
     assert all(refused[name] == "" for name in ("joints", "worst_ratio", "file_integrator", "file_dt_s", "limit_s"))
     assert all(len(row["sha256"]) == 64 and float(row["seconds"]) >= 0.0 for row in first.rows)
 
@@ -100,10 +105,10 @@ def test_the_same_command_goes_on_and_says_what_has_changed(first, folder):
     (folder / "n" / "m" / "broken.xml").write_text(PENDULUM)
     shutil.move(folder / "later", folder / "n" / "later")
     changed = compare(*command, cwd=folder / "n")
-    assert changed.returncode == 0 and "2 files: 2 agree." in changed.stdout
+    assert changed.returncode == 0 and "2 files: 2 are self-consistent." in changed.stdout
     lines = [line for line in changed.stdout.splitlines() if line.startswith("changed: ")]
     assert lines == [
-        "changed: m/broken.xml: refused before, now agree (the file has changed)",
+        "changed: m/broken.xml: refused before, now self-consistent (the file has changed)",
         "changed: m/heavy.xml: gone, differ before",
     ]
 
@@ -115,7 +120,7 @@ def test_a_terminal_shows_how_far_it_is_and_then_what_has_come_out(columns, term
     run = on_terminal(["fleet", "a.xml", "--only", "mass", "--out", "out", "--workers", "1"], columns, term, tmp_path)
     assert run.status == 0
     shown = words(readable_lines(run))
-    assert "1 file: 1 agrees." in shown and "pieces" not in shown
+    assert "1 file: 1 is self-consistent." in shown and "pieces" not in shown
     assert ("of 1 files, " in run.output) == (term != "dumb")
 
 
@@ -130,6 +135,7 @@ def test_a_terminal_shows_how_far_it_is_and_then_what_has_come_out(columns, term
     (["fleet", "m", "--only", ""], "argument --only: it is empty"),
     (["fleet", "m", "--workers", "0"], "argument --workers: '0' is no number of processes; 1 or more are expected"),
     (["fleet", "m", "--workers", "two"], "argument --workers: 'two' is no number of processes"),
+    (["fleet", "m", "--reference", "my.py:"], "'my.py:' is no reference of a fleet; arm or FILE.xml is expected"),
     (["fleet", "m", "--limit", "nan"], "argument --limit: 'nan' is no time; seconds above 0 are expected"),
     (["fleet", "m", "--limit", "-1"], "'-1' is no time"),
     (["fleet", "m", "--limit"], "argument --limit: expected one argument"),
@@ -148,6 +154,7 @@ def test_what_is_mistyped_gets_status_2_and_one_line(arguments, says, capsys):
 @pytest.mark.parametrize("arguments, says", [
     (["nowhere"], "there is no nowhere; a file, a folder, a pattern or @LIST is expected"),
     (["@nowhere"], "cannot read the list nowhere: No such file or directory"),
+    (["m", "--reference", "no.xml"], "--reference: cannot read no.xml: No such file or directory; an MJCF file is expected"),
     (["m", "--since", "nowhere"], "cannot read nowhere/fleet.csv: No such file or directory; the folder of an earlier fleet"),
     (["m", "--out", "m/part.xml"], "cannot write to m/part.xml: it is a file; a folder that can be written is expected"),
 ])  # fmt: skip
@@ -183,7 +190,10 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
     assert tuple(seen) == asked and "seen" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("verdict, status", [("agree", 0), ("refused", 0), ("broke", 1), ("differ", 1)])
+@pytest.mark.parametrize(
+    "verdict, status",
+    [("agree", 0), ("self-consistent", 0), ("refused", 0), ("unconfirmed", 1), ("broke", 1), ("differ", 1)],
+)
 def test_the_status_is_1_where_a_file_differs_or_broke_off(verdict, status, folder, monkeypatch, capsys):
     def carry_out(self, progress):
         for task in self.tasks:

@@ -12,7 +12,7 @@ from compare.fleet.table import picture_of_steps
 ROW = {
     "file": "a.xml", "sha256": "1", "verdict": "agree", "reason": "", "joints": 3, "worst_ratio": 0.123456,
     "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.0123456, "seconds": 1.26,
-    "has_report": True, "reference": "model",
+    "has_report": True, "report_of": "a.xml", "reference": "arm",
 }  # fmt: skip
 EMPTY = dict.fromkeys(("joints", "worst_ratio", "file_integrator", "file_dt_s", "stable_at_file_dt", "limit_s"))
 NAMES = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "&amp;.xml", "q?x=1.xml",
@@ -31,7 +31,7 @@ def cells(text, name):
 
 
 def test_every_name_leads_to_its_report():
-    text = page_of([ROW | {"file": name} for name in NAMES])
+    text = page_of([ROW | {"file": name, "report_of": name} for name in NAMES])
     links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
     assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == NAMES
     for (address, _), name in zip(links, NAMES, strict=True):
@@ -60,7 +60,7 @@ def test_the_verdict_says_whether_a_file_differs():
     assert '<div class="verdict good">' in page_of(
         [ROW, ROW | {"verdict": "refused"}, ROW | {"stable_at_file_dt": False}]
     )
-    for verdict in ("differ", "broke"):
+    for verdict in ("differ", "broke", "unconfirmed"):
         assert '<div class="verdict bad">' in page_of([ROW, ROW | {"verdict": verdict}])
 
 
@@ -84,8 +84,13 @@ def test_nothing_that_is_said_is_taken_for_html():
 
 
 def test_what_differs_or_broke_off_stands_out_and_what_was_refused_does_not():
-    text = page_of([ROW | {"verdict": verdict} for verdict in ("differ", "broke", "refused", "agree")])
-    assert re.findall(r'<tr class="(\w+)">', text) == ["bad", "bad", "none", "good"]
+    text = page_of(
+        [
+            ROW | {"verdict": verdict}
+            for verdict in ("differ", "broke", "unconfirmed", "refused", "self-consistent", "agree")
+        ]
+    )
+    assert re.findall(r'<tr class="(\w+)">', text) == ["bad", "bad", "bad", "none", "none", "good"]
 
 
 def many(count):

@@ -8,7 +8,7 @@ from inside import PENDULUM, Inside, report
 from compare.fleet.file_pieces import UNPACKED, unpacked_at
 from compare.fleet.models import found_models
 from compare.fleet.piece import Outcome
-from compare.fleet.row import AGREE, BROKE, REFUSED
+from compare.fleet.row import AGREE, BROKE, DIFFER, ITSELF, REFUSED
 from compare.fleet.run import AHEAD_FOR_ALL, AHEAD_FOR_EACH
 
 
@@ -19,7 +19,7 @@ def test_files_agree_or_are_refused_with_the_reason_and_parts_are_left_out(fleet
         "part.xml": "<mujoco><actuator><motor joint='j'/></actuator></mujoco>",
     })  # fmt: skip
     verdicts = {name: row["verdict"] for name, row in found.rows.items()}
-    assert verdicts == {"good.xml": AGREE, "scene.xml": AGREE, "broken.xml": REFUSED, "none.xml": REFUSED}
+    assert verdicts == {"good.xml": ITSELF, "scene.xml": ITSELF, "broken.xml": REFUSED, "none.xml": REFUSED}
     assert found.of.parts == [("m/part.xml", "no model of its own, and included by m/scene.xml")]
     assert found.rows["broken.xml"]["reason"].startswith("MuJoCo cannot compile it: ")
     assert found.rows["none.xml"]["reason"] == "it has no joint; at least one is expected"
@@ -53,7 +53,7 @@ def test_a_report_in_the_folder_that_was_made_of_other_experiments_is_made_again
 
 
 def test_a_file_that_changes_or_goes_while_the_fleet_runs_breaks_off_alone(fleet, tmp_path):
-    files = {f"{name}.xml": PENDULUM.format(0.1) for name in "abc"}
+    files = {f"{name}.xml": PENDULUM.format(x) for name, x in zip("abc", (0.1, 0.3, 0.4))}
 
     def before(piece):
         if piece.name == "read of m/a.xml":
@@ -62,13 +62,13 @@ def test_a_file_that_changes_or_goes_while_the_fleet_runs_breaks_off_alone(fleet
 
     found = fleet(files, door=Inside(before=before))
     assert {name: row["verdict"] for name, row in found.rows.items()} == {
-        "a.xml": AGREE,
+        "a.xml": ITSELF,
         "b.xml": BROKE,
         "c.xml": BROKE,
     }
     assert found.rows["b.xml"]["reason"] == "the file, or one that it needs, has changed since the fleet began"
     assert found.rows["c.xml"]["reason"] == "No such file or directory"
-    assert fleet({}).rows["b.xml"]["verdict"] == AGREE
+    assert fleet({}).rows["b.xml"]["verdict"] == ITSELF
 
 
 def test_a_file_that_is_gone_before_it_is_read_is_refused(fleet, tmp_path):
@@ -128,3 +128,48 @@ def test_a_process_keeps_the_files_of_few_models(tmp_path, monkeypatch):
     assert unpacked_at(bundles[-1]) == places[-1] and places[-1].read_text() == str(UNPACKED + 1)
     assert len(list(tmp_path.iterdir())) == UNPACKED
     assert unpacked_at(bundles[0]).read_text() == "0"
+
+
+SOLUTION = PENDULUM.format(0.1)
+CLASS = {
+    "heavy.xml": SOLUTION.replace("mass='1'", "mass='2'"), "heavy_too.xml": SOLUTION.replace("mass='1'", "mass='2'"),
+    "renamed.xml": SOLUTION.replace("name='j' ", ""), "slide.xml": SOLUTION.replace("axis", "type='slide' axis"),
+    "right.xml": SOLUTION,
+}  # fmt: skip
+
+
+def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_matched(fleet, tmp_path):
+    (tmp_path / "solution.xml").write_text(SOLUTION)
+    rows = fleet(CLASS, ["parameters"], reference="solution.xml").rows
+    assert {name: (row["verdict"], row["reason"]) for name, row in rows.items()} == {
+        "heavy.xml": (DIFFER, "mass of b: stated 1 kg, compiled 2 kg"),
+        "heavy_too.xml": (DIFFER, "the same as m/heavy.xml: mass of b: stated 1 kg, compiled 2 kg"),
+        "renamed.xml": (AGREE, "joints matched: joint 0 as j"),
+        "slide.xml": (DIFFER, "joint j is a slide, that of solution.xml a hinge"),
+        "right.xml": (AGREE, ""),
+    }
+    assert [name for name, row in rows.items() if not row["has_report"]] == ["slide.xml"]
+    text = (report(tmp_path, "renamed.xml") / "report.md").read_text()
+    assert "joints matched: joint 0 as j" in text and "--only parameters --reference solution.xml" in text
+    assert not report(tmp_path, "heavy_too.xml").exists() and rows["heavy_too.xml"]["report_of"] == "m/heavy.xml"
+
+
+def test_another_solution_is_another_fleet_and_the_same_computes_nothing(fleet, tmp_path):
+    def verdict(text, reference="solution.xml"):
+        (tmp_path / "solution.xml").write_text(text)
+        found = fleet({"a.xml": SOLUTION}, ["parameters"], reference=reference)
+        return found.rows["a.xml"]["verdict"], len(found.door.names)
+
+    assert verdict(SOLUTION) == (AGREE, 3) and verdict(SOLUTION) == (AGREE, 0)
+    assert verdict(CLASS["heavy.xml"]) == (DIFFER, 3) and verdict(SOLUTION, None) == (ITSELF, 3)
+    assert verdict(SOLUTION)[0] == AGREE
+
+
+def test_files_of_one_content_are_computed_once_if_what_they_load_is_the_same(fleet, tmp_path):
+    text = "<mujoco><include file='part.xml'/></mujoco>"
+    parts = {f"{name}/part.xml": PENDULUM.format(x) for name, x in (("a", 0.1), ("b", 0.1), ("c", 0.2))}
+    found = fleet(parts | {f"{name}/scene.xml": text for name in "abc"})
+    scenes = {row["file"]: row for row in found.of.rows if "scene" in row["file"]}
+    assert [scenes[f"m/{name}/scene.xml"]["reason"] for name in "abc"] == ["", "the same as m/a/scene.xml", ""]
+    assert not any("m/b/scene.xml" in name for name in found.door.names)
+    assert found.of.files_done == found.of.files == len(found.of.rows) == 6

@@ -68,8 +68,8 @@ def test_nothing_of_a_quick_fleet_is_used_for_a_full_one(fleet):
 def test_the_same_file_in_another_folder_has_what_was_said_of_it_and_not_of_the_first(fleet, tmp_path):
     first = {"a/x.xml": PENDULUM.format(0.1)}
     fleet(first, door=Inside(before=answered))
-    again = fleet(first | {"b/x.xml": first["a/x.xml"]}, door=Inside(before=answered))
-    assert again.door.names == [f"{step} of m/b/x.xml" for step in STEPS]
+    again = fleet({"b/x.xml": first["a/x.xml"], "a/x.xml": PENDULUM.format(0.2)}, door=Inside(before=answered))
+    assert [name for name in again.door.names if "/b/" in name] == [f"{step} of m/b/x.xml" for step in STEPS]
     for name in ("a/x.xml", "b/x.xml"):
         assert (report(tmp_path, name) / "index.html").read_text() == f"report of m/{name}"
 

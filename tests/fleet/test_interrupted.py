@@ -56,7 +56,7 @@ def goes_on(folder):
 
 
 def test_the_key_ctrl_c(folder):
-    run = runs.on_terminal(HERE, 100, "xterm", folder, interrupt_at=b"agree")
+    run = runs.on_terminal(HERE, 100, "xterm", folder, interrupt_at=b"self-consistent")
     assert run.status == 2 and run.seconds < runs.SECOND
     lines = runs.readable_lines(run)
     assert [line for line in lines if line][-1].split() == INTERRUPTED.split()

@@ -31,9 +31,12 @@ def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
     here(["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/.git/f.xml", "m/b/.g.xml", "m/mesh.obj", "m/folder.xml/h.xml"])
     here("m/robot.urdf.xml", "<robot name='x'/>")
     here("m/package.xml", "<?xml version='1.0'?><package/>")
-    here("m/no.xml", "")
+    here("m/no.xml", "<!-- nothing -->")
+    here("m/none.xml", "")
+    here("m/words.xml", "alpha turns about y")
     (os.mkfifo if hasattr(os, "mkfifo") else os.mkdir)("m/pipe.xml")
-    assert names("m") == ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml"]
+    # what has no element at all is refused, and not passed over
+    assert names("m") == ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml", "m/none.xml", "m/words.xml"]
     assert found_models(["m"]).left_out == [
         ("m/no.xml", "it is no MJCF, it is no XML"),
         ("m/package.xml", "it is no MJCF, its outermost element is <package>"),

@@ -4,12 +4,12 @@ import csv
 from collections import Counter
 from types import SimpleNamespace
 
-from compare.fleet.table import csv_of_fleet, sentences_of, write_table
+from compare.fleet.table import csv_of_fleet, sentences_of, with_why_itself, write_table
 
 ROW = {
     "file": "a.xml", "sha256": "1", "verdict": "agree", "reason": "", "joints": 3, "worst_ratio": 0.1,
     "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": None, "limit_s": None, "seconds": 1.0,
-    "has_report": True, "reference": "model",
+    "has_report": True, "report_of": "a.xml", "reference": "arm", "why_itself": "",
 }  # fmt: skip
 
 
@@ -24,8 +24,11 @@ def said_of(rows, left_out=(), **more):
 
 
 def test_the_sentences_count_verdicts_and_name_whose_own_step_is_not_stable():
-    rows = [ROW | {"verdict": verdict} for verdict in ("differ", "broke", "broke", "refused", "agree", "agree")]
-    assert said_of(rows) == ["6 files: 1 differs, 2 broke off, 1 was refused, 2 agree."]
+    verdicts = ("differ", "broke", "broke", "refused", "unconfirmed", "agree", "agree")
+    rows = [ROW | {"verdict": verdict} for verdict in verdicts]
+    assert said_of(rows) == [
+        "7 files: 1 differs, 2 broke off, 1 has a prediction that is not confirmed, 1 was refused, 2 agree."
+    ]
     rows = [ROW | {"file": f"{k}.xml", "stable_at_file_dt": False} for k in range(5)]
     assert said_of([*rows[:1], ROW, ROW | {"stable_at_file_dt": True}])[1:] == ["Not stable at its own step: 0.xml."]
     assert said_of(rows)[1:] == ["Not stable at their own step: 0.xml, 1.xml, 2.xml and 2 more."]
@@ -40,11 +43,18 @@ def test_the_sentences_say_what_is_left_out_not_timed_and_known_from_before():
     assert said_of([ROW], done_before=2, pieces_before=1)[1:] == ["Known from before: 2 files and 1 piece of others."]
 
 
-def test_the_sentences_say_which_are_compared_with_stated_numbers():
-    stated = ROW | {"reference": "arm"}
-    words = "Compared with the arm's stated numbers: 1; the others, which have other joints, with themselves."
-    assert said_of([stated, ROW, ROW])[1:] == [words]
-    assert said_of([ROW, ROW])[1:] == [] == said_of([stated, stated])[1:]
+def test_what_is_compared_with_itself_is_counted_apart_and_has_the_reason_beside_files_with_stated_numbers():
+    itself = ROW | {
+        "verdict": "self-consistent",
+        "reference": "model",
+        "why_itself": "joint x is not y",
+        "reason": "slow",
+    }
+    assert said_of([itself, itself, ROW])[0] == "3 files: 2 are self-consistent, 1 agrees."
+    assert len(said_of([itself, ROW])) == 2 == 1 + len(said_of([ROW]))
+    reasons = [row["reason"] for row in with_why_itself([itself, ROW])]
+    assert reasons == ["joint x is not y: compared with its own compiled model only; slow", ""]
+    assert with_why_itself([itself]) == [itself]
 
 
 def test_rows_are_in_their_order_and_parts_and_machines_are_in_the_page(tmp_path):

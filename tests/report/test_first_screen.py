@@ -6,6 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 from sections import BAD, GOOD, section
 
+from compare.judge.check import About
 from compare.report import images, page
 from compare.report.files import write
 from compare.report.first_screen import in_two
@@ -193,9 +194,9 @@ def test_how_a_section_stands():
     assert standing(section("mass", GOOD, BAD)) == (False, "1 of 2 fail")
     assert standing(section("mass")) == (None, "nothing compared")
     broken = section("mass", GOOD)
-    broken.result.check("", "runs to its end", None, 0.0, "", "ValueError", rule="equal")
+    broken.result.check("", "runs to its end", None, 0.0, "", "ValueError", rule="equal", about=About.PROGRAM)
     assert standing(broken) == (False, "broke off")
-    unstable = section("stability", GOOD, ("stable at its own step", 0.002, 0.001, "at most", False))
+    unstable = section("stability", GOOD, ("stable at its own step", 0.002, 0.001, "at most", False, About.STEP))
     assert standing(unstable) == (False, "its step is not stable")
 
 

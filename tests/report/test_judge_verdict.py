@@ -4,6 +4,7 @@ import pytest
 from sections import BAD, GOOD, section
 
 from compare.experiment import largest_share_in_words, say_outcome
+from compare.judge.check import About
 from compare.report import verdict
 
 
@@ -41,9 +42,9 @@ def test_what_does_not_agree_is_named_and_nothing_else():
         "The two models do not agree (1 of 10 experiments ran): 1 of 1 checks fail."
     )
     broken = section("speed")
-    broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no", rule="equal")
+    broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no", rule="equal", about=About.PROGRAM)
     assert verdict.verdict([section("mass", GOOD), broken], 10) == (
-        "Not everything could be compared (2 of 10 experiments); the other 1 checks pass. "
+        "Not everything could be compared (2 of 10 experiments); all 1 checks that compare them pass. "
         "Broken off: speed, ValueError: no."
     )
 
@@ -81,14 +82,20 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
 
 def test_what_broke_off_fails_and_is_no_disagreement():
     broken = section("speed")
-    broken.result.check("", verdict.ENDS, None, 0.0, "", "ValueError: no (speed.py:1)", rule="equal")
+    broken.result.check(
+        "", verdict.ENDS, None, 0.0, "", "ValueError: no (speed.py:1)", rule="equal", about=About.PROGRAM
+    )
     assert not verdict.passed([section("mass", GOOD), broken])
     text = verdict.verdict([section("mass", GOOD), broken], 2)
     assert text == (
-        "Not everything could be compared; the other 1 checks pass. Broken off: speed, ValueError: no (speed.py:1)."
+        "Not everything could be compared; all 1 checks that compare them pass. "
+        "Broken off: speed, ValueError: no (speed.py:1)."
     )
     both = verdict.verdict([section("mass", GOOD, BAD), broken], 2)
-    assert both.startswith("The two models do not agree: 1 of 3 checks fail.") and "Broken off: speed" in both
+    assert (
+        both.startswith("The two models do not agree: 1 of 2 checks that compare them fail.")
+        and "Broken off: speed" in both
+    )
     assert verdict.outcome(broken) == "It is not decided: runs to its end does not hold (ValueError: no (speed.py:1))."
 
 
@@ -104,28 +111,54 @@ def test_the_verdict_names_the_first_cause_and_counts_the_others():
 def test_a_run_that_diverged_is_a_disagreement_and_what_cannot_be_locked_is_none():
     diverged = section("trajectory", ("open loop", None, 1.0, "at most", True))
     assert verdict.verdict([diverged], 1).startswith("The two models do not agree: 1 of 1 checks fail.")
-    tied = section("reduction", (verdict.LOCKABLE, 0.0, 1.0, "equal", False))
-    assert verdict.verdict([tied], 1).startswith("Not everything could be compared")
+    tied = section("reduction", ("models whose hinges can be locked", 0.0, 1.0, "equal", False, About.PROGRAM))
+    assert verdict.verdict([tied], 1).startswith("Nothing was compared. Broken off: reduction")
 
 
-STEP = ("stable at its own step", 0.002, 0.00111, "at most", False)
+LIMIT = ("limit, observed / predicted - 1", 0.009, 0.001, "at most", False, About.PREDICTION)
+
+
+def test_a_prediction_that_no_run_confirms_is_no_disagreement():
+    sections = [section("mass", GOOD), section("stability", GOOD, LIMIT)]
+    assert not verdict.passed(sections)
+    assert verdict.failures(sections).differing == [] and len(verdict.failures(sections).unconfirmed) == 1
+    found = verdict.verdict(sections, 2)
+    assert found.startswith(
+        "The two models agree: all 2 checks that compare them pass. One prediction is not confirmed"
+    )
+    assert "stability: limit, observed / predicted - 1, zero: 0.009" in found
+    assert verdict.standing(sections[1]) == (False, "1 not confirmed")
+    assert "1 checks pass; but one prediction" in verdict.outcome(sections[1])
+    assert verdict.verdict([*sections, section("gravity", BAD)], 3).startswith("The two models do not agree")
+
+
+def test_each_failing_check_counts_once_and_fails_the_verdict():
+    kinds = [
+        ("what", 2.0, 1.0, "at most", False, about)
+        for about in (About.MODELS, About.PREDICTION, About.STEP, About.PROGRAM)
+    ]
+    for kind in kinds:
+        assert not verdict.passed([section("mass", GOOD, kind)])
+    assert [len(found) for found in verdict.failures([section("mass", GOOD, *kinds)])] == [1, 1, 1, 1]
+
+
+OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
 
 
 def test_a_step_of_the_robot_that_is_not_stable_is_no_disagreement():
-    stable = section("stability", GOOD, ("stable at its own step", 0.002, 0.002, "at most", False))
+    stable = section("stability", GOOD, ("stable at its own step", 0.002, 0.002, "at most", False, About.STEP))
     assert verdict.passed([stable]) and "all 2 checks pass" in verdict.verdict([stable], 1)
-    unstable = section("stability", GOOD, STEP, STEP, ("stable at its own step", 0.002, 0.001, "at most", False))
+    worst = ("stable at its own step", 0.002, 0.001, "at most", False, About.STEP)
+    unstable = section("stability", GOOD, OWN_STEP, OWN_STEP, worst)
     sections = [section("mass", GOOD), unstable]
     assert not verdict.passed(sections)
-    assert verdict.failures(sections)[:2] == ([], []) and len(verdict.failures(sections)[2]) == 3
+    assert verdict.failures(sections).differing == [] and len(verdict.failures(sections).unstable) == 3
     found = verdict.verdict(sections, 2, compared="TMT and MuJoCo", robot="arm7")
     assert found == (
-        "TMT and MuJoCo agree: all 2 checks that compare them pass; but arm7 is not stable at its own step of 2 ms at zero and 2 "
+        "TMT and MuJoCo agree: all 2 checks that compare them pass. But arm7 is not stable at its own step of 2 ms at zero and 2 "
         "more postures: the limit is 1 ms."
     )
-    assert verdict.outcome(unstable).startswith(
-        "It holds: 1 checks that compare pass; but the robot is not stable at its own"
-    )
+    assert verdict.outcome(unstable).startswith("1 checks pass; but the robot is not stable at its own step")
     said = Lines()
     say_outcome(said, unstable, 1.0, [])
     assert said[0].split()[:3] == ["stability", "3", "FAILED"] and said[1].startswith(
@@ -134,5 +167,5 @@ def test_a_step_of_the_robot_that_is_not_stable_is_no_disagreement():
 
 
 def test_a_disagreement_stays_one_beside_a_step_that_is_not_stable():
-    text = verdict.verdict([section("mass", GOOD, BAD), section("stability", STEP)], 2, robot="arm7")
-    assert text.startswith("The two models do not agree: 1 of 3 checks fail. First: mass: Mbar, zero")
+    text = verdict.verdict([section("mass", GOOD, BAD), section("stability", OWN_STEP)], 2, robot="arm7")
+    assert text.startswith("The two models do not agree: 1 of 2 checks that compare them fail. First: mass: Mbar, zero")

@@ -108,8 +108,7 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float | None
 def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     """The engine's model from its file, its contact and constraint stages off, with an edit."""
     spec = editable(engine.source)
-    if engine.bare:
-        bare(without_geoms(spec))
+    bare(without_geoms(spec)) if engine.bare else with_names(spec)
     spec.option.disableflags |= LEFT_OUT
     edit(spec)
     model = spec.compile()

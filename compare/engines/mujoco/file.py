@@ -9,6 +9,7 @@ import mujoco
 import tmt
 
 from .engine import Mujoco
+from .joints import joint_name, joint_places
 from .light import without_visuals
 from .lock import ModelError, editable, name_of
 
@@ -31,6 +32,8 @@ def has_hinges(path: str | Path, names: Sequence[str]) -> bool:
 def compiled(source: Path | str, compiling: Callable[[], mujoco.MjModel]) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     """The model that compiling a source gives, and what MuJoCo's compiler warns of, one line each; ModelError if it cannot be."""
     text = text_of(source) if isinstance(source, Path) else source
+    if not text.strip():
+        raise ModelError(f"{name_of(source)} is empty; an MJCF file is expected")
     found, before = [], mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(found.append)
     try:
@@ -66,10 +69,10 @@ def parse(text: str, tree: tmt.Tree) -> Mujoco:
 def with_hinges(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree, warned: tuple = ()) -> Mujoco:
     """The engine, if the model moves by exactly the hinges of the Tree; it remembers its source, a Path or MJCF text."""
     hinges = tree.hinge_names
-    names = [model.joint(j).name for j in range(model.njnt)]
+    names = [joint_name(model, j) for j in range(model.njnt)]
     kinds = [mujoco.mjtJoint(model.jnt_type[j]).name.removeprefix("mjJNT_").lower() for j in range(model.njnt)]
     if sorted(names) != sorted(hinges) or set(kinds) != {"hinge"}:
-        found = ", ".join(f"{name or 'unnamed'} ({kind})" for name, kind in zip(names, kinds)) or "none"
+        found = ", ".join(f"{name} ({kind})" for name, kind in zip(names, kinds)) or "none"
         raise ModelError(
             f"{name_of(source)} has the joints {found}; hinges {', '.join(hinges)} and no others are expected"
         )
@@ -84,7 +87,7 @@ def bodies(model: mujoco.MjModel, source: Path | str, tree: tmt.Tree) -> list[in
     found = []
     for name, hinge in zip(tree.body_names, tree.body_hinge):
         if hinge >= 0 and tree.body_hinge.count(hinge) == 1:
-            found.append(int(model.jnt_bodyid[model.joint(tree.hinge_names[hinge]).id]))
+            found.append(int(model.jnt_bodyid[joint_places(model)[tree.hinge_names[hinge]].joint]))
             continue
         number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
         if number < 0:

@@ -1,6 +1,6 @@
 """A file read as a Tree: the model as MuJoCo compiled it, with what the Tree has not listed and switched off."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -111,18 +111,44 @@ def light_model(source: Path | str | None, whole: mujoco.MjModel) -> mujoco.MjMo
     return model if moves_the_same(whole, model) else whole
 
 
-def engine(reading: Reading) -> Mujoco:
-    """MuJoCo with all of it switched off that the Tree has not."""
-    tree = reading.tree
+def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
+    """MuJoCo with all of it switched off that the Tree has not.
+
+    solution: its Tree, whose joints are called as those of the file, counts, and the bodies are in its order; ModelError if a
+    joint does not move as many bodies there.
+    """
+    tree = (solution or reading).tree
     return Mujoco(
         reading.model,
         tree.hinge_names,
-        reading.bodies,
+        bodies_as_in(solution, reading) if solution else reading.bodies,
         reading.source,
         bare=True,
         warnings=reading.warnings,
         methods=methods_for(tree),
     )
+
+
+def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
+    """The numbers of the bodies of a file in the order of those of a solution: on the same joint, by name or by their order."""
+    names, places, found = solution.tree.hinge_names, joint_places(reading.model), {}
+    ours = moved_by(reading, [places[name] for name in names])
+    theirs = moved_by(solution, joint_places(solution.model).values())
+    for joint, bodies, stated in zip(names, ours, theirs, strict=True):
+        if len(bodies) != len(stated):
+            counts = f"joint {joint} moves {len(bodies)} bodies with mass, and {len(stated)} in the solution"
+            raise ModelError(f"{name_of(reading.source)} cannot be compared body by body: {counts}")
+        called = {reading.model.body(body).name: body for body in bodies}
+        wanted = [solution.model.body(body).name for body in stated]
+        found |= zip(stated, [called[name] for name in wanted] if set(wanted) == set(called) else bodies)
+    return [found[body] for body in solution.bodies]
+
+
+def moved_by(reading: Reading, places: Iterable[Place]) -> list[list[int]]:
+    """Of each joint the bodies with mass that are fixed to the body that it moves, by number."""
+    fixed_to = reading.model.body_weldid
+    carriers = [reading.model.jnt_bodyid[place.joint] for place in places]
+    return [[body for body in reading.bodies if fixed_to[body] == carrier] for carrier in carriers]
 
 
 def moving_bodies(model: mujoco.MjModel) -> list[int]:

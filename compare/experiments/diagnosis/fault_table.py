@@ -11,7 +11,7 @@ from tmt import literal
 
 from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.places import OF_ZERO
-from ...judge.check import ENDS, Result
+from ...judge.check import ENDS, About, Result
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots.arm import ARM
@@ -69,7 +69,9 @@ def rows_by_pieces(
     table = []
     for fault, outcome in zip(faults, door.outcomes(row_of, faults, progress=progress)):
         if outcome.broke:
-            result.check(f"{fault.robot}, {fault.name}", ENDS, None, 0.0, "", outcome.broke, rule="equal")
+            result.check(
+                f"{fault.robot}, {fault.name}", ENDS, None, 0.0, "", outcome.broke, rule="equal", about=About.PROGRAM
+            )
         else:
             table.append(outcome.returned)
     return table
@@ -106,7 +108,8 @@ def judge_faults(result: Result, table: list[dict]) -> None:
         seen = Counter(row["outcome"] for row in rows if row["visible"])
         wrong = sum(row["outcome"] == "wrong" for row in rows)
         whose = {"list": "of the list", "generator": "of the generator"}[source]
-        result.check("made faults", f"{whose}: explained by something else", wrong, 0.0, "faults", rule="equal")
+        what = f"{whose}: explained by something else"
+        result.check("made faults", what, wrong, 0.0, "faults", rule="equal", about=About.PREDICTION)
         counts = ", ".join(f"{seen[outcome]} {outcome}" for outcome in ("right", "tied", "none", "wrong"))
         unseen = sum(not row["visible"] for row in rows)
         times = [row["seconds"] for row in rows] or [0.0]

@@ -31,6 +31,12 @@ of the assignment's arm, else `model`, itself; --reference says otherwise.
 Postures of a file are its keyframes by their names (`key 0` without one),
 `qpos0` and `middle`, that of the joints' ranges.
 
+With --reference FILE.xml the numbers of both files, as MuJoCo compiled them,
+are compared, joint by joint and body by body: masses, centres of mass, inertia
+tensors, axes, anchors, zero, gravity, damping, armature and springs. Of limits,
+actuators, equalities and whatever else the equations do not have, the number of
+each is compared.
+
 Tables: parameters.csv (each number: stated, compiled, difference); of a robot's
 file inventory.csv (each feature of the file: modelled or switched off, and
 why).
@@ -44,21 +50,23 @@ Examples:
     python -m compare parameters
     python -m compare parameters --mjcf robot.xml
     python -m compare parameters --mjcf my_arm.xml --reference arm
+    python -m compare parameters --mjcf my_robot.xml --reference solution.xml
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
 
 import tmt
 
+from ...case import Coordinates
 from ...engines.mujoco.parameters import STATED_FLAGS, options, parameters
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...setup import Setup
-from . import file
+from . import file, solution
 
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
@@ -67,12 +75,14 @@ OF_ALL = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendo
 OF_BODIES = ("mass", "com", "inertia", "gravcomp")
 QUANTITIES = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *NOT_HAD), "") | {
     "ref": "rad", "anchor": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m", "stiffness": "N m/rad",
-    "mass": "kg", "com": "m", "inertia": "kg m2", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
+    "mass": "kg", "com": "m", "inertia": "kg m2", "rest": "rad", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
     "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
+OF_SLIDES = {"ref": "m", "rest": "m", "damping": "N s/m", "armature": "kg", "stiffness": "N/m", "frictionloss": "N"}
 # that are so or not, a place, or a count
 WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
 OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
+AT_TIMES = ("limited", "contact pairs")  # what acts at some states only comes after what always acts
 EXPLAINED = {  # forces, by the quantities that say why they act
     "springs, fluid and tendons": ("stiffness", "density", "viscosity", "gravcomp", *NOT_HAD[1:4]),
     "actuators": (),
@@ -82,6 +92,8 @@ EXPLAINED = {  # forces, by the quantities that say why they act
 
 def claim(robot: Robot) -> str:
     """What is claimed of any robot."""
+    if robot.stated_in:
+        return solution.CLAIM_OF_SOLUTION.format(robot.stated_in)
     if robot.is_read:
         return file.CLAIM
     return (
@@ -94,6 +106,8 @@ def claim(robot: Robot) -> str:
 
 def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
+    if robot.stated_in:
+        return solution.TOLERANCE_OF_SOLUTION
     if robot.is_read:
         return file.TOLERANCE
     return (
@@ -129,43 +143,69 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     """The names of what has a quantity: the world, the bodies or the joints."""
     if quantity in OF_ALL:
         return ("world",)
+    if quantity in ("axis", "damping", "armature", "rest"):
+        coordinates = Coordinates(tree.hinge_names, tree.kind)
+        return coordinates.positions if quantity == "rest" else coordinates.speeds
     return tree.body_names if quantity in OF_BODIES else tree.hinge_names
 
 
 def rows(setup: Setup) -> Result:
     """One row for each number; one check for each quantity of each hinge or body; the causes that follow."""
-    if setup.robot.is_read:
+    robot = setup.robot
+    if not robot.is_stated:
         return file.rows_of_file(setup)
     result = Result("parameters", shown=["of", "quantity", "component", "stated", "compiled", "unit"])
-    tree, dynamics = setup.robot.tree, setup.compared()["mujoco"]
-    compiled = parameters(dynamics)
-    expected_of, causes = stated(tree), []
-    for quantity, unit in QUANTITIES.items():
+    tree, dynamics = robot.tree, setup.compared()["mujoco"]
+    if robot.stated_in:
+        expected_of, compiled = solution.compared_numbers(setup)
+    else:
+        expected_of, compiled = stated(tree), parameters(dynamics)
+    causes = []
+    for quantity in (name for name in QUANTITIES if name in expected_of):
         expected = np.asarray(expected_of[quantity], dtype=float)
         found = np.asarray(compiled[quantity], dtype=float)
         names = owners(tree, quantity)
         for owner, e, f in zip(names, expected.reshape(len(names), -1), found.reshape(len(names), -1)):
-            off, tolerance = np.abs(e - f), FACTOR * EPS * np.abs(e).max()
-            whole = quantity in WHOLE_NUMBERS
+            size = np.abs(expected if robot.stated_in else e).max()
+            off, tolerance, unit = np.abs(e - f), FACTOR * EPS * size, unit_of_number(tree, owner, quantity)
+            whole = quantity in WHOLE_NUMBERS and not (quantity == "ref" and robot.stated_in)
             value, bound, rule = (f[0], e[0], "equal") if whole else (off.max(), tolerance, "at most")
             result.check(owner, quantity, value, bound, unit, rounding=not whole, rule=rule)
             for k, (a, b) in enumerate(zip(e, f)):
                 about = {"of": owner, "quantity": quantity, "component": component(k, len(e))}
                 result.rows.append(about | {"stated": a, "compiled": b, "difference": b - a, "unit": unit})
             causes += causes_in(tree, owner, quantity, e, f, off, tolerance)
-    sample = setup.random
-    for source, force in dynamics.other_forces(sample.q, sample.qd).items():
+    if robot.stated_in:
+        causes += solution.compare_features(result, setup)
+        file.check_forces(result, setup)
+        result.tables["inventory"] = file.inventory(robot.features)
+        result.notes = file.treatments_in_words(robot.features)
+    else:
+        causes += causes_of_other_forces(result, setup, causes)
+    for option, value in options(setup.engines["mujoco"], dynamics).items():
+        result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
+    result.curves["causes"] = sorted(causes, key=lambda c: (c["rank"], c["quantity"] in AT_TIMES, -c["size"]))
+    return result
+
+
+def causes_of_other_forces(result: Result, setup: Setup, known: Sequence[dict]) -> list[dict]:
+    """Checks that nothing else acts; the causes of what does, where none of those that are known says why."""
+    sample, causes = setup.random, []
+    for source, force in setup.compared()["mujoco"].other_forces(sample.q, sample.qd).items():
         most = float(np.abs(force).max())
         check = result.check(sample.name, f"no forces of {source}", most, 0.0, "N m")
-        if not check.passed and not any(cause["quantity"] in EXPLAINED[source] for cause in causes):
+        if not check.passed and not any(cause["quantity"] in EXPLAINED[source] for cause in known):
             place = f"forces of {source}"
             text = f"{place}: none stated, up to {most:.3g} N m found"
             about = {"rank": 2, "place": place, "stated": 0.0, "found": most, "text": text}
             causes.append(about | {"size": np.inf, "quantity": place})
-    for option, value in options(setup.engines["mujoco"], dynamics).items():
-        result.rows.append({"of": "file", "quantity": option, "component": "", "compiled": value, "unit": ""})
-    result.curves["causes"] = sorted(causes, key=lambda cause: (cause["rank"], -cause["size"]))
-    return result
+    return causes
+
+
+def unit_of_number(tree: tmt.Tree, owner: str, quantity: str) -> str:
+    """The unit of a quantity, of a slide its own."""
+    of_slide = dict(zip(tree.hinge_names, tree.kind)).get(owner) == "slide" and quantity not in OF_BODIES
+    return OF_SLIDES.get(quantity, QUANTITIES[quantity]) if of_slide else QUANTITIES[quantity]
 
 
 def causes_in(
@@ -183,15 +223,23 @@ def causes_in(
         if not difference <= tolerance:
             place = " ".join(filter(None, (quantity, component(k, len(stated))))) + of
             share = difference / tolerance if tolerance else np.inf
-            causes.append(cause(tree, rank, quantity, place, a, b, share, " (the opposite sign)" * flipped))
+            unit = unit_of_number(tree, owner, quantity)
+            causes.append(cause(tree, rank, quantity, unit, place, a, b, share, " (the opposite sign)" * flipped))
     return causes
 
 
 def cause(
-    tree: tmt.Tree, rank: int, quantity: str, place: str, stated: float, found: float, size: float, remark: str = ""
+    tree: tmt.Tree,
+    rank: int,
+    quantity: str,
+    unit: str,
+    place: str,
+    stated: float,
+    found: float,
+    size: float,
+    remark: str,
 ) -> dict:
     """A cause with its sentence; size: its difference over its tolerance."""
-    unit = QUANTITIES[quantity]
     if quantity.startswith("flag "):
         values = ["enable" if number else "disable" for number in (stated, found)]
     elif quantity == "parent":

@@ -40,7 +40,7 @@ from tmt.reference import DIGITS
 
 from ...case import Case
 from ...engines.mujoco import ModelError
-from ...judge.check import LOCKABLE, Result
+from ...judge.check import About, Result
 from ...judge.entries import has_own_scales
 from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
@@ -130,7 +130,8 @@ def say_not_lockable(result: Result, robot: Robot, error: ModelError) -> None:
     if robot.is_read:
         result.notes.append(f"Nothing is reduced: {error}.")
     else:
-        result.check("every subset", LOCKABLE, 0, 1, "models", str(error), rule="equal")
+        quantity = "models whose hinges can be locked"
+        result.check("every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM)
 
 
 def fill(result: Result, setup: Setup, cases: Sequence[Case], timed: bool) -> list[tuple]:

@@ -10,7 +10,7 @@ import tmt
 from ...case import Case, Coordinates
 from ...engines import Setting
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, OFF_FLOOR, ON_FLOOR, contacts, with_additions
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import movement_unit, step_in_words
 from ...judge.scale import reaches
 from ...judge.timing import fastest
@@ -127,6 +127,6 @@ def check_bits(result: Result, where: str, rows: list[dict], pushed: set[tuple])
         name, integrator, changed = row["added"], row["integrator"], int(not row["same_bits"])
         scene, unit = f"{where}, {integrator}", "runs that differ"
         if (name, integrator) in pushed:
-            result.check(scene, f"another motion with {name}", changed, 1, unit, rule="equal")
+            result.check(scene, f"another motion with {name}", changed, 1, unit, rule="equal", about=About.PREDICTION)
         elif name not in (MINIMAL, AGAIN):
-            result.check(scene, f"the same bits with {name}", changed, 0, unit, rule="equal")
+            result.check(scene, f"the same bits with {name}", changed, 0, unit, rule="equal", about=About.PREDICTION)

@@ -10,7 +10,7 @@ from tmt.reference import DIGITS, distance
 
 from ...case import SEED, Case
 from ...engines import LABELS
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import MOVES, ORDER_MARGIN
 from ...judge.scale import EPS, FACTOR, gravity_scale, mass_scale
 from ...robots import Robot
@@ -127,7 +127,8 @@ def order_from(order: int, angles: np.ndarray) -> int | None:
 
 def check_function(result: Result, scene: str, off: float, scale: float) -> None:
     """A check: the elliptic function in doubles is that with 50 digits, but for rounding. off, scale: rad."""
-    result.check(scene, f"elliptic function, scipy to {DIGITS} digits", off, FACTOR * EPS * scale, "rad", rounding=True)
+    what = f"elliptic function, scipy to {DIGITS} digits"
+    result.check(scene, what, off, FACTOR * EPS * scale, "rad", rounding=True, about=About.PREDICTION)
 
 
 def check_falling(
@@ -151,7 +152,8 @@ def check_falling(
         with np.errstate(divide="ignore", invalid="ignore"):
             orders[engine, integrator] = float(np.log2(np.divide(values[clear - 2], values[clear - 1])))
         off = abs(orders[engine, integrator] - order)
-        result.check(where, f"order of the error against the elliptic function, from {order}", off, ORDER_MARGIN, "")
+        what = f"order of the error against the elliptic function, from {order}"
+        result.check(where, what, off, ORDER_MARGIN, "", about=About.PREDICTION)
     return orders
 
 
@@ -239,5 +241,6 @@ def check_modes(result: Result, posture: str, off: Mapping[str, Sequence[float]]
         with np.errstate(divide="ignore", invalid="ignore"):
             powers[engine] = float(np.log2(np.divide(values[-2], values[-1])))
         what = "power of the amplitude with which the distance from the linear modes falls, from 2"
-        result.check(f"{posture}, {LABELS[engine]}", what, abs(powers[engine] - 2.0), ORDER_MARGIN, "")
+        where, off = f"{posture}, {LABELS[engine]}", abs(powers[engine] - 2.0)
+        result.check(where, what, off, ORDER_MARGIN, "", about=About.PREDICTION)
     return powers

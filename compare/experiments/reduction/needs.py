@@ -9,7 +9,7 @@ from tmt.reference import DIGITS
 
 from ...case import Case, Coordinates
 from ...engines import LABELS
-from ...judge.check import Result, closest
+from ...judge.check import About, Result, closest
 from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, movement_unit, required_time, step_in_words
 from ...judge.words import capital
@@ -203,7 +203,7 @@ def check_smaller(
     place, unit = f"{coordinates.speeds[i % n]} at t = {t[k]:.3f} s", coordinates.units[i % n] + ("", "/s")[i // n]
     result.check(where, "smallest model to whole", apart[k, i], width[k, i], unit, place, True)
     until = float(t[judged][-1])
-    result.check(where, "time judged", until, required, "s", rule="at least")
+    result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
     return until
 
 

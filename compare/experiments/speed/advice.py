@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...engines import Method
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import ORDER_MARGIN
 from .accuracy import NEAR_ROUNDING, Floors
 
@@ -149,7 +149,9 @@ def orders(result: Result, scenes: Sequence[str], methods: Sequence[Method], com
         shown = sum((row["engine"], row["method"]) == (method.engine, method.name) for row in table)
         if shown or not near_rounding(result, scenes, method):
             where = f"{method.engine} {method.name}"
-            result.check(where, "scenes that show its order", shown, 1, "scenes", rule="at least")
+            result.check(
+                where, "scenes that show its order", shown, 1, "scenes", rule="at least", about=About.PREDICTION
+            )
     return table
 
 
@@ -183,7 +185,7 @@ def check_order(result: Result, where: str, order: int, measured: float) -> None
     """A check: the measured order is the method's; of order 8 it is at least 7."""
     least = LEAST_ORDER.get(order)
     if least is None:
-        off = abs(measured - order)
-        result.check(where, f"distance of the measured order from {order}", off, ORDER_MARGIN, "", f"{measured:.2f}")
+        what, note = f"distance of the measured order from {order}", f"{measured:.2f}"
+        result.check(where, what, abs(measured - order), ORDER_MARGIN, "", note, about=About.PREDICTION)
     else:
-        result.check(where, f"measured order, of {order}", measured, least, "", rule="at least")
+        result.check(where, f"measured order, of {order}", measured, least, "", rule="at least", about=About.PREDICTION)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ...judge import timing
-from ...judge.check import ENDS, Result
+from ...judge.check import ENDS, About, Result
 from ...setup import Setup, nothing
 from .growth import Extent, add_costs, costs_of_growth, extent_of, made_chains, number_in_words, reasons_in_words
 
@@ -44,7 +44,7 @@ def add_growth_elsewhere(result: Result, setup: Setup) -> None:
     rows, left_out, absent, places = [], {}, {}, {}
     for n, outcome in zip(extent.numbers, setup.door.outcomes(timed_chain, asked, timed=True, progress=progress)):
         if outcome.broke:
-            result.check(f"chain of {n}", ENDS, None, 0.0, "", outcome.broke, rule="equal")
+            result.check(f"chain of {n}", ENDS, None, 0.0, "", outcome.broke, rule="equal", about=About.PROGRAM)
             continue
         found = outcome.returned
         rows += found.rows

@@ -10,7 +10,7 @@ import tmt
 from ...case import Case
 from ...engines import LABELS, Engine, Method
 from ...engines.mujoco import engine, read
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...robots import Robot
 from ...truth.free_body import free_turning
 from .advice import CLEAR, REGULAR, check_order
@@ -68,7 +68,7 @@ def orders_on_a_body(result: Result, engines: Mapping[str, Engine]) -> list[dict
                 check_order(result, f"{BODY}, {method.engine} {method.name}", method.order, order)
             elif not method.adaptive:
                 where = f"{BODY}, {method.engine} {method.name}"
-                result.check(where, "runs that show its order", 0, 1, "runs", rule="at least")
+                result.check(where, "runs that show its order", 0, 1, "runs", rule="at least", about=About.PREDICTION)
     result.notes.append(orders_in_words(table))
     return table
 

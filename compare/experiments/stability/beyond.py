@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...engines import LABELS, Engine
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import LEFT, departure, deviation, number_or_none
 from ...robots import Robot
 from ...truth.linear import held
@@ -79,22 +79,23 @@ def check_kept(result: Result, robot: Robot, found: dict) -> None:
     for row in (row for row in rows if row["dt_s"] < limit):
         where = f"{claims.kept}, {who(row)}, dt = {row['dt_s']:.4g} s, torque {row['torque']}"
         stays = row["run_s"] if row["observed_s"] is None else row["observed_s"]
-        result.check(where, f"time within {LEFT:g} rad, below the limit", stays, row["run_s"], "s", rule="at least")
+        what = f"time within {LEFT:g} rad, below the limit"
+        result.check(where, what, stays, row["run_s"], "s", rule="at least", about=About.PREDICTION)
     for (engine, torque), counts in leaves.items():
         if torque == ONE_ULP:
+            where = f"{claims.kept}, {LABELS[engine]}, torque {torque}"
             quantity = f"numbers of steps in {claims.duration:g} s with which it leaves"
-            result.check(
-                f"{claims.kept}, {LABELS[engine]}, torque {torque}", quantity, len(counts), 0, "", rule="equal"
-            )
+            result.check(where, quantity, len(counts), 0, "", rule="equal", about=About.PREDICTION)
     stays = all(check.passed for check in result.checks[first:])
     ends = []
     for engine, pushed in found["acceleration_at_end"].items():
-        size = float(np.abs(pushed).max())
+        where, size = f"{claims.end}, {LABELS[engine]}", float(np.abs(pushed).max())
         quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
-        away = result.check(f"{claims.end}, {LABELS[engine]}", quantity, size, PUSHED, "rad/s2", rule="at least").passed
+        away = result.check(where, quantity, size, PUSHED, "rad/s2", rule="at least", about=About.PREDICTION).passed
+        where = f"{claims.kept}, {LABELS[engine]}, RK4 at {FREE_STEP:g} s"
         quantity = f"angle from {claims.end} after {FREE_TIME:g} s, free"
         off = found["free_from_end"][engine]
-        result.check(f"{claims.kept}, {LABELS[engine]}, RK4 at {FREE_STEP:g} s", quantity, off, AT_REST, "rad")
+        result.check(where, quantity, off, AT_REST, "rad", about=About.PREDICTION)
         ends.append(away)
     above = [row for row in rows if row["dt_s"] > limit]
     moves = bool(above) and all(row["observed_s"] is not None or (row["largest_rad"] or 0.0) > 1e-3 for row in above)

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...engines import LABELS
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import LEFT, number_or_nan
 from ...robots import Robot
 from .choice import fraction, who
@@ -42,10 +42,12 @@ def check_torques(result: Result, robot: Robot, torques: list[dict]) -> None:
         for row in (row for row in of_engine if row["torque"] in CLEAR_TORQUES):
             along = None if row["direction"] is None else row["direction"] * np.sign(row["push_rad_per_s2"])
             text = "departure along the push of the residual (1; against it: -1)"
-            result.check(f"{where}, torque {row['torque']}", text, along, 1, "", rule="equal")
+            result.check(f"{where}, torque {row['torque']}", text, along, 1, "", rule="equal", about=About.PREDICTION)
             check_row(result, f"{where}, torque {row['torque']}", row)
         if engine == "mujoco":  # of TMT no double need be the bias: compiled code rounds its last sum only once
-            result.check(where, "movement under the engine's own bias", own["moved_rad"], 0.0, "rad")
+            result.check(
+                where, "movement under the engine's own bias", own["moved_rad"], 0.0, "rad", about=About.PREDICTION
+            )
         gone = [row for row in rows if row["observed_s"] is not None]
         near_claim = sum(abs(row["observed_s"] - claims.left_after) <= ABOUT_SO_LATE for row in gone)
         off = max((number_or_nan(row["residual_ulps"]) for row in rows), default=np.nan)
@@ -99,7 +101,7 @@ def check_finer_steps(result: Result, robot: Robot, finer: list[dict]) -> None:
     for row in (row for row in finer if steps_of(row) == count):
         where = f"{claims.left}, {who(row)}, torque {row[column]:+d} ulp"
         quantity = f"movement in {claims.duration:g} s at {count} steps"
-        still &= result.check(where, quantity, row["moved_rad"], 0.0, "rad").passed
+        still &= result.check(where, quantity, row["moved_rad"], 0.0, "rad", about=About.PREDICTION).passed
     series, turned, leave = [], 0, True
     for engine, sign in dict.fromkeys((row["engine"], row[column]) for row in finer):
         rows = [row for row in finer if (row["engine"], row[column]) == (engine, sign) and row["direction"]]

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ...engines import Engine, Method
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import LEFT, departure
 from ...judge.scale import EPS, gravity_scale
 from ...truth.linear import NEGLIGIBLE, Held
@@ -175,7 +175,7 @@ def check_row(result: Result, where: str, row: dict) -> None:
     missing = {"observed_s": "the run stays", "predicted_s": "the prediction stays"}
     note = " and ".join(text for key, text in missing.items() if row[key] is None)
     quantity = "departure, observed - predicted"
-    result.check(where, quantity, None if off is None else abs(off), near_row(row), "s", note)
+    result.check(where, quantity, None if off is None else abs(off), near_row(row), "s", note, about=About.PREDICTION)
 
 
 def departures_in_words(rows: list[dict]) -> str:

@@ -11,7 +11,7 @@ from tmt import literal
 from ...case import Case
 from ...engines import LABELS, Engine, Method
 from ...engines.mujoco.linear import left_to_itself
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
 from ...robots import Robot
@@ -136,12 +136,15 @@ def check_near(result: Result, robot: Robot, posture: str, found: dict) -> None:
     worst = {method.label: np.minimum(grown.max(axis=1), DIVERGED_GROWTH) for method, grown in found["grown"].items()}
     for label, (small, large) in worst.items():
         where, quantity = f"{posture}, {label}, omega dt near sqrt 3", f"growth in {steps} steps from"
-        result.check(where, f"{quantity} {LINEAR_DEVIATION:g} rad", small, GROWTH_ALLOWED, "fold")
+        result.check(
+            where, f"{quantity} {LINEAR_DEVIATION:g} rad", small, GROWTH_ALLOWED, "fold", about=About.PREDICTION
+        )
         if robot.kinds.get("resonant") == posture:
             note = "" if large < DIVERGED_GROWTH else f"diverges, for which {DIVERGED_GROWTH:g} stands"
             result.check(
-                where, f"{quantity} {LARGE_DEVIATION:g} rad", large, GROWTH_ALLOWED, "fold", note, rule="at least"
-            )
+                where, f"{quantity} {LARGE_DEVIATION:g} rad", large, GROWTH_ALLOWED, "fold", note, rule="at least",
+                about=About.PREDICTION,
+            )  # fmt: skip
     by_method = "; ".join(f"{label} {fold(small)} and {fold(large)}" for label, (small, large) in worst.items())
     result.notes.append(
         f"The nonlinear edge, at {posture}: at omega dt = sqrt 3 = {RESONANCE:.4f}, below the linear limit of 2, a swing of the "
@@ -166,7 +169,7 @@ def check_silent(result: Result, reset: dict, gain: dict) -> None:
                 delay = run["caught_in_it_s"] - run["since_s"]
             quantity = "time from a silent failure until it is caught"
             where = f"{case.name}, {LABELS['mujoco']} {where}, {step_in_words(case, case.steps)}"
-            result.check(where, quantity, delay, case.scene.dt, "s")
+            result.check(where, quantity, delay, case.scene.dt, "s", about=About.PREDICTION)
     result.notes += [reset_in_words(reset), gain_in_words(gain)]
     result.curves["silent"] = {"reset": reset, "gain": gain}
 

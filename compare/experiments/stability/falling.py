@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import quad
 
 from ...engines import LABELS, Engine, Method
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import LEFT, departure
 from ...truth.linear import Held
 from .departure import span
@@ -84,7 +84,9 @@ def check_falls(result: Result, falls: list[dict]) -> None:
             found = exponents[engine, side] = exponent(mine)
             off = None if found is None else abs(found + 0.5)
             where = f"{falls[0]['scene']}, {LABELS[engine]}, {side}"
-            result.check(where, "exponent of the time to leave, from -1/2", off, EXPONENT_TOLERANCE, "")
+            result.check(
+                where, "exponent of the time to leave, from -1/2", off, EXPONENT_TOLERANCE, "", about=About.PREDICTION
+            )
     if falls:
         result.notes.append(falls_in_words(falls, list(exponents.values())))
 

@@ -7,7 +7,7 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...engines import Engine, Method
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.rounding import slope_rounding
 from ...judge.scale import FACTOR
 from ...robots import Robot
@@ -193,16 +193,19 @@ def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
             continue
         if row["limit"] == "finite":
             note = "" if seen == "finite" else f"it {LIMIT_KINDS[seen]}"
-            result.check(where, "limit, observed / predicted - 1", apart(row), tolerance, "", note)
+            result.check(
+                where, "limit, observed / predicted - 1", apart(row), tolerance, "", note, about=About.PREDICTION
+            )
         else:
             quantity = f"runs in which it {LIMIT_KINDS[row['limit']]}, as predicted"
-            result.check(where, quantity, int(seen == row["limit"]), 1, "runs", rule="equal")
+            result.check(where, quantity, int(seen == row["limit"]), 1, "runs", rule="equal", about=About.PREDICTION)
         if tolerance > LIMIT_TOLERANCE:
             late[where] = tolerance
     growths = [row for part in parts for row in part["growths"]]
     for row in growths:
         where, off = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s", row.pop("total_off")
-        result.check(where, f"growth in {row['steps']} steps, observed / predicted - 1", off, GROWTH_TOLERANCE, "")
+        what = f"growth in {row['steps']} steps, observed / predicted - 1"
+        result.check(where, what, off, GROWTH_TOLERANCE, "", about=About.PREDICTION)
     result.tables["stability_growth"] = growths
     words = limits_in_words(robot, result.rows, predicted_only) + late_in_words(late) + undecided_in_words(undecided)
     result.notes[:0] = words

@@ -10,7 +10,7 @@ from tmt import literal
 
 from ...case import Case
 from ...engines import LABELS, Dynamics, Engine, Method, compared, one_of_each_scheme, same_scheme
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.run import ORDER_MARGIN
 from ...judge.scale import EPS, FACTOR, gravity_scale
 from ...robots import Robot
@@ -102,10 +102,19 @@ def check_drifts(result: Result, drifts: dict, rounding: Mapping[tuple, float]) 
                 where = f"{scene}, {method.name}, {LABELS[engine]}, {DRIFT_DURATION:g} s"
                 if not why:
                     off = abs(found[engine] - method.order)
-                    result.check(where, f"order of the drift of {quantity}, from {method.order}", off, ORDER_MARGIN, "")
+                    result.check(
+                        where,
+                        f"order of the drift of {quantity}, from {method.order}",
+                        off,
+                        ORDER_MARGIN,
+                        "",
+                        about=About.PREDICTION,
+                    )
                 if method.scheme == "rk4" and not is_rounding(of_scene[euler], allowed):
                     share = drift_ratio(values[-1], of_scene[euler][engine][-1])
-                    result.check(where, f"drift of {quantity} over that of Euler", share, OF_EULER, "")
+                    result.check(
+                        where, f"drift of {quantity} over that of Euler", share, OF_EULER, "", about=About.PREDICTION
+                    )
 
 
 def no_order(method: Method, engines: dict, found: dict, allowed: float | None) -> str | None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...case import Coordinates
-from ...judge.check import Result, closest
+from ...judge.check import About, Result, closest
 from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 
@@ -43,7 +43,8 @@ def check_divergence(
 def check_same_bits(result: Result, where: str, integrator: str, first: list, other: list) -> None:
     """Integrators that are one scheme here give the same bits: q and v of both."""
     differ = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(first, other))
-    result.check(where, f"the same bits as {integrator}", differ, 0.0, "arrays that differ", rule="equal")
+    quantity, unit = f"the same bits as {integrator}", "arrays that differ"
+    result.check(where, quantity, differ, 0.0, unit, rule="equal", about=About.PREDICTION)
 
 
 def check_level(

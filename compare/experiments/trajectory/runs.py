@@ -9,7 +9,7 @@ from tmt.methods import METHODS
 
 from ...case import Case, Coordinates
 from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
-from ...judge.check import Result
+from ...judge.check import About, Result
 from ...judge.rounding import NARROW, band, slope_rounding, step_rounding
 from ...judge.run import (
     check_movement,
@@ -188,7 +188,7 @@ def compare_runs(
         if not slow.all():
             result.notes.append(f"{where}: {np.sum(~slow)} of {len(slow)}")
         if required:  # a scene may leave it open
-            result.check(where, "time judged", until, required, "s", rule="at least")
+            result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
         check_divergence(result, where, ends, dt, steps, angle_band)
         if case.is_free and "own" not in case.scene.tags:
             before = t < ends_first(ends)

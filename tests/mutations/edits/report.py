@@ -6,7 +6,7 @@ EDITS = (
     Edit("verdict", "failures", "section.result.checks", "section.result.checks[:60]", "60 checks of a section count"),
     Edit("verdict", "failures", "not check.passed", "check.passed is None", "nothing fails"),
     Edit("verdict", "failures", "sections", "sections[:1]", "only the first experiment counts"),
-    Edit("verdict", "failures", "check.quantity in (ENDS, LOCKABLE) or _1", "True", "every failure is a run that broke off"),
+    Edit("verdict", "failures", "check.about == kind", "kind == About.PROGRAM", "every failure is a run that broke off"),
     Edit("verdict", "worst", "max(_1, key=_2, default=None)", "min(_1, key=_2, default=None)", "the best check is the worst"),
     Edit("verdict", "verdict", "100 * top.over_tolerance", "top.over_tolerance", "a share as a percentage"),
     Edit("verdict", "verdict", "causes[0]['text']", "causes[-1]['text']", "the last cause comes first"),

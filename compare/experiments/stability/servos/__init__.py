@@ -5,7 +5,7 @@ from functools import partial
 
 from ....engines.mujoco import Reading
 from ....engines.mujoco.flags import INTEGRATORS
-from ....judge.check import AT_OWN_STEP, Result
+from ....judge.check import AT_OWN_STEP, About, Result
 from ....robots import Robot
 from ....setup import Setup
 from ....truth.postures import posture_names
@@ -172,7 +172,7 @@ def check_steps(result: Result, one: Predicted, steps: Sequence[Steps]) -> None:
         where = named_place(row, len(one.at.bases) > 1)
         if found.apart is not None:
             quantity = "limit of the step under its servos, closed form to eigenvalues of a step"
-            result.check(where, quantity, found.apart, FORMS_WITHIN, "")
+            result.check(where, quantity, found.apart, FORMS_WITHIN, "", about=About.PREDICTION)
         if found.beside is not None:
             quantity = "growth of a step near that limit, TMT to MuJoCo"
             result.check(where, quantity, found.beside, RADII_WITHIN, "")
@@ -187,7 +187,7 @@ def check_observed(result: Result, row: dict, kind: str, several: bool) -> None:
     apart = abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if both else None
     note = "" if both else f"predicted: {row['limit']}, observed: {kind}"
     quantity = "limit of the step under its servos, observed to predicted"
-    result.check(named_place(row, several), quantity, apart, OBSERVED_WITHIN, "", note)
+    result.check(named_place(row, several), quantity, apart, OBSERVED_WITHIN, "", note, about=About.PREDICTION)
 
 
 def check_own_step(result: Result, rows: Sequence[dict]) -> None:
@@ -195,4 +195,4 @@ def check_own_step(result: Result, rows: Sequence[dict]) -> None:
     for row in known(rows, rows[0]["file_integrator"]):
         limit = row["predicted_dt_s"] or LIMIT_UP_TO
         note = ", ".join(filter(None, (f"under {row['file_integrator']}", row["limiting_joint"])))
-        result.check(row["posture"], AT_OWN_STEP, row["file_dt_s"], limit, "s", note)
+        result.check(row["posture"], AT_OWN_STEP, row["file_dt_s"], limit, "s", note, about=About.STEP)
