@@ -67,6 +67,7 @@ from . import beyond, choice, claims, departure, failure, falling, growth, limit
 from .choice import dampings_of
 from .claims_judged import check_claims
 from .equilibria import check_equilibria, planes
+from .limits_judged import check_limits
 from .subjects import MANY, places, subjects_of
 
 TITLE = "Stability: where methods fail"
@@ -207,7 +208,7 @@ def rows(setup: Setup) -> Result:
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
     said = servos.add(result, setup, work["servos"]) if work["servos"] else []
     check_equilibria(result, setup)
-    limits.check_limits(result, robot, list(work["limits"]))
+    check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
     departure.check_departures(result, [row for part in work["departure"] for row in part] + falls)
     falling.check_falls(result, falls)

@@ -10,7 +10,7 @@ from models import PATHS
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
-from compare.experiments.stability import equilibria, figures_limits, limits
+from compare.experiments.stability import equilibria, figures_limits, limits, limits_judged
 from compare.experiments.stability.subjects import subjects_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -47,7 +47,7 @@ def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more)
 
 
 def check_limits(result, *rows, growths=()):
-    limits.check_limits(result, ARM, [{"rows": list(rows), "growths": list(growths)}])
+    limits_judged.check_limits(result, ARM, [{"rows": list(rows), "growths": list(growths)}])
 
 
 @BOTH
@@ -71,7 +71,7 @@ def test_a_limit_that_no_run_shows_fails_and_is_said(result):
 
 
 def test_the_largest_difference_of_a_limit_is_said():
-    (text,) = limits.limits_in_words(ARM, [limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
+    (text,) = limits_judged.limits_in_words(ARM, [limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
     assert "largest difference: 0.500 % undamped" in text and text.startswith("3 finite limits")
 
 
