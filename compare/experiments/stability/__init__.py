@@ -242,7 +242,9 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     left = any(row["scene"] == looked_at["saddle"] for row in tables.get("departure", ()))
     drawn = {
         figures_step.draw_step_response: any(curves.get("step response", {"lines": {}})["lines"].values()),
-        figures_limits.draw_limits: bool(looked_at["centres"]),
+        figures_limits.draw_limits: any(
+            row["predicted_dt_s"] or row["observed_dt_s"] for row in result.rows if row["scene"] in looked_at["centres"]
+        ),
         figures_limits.draw_regions: bool(curves["points"]),
         figures_departure.draw_departure: left,
         figures_claims.draw_torques: "stability_torques" in tables,
