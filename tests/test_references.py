@@ -135,7 +135,7 @@ def test_a_file_of_any_name_stays_in_one_line(tmp_path, monkeypatch, name, said)
     first, _, second, *_ = text.splitlines()
     assert unescaped(first) == reference.lines[0] and second.startswith("open tree: ")
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
-    assert "<b>" not in page and page.index("reference: model; ") < page.index("<h1>")
+    assert "<b>" not in page and page.index("<h1>") < page.index("reference: model; ")
     assert page.count(said.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")) >= 3
     assert f"compared on {said}" in unescaped(text)
 

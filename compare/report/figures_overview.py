@@ -50,7 +50,9 @@ def has_data(name: str, results: Mapping[str, Result]) -> bool:
     (result,) = (results[need] for need in overview.PICTURES[name])
     if name == "times":
         return bool(methods_compared.best_curves(result))
-    return bool(result.rows if name == "scenes" else methods_compared.limits_found(result))
+    if name == "scenes":
+        return bool(result.rows)
+    return any(one.predicted or one.observed or not one.passed for one in methods_compared.limits_found(result))
 
 
 def empty(height: float = SIZE[1]) -> tuple[Figure, Axes]:

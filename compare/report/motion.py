@@ -9,7 +9,8 @@ from string import Template
 
 import numpy as np
 
-from .verdict import Section
+from .engines_apart import scene_named_in
+from .verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page
 STICK_BYTES = 48  # of a stick in the picture without script
@@ -24,12 +25,15 @@ UNDER = 0.9  # of what is shown at its own speed
 def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     """A <figure> with its style, script and data, at most 300 kB; "" where no scene is drawn. robot: whose motion it is.
 
-    Where all pictures would take more, every second, fourth ... is left out, and then the last scenes: that is said.
+    It opens on a scene in which the engines differ, where there is one. Where all pictures would take more, every second,
+    fourth ... is left out, and then the last scenes: that is said.
     """
     section = next((section for section in sections if section.name == DRAWN_IN), None)
     drawn = section.result.curves.get("drawn") if section else None
     if not drawn:
         return ""
+    differing = scenes_that_differ(section)
+    drawn = sorted(drawn, key=lambda one: one.scene not in differing)
     label = section.result.label
     engines = [label[:1].upper() + label[1:], "MuJoCo"]
     data, stride, scenes = inlined(drawn, engines)
@@ -59,6 +63,12 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
         data=data,
         script=(here / "motion.js").read_text(encoding="utf-8"),
     )
+
+
+def scenes_that_differ(section: Section) -> set[str]:
+    """The scenes of which a check of the two models fails."""
+    names = [one.scene for one in section.result.curves["drawn"]]
+    return {scene_named_in(check.scene, names) for check in failures([section]).differing} - {None}
 
 
 def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dict]]:

@@ -70,7 +70,9 @@ def unstable_in_words(unstable: Sequence[Check]) -> str:
         else " and one more posture" * (len(unstable) > 1)
     )
     step, limit = (f"{1e3 * number:.4g} ms" for number in (worst.value, worst.tolerance))
-    return f"not stable at its own step of {step} at {worst.scene}{more}: the limit is {limit} {worst.note}".rstrip()
+    times = worst.value / worst.tolerance
+    far = f", {times:.2g} times beyond the limit of {limit}" if times >= 10.0 else f": the limit is {limit}"
+    return f"not stable at its own step of {step} at {worst.scene}{more}{far} {worst.note}".rstrip()
 
 
 def unconfirmed_in_words(unconfirmed: Sequence[Check]) -> str:

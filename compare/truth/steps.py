@@ -52,6 +52,16 @@ def growth_of(stepping, z: np.ndarray) -> np.ndarray:
     return 1.0 + z * sum(b * stage for b, stage in zip(stepping.b, stages) if b)
 
 
+def beyond_limit(at, name: str, dt: float) -> float:
+    """How many times a step, s, of a method is beyond the last one that lets no mode of a held posture grow as it should not.
+
+    That is faster than the equations of motion have it grow, by more than a tenth.
+    """
+    steps = dt * np.geomspace(1e-5, 1.0, 201)
+    fast = at.growth(name, steps) > 1.1 * np.exp(max(at.modes[0].real.max(), 0.0) * steps)
+    return float(dt / steps[max(int(np.argmax(fast)) - 1, 0)]) if fast.any() else 1.0
+
+
 def region(name: str, z: np.ndarray) -> np.ndarray:
     """Growth in one step of a single hinge whose eigenvalues times dt are z and its conjugate, shape of z.
 

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ import pytest
 from sections import section
 
 from compare.experiments.trajectory.motion_frames import Drawn
+from compare.judge.check import About
 from compare.report import motion
 from compare.robots.arm import ARM
 
@@ -55,6 +57,18 @@ def test_there_is_no_figure_where_nothing_moves():
     assert motion.motion_in_html([], ARM) == motion.motion_in_html([section("mass")], ARM) == page_of() == ""
     broken = section("trajectory")  # one that broke off has no curves
     assert motion.motion_in_html([broken], ARM) == ""
+
+
+def test_it_opens_on_the_scene_that_differs():
+    of = section(
+        "trajectory", ("open loop", 2.0, 1.0, "at most", True), ("drift", 2.0, 1.0, "at most", False, About.PREDICTION)
+    )
+    of.result.checks = [
+        replace(check, scene=f"{scene}, RK4") for check, scene in zip(of.result.checks, ("let go", "held"))
+    ]
+    of.result.curves = {"drawn": [drawn("held"), drawn("let"), drawn("let go")]}
+    names = [scene["name"] for scene in data_of(motion.motion_in_html([of], ARM))["scenes"]]
+    assert names == ["let go", "held", "let"]
 
 
 def test_the_figure_is_whole_and_fetches_nothing():
@@ -158,7 +172,11 @@ def test_the_script_is_short_and_packed():
 
 def test_any_robot_is_named():
     assert "The robot is seen" in motion.motion_in_html(
-        [SimpleNamespace(name="trajectory", result=SimpleNamespace(curves={"drawn": [drawn()]}, label="TMT"))],
+        [
+            SimpleNamespace(
+                name="trajectory", result=SimpleNamespace(curves={"drawn": [drawn()]}, checks=[], label="TMT")
+            )
+        ],
         SimpleNamespace(noun="robot"),
     )
 

@@ -150,7 +150,8 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """What each scene needs and how fast that is; exact swings; small oscillations; costs: calls that draw one figure."""
     from . import figures_motion, figures_needs  # matplotlib is for the process that draws
 
-    if result.rows:  # none of a model that cannot be locked
+    needs = result.curves["needs"].values() if result.rows else ()  # none of a model that cannot be locked
+    if any(found["stays"] or found["locked"] or found.get("undecided") for found in needs):
         yield partial(figures_needs.draw_needs, result, robot)
     for scene in result.curves["swings"]:
         yield partial(figures_motion.draw_swing, result, scene)

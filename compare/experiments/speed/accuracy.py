@@ -40,19 +40,19 @@ def check_smallest_errors(result: Result, floors: Floors, unit: str = "rad") -> 
     """MuJoCo's RK4 comes as near to the reference as tmt's; and where errors stop falling, they are of the size of rounding.
 
     Where the steps of MuJoCo's end before its errors stop falling, tmt's is taken with steps no finer: it may afford more. Where
-    with these both diverge, as with a stiff robot, there is nothing to compare.
+    with these both diverge, as with a stiff robot, or tmt's took none that is as coarse, there is nothing to compare.
     """
     for scene, left in floors.items():
-        least = {}
+        least, finest = {}, finest_while_falling(result.rows, scene, "mujoco", "RK4") or 0.0
         for engine, method in (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")):
             errors = errors_of(result.rows, scene, engine, method)
             least[method] = min(errors, default=np.inf)
             if stopped(errors):
                 quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
                 result.check(scene, quantity, least[method], FACTOR * left, unit, rounding=True)
-        if theirs := finest_while_falling(result.rows, scene, "mujoco", "RK4"):
-            least["rk4"] = min(errors_of(result.rows, scene, "tmt", "rk4", theirs), default=np.inf)
-        if not np.isfinite([least["RK4"], least["rk4"]]).any():
+        comparable = errors_of(result.rows, scene, "tmt", "rk4", finest)
+        least["rk4"] = min(comparable, default=np.inf)
+        if not comparable or not np.isfinite([least["RK4"], least["rk4"]]).any():
             continue
         tolerance = FACTOR * left + (2.0 * least["rk4"] if np.isfinite(least["rk4"]) else 0.0)
         result.check(scene, "smallest error of MuJoCo's RK4, beside that of tmt's rk4", least["RK4"], tolerance, unit)

@@ -67,6 +67,7 @@ from . import beyond, choice, claims, departure, failure, falling, growth, limit
 from .choice import dampings_of
 from .claims_judged import check_claims
 from .equilibria import check_equilibria, planes
+from .limits_judged import check_limits
 from .subjects import MANY, places, subjects_of
 
 TITLE = "Stability: where methods fail"
@@ -207,7 +208,7 @@ def rows(setup: Setup) -> Result:
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
     said = servos.add(result, setup, work["servos"]) if work["servos"] else []
     check_equilibria(result, setup)
-    limits.check_limits(result, robot, list(work["limits"]))
+    check_limits(result, robot, list(work["limits"]))
     falls = [row for part in work["falls"] for row in part]
     departure.check_departures(result, [row for part in work["departure"] for row in part] + falls)
     falling.check_falls(result, falls)
@@ -241,7 +242,9 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     left = any(row["scene"] == looked_at["saddle"] for row in tables.get("departure", ()))
     drawn = {
         figures_step.draw_step_response: any(curves.get("step response", {"lines": {}})["lines"].values()),
-        figures_limits.draw_limits: bool(looked_at["centres"]),
+        figures_limits.draw_limits: any(
+            row["predicted_dt_s"] or row["observed_dt_s"] for row in result.rows if row["scene"] in looked_at["centres"]
+        ),
         figures_limits.draw_regions: bool(curves["points"]),
         figures_departure.draw_departure: left,
         figures_claims.draw_torques: "stability_torques" in tables,

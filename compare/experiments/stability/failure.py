@@ -161,9 +161,13 @@ def fold(grown: float) -> str:
 
 
 def check_silent(result: Result, reset: dict, gain: dict) -> None:
-    """Failures that MuJoCo does not report: where one occurs, it must be caught at once."""
+    """Failures that MuJoCo does not report: where one occurs, it must be caught at once.
+
+    Of a robot of a file that is told and not checked: how far its potential reaches is found by a search, and the bound of its
+    energy by which a run is caught may be far above.
+    """
     for where, run in (("Euler, automatic reset on", reset), ("implicit", gain)):
-        if run["since_s"] is not None:
+        if run["since_s"] is not None and not run["case"].robot.is_read:
             case, delay = run["case"], None
             if run["caught_in_it_s"] is not None:
                 delay = run["caught_in_it_s"] - run["since_s"]

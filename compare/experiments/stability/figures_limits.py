@@ -11,7 +11,7 @@ from ...robots import Robot
 from .choice import coarsest_case, damped, fraction, unit_of_movements
 from .departure import span
 from .growth import LINEAR_DEVIATION
-from .limits import apart
+from .limits_judged import apart
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),

@@ -12,6 +12,9 @@ LINEAR_DEVIATION = 1e-6  # rad, at the start
 GROWTH_STEPS = 2000  # of a run
 # where growth per step is compared: rad, of the deviation; how much it may grow; in at most how many steps
 TINY_DEVIATION, TOTAL_GROWTH, MOST_GROWTH_STEPS = 1e-8, 1e3, 200
+MOST_OF_A_STEP = (
+    100.0  # fold: a step that multiplies a deviation by more takes the run out of the reach of a linear motion
+)
 
 
 def growth_in_run(

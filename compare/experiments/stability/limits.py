@@ -7,13 +7,11 @@ import numpy as np
 from tmt.methods import METHODS
 
 from ...engines import Engine, Method
-from ...judge.check import About, Result
 from ...judge.rounding import slope_rounding
 from ...judge.scale import FACTOR
-from ...robots import Robot
 from ...truth.linear import Held
-from .choice import damped, who
-from .growth import GROWTH_STEPS, LINEAR_DEVIATION, growth_per_step, growth_per_step_in_words
+from ...truth.steps import beyond_limit
+from .growth import GROWTH_STEPS, LINEAR_DEVIATION, MOST_OF_A_STEP, growth_per_step
 
 GROWTH_ALLOWED = 100.0  # fold, of the deviation
 FAR = 1e4  # fold, of what has left the reach of a linear motion
@@ -40,9 +38,10 @@ def limits_and_growths(
 ) -> dict:
     """Rows for tables/stability.csv and tables/stability_growth.csv of one posture.
 
-    growth_dts: s, where growth per step is compared if a method always fails.
+    growth_dts: s, where growth per step is compared if a method always fails; too long: those that are left out, each with how
+    many times it is beyond the limit.
     """
-    rows, growths = [], []
+    rows, growths, too_long = [], [], {}
     for method in methods:
         kind, predicted = at.limit(method.scheme)
         tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
@@ -55,14 +54,18 @@ def limits_and_growths(
         if kind == "finite" and seen == "always_fails" and predicted < tried_at(at, predicted)[0]:
             kind, predicted = seen, None  # it fails at every step that is tried
         if kind == "always_fails":
-            growths += [growth_per_step(method, engines, at, dt) for dt in growth_dts]
+            for each in growth_dts:
+                if at.growth(method.scheme, each) > MOST_OF_A_STEP:
+                    too_long[f"{at.name}, {method.label}, dt = {each:.4g} s"] = beyond_limit(at, method.scheme, each)
+                else:
+                    growths.append(growth_per_step(method, engines, at, each))
         rows.append({
             "scene": at.name, "engine": method.engine, "method": method.name, "damping": at.case.scene.damping,
             "mode_per_s": np.abs(at.modes[0]).max() if kind == "never_fails" else at.rate(shape),
             "predicted_dt_s": predicted, "observed_dt_s": observed, "limit": kind, "criterion": CRITERION,
             "seen": seen, "allowed": tolerance, "undecided": open_end,
         })  # fmt: skip
-    return {"rows": rows, "growths": growths}
+    return {"rows": rows, "growths": growths, "too long": too_long}
 
 
 def observed_limit(
@@ -110,7 +113,9 @@ def shares(
     """Shares of the modes in the deviation, over those at the start, in the second and the last quarter of a run, (2n,).
 
     All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of motion, not of
-    a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that swings in it cancel.
+    a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that swings in it cancel. Of a robot of a
+    file a mode that does not grow by itself and of which a quarter holds no swing is left out: squares of what the fast ones do
+    move what it swings about.
     """
     n, vectors = at.nv, at.shapes
     quarter = quarter_of(at, dt, steps)
@@ -123,8 +128,15 @@ def shares(
         parts = (slice(0, 1), slice(quarter + 1, 2 * quarter + 1), slice(3 * quarter + 1, None))
         deviations = (np.concatenate([at.away(motion.q[part]), motion.v[part]], axis=1) for part in parts)
         first, *found = (np.abs(off @ at.measures.T) ** 2 for off in deviations)
-        early, late = (np.sqrt(weight @ part / first[0]) for part in found)
+        seen = is_seen(at.modes[0][~at.without_stiffness], at.small, quarter * dt)
+        early, late = (np.sqrt(weight @ part / first[0])[seen] for part in found)
         return early, late
+
+
+def is_seen(rates: np.ndarray, small: float, duration: float) -> np.ndarray:
+    """Which modes a run shows, by their rates, 1/s: those that grow, and those that move in a part of so many seconds."""
+    seen = (rates.real > small) | (np.abs(rates) * duration >= 2.0 * np.pi)
+    return seen if seen.any() else np.ones_like(seen)
 
 
 def quarter_of(at: Held, dt: float, steps: int) -> int:
@@ -178,83 +190,3 @@ def grows(early: np.ndarray, late: np.ndarray) -> bool:
         return True
     still = (late > (1.0 + GROWTH_MARGIN) * early) & (late > DECAYED)
     return bool(((early > FAR) | (late > GROWTH_ALLOWED) | still).any())
-
-
-def check_limits(result: Result, robot: Robot, parts: Sequence[dict]) -> None:
-    """The table of limits and that of growth per step, and a check for each row."""
-    late, undecided, predicted_only = {}, {}, 0
-    for row in (row for part in parts for row in part["rows"]):
-        seen, tolerance, reason = row.pop("seen"), row.pop("allowed"), row.pop("undecided", None)
-        result.rows.append(row)
-        where = f"{row['scene']}, {who(row)}, damping {row['damping']:g}"
-        if seen is None:
-            undecided.setdefault(reason, []).append(where)
-            predicted_only += row["limit"] == "finite"
-            continue
-        if row["limit"] == "finite":
-            note = "" if seen == "finite" else f"it {LIMIT_KINDS[seen]}"
-            result.check(
-                where, "limit, observed / predicted - 1", apart(row), tolerance, "", note, about=About.PREDICTION
-            )
-        else:
-            quantity = f"runs in which it {LIMIT_KINDS[row['limit']]}, as predicted"
-            result.check(where, quantity, int(seen == row["limit"]), 1, "runs", rule="equal", about=About.PREDICTION)
-        if tolerance > LIMIT_TOLERANCE:
-            late[where] = tolerance
-    growths = [row for part in parts for row in part["growths"]]
-    for row in growths:
-        where, off = f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s", row.pop("total_off")
-        what = f"growth in {row['steps']} steps, observed / predicted - 1"
-        result.check(where, what, off, GROWTH_TOLERANCE, "", about=About.PREDICTION)
-    result.tables["stability_growth"] = growths
-    words = limits_in_words(robot, result.rows, predicted_only) + late_in_words(late) + undecided_in_words(undecided)
-    result.notes[:0] = words
-    result.notes += growth_per_step_in_words(growths)
-
-
-def apart(row: dict) -> float | None:
-    """How far an observed limit is from the predicted one, relative; None if one of them is missing."""
-    known = row["observed_dt_s"] and row["predicted_dt_s"]
-    return abs(row["observed_dt_s"] / row["predicted_dt_s"] - 1.0) if known else None
-
-
-def limits_in_words(robot: Robot, rows: list[dict], undecided: int = 0) -> list[str]:
-    """How far observed limits are from the predicted ones, damping by damping; undecided: how many no run was asked for."""
-    expected = [row for row in rows if row["limit"] == "finite"]
-    known = [row for row in expected if apart(row) is not None]
-    if not expected:
-        return ["No method has a finite limit in these scenes."]
-    differences = ", ".join(
-        f"{100 * max(apart(row) for row in known if row['damping'] == damping):.3f} % "
-        + (f"with {damped(robot, damping)} N m s/rad" if damping else damped(robot, damping))
-        for damping in sorted({row["damping"] for row in known})
-    )
-    missing = len(expected) - len(known) - undecided
-    if missing:
-        seen = f"In {missing} cases the runs show no finite limit."
-    else:
-        seen = f"Of {undecided} no run decides." if undecided else "The runs show each of them."
-    return [
-        f"{len(expected)} finite limits are predicted without a run. "
-        + (f"{len(known)} are observed without the prediction; largest difference: {differences}. " if known else "")
-        + seen
-    ]
-
-
-def late_in_words(late: Mapping[str, float]) -> list[str]:
-    """Where growth is seen only far above a limit, {where: how far, relative}."""
-    if not late:
-        return []
-    places = "; ".join(f"{where}: {100 * excess:.2g} %" for where, excess in late.items())
-    return [
-        f"With little damping a mode hardly grows just above its limit. So far above it a run of this length shows the growth, "
-        f"and so far from the prediction an observed limit may be: {places}."
-    ]
-
-
-def undecided_in_words(undecided: Mapping[str, Sequence[str]]) -> list[str]:
-    """Which limits no run decides, {why: where}."""
-    return [
-        f"Limits that no run decides, and that are not checked, for {why}: {'; '.join(of)}."
-        for why, of in undecided.items()
-    ]

@@ -27,13 +27,14 @@ def check_divergence(
 ) -> None:
     """Both diverge at the same step, if one does while the band (recorded,) is narrow: then rounding decides nothing.
 
+    It is to be narrow at the first recorded state that is not before the divergence: between two states it may open wide.
     ends: of the engine that MuJoCo is compared with, and of MuJoCo, s.
     """
     end = ends_first(ends)
     if end == np.inf:
         return
     every = steps // (len(width) - 1)
-    if width[int(round(end / dt) / every)] < NARROW:
+    if width[-(-round(end / dt) // every)] < NARROW:
         ours, theirs = (steps + 1 if at is None else round(at / dt) for at in ends.values())
         whose = "TMT's" if result.label == "TMT" else result.label
         note = f"{steps + 1}: never" if steps + 1 in (ours, theirs) else ""

@@ -21,7 +21,9 @@ from ...judge.run import (
     step_in_words,
 )
 from ...judge.scale import EPS
+from ...truth.linear import Held
 from ...truth.smallest import reduced
+from ...truth.steps import beyond_limit
 from .motion import at_equal_times
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
@@ -112,13 +114,20 @@ def follow(
         ]
     unjudged = [row for row in result.rows if row["level"] == "open loop" and not row["judged_until_s"]]
     if unjudged:
-        runs = "; ".join(f"{row['engine_integrator']}, {case.duration / row['dt_s']:.0f} steps" for row in unjudged)
+        runs = "; ".join(run_in_words(case, row) for row in unjudged)
         result.notes.append(
             f"{case.name}: no state of a run but its start is judged, as rounding may drive the next one apart by more than "
             f"{NARROW:g} {movement_unit(case.coordinates)}, or the run has diverged there: {runs}. Nothing is said of these runs "
             "beyond single steps."
         )
     return result
+
+
+def run_in_words(case: Case, row: dict) -> str:
+    """Which run a row is of, and how far its step is beyond the limit at the start, if it is."""
+    times = beyond_limit(Held(case), row["twin"], row["dt_s"])
+    beyond = f", a step {times:.2g} times beyond the limit" if times > 1.0 else ""
+    return f"{row['engine_integrator']}, {case.duration / row['dt_s']:.0f} steps{beyond}"
 
 
 def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: int = MOST_ENTRIES) -> TmtSide:

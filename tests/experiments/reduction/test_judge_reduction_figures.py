@@ -167,6 +167,13 @@ def test_any_name_of_a_scene_is_drawn_as_it_is_and_gives_a_plain_file_name(tmp_p
     assert name == "reduction_to_5_and_6_x_" and not fig.axes[0].texts  # no order is measured
 
 
+@pytest.mark.parametrize("stays, count", [((), 0), (("gamma",), 1)])
+def test_what_needs_every_joint_has_no_figure_of_needs(stays, count):
+    needs = {"bent, free": {"stays": list(stays), "locked": []}}
+    result = Result("reduction", rows=[{"scene": "bent, free"}], curves={"swings": {}, "needs": needs})
+    assert len(list(reduction.figures(result, ARM))) == count
+
+
 def test_an_empty_section_has_no_figures_and_none_raises():
     empty = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}}, tables={"cost_in_mujoco": []})
     assert len(list(reduction.figures(Result("reduction", curves={"swings": {}}), ARM))) == 0

@@ -46,6 +46,14 @@ def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
     assert found == ({} if verdict is None else {"the same error as tmt's rk4": verdict})
 
 
+def test_where_tmt_took_no_step_as_coarse_nothing_is_compared():
+    quantity = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
+    theirs = [row("mujoco", "RK4", 1e-3, 64), row("mujoco", "RK4", 1e-5, 128)]
+    assert smallest_errors(theirs, {"bent, free": 1e-16}) == {}
+    assert smallest_errors([*theirs, row("tmt", "rk4", 1e-9, 1024)], {"bent, free": 1e-16}) == {}
+    assert smallest_errors([*theirs, row("tmt", "rk4", None, 128)], {"bent, free": 1e-16}) == {quantity: False}
+
+
 @pytest.mark.parametrize("left, passes", [(1e-14, True), (0.9e-14, True), (0.99e-14 / 64 / 2, False)])
 def test_errors_that_have_stopped_are_of_the_size_of_rounding(left, passes):
     stops = [1e-6, 1e-14, 2e-14]  # 64 of the rounding, at least, where the last is not the least

@@ -10,11 +10,13 @@ from models import PATHS
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
-from compare.experiments.stability import equilibria, figures_limits, limits
+from compare.experiments.stability import equilibria, figures_limits, limits, limits_judged
 from compare.experiments.stability.subjects import subjects_of
+from compare.judge.check import About
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.linear import held
+from compare.truth.steps import beyond_limit
 
 EPS = 2.0**-52
 RK4 = Tmt().methods["rk4"]
@@ -47,7 +49,7 @@ def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more)
 
 
 def check_limits(result, *rows, growths=()):
-    limits.check_limits(result, ARM, [{"rows": list(rows), "growths": list(growths)}])
+    limits_judged.check_limits(result, ARM, [{"rows": list(rows), "growths": list(growths)}])
 
 
 @BOTH
@@ -65,13 +67,39 @@ def test_kind_of_limit_is_as_predicted(result, kind, seen):
     assert only(result) is (kind == seen)
 
 
+@pytest.mark.parametrize("theirs, about", [(0.12, About.PREDICTION), (0.1, About.MODELS)])
+def test_what_both_engines_do_and_is_not_predicted_is_no_difference_of_the_models(result, theirs, about):
+    result.curves["schemes"] = {("mujoco", "RK4"): "rk4"}
+    check_limits(result, limit_row(observed=0.12), limit_row(observed=theirs) | {"engine": "mujoco", "method": "RK4"})
+    assert result.checks[0].about == about and not result.checks[0].passed
+
+
+def test_a_step_that_multiplies_a_deviation_by_much_is_told_and_not_compared(result):
+    part = {"rows": [], "growths": [], "too long": {"bent, TMT rk4, dt = 0.01 s": 243.2}}
+    limits_judged.check_limits(result, ARM, [part])
+    assert not result.checks and "dt = 0.01 s is 243 times beyond the limit" in result.notes[-1]
+
+
+def test_how_far_a_step_is_beyond_the_limit():
+    at = held(ARM, "hanging")
+    limit = at.limit("rk4")[1]
+    assert beyond_limit(at, "rk4", 50.0 * limit) == pytest.approx(50.0, rel=0.1)
+    assert beyond_limit(at, "rk4", 0.5 * limit) == 1.0
+
+
+def test_a_slow_mode_that_does_not_grow_by_itself_is_not_seen_in_a_short_run():
+    rates = np.array([3.0j, 0.01j, -0.01, 0.01, -50.0])
+    np.testing.assert_array_equal(limits.is_seen(rates, 1e-6, 10.0), [True, False, False, True, True])
+    assert limits.is_seen(np.array([0.01j]), 1e-6, 10.0).all()  # there is no other
+
+
 def test_a_limit_that_no_run_shows_fails_and_is_said(result):
     check_limits(result, limit_row(observed=None, seen="never_fails"))
     assert not only(result) and "In 1 cases the runs show no finite limit" in result.notes[0]
 
 
 def test_the_largest_difference_of_a_limit_is_said():
-    (text,) = limits.limits_in_words(ARM, [limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
+    (text,) = limits_judged.limits_in_words(ARM, [limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
     assert "largest difference: 0.500 % undamped" in text and text.startswith("3 finite limits")
 
 

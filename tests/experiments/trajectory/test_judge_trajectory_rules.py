@@ -88,6 +88,14 @@ def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, wi
     assert all(check.rule == "equal" for check in result.checks)
 
 
+def test_no_step_of_divergence_is_asked_where_the_band_opens_before_the_next_recorded_state():
+    for end, found in ((0.12, {}), (0.1, {"step of divergence, MuJoCo's, is TMT's": False})):
+        result = Result("trajectory")
+        width = np.array([0.0, 1e-9, *[np.inf] * 9])
+        rules.check_divergence(result, "x", {"tmt": end, "mujoco": end + 0.01}, 0.01, 100, width)
+        assert verdicts(result) == found
+
+
 def test_a_free_run_moves_by_a_tenth_of_a_radian():
     for moved, passes in ((0.1001, True), (0.0999, False)):
         result = Result("trajectory")
