@@ -64,7 +64,7 @@ def assert_agrees(
     __tracebackhide__ = True  # pytest shows the line of the test
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
     if given.fails or given.problems:
-        raise AssertionError(message(given, cause_of(given) if given.fails else ""))
+        raise AssertionError(message(given, *(cause_of(given) if given.fails else ("", False))))
 
 
 def differences(
@@ -87,7 +87,7 @@ def differences(
     The same arguments and errors as `assert_agrees`.
     """
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
-    cause = cause_of(given) if given.fails else ""
+    cause = cause_of(given)[0] if given.fails else ""
     found = []
     for name, one in given.compared.items():
         entries = given.entries(name)

@@ -21,6 +21,7 @@ ARGUMENTS = {
     "jacobians": 1,
 }
 STATE = ("q", "qd", "tau")
+QUICK = 1e-3  # s a state: functions that take no longer are asked some hundred times more
 OF_A_TREE = {"gravity": "gravity_balance"}  # where tmt has another name
 
 
