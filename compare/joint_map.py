@@ -68,6 +68,21 @@ class JointMap:
         same = self.sign.min() == self.of_q.min() == self.of_q.max() == 1.0 and not self.zero.any()
         return bool(same and (self.of_v == 1.0).all() and (self.q == np.arange(len(self.q))).all())
 
+    def after(self, found: "JointMap", coordinates: Coordinates) -> "JointMap | None":
+        """The map from a model to one's own joints, where what this map takes for the model's joints are those of `found`.
+
+        None where it cannot be stated, as of degrees of degrees.
+        """
+        places, joints = {name: i for i, name in enumerate(coordinates.names)}, []
+        for stated in self.joints:
+            inner = found.joints[places[stated.name]]
+            if stated.unit and inner.unit:
+                return None
+            zero = stated.sign * inner.zero + stated.zero / PER_UNIT[inner.unit][0]
+            sign, unit = stated.sign * inner.sign, stated.unit or inner.unit
+            joints.append(Joint(inner.name, sign, within_a_turn(zero, inner.slides), unit, inner.slides))
+        return JointMap(coordinates, joints)
+
     def own_positions(self, q: np.ndarray) -> np.ndarray:
         return (np.asarray(q)[..., self.q] * self.sign + self.zero) * self.of_q
 
@@ -94,6 +109,12 @@ class JointMap:
     def mass_matrix(self, own: np.ndarray) -> np.ndarray:
         back = np.argsort(self.v)
         return (np.asarray(own) * self.sense[:, None] * self.sense)[..., back[:, None], back]
+
+
+def within_a_turn(zero: float, slides: bool) -> float:
+    """The zero of a hinge between -180 and 180 deg, 0 if only rounding is left of it; that of a slide as it is."""
+    turned = zero if slides else (zero + np.pi) % (2.0 * np.pi) - np.pi
+    return 0.0 if abs(turned) < 1e-9 else float(turned)
 
 
 def put(values: np.ndarray, at: np.ndarray) -> np.ndarray:

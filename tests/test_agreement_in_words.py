@@ -54,13 +54,13 @@ def test_the_message_in_the_manner_of_numpy_testing(given):
 
 
 @pytest.mark.parametrize("brought, cause", [
-    ({"bias": wrong_bias}, "h[0], coefficient of qd1^2: yours is -1 times the right one."),
-    ({"mass_matrix": mass_matrix, "bias": wrong_bias}, "h[0], coefficient of qd1^2: yours is -1 times the right one."),
-    ({"gravity": lambda q: -gravity(q)}, "gravity"), ({"gravity": lambda q: gravity(q) * [1, 2]}, "h[1] at rest"),
+    ({"bias": wrong_bias}, "h[hip], coefficient of knee'^2: yours is -1 times the right one."),
+    ({"mass_matrix": mass_matrix, "bias": wrong_bias}, "h[hip], coefficient of knee'^2: yours is -1 times the right one."),
+    ({"gravity": lambda q: -gravity(q)}, "gravity"), ({"gravity": lambda q: gravity(q) * [1, 2]}, "h[knee] at rest"),
     ({"acceleration": lambda q, v, t: np.linalg.solve(mass_matrix(q), t - bias(q, v))}, "damping in the acceleration: left out"),
     ({"acceleration": lambda q, v, t: acceleration(q, v, -t)}, "torque in the acceleration: of the other sign"),
     ({"acceleration": lambda q, v, t: np.linalg.solve(mass_matrix(q), t - wrong_bias(q, v) - np.array([0.3, 0]) * v)},
-     "h[0], coefficient of qd1^2: yours is -1 times the right one."),
+     "h[hip], coefficient of knee'^2: yours is -1 times the right one."),
     (RIGHT | {"acceleration": lambda q, v, t: acceleration(q, v, t) * [1.0, 1.1]}, "mass_matrix and bias agree"),
     (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v}, "damping of every joint in h: 0.1 N m s/rad in place of 0"),
     (RIGHT | {"bias": lambda q, v: bias(q, v) + 0.1 * v[::-1]}, "Your bias is linear in qd: is damping in it?"),
@@ -73,7 +73,7 @@ def test_the_cause_is_sought_where_there_are_values(rng):
     q, qd = rng.uniform(-2.0, 2.0, (2, 50, 2))
     values = np.array([wrong_bias(*state) for state in zip(q, qd)])
     values[:30] = np.nan
-    assert "Probable cause: h[0], coefficient of qd1^2: yours is -1 times the right one.\n" in message_of(
+    assert "Probable cause: h[hip], coefficient of knee'^2: yours is -1 times the right one.\n" in message_of(
         mass_matrix=mass_matrix, bias=values, q=q, qd=qd
     )
 
@@ -87,7 +87,7 @@ def test_one_triangle_alone_is_wrong(given):
     values = given.values["mass_matrix"].copy()
     values[:, 0, 1] += 0.1
     text = message_of(mass_matrix=values, q=given.states["q"])
-    assert "Probable cause: Your M is not symmetric: M[0][1] is " in text and "entries 12 / 48" in text
+    assert "Probable cause: Your M is not symmetric: M[hip][knee] is " in text and "entries 12 / 48" in text
 
 
 def test_values_of_accelerations_alone_have_no_cause_of_their_own(given):
@@ -219,3 +219,26 @@ def test_the_signature_is_the_one_that_is_promised():
         assert str(plain) == expected
     with pytest.raises(AttributeError, match="has no attribute 'agrees'"):
         _ = compare.agrees
+
+
+def test_help_says_first_what_it_does_and_names_every_field():
+    for function in (compare.assert_agrees, compare.differences):
+        assert len(str(inspect.signature(function))) < 400
+    fields = compare.differences(PENDULUM, bias=bias, states=1)[0]
+    assert all(f"{name}:" in fields.__doc__ or f"{name}," in fields.__doc__ for name in fields._fields)
+
+
+@pytest.mark.parametrize("more, said", [
+    ({"q": np.zeros((5, 2)), "states": 500}, "states=500 is not used: the 5 states of q are compared"),
+    ({"states": 10**6}, "random states in place of 1,000,000"),
+])  # fmt: skip
+def test_states_that_are_not_compared_are_said(more, said, monkeypatch):
+    monkeypatch.setattr("compare.states.MOST_NUMBERS", 120)
+    with pytest.warns(UserWarning, match=said) as caught:
+        compare.assert_agrees(PENDULUM, mass_matrix=mass_matrix, **more)
+    assert caught[0].filename == __file__
+
+
+def test_what_is_neither_a_function_nor_numbers():
+    with pytest.raises(ValueError, match="; a function, or an array of its values at q, is expected"):
+        compare.assert_agrees(PENDULUM, mass_matrix=inspect)

@@ -247,7 +247,7 @@ def test_own_equations_on_the_command_line_run_as_the_readme_has_them(tmp_path, 
     lines = [shlex.split(line)[3:] for line in commands() if "--reference my_equations.py:" in line]
     assert [line[0] for line in lines] == ["all", "mass", "diagnosis"]
     assert main([*lines[2], "--quick", "--out", "out"]) == 1
-    assert "coefficient of qd1^2" in Path("out/report.md").read_text(encoding="utf-8")
+    assert "coefficient of knee'^2" in Path("out/report.md").read_text(encoding="utf-8")
     assert Path("out/figures/diagnosis_nearest.png").stat().st_size > 5000  # the picture beside it
     assert sorted(os.listdir()) == ["my_equations.py", "out", "robot.xml"]
     capsys.readouterr()

@@ -11,7 +11,7 @@ LEAST_DIGITS = 2  # in common: then the constants may be rounded
 MOST_LISTED = 8  # joints
 
 
-def message(given: Given, cause: str) -> str:
+def message(given: Given, cause: str, is_small: bool) -> str:
     """How many entries of which quantity are off, the worst place, the probable cause, and what can be stated."""
     beside = f" + rtol={given.rtol:g}" if given.rtol else ""
     lines = [f"Not equal to MuJoCo to tolerance (64 eps{beside}) x the scale of each entry"]
@@ -24,7 +24,7 @@ def message(given: Given, cause: str) -> str:
     if cause:
         lines.append(f"Probable cause: {cause}")
     if given.fails:
-        lines += line_of_digits(given)
+        lines += line_of_digits(given) * is_small
         lines.append(line_of_joints(given))
     return "\n".join(lines)
 

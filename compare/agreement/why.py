@@ -6,18 +6,19 @@ import numpy as np
 
 from tmt import literal
 
-from ..diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
+from ..diagnosis import STATES_ASKED
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.finding import LEAST_STATES
 from ..diagnosis.forces import causes_of_forces
+from ..diagnosis.stated import diagnose_stated
+from ..diagnosis.words import joints_stated
+from ..engines.own import QUICK
 from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from .given import Given
 
 SECONDS_OF_CAUSE = 10.0  # of a search
-QUICK = 1e-3  # s a state: functions that take no longer are asked some hundred times more
-STATED_SO = "state it as"  # in the text of a cause that `joints` can state
 SHARPER = 4.0  # times the tolerance: of Mbar and h that are found from accelerations
 SHOWN_CAUSES = 4
 
@@ -32,59 +33,56 @@ class Values(NamedTuple):
     tolerances: tuple[np.ndarray, np.ndarray]  # of Mbar and h
 
 
-def cause_of(given: Given) -> str:
-    """The sentence; "" where there are no values of which it could be sought."""
+def cause_of(given: Given) -> tuple[str, bool]:
+    """The sentence, "" where there are no values of which it could be sought; and whether rounded constants may have done it."""
     if len(some_states(given)) < min(LEAST_STATES, len(given.q)):
-        return ""  # too few of them are numbers
+        return "", False  # too few of them are numbers
     failing = [name for name, one in given.compared.items() if (one.ratio > 1.0).any()]
     if failing == ["acceleration"]:
         which = some_states(given)
         if acting := of_forces(given, which):
-            return acting
+            return acting, True
         if {"mass_matrix", "bias"} <= given.compared.keys():
-            return "mass_matrix and bias agree: it is in how they are solved, or in damping, springs or friction."
+            return "mass_matrix and bias agree: it is in how they are solved, or in damping, springs or friction.", True
         values = of_accelerations(given, which)
     else:
         values = of_equations(given, [name for name in failing if name != "acceleration"])
     if values is None:
-        return "It cannot be found in values of accelerations alone: give mass_matrix and bias too."
+        return "It cannot be found in values of accelerations alone: give mass_matrix and bias too.", True
     return diagnosed_sentence(given, values)
 
 
-def diagnosed_sentence(given: Given, values: Values) -> str:
-    """What a diagnosis says of values. Joints that it finds to be otherwise are stated in place of what was stated."""
-    joints, (of_M, of_h), nv = given.joints, values.tolerances, given.coordinates.nv
-
-    def found(q, qd, M, h, of_M, of_h) -> Diagnosis:
-        given_values, tolerance = (packed(*both, nv, len(q)) for both in ((M, h), (of_M, of_h)))
-        return diagnose(given.tree, given.coordinates.names, q, qd, given_values, tolerance, SECONDS_OF_CAUSE)
-
-    if values.mass_matrix is not None and np.isfinite(values.mass_matrix).all():
-        mirrored = symmetric(values.mass_matrix, of_M.max(axis=(1, 2)))
+def diagnosed_sentence(given: Given, values: Values) -> tuple[str, bool]:
+    """What a diagnosis says of values, and whether rounded constants may have done it."""
+    own, M = given.own, values.mass_matrix
+    if M is not None and np.isfinite(M).all():
+        mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), given.coordinates.speeds)
         if not mirrored.is_met:
-            return mirrored.text
-    first = found(values.q, values.qd, values.mass_matrix, values.bias, of_M, of_h)
-    if not first.differs:
-        return ""
-    is_of_joints = any(STATED_SO in cause.text for cause in first.causes)
-    if (is_of_joints or not first.causes) and not joints.is_same:
-        M, h = values.mass_matrix, values.bias
-        anew = found(
-            joints.own_positions(values.q),
-            joints.own_speeds(values.qd),
-            None if M is None else joints.own_mass_matrix(M),
-            None if h is None else joints.own_forces(h),
-            np.abs(joints.own_mass_matrix(of_M)),
-            np.abs(joints.own_forces(of_h)),
-        )
-        stated = f"joints={[str(joint) for joint in joints.joints]}"
-        if not anew.differs:
-            return f"{stated} explains it: without it they agree."
-        if anew.causes and (is_of_joints or any(STATED_SO in cause.text for cause in anew.causes)):
-            return f"{anew.sentence} That is to take the place of {stated}."
-    if not first.causes and (broken := first_broken(given, values)):
-        return f"{broken} {first.sentence}"
-    return first.sentence
+            return mirrored.text, False
+
+    def bias(qd: np.ndarray) -> np.ndarray:
+        return own.bias(values.q, qd)
+
+    can_be_asked = own is not None and own.has("bias") and own.seconds <= QUICK and "bias" in given.compared
+    found = diagnose_stated(
+        given.tree,
+        given.joints,
+        values.q,
+        values.qd,
+        (M, values.bias),
+        values.tolerances,
+        SECONDS_OF_CAUSE,
+        bias if can_be_asked else None,
+    )
+    if not found.differs:
+        return "", True
+    sentence = found.sentence
+    if given.are_stated and any(cause.joints and not cause.joints.is_same for cause in found.causes):
+        sentence += f" That is to take the place of joints={joints_stated(given.joints)}."
+    if not found.causes and (broken := first_broken(given, values)):
+        return f"{broken} {sentence}", found.is_small
+    is_of_numbers = not found.causes or any("number" in cause.kind for cause in found.causes)
+    return sentence, found.is_small and is_of_numbers
 
 
 def first_broken(given: Given, values: Values) -> str:

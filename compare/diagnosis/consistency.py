@@ -6,7 +6,7 @@ is taken from a step twice as long. Noise in the values (single precision, const
 measured first, by differences of sixth order over steps too short for anything else, and belongs to every tolerance.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import comb
 from typing import NamedTuple
 
@@ -48,15 +48,16 @@ def conditions(
     M, still = np.asarray(mass_matrix(q)), np.zeros_like(qd)
     floors = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
     of_h = SAFETY * noise(lambda q: bias(q, qd), coordinates, q)
-    found = [symmetric(M, floors), definite(M, floors)]
+    names = coordinates.speeds
+    found = [symmetric(M, floors, names), definite(M, floors)]
     found.append(gradient_at_rest(lambda q: bias(q, np.zeros((len(q), qd.shape[1]))), coordinates, q, of_h))
     weight, ahead, behind = (np.asarray(bias(q, rates)) for rates in (still, qd, -qd))
     doubled = (np.asarray(bias(q, 2.0 * qd)) + np.asarray(bias(q, -2.0 * qd))) / 2.0
     size = np.max([np.abs(part) for part in (weight, ahead, behind, doubled)], axis=(0, 2))
     size = FACTOR * EPS * size + of_h
-    found.append(even(ahead, behind, size))
+    found.append(even(ahead, behind, size, names))
     of_rates = (ahead + behind) / 2.0 - weight
-    found.append(quadratic(of_rates, doubled - weight, size))
+    found.append(quadratic(of_rates, doubled - weight, size, names))
     if found[0].is_met:
         found.append(power_balance(mass_matrix, coordinates, q, qd, of_rates, floors, size))
     return [condition for condition in found if condition is not None]
@@ -73,11 +74,12 @@ def noise(function: Callable, coordinates: Coordinates, q: np.ndarray) -> float:
     return float(np.abs(difference).max()) / np.sqrt(comb(2 * ORDER, ORDER))
 
 
-def symmetric(M: np.ndarray, allowed: np.ndarray) -> Condition:
+def symmetric(M: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
     skew = np.abs(M - np.swapaxes(M, 1, 2))
     s = int(np.argmax(ratios(skew.max(axis=(1, 2)), allowed)))
     i, j = np.unravel_index(np.argmax(skew[s]), skew[s].shape)
-    text = f"Your M is not symmetric: M[{i}][{j}] is {M[s, i, j]:.6g}, M[{j}][{i}] is {M[s, j, i]:.6g}."
+    a, b = names[i], names[j]
+    text = f"Your M is not symmetric: M[{a}][{b}] is {M[s, i, j]:.6g}, M[{b}][{a}] is {M[s, j, i]:.6g}."
     return Condition("M is symmetric", float(skew[s].max()), float(allowed[s]), "kg m2", s, text)
 
 
@@ -111,33 +113,34 @@ def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, 
     rounding = (FACTOR * EPS * np.max(sizes, axis=(0, 2)) + floor) / STEP
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
     s, a, b = map(int, np.unravel_index(np.argmax(ratios(curl, allowed)), curl.shape))
-    i, j = straight[a], straight[b]
+    one, other = coordinates.speeds[straight[a]], coordinates.speeds[straight[b]]
     text = (
-        f"Your h at rest is not the gradient of an energy: dh[{i}]/dq{j} is {slopes[s, a, b]:.6g} and dh[{j}]/dq{i} is "
-        f"{slopes[s, b, a]:.6g}."
+        f"Your h at rest is not the gradient of an energy: dh[{one}]/d {other} is {slopes[s, a, b]:.6g} and dh[{other}]/d "
+        f"{one} is {slopes[s, b, a]:.6g}."
     )
     return Condition("h at rest is a gradient", float(curl[s, a, b]), float(allowed[s, a, b]), "N m/rad", s, text)
 
 
-def even(ahead: np.ndarray, behind: np.ndarray, allowed: np.ndarray) -> Condition:
+def even(ahead: np.ndarray, behind: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
     """h(q, qd) = h(q, -qd)."""
     odd = np.abs(ahead - behind) / 2.0
     s = int(np.argmax(ratios(odd.max(axis=1), allowed)))
     i = int(np.argmax(odd[s]))
-    text = (
-        f"Your bias is linear in qd: is damping in it? Of h[{i}] {odd[s, i]:.3g} N m changes its sign with the rates."
-    )
+    text = f"Your bias is linear in qd: is damping in it? Of h[{names[i]}] {odd[s, i]:.3g} N m changes its sign with the rates."
     return Condition("h is even in the rates", float(odd[s, i]), float(allowed[s]), "N m", s, text)
 
 
-def quadratic(of_rates: np.ndarray, doubled: np.ndarray, floor: np.ndarray) -> Condition:
+def quadratic(of_rates: np.ndarray, doubled: np.ndarray, floor: np.ndarray, names: Sequence[str]) -> Condition:
     """Twice the rates, four times what they add to h."""
     off = np.abs(doubled - 4.0 * of_rates)
     allowed = 4.0 * floor
     s = int(np.argmax(ratios(off.max(axis=1), allowed)))
     i = int(np.argmax(off[s]))
     factor = doubled[s, i] / of_rates[s, i] if of_rates[s, i] else np.inf
-    text = f"Your h is not quadratic in the rates: at twice the rates their part of h[{i}] is {factor:.4g} times as large, not 4."
+    text = (
+        f"Your h is not quadratic in the rates: at twice the rates their part of h[{names[i]}] is {factor:.4g} times as large, "
+        "not 4."
+    )
     return Condition("h is quadratic in the rates", float(off[s, i]), float(allowed[s]), "N m", s, text)
 
 

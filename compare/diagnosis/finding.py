@@ -9,6 +9,8 @@ from .words import Cause
 
 LEAST_STATES = 4  # different positions: of fewer, wrong numbers explain by luck
 ENTRIES_SHOWN = 6  # entries in a sentence
+CAUSES_SHOWN = 8
+OTHERWISE = " State joints only if yours are defined so: with a number or term that is wrong they would agree too."
 
 
 class Diagnosis(NamedTuple):
@@ -18,7 +20,9 @@ class Diagnosis(NamedTuple):
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
     left: float = 0.0  # of the difference that the nearest single number, term or pair leaves, a share
     digits: float = np.inf  # to which the values agree
-    entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[0][1]"
+    is_small: bool = False  # whether every difference is small beside its own entry or coefficient
+    details: str = ""  # which of M, gravity and the velocity terms differ, and which coefficients, with both numbers
+    entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     states: tuple[int, int] = (0, 0)  # at how many they differ, and of how many
     compared: int = 0  # entries in all
     nearest: tuple[tuple[str, float], ...] = ()  # single explanations that leave least, and what they leave, a share
@@ -32,19 +36,24 @@ class Diagnosis(NamedTuple):
             return "There is nothing to explain: the equations agree."
         if self.causes:
             ties = "" if len(self.causes) == 1 else f" ({len(self.causes)} explanations that cannot be told apart)"
-            return f"{'; or '.join(cause.text for cause in self.causes[:4])}{ties}."
+            shown = self.causes[:CAUSES_SHOWN]
+            more = " Others beside these are listed in the report." * (len(self.causes) > CAUSES_SHOWN)
+            of_joints = {cause.joints is not None for cause in self.causes}
+            more += OTHERWISE * (len(of_joints) == 2)
+            return f"{'; or '.join(cause.text for cause in shown)}{ties}.{more}"
         if self.too_few:
             few = f"{self.too_few} state{'s' * (self.too_few > 1)}"
             return f"No cause can be told from {few}: {LEAST_STATES} different positions are needed. {self.where}"
         if self.searched:
             return f"Nothing of what there was time for explains this ({self.searched}). {self.where}"
         rounded = ""
-        if 2.0 <= self.digits < np.inf:
+        if 2.0 <= self.digits < np.inf and self.is_small:
             rounded = (
                 f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
             )
         share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
-        return f"None of the changes that are tried, nor two of them, explains this: {share} is left. {self.where}{rounded}"
+        said = f"None of the changes that are tried, nor two of them, explains this: {share} is left. {self.where}"
+        return f"{said} {self.details}".rstrip() + rounded
 
     @property
     def where(self) -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .model import TINY, Equations
+from .model import TINY, Equations, Path
 from .places import OF_ZERO, Place
 
 ROUNDS = 25  # of a search from one start
@@ -176,6 +176,13 @@ class Search:
         size = np.array([[place.size] for place in self.places])
         up, down = (self.values(which, sign * size) for sign in (1.0, -1.0))
         return (up - down) / 2.0 * self.weight, ((up + down) / 2.0 - self.right) * self.weight
+
+    @property
+    def seen(self) -> list[Path]:
+        """The numbers of the tree on which the values depend."""
+        first, second = self.expansion
+        moved = (np.abs(first).max(axis=(1, 2)) > 1.0) | (np.abs(second).max(axis=(1, 2)) > 1.0)
+        return [place.moves[0][0] for place, moves in zip(self.places, moved) if moves and place.moves]
 
     def partners(self, leading: Fitted) -> tuple[np.ndarray, np.ndarray]:
         """Places that explain most of what a fitted one leaves, beside it, and starts: (PARTNERS, 2) each.

@@ -15,6 +15,7 @@ import tmt
 from tmt import method
 from tmt.space import Vector
 
+from ..coordinates import Coordinates
 from ..joint_map import JointMap
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
@@ -58,6 +59,11 @@ class Equations:
         part = copy(self)
         part.q, part.qd = self.q[:states], self.qd[:states]
         return part
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the speeds."""
+        return Coordinates(self.tree.hinge_names, self.tree.kind).speeds
 
     @property
     def entries(self) -> list[tuple]:

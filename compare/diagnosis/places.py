@@ -4,6 +4,7 @@ A change x of a place adds x times its coefficient to entries of the tree (or to
 coefficient to an entry of Mbar or h. A convention of a joint, its zero, is a number too, of rank 1; the others are of rank 2.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ OF_TERM = {
 }  # fmt: skip
 TOGETHER = {  # terms that are often left out together, and what they are called
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
-    "all rates of {} in the bias": ("convective", "Euler", "gyroscopic"),
+    "velocity terms of {} in h": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
 OF_BIAS = ("gravity", "convective", "Euler", "gyroscopic")  # of the terms, those of h
@@ -131,13 +132,33 @@ def terms(equations: Equations) -> list[Place]:
     return found
 
 
+def entry_name(entry: tuple, names: Sequence[str]) -> str:
+    """An entry of Mbar or h, "M[hip][knee]": of Mbar the one above the diagonal stands for both."""
+    kind, *indices = entry
+    return kind + "".join(f"[{names[i]}]" for i in sorted(indices))
+
+
+def rates_name(j: int, k: int, names: Sequence[str]) -> str:
+    """A product of two speeds, "hip' knee'"."""
+    return f"{names[j]}'^2" if j == k else f"{names[j]}' {names[k]}'"
+
+
 def coefficients(equations: Equations) -> list[Place]:
     """Entries of Mbar, entries of gravity, and the coefficients of products of rates in h; 1 is right."""
-    nv, states = equations.nv, len(equations.q)
+    nv, states, names = equations.nv, len(equations.q), equations.names
     values = dict(zip(equations.entries, equations.values()[0].T))
     at = {entry: k for k, entry in enumerate(equations.entries)}
     found = [
-        Place(2, "coefficient", f"M[{i}][{j}]", 1.0, "times", 1.0, entry=at["M", i, j], column=values["M", i, j])
+        Place(
+            2,
+            "coefficient",
+            entry_name(("M", i, j), names),
+            1.0,
+            "times",
+            1.0,
+            entry=at["M", i, j],
+            column=values["M", i, j],
+        )
         for i, j in zip(*map(np.ndarray.tolist, equations.triangle))
     ]
     whole, parts = equations.values()[0], len(equations.triangle[0])
@@ -146,17 +167,15 @@ def coefficients(equations: Equations) -> list[Place]:
     of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, bias_at_rest(equations))
     for i in range(nv):
         row = values["h", i]
-        found.append(Place(2, "coefficient", f"h[{i}]", 1.0, "times", 1.0, entry=at["h", i], column=row))
-        found.append(
-            Place(2, "coefficient", f"h[{i}] at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i])
-        )
+        of = entry_name(("h", i), names)
+        found.append(Place(2, "coefficient", of, 1.0, "times", 1.0, entry=at["h", i], column=row))
+        found.append(Place(2, "coefficient", f"{of} at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i]))
         for j in range(nv) if nv <= MOST_SPEEDS else ():
             if j != i:
-                name = f"h[{j}] at rest in h[{i}]"
+                name = f"{entry_name(('h', j), names)} at rest in {of}"
                 found.append(Place(2, "coefficient", name, 0.0, "times", 1.0, entry=at["h", i], column=weight[:, j]))
         for (j, k), column in of_rates.items():
-            rates = f"qd{j}^2" if j == k else f"qd{j} qd{k}"
-            name = f"h[{i}], coefficient of {rates}"
+            name = f"{of}, coefficient of {rates_name(j, k, names)}"
             column = column[:, i] * equations.qd[:, j] * equations.qd[:, k]
             found.append(Place(2, "coefficient", name, 1.0, "times", 1.0, entry=at["h", i], column=column))
     found += terms_of_rows(equations) if nv <= MOST_SPEEDS else []
@@ -173,7 +192,8 @@ def terms_of_rows(equations: Equations) -> list[Place]:
     found = []
     for (b, term), column in zip(indices, added[..., -nv:]):
         for i in range(nv):
-            name = f"{OF_TERM[BODY_TERMS[term]].format(equations.tree.body_names[b])} in h[{i}]"
+            of = OF_TERM[BODY_TERMS[term]].format(equations.tree.body_names[b])
+            name = f"{of} in {entry_name(('h', i), equations.names)}"
             at = right.shape[1] - nv + i
             found.append(Place(2, "term", name, 1.0, "times", 1.0, entry=at, column=column[:, i]))
     return found

@@ -5,14 +5,18 @@ They are made on the Jacobians and convective terms of each body, of one body or
 
 from collections.abc import Callable, Iterator
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 
 from tmt import method
 
 from .model import Equations, Path
-from .places import EVERY_BODY, bias_at_rest
+from .places import EVERY_BODY, bias_at_rest, entry_name
 from .variants import Variant
+
+PARALLEL_AXIS = "parallel-axis term m (c'c 1 - c c') of {} left out"
+IN_MASS_ALONE = " in M alone"
 
 
 class Parts:
@@ -79,12 +83,14 @@ def slips(equations: Equations) -> Iterator[Variant]:
     twice = {name: np.einsum(how, parts.R, world[name]) for name, how in to_world.items()}
     twice["B"] = np.einsum("sbcd,sbdi->sbci", parts.R, turned)
     about_joint = parts.inertia + np.array([shifted(m, np.array(c)) for m, c in zip(tree.mass, tree.com)])
+    without_parallel = 2.0 * parts.inertia - about_joint
     wrong_way = np.einsum("sbdc,sbde,sbef->sbcf", parts.R, parts.inertia, parts.R)
     slipped = {
         "R for R' in the angular velocity of {}": twice,
         "inertia of {} not turned to the inertial frame": world,
         "R' I R for R I R' of {}": world | {"inertia": wrong_way},
         "inertia of {} about its joint and mass counted again": {"inertia": about_joint},
+        PARALLEL_AXIS: {"inertia": without_parallel},
         "products of different rates in v_conv of {} left out": {"v_conv": v_alone},
         "products of different rates in v_conv of {} once for twice": {"v_conv": (v_alone + parts.v_conv) / 2.0},
         "products of different rates in w_conv of {} left out": {"w_conv": w_alone},
@@ -94,6 +100,8 @@ def slips(equations: Equations) -> Iterator[Variant]:
     for name, changed in slipped.items():
         for of, which in groups.items():
             yield slip(name.format(of), "right", "so", lambda c=changed, w=which: parts.values(**only(parts, c, w)))
+    for of, which in groups.items():
+        yield from in_mass_alone(parts, PARALLEL_AXIS.format(of), {"inertia": without_parallel}, which)
     for b, body in enumerate(tree.body_names):
         for x, y in ((0, 1), (0, 2), (1, 2)):
             order = [0, 1, 2]
@@ -109,6 +117,21 @@ def slips(equations: Equations) -> Iterator[Variant]:
             )
     yield from plain_numbers(equations)
     yield from lagrange(equations)
+
+
+def in_mass_alone(parts: Parts, name: str, changed: dict, which: list[int]) -> Iterator[Variant]:
+    """A slip in Mbar alone, and in each of its entries alone."""
+    equations, right = parts.equations, parts.equations.values()
+    values = parts.values(**only(parts, changed, which))
+    entries = [k for k, entry in enumerate(equations.entries) if entry[0] == "M"]
+    differing = [k for k in entries if np.abs(values[0, :, k] - right[0, :, k]).max() > 0.0]
+    if not differing:
+        return
+    for together in [differing, *([k] for k in differing)] if len(differing) > 1 else [differing]:
+        of = f" in {entry_name(equations.entries[together[0]], equations.names)} alone"
+        mixed = right.copy()
+        mixed[..., together] = values[..., together]
+        yield slip(name + (IN_MASS_ALONE if len(together) > 1 else of), "right", "so", lambda v=mixed: v)
 
 
 def lagrange(equations: Equations) -> Iterator[Variant]:
@@ -190,6 +213,16 @@ def plain_numbers(equations: Equations) -> Iterator[Variant]:
     for b, (body, com) in enumerate(zip(tree.body_names, tree.com)):
         added = {Path("com", (b, k)): -com[k] for k in range(3) if com[k]}
         made.append((f"CoM of {body}", "where it is", "at the joint", added))
+    for (a, one), (b, other) in combinations(enumerate(tree.body_names), 2):
+        more = tree.mass[b] - tree.mass[a]
+        made.append(
+            (
+                f"masses of {one} and {other}",
+                "right",
+                "exchanged",
+                {Path("mass", (a,)): more, Path("mass", (b,)): -more},
+            )
+        )
     for joint, (kind, _, by) in zip(tree.hinge_names, tree.coordinates.joints):
         stated = np.array(tree.axis[by.start])
         shown = "(" + ", ".join(f"{a:.4g}" for a in stated) + ")"

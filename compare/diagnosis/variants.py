@@ -75,10 +75,15 @@ def program_options(equations: Equations) -> Iterator[Variant]:
 
     yield Variant(1, "option", "gravity", "on", "off", with_factor("gravity", 0.0))
     yield Variant(1, "option", "sign of gravity", "+", "-", with_factor("gravity", -1.0))
-    yield Variant(1, "option", "terms of the rates in the bias", "there", "left out", with_factor("rates", 0.0))
+    yield Variant(1, "option", "velocity terms in h", "there", "left out", with_factor("rates", 0.0))
     yield Variant(1, "option", "bias", "there", "left out", with_bias(np.zeros_like))
     negative = with_bias(lambda h: -h)
     yield Variant(1, "option", "sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", negative)
+    if equations.q.shape == equations.qd.shape:
+        exchanged = with_bias(lambda h: 0.0 * h + Equations(tree, equations.qd, equations.q).values()[0][:, -nv:])
+        yield Variant(
+            1, "option", "arguments of bias", "bias(q, qd)", "exchanged, bias(qd, q)", exchanged, is_simple=False
+        )
     if any(tree.damping):
         drag = np.array(tree.damping) * equations.qd
         yield Variant(1, "option", "damping D qd", "not in h", "in h", with_bias(lambda h: h + drag))

@@ -67,8 +67,8 @@ def test_what_nothing_explains_names_the_entries():
     given[:, 8] += np.cos(5.0 * q[:, 1]) * qd[:, 2] ** 3  # h[2]
     found = diagnosis(given)
     assert found.differs and found.causes == ()
-    assert found.entries == ("M[0][1]", "h[2]")
-    assert "M[0][1] and h[2] differ, the others agree" in found.sentence
+    assert found.entries == ("M[alpha][beta]", "h[gamma]")
+    assert "M[alpha][beta] and h[gamma] differ, the others agree" in found.sentence
     assert found.sentence.startswith("None of the changes that are tried, nor two of them, explains this: ")
     assert 0.0 < found.left <= 1.0
 
@@ -99,7 +99,7 @@ def test_rounded_constants_have_no_culprit():
 
 def test_equations_that_fit_nothing_have_no_culprit():
     found = diagnosis(np.random.default_rng(0).normal(size=(24, 9)))
-    assert found.causes == () and found.sentence.endswith("Every entry differs.")
+    assert found.causes == () and "Every entry differs." in found.sentence
 
 
 def test_only_what_is_given_is_compared():

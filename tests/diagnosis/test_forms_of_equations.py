@@ -19,7 +19,7 @@ ROW = replace(
 
 
 @pytest.mark.parametrize("part, place", [
-    (slice(6), "all of M"), (slice(6, None), "all of h"), (slice(None), "all of M and h"), (slice(7, 8), "h[1]"),
+    (slice(6), "all of M"), (slice(6, None), "all of h"), (slice(None), "all of M and h"), (slice(7, 8), "h[beta]"),
 ])  # fmt: skip
 def test_a_factor_of_a_whole_quantity_is_named(part, place):
     given = values(ARM, *states())
@@ -32,7 +32,7 @@ def test_a_row_at_rest_in_another_is_named():
     q, qd = states()
     given = values(ARM, q, qd)
     given[:, 6] -= tmt.gravity_balance(q)[:, 1]
-    (cause,) = (cause for cause in diagnosis(given).causes if cause.place == "h[1] at rest in h[0]")
+    (cause,) = (cause for cause in diagnosis(given).causes if cause.place == "h[beta] at rest in h[alpha]")
     assert cause.explains == pytest.approx(-1.0) and "-1 times it is added" in cause.text
 
 

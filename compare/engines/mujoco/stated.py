@@ -13,7 +13,7 @@ import numpy as np
 from .engine import FROM_4
 from .joints import aligns, joint_name, kind_of, own_name
 from .light import without_geoms
-from .lock import editable, placed, turned
+from .lock import editable_again, placed, turned
 from .reading import Reading
 
 TRUE = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -34,7 +34,7 @@ class Stated(NamedTuple):
 
 def stated_numbers(reading: Reading) -> list[Stated]:
     """A row for every mass, place, tensor, axis, armature, damping and stiffness that the file states."""
-    spec, numbered, model = editable(reading.source), editable(reading.source), reading.model
+    spec, numbered, model = editable_again(reading.source), editable_again(reading.source), reading.model
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the reading has them
         without_geoms(numbered).compile()  # elements have their numbers in the model only once compiled

@@ -11,10 +11,20 @@ from tmt.stepping import stepped
 from ...case import Case
 from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .equations import OwnEquations
-from .functions import ARGUMENTS, OwnError, is_function
+from .functions import ARGUMENTS, QUICK, OwnError, is_function
 from .returned import Problem, state_in_words
 
-__all__ = ["ARGUMENTS", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem", "is_function", "state_in_words"]
+__all__ = [
+    "ARGUMENTS",
+    "QUICK",
+    "Own",
+    "OwnDynamics",
+    "OwnEquations",
+    "OwnError",
+    "Problem",
+    "is_function",
+    "state_in_words",
+]
 
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme
 

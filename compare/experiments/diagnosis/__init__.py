@@ -6,7 +6,8 @@ Compares: the values of both engines with those of models that are wrong in one
 place: one number (a mass, a length, an inertia), one term (a factor, a sign),
 one coefficient of the equations, or the convention of a joint (its order, sign,
 zero or unit). What explains all of the difference is named, with the stated and
-the found value: "h[0], coefficient of qd1^2: yours is -1 times the right one".
+the found value: "h[hip], coefficient of knee'^2: yours is -1 times the right
+one".
 In `all` it is made where mass, gravity, acceleration or trajectory has failed.
 Alone and without a file it tries itself: hundreds of made faults, each of
 which must be found. They go to other processes with --workers N, and with
@@ -66,14 +67,16 @@ from tmt import literal
 from ...diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
 from ...diagnosis.consistency import Condition
 from ...diagnosis.forces import causes_of_forces
+from ...diagnosis.stated import diagnose_stated
 from ...diagnosis.words import Cause
+from ...engines.own import QUICK
 from ...judge.check import Result, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...setup import Setup
 from . import fault_table
-from .own_equations import asked_conditions, diagnosed_as_stated, for_command_line
+from .own_equations import asked_conditions, for_command_line
 from .single_steps import Stepped, steps_of_integrators
 
 TITLE = "Diagnosis: what explains a difference?"
@@ -128,9 +131,9 @@ def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
     return (
         "64 eps x scale of each entry, the sum of the absolute values of the terms that are added up in it. A cause explains "
-        "the difference if it leaves no more than that at any of the states; all causes of the same rank that do are ties. "
-        "Derivatives that the conditions on M and h need are differences of fourth order; their error is estimated by a step "
-        "twice as long."
+        "the difference if it leaves no more than that at any of the states; all causes of the same rank that do are ties, and "
+        "where joints may be otherwise numbers and terms too. Derivatives that the conditions on M and h need are differences of "
+        "fourth order; their error is estimated by a step twice as long."
     )
 
 
@@ -149,13 +152,18 @@ def search(setup: Setup) -> Found:
     M, h = np.asarray(given.mass_matrix(q)), np.asarray(given.bias(q, qd))
     allowed = packed_tolerances(tree, q, qd)
     values = packed(M, h, tree.coordinates.nv, len(q))
+
+    def bias(qd: np.ndarray) -> np.ndarray:
+        return np.asarray(given.bias(q, qd))
+
     names, (asked, unasked) = setup.robot.joints, ([], "")
     if name == "own":
         asked, unasked = asked_conditions(given, q, qd, M, h)
         joints, sizes = given.equations.joints, sizes_of(tree, q, qd)
-        diagnosis = diagnosed_as_stated(tree, names, joints, q, qd, (M, h), sizes, SECONDS)
+        of_speeds = bias if given.equations.seconds <= QUICK else None
+        diagnosis = diagnose_stated(tree, joints, q, qd, (M, h), sizes, SECONDS, of_speeds)
     else:
-        diagnosis = diagnose(tree, names, q, qd, values, allowed, SECONDS)
+        diagnosis = diagnose(tree, names, q, qd, values, allowed, SECONDS, bias)
     right = packed(literal.mass_matrix(q, tree), literal.bias(q, qd, tree), tree.coordinates.nv, len(q))
     off = over(np.abs(values - right), allowed)
     acting, size = left_over(tree, q, qd, tau, M, h, np.asarray(given.acceleration(q, qd, tau)))

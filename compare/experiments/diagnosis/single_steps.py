@@ -42,6 +42,6 @@ def steps_of_integrators(setup: Setup, q: np.ndarray, qd: np.ndarray, tau: np.nd
         motion = dynamics.run(q, qd, tau, dt, 1, name)
         steps = Steps(q, qd, tau, dt, motion.q[..., 1, :], motion.v[..., 1, :])
         ratio, causes = diagnose_steps(case.tree, steps, method.scheme)
-        text = [cause._replace(text=f"{name}: {cause.text}") for cause in causes]
+        text = [cause._replace(what=f"{name}: {cause.what}") for cause in causes]
         found.append(Stepped(name, method.scheme, ratio, tuple(text)))
     return found
