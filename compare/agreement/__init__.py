@@ -5,6 +5,8 @@ added up in it, see judge/entries.py, and not the entry itself: that may be the 
 constant leaves in it is as large as in the terms.
 """
 
+from __future__ import annotations  # so that help() shows the short names of types
+
 from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import NamedTuple
@@ -18,45 +20,59 @@ from .why import cause_of
 
 __all__ = ["Difference", "State", "assert_agrees", "differences"]
 
-Quantity = Callable | ArrayLike | tuple  # a function, values, or a SymPy matrix and its symbols
+Model = str | PathLike | object  # a path, MJCF text or an MjModel
+Quantity = Callable | ArrayLike | tuple | None  # a function, values, or a SymPy matrix and its symbols
+Values = ArrayLike | None
+Names = Sequence[str] | None
 
 
 class Difference(NamedTuple):
-    """One entry at one state, in joints of one's own."""
+    """One entry at one state, in joints of one's own.
 
-    quantity: str  # "mass_matrix", "bias", "gravity", "acceleration"
-    entry: str  # such as M[hip][knee], h[hip]
+    quantity: "mass_matrix", "bias", "gravity" or "acceleration".
+    entry: such as "M[hip][knee]" or "h[hip]".
+    state: number, q, qd and tau, each as one's own equations take it.
+    yours, mujoco: both values: kg m2 (M), N m (h, gravity), rad/s2 (acceleration), of slides kg, N and m/s2.
+    difference: yours - mujoco.
+    tolerance: (64 eps + rtol) times the scale of the entry.
+    ratio: of the difference to its tolerance; they agree if it is at most 1; inf where yours is not a finite number.
+    cause: the probable cause of all that differs, in a sentence; "" where the entry agrees.
+    """
+
+    quantity: str
+    entry: str
     state: State
     yours: float
     mujoco: float
-    difference: float  # yours - mujoco
+    difference: float
     tolerance: float
-    ratio: float  # of the difference to its tolerance; inf where yours is not a finite number
-    cause: str  # the probable cause, in a sentence; "" where the entry agrees
+    ratio: float
+    cause: str
 
 
 def assert_agrees(
-    mjcf: str | PathLike | object,
+    mjcf: Model,
     *,
-    mass_matrix: Quantity | None = None,
-    bias: Quantity | None = None,
-    gravity: Quantity | None = None,
-    acceleration: Quantity | None = None,
-    q: ArrayLike | None = None,
-    qd: ArrayLike | None = None,
-    tau: ArrayLike | None = None,
-    joints: Sequence[str] | None = None,
+    mass_matrix: Quantity = None,
+    bias: Quantity = None,
+    gravity: Quantity = None,
+    acceleration: Quantity = None,
+    q: Values = None,
+    qd: Values = None,
+    tau: Values = None,
+    joints: Names = None,
     rtol: float = 0.0,
     states: int = 100,
     seed: int = 0,
 ) -> None:
-    """AssertionError unless equations of one's own agree with MuJoCo: it names the worst place and the probable cause.
+    """Compare equations of your own with MuJoCo: AssertionError, with the worst place and the probable cause, unless they agree.
 
     mjcf: a path, MJCF text or an MjModel; contacts, limits, actuators and equalities are switched off.
     mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): each a function of one state or a batch, or the array of
     its values at the given q (N, nq), qd, tau (N, nv), or a pair of a SymPy matrix and the list of its symbols.
     Mbar qdd + h = tau - D qd - k (q - rest), with D and k of the joints in acceleration alone; rad, N m, and m, N of slides.
-    q, qd, tau: the states, in joints of one's own; None: `states` random ones by `seed`, within the joints' ranges.
+    q, qd, tau: the states, in joints of one's own; None: `states` random ones by `seed`, within the joints' ranges. A UserWarning
+    says where `states` is not what is compared: q is given, or your functions or so many states would take long.
     joints: the joints as one's own equations take them, such as ["knee", "-hip", "ankle+90deg"]; None: as the model has them.
     rtol: of each entry's scale, beside the tolerance of rounding: for equations whose constants are rounded.
     ValueError, in one line, for what cannot be compared: a model, a shape, a function that raises at the first state.
@@ -68,16 +84,16 @@ def assert_agrees(
 
 
 def differences(
-    mjcf: str | PathLike | object,
+    mjcf: Model,
     *,
-    mass_matrix: Quantity | None = None,
-    bias: Quantity | None = None,
-    gravity: Quantity | None = None,
-    acceleration: Quantity | None = None,
-    q: ArrayLike | None = None,
-    qd: ArrayLike | None = None,
-    tau: ArrayLike | None = None,
-    joints: Sequence[str] | None = None,
+    mass_matrix: Quantity = None,
+    bias: Quantity = None,
+    gravity: Quantity = None,
+    acceleration: Quantity = None,
+    q: Values = None,
+    qd: Values = None,
+    tau: Values = None,
+    joints: Names = None,
     rtol: float = 0.0,
     states: int = 100,
     seed: int = 0,

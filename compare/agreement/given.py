@@ -28,6 +28,7 @@ SYMBOLS_OF = {
     "gravity": "g",
     "acceleration": "qdd",
 }  # and what their entries are called
+STATES = 100  # random ones, unless another number is asked for
 OWN_SECONDS = 20.0  # s of one's own functions at random states
 
 
@@ -70,6 +71,9 @@ class Given:
         self.are_stated = joints is not None
         self.joints: JointMap = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in brought.items() if is_function(value)}
+        for name, value in brought.items():
+            if name not in functions and real_numbers(value) is None:
+                raise ValueError(f"{name} is {shown(value)}; a function, or an array of its values at q, is expected")
         self.own = OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
         if q is None:
             alone = [f"{name} is an array of values" for name in brought if name not in functions]
@@ -79,6 +83,8 @@ class Given:
             self.take_random(states, seed)
         else:
             self.take_states(q, qd, tau)
+            if states != STATES:
+                warnings.warn(f"states={shown(states)} is not used: the {len(self.q)} states of q are compared", stacklevel=3)
 
     # the model
 
@@ -102,6 +108,8 @@ class Given:
                 raise ValueError(f"{name} is {shown(value)}; a whole number of at least {least} is expected")
         sample = random(self.robot, states, 0, seed)
         self.q, self.qd, self.tau = sample.q, sample.qd, sample.tau
+        for note in sample.notes:
+            warnings.warn(note, stacklevel=4)
         self.own.try_at(self.q, self.qd, self.tau)
         count = self.own.affordable(len(self.q), OWN_SECONDS)
         if count < len(self.q):

@@ -14,7 +14,7 @@ import numpy as np
 JOINTS_OF_TERMS = 3  # of whose positions all terms are tried
 MOST_COLUMNS = 1500  # in pairs that are tried
 STATES_PER_TERM = 2  # at which the right expressions are known
-NEGLIGIBLE = 1e-9  # of the largest coefficient: rounding of a fit
+LEFT_BY_FIT = 1e-9  # of the largest coefficient: rounding of a fit
 AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
 COMBINATIONS = (  # so many terms of the right expression and of others, and whether these take the place of those
     *((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 2, True)),
@@ -117,8 +117,8 @@ def right_terms(names, kinds, x: np.ndarray, right: np.ndarray) -> list[dict[str
     for k, expression in enumerate(right):
         size, best = np.abs(expression).max(), {}
         for called, coefficients, off in forms:
-            large = np.flatnonzero(np.abs(coefficients[:, k]) > NEGLIGIBLE * size)
-            if off[k] <= NEGLIGIBLE * size and (not best or len(large) < len(best)):
+            large = np.flatnonzero(np.abs(coefficients[:, k]) > LEFT_BY_FIT * size)
+            if off[k] <= LEFT_BY_FIT * size and (not best or len(large) < len(best)):
                 best = {called[i]: float(coefficients[i, k]) for i in large}
         found.append(best)
     return found
@@ -138,10 +138,10 @@ def few_terms(known: Terms, right: dict[str, float], off: np.ndarray, tolerance:
             for best in completed(columns, inner, target, list(chosen), others):
                 x = np.linalg.lstsq(columns[best].T, target, rcond=None)[0]
                 sizes = np.abs(x)
-                if sizes.min() <= NEGLIGIBLE * sizes.max() or np.abs(target - x @ columns[best]).max() > 1.0:
+                if sizes.min() <= LEFT_BY_FIT * sizes.max() or np.abs(target - x @ columns[best]).max() > 1.0:
                     continue
                 if is_replaced and not np.allclose(
-                    np.sort(sizes[:of_right]), np.sort(sizes[of_right:]), rtol=NEGLIGIBLE
+                    np.sort(sizes[:of_right]), np.sort(sizes[of_right:]), rtol=LEFT_BY_FIT
                 ):
                     continue
                 return {known.names[k]: float(value) for k, value in zip(best, x)}

@@ -9,7 +9,7 @@ import numpy as np
 from ...actuators import Actuator, Drive, Tendon
 from .flags import on
 from .joints import joint_name, kind_of, own_name
-from .lock import editable
+from .lock import editable_again
 from .rotors import output_of
 
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
@@ -200,7 +200,7 @@ def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
     spec = None  # its keyframes live as long as it does
     if source is not None:
         with suppress(ValueError):
-            spec = editable(source)
+            spec = editable_again(source)
     keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None
     found = {}
     for k in range(m.nkey):

@@ -10,7 +10,7 @@ from .engine import Mujoco
 from .flags import FLAGS, bit
 from .inventory import take_away
 from .joints import joint_name, kind_of
-from .lock import clear, editable, with_names
+from .lock import clear, editable_again, with_names
 
 LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
 OF_THE_FORCES = bit(("GRAVITY",)) | bit(("DAMPER",)) | bit(("SPRING",))  # of the file, see take_away
@@ -106,7 +106,7 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float | None
 
 def edited(engine: Mujoco, edit: Callable) -> Mujoco:
     """The engine's model from its file, its contact and constraint stages off, with an edit."""
-    spec = editable(engine.source)
+    spec = editable_again(engine.source)
     if engine.bare:
         bare(spec)
     spec.option.disableflags |= LEFT_OUT

@@ -46,6 +46,13 @@ def editable(source: Path | str) -> mujoco.MjSpec:
     )
 
 
+def editable_again(source: Path | str) -> mujoco.MjSpec:
+    """The same, without the warnings of MuJoCo's compiler, which the first reading has."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return editable(source)
+
+
 def locked_model(source: Path | str | None, positions: Mapping, bare: bool = False) -> mujoco.MjModel:
     """The compiled model without the joints that are with_names in `positions`, {name: rad, m or quaternion}.
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from .engine import FROM_4
 from .joints import joint_name, kind_of, own_name
-from .lock import aligns, editable, placed, turned
+from .lock import aligns, editable_again, placed, turned
 from .reading import Reading, without_fusing
 
 TRUE = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -33,7 +33,7 @@ class Stated(NamedTuple):
 
 def stated_numbers(reading: Reading) -> list[Stated]:
     """A row for every mass, place, tensor, axis, armature, damping and stiffness that the file states."""
-    spec, numbered, model = editable(reading.source), editable(reading.source), reading.model
+    spec, numbered, model = editable_again(reading.source), editable_again(reading.source), reading.model
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the reading has them
         without_fusing(numbered)  # elements have their numbers in the model only once compiled

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -62,6 +64,8 @@ def source_name(source: object) -> str:
     """What a message calls a source."""
     if isinstance(source, type):
         return f"the class {source.__name__}"
+    if isinstance(source, ModuleType) and getattr(source, "__file__", None):
+        return Path(source.__file__).name
     name = getattr(source, "__name__", None)
     return name if isinstance(name, str) else f"the {type(source).__name__}"
 
