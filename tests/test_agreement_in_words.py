@@ -219,3 +219,26 @@ def test_the_signature_is_the_one_that_is_promised():
         assert str(plain) == expected
     with pytest.raises(AttributeError, match="has no attribute 'agrees'"):
         _ = compare.agrees
+
+
+def test_help_says_first_what_it_does_and_names_every_field():
+    for function in (compare.assert_agrees, compare.differences):
+        assert len(str(inspect.signature(function))) < 400
+    fields = compare.differences(PENDULUM, bias=bias, states=1)[0]
+    assert all(f"{name}:" in fields.__doc__ or f"{name}," in fields.__doc__ for name in fields._fields)
+
+
+@pytest.mark.parametrize("more, said", [
+    ({"q": np.zeros((5, 2)), "states": 500}, "states=500 is not used: the 5 states of q are compared"),
+    ({"states": 10**6}, "random states in place of 1,000,000"),
+])  # fmt: skip
+def test_states_that_are_not_compared_are_said(more, said, monkeypatch):
+    monkeypatch.setattr("compare.states.MOST_NUMBERS", 120)
+    with pytest.warns(UserWarning, match=said) as caught:
+        compare.assert_agrees(PENDULUM, mass_matrix=mass_matrix, **more)
+    assert caught[0].filename == __file__
+
+
+def test_what_is_neither_a_function_nor_numbers():
+    with pytest.raises(ValueError, match="; a function, or an array of its values at q, is expected"):
+        compare.assert_agrees(PENDULUM, mass_matrix=inspect)

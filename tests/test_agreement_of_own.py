@@ -280,3 +280,37 @@ def test_joints_that_are_stated_wrongly_are_stated_anew():
     assert "state it as joints=['knee', 'hip']" in text
     assert "That is to take the place of joints=['knee', '-hip']." in text
     assert text.splitlines()[-1] == "Compared with joints=['knee', '-hip']."
+
+
+SHORT = {  # stated, what is right
+    "a sense": (["knee", "hip"], ["knee", "-hip"]),
+    "a zero": (["knee", "hip"], ["knee+30deg", "hip"]),
+    "units": (["-knee", "hip"], ["-knee in deg", "hip in deg"]),
+    "one too many": (["hip", "-knee"], ["hip", "knee"]),
+}
+
+
+@pytest.mark.parametrize("stated, right", SHORT.values(), ids=SHORT)
+def test_the_step_that_is_missing_is_told_together_with_what_is_stated(stated, right):
+    of = joint_map(robot_of(READING, "p").coordinates, right)
+    brought = {
+        "mass_matrix": lambda q: of.own_mass_matrix(mass_matrix(of.positions(q))),
+        "bias": lambda q, v: of.own_forces(bias(of.positions(q), of.speeds(v))),
+    }
+    text = message_of(**brought, joints=stated)
+    told = text.partition("state it as joints=")[2].partition(")")[0]
+    compare.assert_agrees(PENDULUM, **brought, joints=eval(told))
+    assert text.index("state it as") < text.find("would explain it") or "would explain it" not in text
+
+
+def test_joints_after_joints():
+    coordinates = robot_of(READING, "p").coordinates
+    first, then = joint_map(coordinates, ["-knee+90deg", "hip in deg"]), joint_map(coordinates, ["knee", "-hip+0.3rad"])
+    both = then.after(first, coordinates)
+    q, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 5, 2))
+    assert [joint.name for joint in both.joints] == ["hip", "knee"] and both.joints[0].unit == "deg"
+    inner = first.own_positions(q)
+    assert np.allclose(np.cos(both.own_positions(q)), np.cos(then.own_positions(inner)))
+    assert np.allclose(both.own_speeds(v), then.own_speeds(first.own_speeds(v)))
+    degrees = joint_map(coordinates, ["hip", "knee in deg"])
+    assert degrees.after(degrees, coordinates) is None

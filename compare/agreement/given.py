@@ -84,7 +84,9 @@ class Given:
         else:
             self.take_states(q, qd, tau)
             if states != STATES:
-                warnings.warn(f"states={shown(states)} is not used: the {len(self.q)} states of q are compared", stacklevel=3)
+                warnings.warn(
+                    f"states={shown(states)} is not used: the {len(self.q)} states of q are compared", stacklevel=3
+                )
 
     # the model
 
