@@ -28,7 +28,7 @@ SYMBOLS_OF = {
     "gravity": "g",
     "acceleration": "qdd",
 }  # and what their entries are called
-STATES = 100  # random ones, unless another number is asked for
+STATES_UNLESS_ASKED = 100  # random ones, unless another number is asked for
 OWN_SECONDS = 20.0  # s of one's own functions at random states
 
 
@@ -83,7 +83,7 @@ class Given:
             self.take_random(states, seed)
         else:
             self.take_states(q, qd, tau)
-            if states != STATES:
+            if states != STATES_UNLESS_ASKED:
                 warnings.warn(
                     f"states={shown(states)} is not used: the {len(self.q)} states of q are compared", stacklevel=3
                 )

@@ -26,6 +26,7 @@ class Column(NamedTuple):
     unit: str
     stated: float
     force: np.ndarray  # (states, nv), of a change of 1 of the number, in r
+    is_never_negative: bool = True  # no damper, spring or friction is
 
 
 def causes_of_forces(
@@ -70,6 +71,8 @@ def causes_of_forces(
                 continue
             weight = (1.0 / tolerance).ravel()
             x = np.linalg.lstsq(matrix * weight[:, None], left_over.ravel() * weight, rcond=None)[0]
+            if any(one.stated + change < 0.0 and one.is_never_negative for one, change in zip(chosen, x)):
+                continue
             if (left := left_by((matrix @ x).reshape(left_over.shape))) is not None:
                 causes.append(of_columns(chosen, x, left, 1 + count))
     return [cause._replace(tied=len(causes) - 1) for cause in causes]
@@ -101,7 +104,7 @@ def numbers_of_forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator
             own = np.eye(qd.shape[1])[v]
             yield Column(f"damping of {called}", units[0], tree.damping[v], qd[:, v : v + 1] * own)
             yield Column(f"friction of {called}", units[2], 0.0, np.sign(qd[:, v : v + 1]) * own)
-            yield Column(f"constant force at {called}", units[2], 0.0, np.ones((len(qd), 1)) * own)
+            yield Column(f"constant force at {called}", units[2], 0.0, np.ones((len(qd), 1)) * own, False)
             if kind != "ball":
                 rest = tree.rest[at.start] if tree.stiffness[i] else tree.reference[i]
                 stretched = q[:, at.start : at.stop] - rest

@@ -58,6 +58,11 @@ def test_one_number(place, more):
     assert (cause.rank, cause.place) == (2, place) and abs(cause.explains) == pytest.approx(value)
 
 
+@pytest.mark.parametrize("force", [0.1 * QD * [0, 1, 0], 2.0 * Q * [0, 0, 1], 0.3 * np.sign(QD) * [1, 0, 0]])
+def test_no_damping_stiffness_or_friction_below_zero(force):
+    assert causes(acceleration(TAU - H + force)) == []
+
+
 def test_two_numbers():
     (cause,) = causes(acceleration(TAU - H - QD * [0.1, 0.2, 0.0]))
     assert cause.rank == 3 and cause.place == "damping of alpha and damping of beta"

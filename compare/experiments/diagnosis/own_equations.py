@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 from ...diagnosis.consistency import Condition, conditions
+from ...diagnosis.finding import OTHERWISE
 from ...engines.own import OwnDynamics
 
 SECONDS_OF_CONDITIONS = 3.0
@@ -37,5 +38,6 @@ def for_command_line(text: str, is_own: bool) -> str:
     def stated(match: re.Match) -> str:
         return f"--joints={','.join(re.findall(QUOTED, match[1]))}"
 
+    text = text if is_own else text.replace(OTHERWISE, "")
     text = HOW_STATED.sub(lambda match: f" (state it by {stated(match)})" if is_own else "", text)
     return STATED_JOINTS.sub(stated, text)
