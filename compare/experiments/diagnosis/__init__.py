@@ -131,10 +131,9 @@ def tolerance(robot: Robot) -> str:
     """By what the claim is judged."""
     return (
         "64 eps x scale of each entry, the sum of the absolute values of the terms that are added up in it. A cause explains "
-        "the difference if it leaves no more than that at any of the states; all causes of the same rank that do are ties, and numbers "
-        "beside joints. "
-        "Derivatives that the conditions on M and h need are differences of fourth order; their error is estimated by a step "
-        "twice as long."
+        "the difference if it leaves no more than that at any of the states; all causes of the same rank that do are ties, and "
+        "where joints may be otherwise numbers and terms too. Derivatives that the conditions on M and h need are differences of "
+        "fourth order; their error is estimated by a step twice as long."
     )
 
 
