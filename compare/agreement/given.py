@@ -72,7 +72,7 @@ class Given:
         self.joints: JointMap = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in brought.items() if is_function(value)}
         for name, value in brought.items():
-            if name not in functions and real_numbers(value) is None:
+            if q is None and name not in functions and real_numbers(value) is None:
                 raise ValueError(f"{name} is {shown(value)}; a function, or an array of its values at q, is expected")
         self.own = OwnEquations(functions, self.coordinates, self.joints, self.tree, ()) if functions else None
         if q is None:
