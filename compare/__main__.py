@@ -112,6 +112,11 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         with door_opened(options.dask, options.workers) as door, new_report(options.out) as folder:
             for line in compared.lines:
                 terminal.say(line)
+            if options.experiment == "stability" and reading and not reading.drive.feeds_back:
+                terminal.say(
+                    f"No actuator of {robot.name} holds a position or a speed: there is no servo whose step could be unstable. "
+                    "What follows is about the robot without its actuators."
+                )
             with start_workers() as workers, terminal.progress("imports"):
                 for needed in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
                     workers.submit(load_modules, *needed)

@@ -117,6 +117,27 @@ class Tendon(NamedTuple):
         return not self.low + ON_EDGE < length < self.high - ON_EDGE
 
 
+class Rows(NamedTuple):
+    """c constraints of MuJoCo near a posture at rest, J qdd + R f = aref, aref = -damping J qd - stiffness r + that at rest.
+
+    jacobian: J (c, nv); forces: f at rest, (c,) N m or N, of which J' f acts on the speeds; damping (c,), 1/s; stiffness (c,),
+    1/s2, of a further violation r, with what the change of R does to f; softness: R (c,); limits: the joints of the model at
+    whose limits some of the rows are.
+    """
+
+    jacobian: np.ndarray
+    forces: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    softness: np.ndarray
+    limits: tuple[int, ...] = ()
+
+    @property
+    def springs(self) -> np.ndarray:
+        """J' (-df/dr) J, (nv, nv): at rest they are springs."""
+        return (self.jacobian.T * (self.stiffness / self.softness)) @ self.jacobian
+
+
 @dataclass(frozen=True)
 class Drive:
     """All that drives a robot, see Actuator and Tendon.

@@ -41,7 +41,9 @@ def posture_of(source, name: str | None = None):
     """A posture of a file or text, by default the first; and its reading."""
     reading = read(source)
     robot = robot_of(reading, "robot.xml")
-    return Posture(robot, name or next(iter(robot.positions)), Acting(reading.model, robot.drive).along), reading
+    acting = Acting(reading.model, robot.drive)
+    rows = acting.rows if acting.is_coupled else None
+    return Posture(robot, name or next(iter(robot.positions)), acting.along, rows, reading.dt), reading
 
 
 def acting_of(at: Posture, reading, base: str | None = None) -> Acting:

@@ -20,7 +20,9 @@ from shown import BLOCKS, README, ROOT, blocks, commands, indented
 from compare.__main__ import main
 from compare.command_line import help_of
 from compare.engines.mujoco import reading
+from compare.engines.mujoco.flags import INTEGRATORS
 from compare.experiments.stability.servos import full_at
+from compare.experiments.stability.servos.circumstances import circumstances
 from compare.experiments.stability.servos.predicted import limit_rows, predicted_at
 from compare.experiments.stability.servos.sentences import at_the_top
 from compare.reference import compared_with
@@ -226,8 +228,9 @@ def test_the_answer_for_a_step_is_the_one_that_is_shown():
     found = reading.read(PATHS["arm7"])
     robot = robot_of(found, "arm7.xml")
     predicted = [predicted_at(robot, name, found) for name in robot.positions]
-    full = [row for one in predicted for row in full_at(one, found)]
-    assert at_the_top(limit_rows(predicted, found.dt, found.integrator), full) == shown
+    full = [row for one in predicted for row in full_at(one, list(INTEGRATORS), found)]
+    rows = limit_rows(predicted, found.dt, found.integrator)
+    assert at_the_top(rows, full, True, circumstances(predicted)) == shown
 
 
 @pytest.mark.parametrize("text", blocks("toml"))

@@ -3,6 +3,8 @@
 import os
 import re
 import sys
+import threading
+import time
 from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from textwrap import fill
@@ -16,15 +18,18 @@ from ..process.streams import Stream, readable
 EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
 
+SILENT_FOR = 25.0  # s, at most, of a run whose progress cannot be shown
+
+
 class Terminal:
-    """Says lines on stdout; where stderr is a terminal, shows there what is under way."""
+    """Says lines on stdout; where stderr is a terminal, shows there what is under way, else a line of it now and then."""
 
     def __init__(self):
         self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
         self.lines, self.beside = (
             Console(file=stream, force_terminal=stream.isatty(), width=80, height=25) for stream in (self.out, self.err)
         )
-        self.status, self.text, self.how_far = None, "", list
+        self.status, self.text, self.how_far, self.spoke = None, "", list, time.monotonic()
 
     def say(self, text="", style="") -> None:
         """A line; on a terminal that is narrower: its columns closed up, and broken between words."""
@@ -35,6 +40,7 @@ class Terminal:
             text = fill(
                 text, max(columns, 20), subsequent_indent=indent + "  ", break_long_words=False, break_on_hyphens=False
             )
+        self.spoke = time.monotonic()
         with self.paused():
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 
@@ -50,10 +56,15 @@ class Terminal:
 
     @contextmanager
     def progress(self, text: str):
-        """The block's progress is shown, if that is possible."""
+        """The block's progress is shown, if that is possible; else a line says it after each 25 s without another."""
         self.show(text)
         if not self.beside.is_terminal or self.beside.is_dumb_terminal:
-            yield
+            ended = threading.Event()
+            threading.Thread(target=self.speak_until, args=(ended,), daemon=True).start()
+            try:
+                yield
+            finally:
+                ended.set()
             return
         spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
         interrupt.undo.append(wipe)
@@ -64,6 +75,12 @@ class Terminal:
         finally:
             self.status = None
             interrupt.undo.remove(wipe)
+
+    def speak_until(self, ended: threading.Event) -> None:
+        """Say how far the run is and what is under way whenever no line was said for long."""
+        while not ended.wait(min(1.0, SILENT_FOR)):
+            if time.monotonic() - self.spoke >= SILENT_FOR:
+                self.say("  " + ": ".join(filter(None, (", ".join(self.how_far()), self.text))))
 
     def line(self) -> str:
         """How far the run is and what is under way, as far as there is room; a name that would stand there twice is said once."""

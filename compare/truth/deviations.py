@@ -48,6 +48,9 @@ class Deviations:
         }
         return replace(self, names=tuple(self.names[k] for k in rest), damping=self.damping[rest], **square)
 
+    def __getstate__(self) -> dict:
+        return dict(self.__dict__)  # a copy: a thread may pickle it while more is computed of it
+
     # in the units of M, where it is the identity
 
     @cached_property

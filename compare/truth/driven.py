@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -10,7 +10,9 @@ import tmt
 from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 from tmt.methods import by_speed, lone_speeds
 
-from ..actuators import Cut
+from ..actuators import Cut, Rows
+from .constraints import turning
+from .coupling import Coupled, of_small
 from .servos import Driven
 from .step_limits import Small
 
@@ -21,16 +23,29 @@ BASES = {
 }
 
 
+BEYOND = 1e-3  # rad or m, of a range: what soft limits give way
+
+
 @dataclass(frozen=True)
 class Posture:
     """A posture of a robot under u of each actuator: at its name's position, then where it rests.
 
-    ask: see Driven. A robot that floats is without gravity: it has no rest with it.
+    ask: see Driven. A robot that floats is without gravity: it has no rest with it. rows: Rows at q, a step and an integrator,
+    None: no constraints; dt, integrator: at which the rest is, all but discrete alike. aside: speeds that are locked, because
+    nothing holds them. begin: from where the rest is looked for, by default the posture.
     """
 
     robot: object  # a robots.Robot
     name: str
     ask: Callable | None = None
+    rows: Callable | None = None
+    dt: float = 0.0
+    aside: tuple[int, ...] = ()
+    begin: tuple[float, ...] | None = None
+    integrator: str = "Euler"
+
+    def __getstate__(self) -> dict:
+        return dict(self.__dict__)  # a copy: a thread may pickle it while more is computed of it
 
     @cached_property
     def driven(self) -> Driven:
@@ -42,7 +57,8 @@ class Posture:
                 if hinge >= 0 and tree.coordinates.joints[hinge].qd.start in self.lone:
                     parts[body] = 1.0
             drive = replace(drive, compensation=tuple(parts))
-        return Driven(tree, drive, self.ask, weightless=bool(self.base))
+        rows = self.rows and partial(self.rows, dt=self.dt, integrator=self.integrator)
+        return Driven(tree, drive, self.ask, weightless=bool(self.base), rows=rows, locked=self.aside)
 
     @property
     def start(self) -> np.ndarray:
@@ -57,11 +73,25 @@ class Posture:
     @cached_property
     def rest(self) -> tuple[np.ndarray, float]:
         """Where it rests, (nq,), found from the posture, and the size of the force that is left, N m or N; 0.0: it rests."""
-        return self.driven.at_rest(self.start, self.u)
+        return self.driven.at_rest(self.start if self.begin is None else np.array(self.begin), self.u)
 
     @property
     def q(self) -> np.ndarray:
         return self.rest[0]
+
+    @cached_property
+    def limits(self) -> tuple[int, ...]:
+        """The joints of the model at whose limits it rests, if these are among its rows."""
+        return self.rows(self.q, self.dt, self.integrator).limits if self.rows else ()
+
+    def beyond(self, by: float = BEYOND) -> tuple[str, ...]:
+        """The joints, of one number each, that rest beyond their ranges by more than so much, rad or m."""
+        coordinates = self.robot.coordinates
+        return tuple(
+            name
+            for name, (kind, at, _), known in zip(coordinates.names, coordinates.places.joints, self.robot.ranges)
+            if known and kind != "ball" and not known[0] - by <= self.q[at.start] <= known[1] + by
+        )
 
     @property
     def moved(self) -> float:
@@ -112,7 +142,7 @@ class Posture:
         return Small(
             names=self.robot.coordinates.speeds,
             M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
-            K=slopes.K,
+            K=slopes.K + turning(self.driven.rows, self.robot.coordinates, self.q),
             D=slopes.D,
             damping=speeds,
             uncut=slopes.uncut,
@@ -126,11 +156,35 @@ class Posture:
 
     def small(self, base: str) -> Small:
         """Small deviations with a base of BASES; free bodies that stand alone are left out."""
+        still = {*self.lone, *self.aside}
         if base == "free":
             names = [self.whole.names[k] for k in self.base]
-            kept = self.whole.locked(self.lone)
-            return kept.free([k for k, name in enumerate(kept.names) if name in names])
-        return self.whole.locked(sorted({*self.lone, *(self.base if base == "locked" else ())}))
+            kept = self.whole.locked(sorted(still))
+            small = kept.free([k for k, name in enumerate(kept.names) if name in names])
+        else:
+            small = self.whole.locked(sorted(still | {*(self.base if base == "locked" else ())}))
+        kept = [k for k, name in enumerate(self.whole.names) if name in small.names]
+        if self.rows and self.rows(self.q, self.dt, "Euler").jacobian[:, kept].any():
+            return Coupled(**of_small(small), couple=partial(self.couple, kept))
+        return small
+
+    def couple(self, kept: list[int], dt: float, integrator: str) -> Rows:
+        """The Rows of some speeds at rest."""
+        rows = self.rows(self.q, dt, integrator)
+        return rows._replace(jacobian=rows.jacobian[:, kept])
+
+    @cached_property
+    def unheld(self) -> tuple[int, ...]:
+        """The speeds that no servo, no spring and no constraint to such holds, but those of a base or of what stands alone."""
+        tree, drive = self.robot.tree, self.robot.drive
+        along = self.driven.along(self.start)
+        pulling = [one.is_servo for one in drive.actuators] + [one.stiffness != 0.0 for one in drive.tendons]
+        springs = np.array(by_speed(tree, tree.stiffness or [0.0] * len(tree.kind)))
+        held = along.moments[pulling].any(axis=0) | (springs != 0.0)
+        rows = self.rows(self.start, self.dt, "Euler").jacobian != 0.0 if self.rows else np.zeros((0, len(held)), bool)
+        for _ in rows:
+            held = held | rows[(rows & held).any(axis=1)].any(axis=0)
+        return tuple(k for k in np.flatnonzero(~held).tolist() if k not in (*self.base, *self.lone))
 
 
 def floating(tree: tmt.Tree) -> list[list[int]]:

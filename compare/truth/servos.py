@@ -12,10 +12,9 @@ from tmt.methods import by_speed
 
 from ..actuators import Cut, Drive
 from ..case import Coordinates
+from .constraints import TURNED_BY, constraint_forces, downhill, turning
 from .weight import Weight, spring_slope, weight
 
-TURNED_BY = 1e-6  # rad or m, of central differences where a moment turns with the posture
-SINGULAR = 1e-9  # of the largest stiffness, or damping: less is none
 REST_STEPS = 60  # at most
 REST_FORCE = 1e-9  # of the largest single force: what may be left at rest
 REST_REACH = 0.3  # rad or m, of one step of it
@@ -63,13 +62,15 @@ class Driven:
     """A tree with its drive: forces at rest, and their derivatives.
 
     ask: lengths (k,) and moments (k, nv) at q of all actuators and then all tendons, of MuJoCo; used where a moment turns.
-    weightless: without gravity.
+    weightless: without gravity. rows: the coupling.Rows at q, None: no constraints. locked: speeds that do not move.
     """
 
     tree: tmt.Tree
     drive: Drive
     ask: Callable | None = None
     weightless: bool = False
+    rows: Callable | None = None
+    locked: tuple[int, ...] = ()
 
     @property
     def coordinates(self) -> Coordinates:
@@ -222,16 +223,25 @@ class Driven:
         return found
 
     def descended(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, float]:
-        """The same by Newton's method from q alone."""
+        """The same by Newton's method from q alone; where K is symmetric downhill, so that it does not climb to a saddle."""
         best, left, scale = q, np.inf, 0.0
         for _ in range(REST_STEPS):
             force, largest = self.forces(q, u)
-            size, scale = float(np.abs(force).max()), max(scale, largest)
+            held, springs = constraint_forces(self.rows, self.coordinates, q)
+            force = self.of_moving(force + held)
+            size, scale = float(np.abs(force).max()), max(scale, largest, np.abs(held).max())
             if size < left:
                 best, left = q, size
             if size <= 1e-4 * REST_FORCE * scale:
                 break
-            K = self.slopes(q, u).K
-            step = np.linalg.lstsq(K, force, rcond=SINGULAR)[0]
+            K = self.slopes(q, u).K + springs + turning(self.rows, self.coordinates, q)
+            step = np.zeros(len(force))
+            rest = np.delete(np.arange(len(force)), self.locked)
+            step[rest] = downhill(K[np.ix_(rest, rest)], force[rest])
             q = self.coordinates.move(q, step * min(1.0, REST_REACH / max(np.abs(step).max(), 1e-300)))
         return best, 0.0 if left <= REST_FORCE * scale else left
+
+    def of_moving(self, force: np.ndarray) -> np.ndarray:
+        """A force (nv,) without that at locked speeds."""
+        force[list(self.locked)] = 0.0
+        return force

@@ -23,6 +23,7 @@ LIMIT_UP_TO = 5.0  # s: what is stable up to it has no limit here
 LIMIT_FROM = 0.01  # of the time of the fastest mode: stable if anything is
 STEPS_A_DECADE = 12  # steps for each power of ten, where no closed form tells the limit
 REFINED = 1e-10  # of a limit
+BEYOND_LIMIT = 1e-3  # of a limit that is found coarsely: where its movement is told
 SPLIT = 1e-6  # of a factor 1
 SAME_SHAPE = 0.9  # of the largest overlap: modes of one shape
 POLE = 2.0  # dt over the time constant of a filter, up to which it is stable
@@ -45,6 +46,14 @@ class Limit(NamedTuple):
 
 class Small(Deviations):
     """Small deviations, and what steps make of them."""
+
+    is_coupled = False  # whether constraints hold speeds together
+    refined = REFINED
+
+    @property
+    def meeting(self) -> np.ndarray:
+        """Movements that the constraints allow, x = N y, (nv, m): here all."""
+        return np.eye(len(self.M))
 
     def braking(self, integrator: str) -> np.ndarray:
         """What of D an integrator has implicit, (nv, nv)."""
@@ -69,16 +78,33 @@ class Small(Deviations):
         n = len(self.M)
         unit, none = np.eye(n), np.zeros((n, n))
         if integrator == "RK4":
-            Z = dt * np.block([[none, unit], [-self.stiff, -self.damped]])
+            stiff, damped, _ = self.constrained(integrator, dt, self.stiff, self.damped, unit)
+            Z = dt * np.block([[none, unit], [-stiff, -damped]])
             return np.eye(2 * n) + Z @ (np.eye(2 * n) + Z @ (np.eye(2 * n) / 2 + Z @ (np.eye(2 * n) / 6 + Z / 24)))
         held = dt * self.held[integrator]
         matrix = unit + dt * (self.implicit[integrator] + held)
-        speeds = np.hstack([none, unit]) - dt * np.linalg.solve(matrix, np.hstack([self.stiff, self.damped + held]))
+        stiff, damped, _ = self.constrained(integrator, dt, self.stiff, self.damped + held, matrix)
+        speeds = np.hstack([none, unit]) - dt * np.linalg.solve(matrix, np.hstack([stiff, damped]))
         return np.vstack([np.hstack([unit, none]) + dt * speeds, speeds])
+
+    def constrained(
+        self, integrator: str, dt: float, stiff: np.ndarray, damped: np.ndarray, matrix: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Stiffness, damping and what becomes of other forces, in the units of M, with the forces of constraints: here of none.
+
+        matrix: by which a step divides.
+        """
+        return stiff, damped, np.eye(len(self.M))
+
+    def equations(self, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Those of a step of this size without its error: from the state (x, v) the accelerations, and those of a unit force."""
+        stiff, damped, share = self.constrained("Euler", dt, self.stiff, self.damped, np.eye(len(self.M)))
+        L, back = self.root, self.unrooted
+        return tuple(back.T @ each for each in (-stiff @ L.T, -damped @ L.T, share @ back))
 
     def growth(self, integrator: str, dt: float) -> float:
         """The spectral radius of a step: above 1 something grows."""
-        if integrator == "RK4":
+        if integrator == "RK4" and not self.is_coupled:
             factors = growth_of(METHODS["rk4"], dt * self.modes[0])
         else:
             factors = np.linalg.eigvals(self.step(integrator, dt))
@@ -153,38 +179,48 @@ class Small(Deviations):
 
     def scanned(self, integrator: str) -> float | None:
         """The limit by the eigenvalues of steps, s: the first that grows; None: none up to 5 s."""
-        first = min(LIMIT_FROM / max(np.abs(self.modes[0]).max(), 1e-300), 0.1 * LIMIT_UP_TO)
-        steps = np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1)
         low = 0.0
-        for dt in steps:
+        for dt in self.steps_tried(integrator):
             if not self.stays(integrator, dt):
-                return bisected(lambda dt: self.stays(integrator, dt), low, dt)
+                return bisected(lambda dt: self.stays(integrator, dt), low, dt, self.refined)
             low = dt
         return None
+
+    def steps_tried(self, integrator: str) -> np.ndarray:
+        """Upwards to 5 s, s."""
+        return upwards(min(LIMIT_FROM / max(np.abs(self.modes[0]).max(initial=0.0), 1e-300), 0.1 * LIMIT_UP_TO))
 
     def limiting(self, integrator: str, dt: float) -> np.ndarray:
         """The movement, in the units of M, (nv,), that a step of this size lets grow first."""
         if self.has_closed_form(integrator):
             return np.linalg.eigh(self.P(integrator, dt))[1][:, 0]
-        if integrator == "RK4":
+        if integrator == "RK4" and not self.is_coupled:
             values, moves = self.modes
             return moves[:, np.argmax(np.abs(growth_of(METHODS["rk4"], dt * values)))]
-        values, vectors = np.linalg.eig(self.step(integrator, dt))
+        beyond = BEYOND_LIMIT * self.is_coupled  # there it is larger than what stays, whose factor is 1
+        values, vectors = np.linalg.eig(self.step(integrator, (1.0 + beyond) * dt))
         move = vectors[: len(self.M), np.argmax(np.abs(values))]
         return move / np.linalg.norm(move)
 
     def nearest(self, shape: np.ndarray) -> tuple[float, str]:
         """Rate, 1/s, and kind, swing or real, of the mode whose movement is nearest, the fastest of several."""
         values, moves = self.modes
+        if not len(values):  # all that moves is what soft constraints give way
+            return 0.0, "real"
         overlap = np.abs(moves.conj().T @ shape)
         near = np.flatnonzero(overlap >= SAME_SHAPE * overlap.max())
         found = values[near[np.argmax(np.abs(values[near]))]]
         return float(np.abs(found)), "swing" if abs(found.imag) > 1e-6 * abs(found) else "real"
 
 
-def bisected(holds, low: float, high: float) -> float:
+def upwards(first: float) -> np.ndarray:
+    """Steps from the first up to 5 s."""
+    return np.geomspace(first, LIMIT_UP_TO, int(np.ceil(STEPS_A_DECADE * np.log10(LIMIT_UP_TO / first))) + 1)
+
+
+def bisected(holds, low: float, high: float, refined: float = REFINED) -> float:
     """The largest step, s, at which something holds that holds at `low` and not at `high`."""
-    while high - low > REFINED * high:
+    while high - low > refined * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return float(low)

@@ -156,3 +156,14 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
         "python -m compare: cannot go on: RuntimeError: two lines (compare/report/terminal.py:10)"
     ]
     assert ROOT.as_posix() not in run.stderr
+
+
+def test_a_run_whose_progress_cannot_be_shown_says_a_line_now_and_then(capfd, monkeypatch):
+    monkeypatch.setattr("compare.report.terminal.SILENT_FOR", 0.05)
+    terminal = Terminal()
+    terminal.tell(lambda: ["4 of 11", "mass"])
+    with terminal.progress("states"):
+        said = ""
+        while "4 of 11, mass: states" not in said:  # the test ends by its time limit otherwise
+            said += capfd.readouterr().out
+    assert "4 of 11, mass: states" in said

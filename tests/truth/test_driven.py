@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from driven_models import with_servos
 from models import PATHS, chain, gymnasium_files
+from servo_models import posture_of
 
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting
@@ -22,9 +23,8 @@ NOISE = 2e-4  # of a spectral radius of 1 in differences: a free base has it twi
 @lru_cache(maxsize=128)
 def at(source, name=None):
     """A posture, by default the first, and what Acting takes of the model."""
-    reading = read(source)
-    robot = robot_of(reading, "robot.xml")
-    return Posture(robot, name or next(iter(robot.positions)), Acting(reading.model, robot.drive).along), reading.model
+    posture, reading = posture_of(source, name)
+    return posture, reading.model
 
 
 def acting(source, base="fixed", name=None):

@@ -6,13 +6,15 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-from ...actuators import UNCUT, Cut, Drive
+from ...actuators import UNCUT, Cut, Drive, Rows
 from .actuators import OF_A_JOINT, control_of
 from .flags import INTEGRATORS, bit
-from .inventory import NOT_HAD_FIELDS
+from .holding import constraint_rows
+from .inventory import NOT_HAD_FIELDS, open_equalities
 from .joints import kind_of
 from .linear import NUDGE
 from .rotors import output_of
+from .servos import MOST_ITERATIONS, SOLVED
 
 # beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
 DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
@@ -20,10 +22,10 @@ LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn
 
 
 class Acting:
-    """A compiled model whose actuators act by their laws alone: no force range, no limit, contact, equality, friction or medium.
+    """A compiled model whose actuators act by their laws alone, with equalities: no force range, contact, friction or medium.
 
     cut: what ranges cut at the posture: it stays what it is there. locked: speeds that do not move. weightless: without gravity.
-    integrator by MuJoCo's name, dt in s.
+    limits: joints of the model whose limits are on. integrator by MuJoCo's name, dt in s.
     """
 
     def __init__(
@@ -33,11 +35,19 @@ class Acting:
         cut: Cut = UNCUT,
         locked: Sequence[int] = (),
         weightless: bool = False,
+        limits: Sequence[int] = (),
     ):
         self.model, self.drive = mujoco.MjModel.__copy__(model), drive
         m = self.model
+        stages = ("EQUALITY",) * bool(open_equalities(m)) + ("LIMIT",) * bool(len(limits))
         for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
             m.opt.disableflags |= bit((flag,))
+        self.is_coupled = bool(stages)
+        if stages:
+            for flag in ("CONSTRAINT", *stages):
+                m.opt.disableflags &= ~bit((flag,))
+            m.jnt_limited[np.setdiff1d(np.arange(m.njnt), limits)], m.tendon_limited[:] = 0, 0
+            m.opt.tolerance, m.opt.iterations = SOLVED, max(m.opt.iterations, MOST_ITERATIONS)
         m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
         for name in set(NOT_HAD_FIELDS) - set(DRIVES):
             if hasattr(m, name):
@@ -100,6 +110,10 @@ class Acting:
         lengths = np.concatenate([d.actuator_length[outputs], d.ten_length[numbers]])
         return lengths, np.concatenate([moments[outputs], jacobian[numbers]])
 
+    def rows(self, q: np.ndarray, dt: float, integrator: str) -> Rows:
+        """Of the constraints that are on, at rest."""
+        return constraint_rows(self.model, self.data, q, dt, INTEGRATORS[integrator])
+
     def at(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Model and data at rest at a posture, under u of each actuator, whose activations, if any, stay as they are."""
         model = mujoco.MjModel.__copy__(self.model)
@@ -144,39 +158,44 @@ class Acting:
 
         (steps, nv + filters): rad or m, a ball's turn in its own axes. It starts at rest at q, moved by a small movement (nv,),
         with a speed (nv,) and activations of filters that are off by so much; jump: of u, (k,), once for all. What has left all
-        bounds stays where MuJoCo stopped it.
+        bounds stays where MuJoCo stopped it. Where constraints hold joints the rest depends on the step: then it is how far the
+        run is from one that starts at rest at q, under u.
         """
         model, data = self.at(q, np.add(u, jump), dt, integrator)
         mujoco.mj_integratePos(model, data.qpos, np.broadcast_to(movement, model.nv).astype(float), 1.0)
         data.qvel[:] = speed
-        rest, filters, controls = data.act.copy(), self.filters, data.ctrl.copy()
+        rest, filters = data.act.copy(), self.filters
         data.act[filters] += activation
         spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        state = np.zeros(mujoco.mj_stateSize(model, spec))
-        mujoco.mj_getState(model, data, state, spec)
+        both = [data, self.at(q, u, dt, integrator)[1]] if self.is_coupled else [data]
+        state = np.zeros((len(both), mujoco.mj_stateSize(model, spec)))
+        for one, row in zip(both, state):
+            mujoco.mj_getState(model, one, row, spec)
+        controls = np.array([one.ctrl for one in both])[:, None]
         for count in steps:
             # rollout sets controls anew, and leaves out the initial state
-            states, _ = rollout(model, data, state, np.tile(controls, (1, count, 1)), nstep=count)
-            state = states[0, -1]
+            states, _ = rollout(model, data, state, np.repeat(controls, count, axis=1), nstep=count)
+            state, positions = states[:, -1], states[:, :, 1 : 1 + model.nq]
             at = 1 + model.nq + model.nv
             activations = states[0, :, at : at + model.na] - rest
-            yield np.hstack([self.movements(states[0, :, 1 : 1 + model.nq], q), activations[:, filters]])
+            start = positions[1] if self.is_coupled else q
+            yield np.hstack([self.movements(positions[0], start), activations[:, filters]])
 
     def movements(self, positions: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """From q to positions near it, (..., nq) -> (..., nv)."""
+        """From q, (nq,) or (..., nq), to positions near it, (..., nq) -> (..., nv)."""
         m = self.model
         found = np.zeros((*positions.shape[:-1], m.nv))
         for j, (a, v) in enumerate(zip(m.jnt_qposadr, m.jnt_dofadr)):
             kind = kind_of(m, j)
             single = {"free": 3, "ball": 0}.get(kind, 1)
-            found[..., v : v + single] = positions[..., a : a + single] - q[a : a + single]
+            found[..., v : v + single] = positions[..., a : a + single] - q[..., a : a + single]
             if kind in ("free", "ball"):
                 # twice the vector of the quaternion from the one to the other: it is near the identity
                 a, v = a + single, v + single
-                w, x = q[a], q[a + 1 : a + 4]
+                w, x = q[..., a, None], q[..., a + 1 : a + 4]
                 w1, x1 = positions[..., a, None], positions[..., a + 1 : a + 4]
                 turn = w * x1 - w1 * x - np.cross(x, x1)
-                found[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 @ x)[..., None])
+                found[..., v : v + 3] = 2.0 * turn * np.sign(w * w1 + (x1 * x).sum(axis=-1, keepdims=True))
         return found
 
     def changed(

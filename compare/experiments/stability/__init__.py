@@ -24,9 +24,12 @@ gains are explicit or implicit in tmt as they are in MuJoCo's integrator.
 
 Actuators are those of joints, fixed and spatial tendons and sites; position,
 velocity, general and motor, with their filters. Named and left out: muscles,
-plugins, PID, DC motors, delays and whatever is not linear. A floating robot is
-taken without gravity, its base free; a posture that is not at rest is followed
-to the rest near it, and a saddle is called one.
+plugins, PID, DC motors, delays and whatever is not linear. Equalities of the
+file are on, as MuJoCo's soft constraints, and so are limits at which a joint
+rests; contacts are off, which the answer says of a file that has them. Joints
+that nothing holds are set aside by name. A floating robot is taken without
+gravity, its base free; a posture that is not at rest is followed to the rest
+near it, and a saddle is called one.
 
 Tables: stability.csv (each limit, predicted and observed),
 stability_growth.csv, departure.csv (when an unstable posture is left),

@@ -68,4 +68,12 @@ EDITS = (
          "what is left slowly is a rest"),
     Edit("step_limits", "Small.stays", "2.0 * dt * self.neutral", "1e-7 * dt * np.abs(self.modes[0]).max()",
          "a fast servo hides what grows"),
+    Edit("coupling", "Coupled.constrained", "matrix if integrator == 'discrete' else np.eye(len(self.M))", "matrix",
+         "forces of constraints know of implicit damping"),
+    Edit("coupling", "Rigid.braking", "N.T @ self.soft.braking(integrator) @ N", "0.0 * self.D",
+         "rigid constraints have no implicit damping"),
+    Edit("truth.constraints", "turning", "(behind - ahead).T", "(ahead - behind).T",
+         "what a constraint does by turning has the other sign"),
+    Edit("driven", "Posture.unheld", "np.flatnonzero(~held)", "np.flatnonzero(held)", "what is held is set aside"),
+    Edit("mujoco.acting", "Acting.__init__", "bool(stages)", "False", "equalities are off in runs"),
 )  # fmt: skip

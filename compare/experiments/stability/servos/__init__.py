@@ -11,6 +11,7 @@ from ....setup import Setup
 from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
 from . import full_model, lifting, observed, response
+from .circumstances import circumstances
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at
 from .remarks import asked_in_words, lifts_in_words, response_error_at, servo_notes
 from .sentences import DEFAULT_INTEGRATOR, at_the_top, known, refused_in_words
@@ -46,8 +47,8 @@ def tolerance_of_servos(robot: Robot) -> str:
 def begin(setup: Setup) -> dict | None:
     """Predict, and set going what is run; None: the robot has no actuator, or its numbers are stated.
 
-    A quick run observes two integrators at one posture, the file's and Euler, and draws nothing; a run of all experiments
-    observes at one posture, the first that has a limit.
+    All integrators are observed, and run in the full model, at the first posture that has a limit; at others the file's and
+    Euler. A quick run has these two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
     """
     robot, reading = setup.robot, setup.reading
     if reading is None or not robot.drive.actuators:
@@ -58,8 +59,13 @@ def begin(setup: Setup) -> dict | None:
     shown = next((one for one in resting if one.is_finite), None)
     looked_at = resting if setup.alone and not setup.is_quick else [shown] * bool(shown)
     own = (reading.integrator, DEFAULT_INTEGRATOR)
-    tried = [(one, *pair) for one in looked_at for pair in one.pairs if not setup.is_quick or pair[1] in own]
-    tried = [(one, base, name) for one, base, name in tried if not setup.is_quick or base == one.at.bases[0]]
+    tried = [
+        (one, base, name)
+        for one in looked_at
+        for base, name in one.pairs
+        if ((one is shown and not setup.is_quick) or (name in own and base == one.at.bases[0]))
+        and not one.gives_way(base, name)
+    ]
     drawn = (
         [name for name in INTEGRATORS if (shown.at.bases[0], name) in shown.pairs]
         if shown and not setup.is_quick
@@ -78,7 +84,9 @@ def begin(setup: Setup) -> dict | None:
         "steps": ask(steps_at, [(one,) for one in resting]),
         "errors": ask(errors_at, [(one,) for one in resting]),
         "lifts": (unstable, ask(lifts_at, unstable)),
-        "full": ask(full_at, [(one,) for one in resting]),
+        "full": ask(
+            full_at, [(one, integrators_run(one, own, one is shown and not setup.is_quick)) for one in resting]
+        ),
         "curves": (drawn, ask(curve_at, [(shown, name) for name in drawn])),
     }
 
@@ -87,6 +95,14 @@ def least_at(resting: Sequence[Predicted], integrator: str, dt: float) -> Predic
     """The posture with the least limit of an integrator, if a step is not stable there; else None."""
     bad = [one for one in resting if one.is_stable(one.at.bases[0], integrator, dt) is False]
     return min(bad, key=lambda one: one.limits[one.at.bases[0], integrator].dt or LIMIT_UP_TO, default=None)
+
+
+def integrators_run(one: Predicted, own: Sequence[str], every: bool) -> list[str]:
+    """The integrators with which the full model is run: every one, or these and, if none of them is stable, one that is."""
+    dt, base = one.at.dt, one.at.bases[0]
+    stable = [name for name in INTEGRATORS if one.is_stable(base, name, dt)]
+    more = () if set(stable) & {*own} else stable[:1]
+    return [name for name in INTEGRATORS if every or name in (*own, *more)]
 
 
 # in a further process
@@ -116,10 +132,10 @@ def lifts_at(one: Predicted, integrator: str, reading: Reading) -> list[lifting.
     return lifting.lifts(acting_at(reading, one.at, base), one.at, base, integrator, reading.dt)
 
 
-def full_at(one: Predicted, reading: Reading) -> list[dict]:
-    """What the full model does at the file's step, with each integrator."""
+def full_at(one: Predicted, integrators: Sequence[str], reading: Reading) -> list[dict]:
+    """What the full model does at the file's step, with some integrators."""
     base = one.at.bases[0]
-    stable = {name: one.is_stable(base, name, reading.dt) for name in INTEGRATORS}
+    stable = {name: one.is_stable(base, name, reading.dt) for name in integrators}
     return full_model.rows(reading.full_model, one.at, reading.dt, stable)
 
 
@@ -145,7 +161,11 @@ def add(result: Result, setup: Setup, work: dict) -> list[str]:
         check_own_step(result, rows)
     full = [row for part in work["full"] for row in part]
     result.tables |= {"step_limits": rows, "full_model": full}
-    result.top = [at_the_top(rows, full, setup.robot.drive.feeds_back), *refused_in_words(setup.robot.drive.refused)]
+    where = circumstances(found)
+    result.top = [
+        at_the_top(rows, full, setup.robot.drive.feeds_back, where),
+        *refused_in_words(setup.robot.drive.refused),
+    ]
     if setup.asked:
         result.top.append(asked_in_words(found, *setup.asked, reading))
     lifted = [(one, name, lifts) for (one, name), lifts in zip(work["lifts"][0], work["lifts"][1])]

@@ -13,6 +13,8 @@ MOVED_BY, MOVED_LEAST, MOVED_MOST = 1e-6, 1e-8, 1e-5  # rad or m at the start, o
 SOUGHT_FROM = 1e-7  # s: from which the limit is sought
 SOUGHT_BY = 4.0  # from one step to the next, upwards, until one fails
 SOUGHT_STEPS, NARROWED_STEPS = 400, 4000  # of a run: upwards, and where the limit is narrowed
+SOFTLY = 0.01  # of a deviation at the start where soft constraints are, which resist the more the more they give way
+APART = 0.01  # of a deviation at the start: what constraints do not allow, which they answer with much
 RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
@@ -97,6 +99,7 @@ def run_parts(
     The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
     by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
     """
+    times = times * (SOFTLY if acting.is_coupled else 1.0)
     rng, kept = np.random.default_rng(SEED), measured_speeds(acting, at)
     M = acting.mass_matrix(at.q)
     inner = np.linalg.inv(np.linalg.inv(M)[np.ix_(kept, kept)])  # of the joints where the base gives way
@@ -104,9 +107,11 @@ def run_parts(
     inertia = np.diag(inner)
     each = times * np.clip(MOVED_BY * np.sqrt(np.median(inertia) / inertia), MOVED_LEAST, MOVED_MOST)
     movement, speed = np.zeros((2, len(M)))
-    movement[kept] = each * rng.uniform(-1.0, 1.0, len(kept))
+    allowed = at.small(base_of(acting, at)).meeting
+    together = (1.0 - APART) * allowed @ allowed.T + APART * np.eye(len(kept))
+    movement[kept] = together @ (each * rng.uniform(-1.0, 1.0, len(kept)))
     # what nothing pulls back drifts no farther in the run than it was moved
-    speed[kept] = each * rng.uniform(-1.0, 1.0, len(kept)) / (steps * dt)
+    speed[kept] = together @ (each * rng.uniform(-1.0, 1.0, len(kept))) / (steps * dt)
     base = np.setdiff1d(np.arange(len(M)), kept)
     speed[base] = -np.linalg.solve(M[np.ix_(base, base)], M[np.ix_(base, kept)] @ speed[kept])
     start = np.linalg.norm(movement[kept] @ root)
@@ -118,6 +123,10 @@ def run_parts(
 
 def measured_speeds(acting: Acting, at: Posture) -> list[int]:
     """The speeds that are measured: with a free base, those that do not follow from the others."""
-    base = "locked" if acting.locked else at.bases[0]
-    names = set(at.small(base).names)
+    names = set(at.small(base_of(acting, at)).names)
     return [k for k, name in enumerate(at.robot.coordinates.speeds) if name in names]
+
+
+def base_of(acting: Acting, at: Posture) -> str:
+    """The base that a run has."""
+    return "locked" if {*at.base} & {*acting.locked} else at.bases[0]

@@ -1,6 +1,7 @@
 """Step limits under a robot's own servos at its postures, predicted, and the same by the eigenvalues of a step."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +10,17 @@ from scipy.optimize import brentq
 from ....engines.mujoco import Reading
 from ....engines.mujoco.acting import Acting
 from ....engines.mujoco.flags import INTEGRATORS
+from ....engines.mujoco.holding import limits_in_force
 from ....robots import Robot
 from ....truth.driven import Posture
 from ....truth.linear import NEUTRAL
 from ....truth.step_limits import LIMIT_UP_TO, Limit, Small
 
 NEAR_LIMIT = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
+FAR_FROM_POSTURE = 0.1  # rad or m, of a rest from the posture
+MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
+STILL_THERE = 1e-6  # rad or m
+GIVEN_WAY = 0.01  # rad or m
 ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is asked
 
 
@@ -22,7 +28,7 @@ class Predicted(NamedTuple):
     """What is predicted at one posture."""
 
     at: Posture
-    small: dict[str, Small]  # by the base; none where it does not rest
+    there: dict[tuple[str, str], Posture]  # at rest with the step that is the limit; none where it does not rest
     limits: dict[tuple[str, str], Limit]  # by the base and the integrator
 
     @property
@@ -31,12 +37,23 @@ class Predicted(NamedTuple):
 
     @property
     def rests(self) -> bool:
-        return bool(self.small)
+        return bool(self.limits)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether every integrator has a limit, or is known to have none, with the base that counts."""
+        kinds = {limit.limit for (base, _), limit in self.limits.items() if base == self.at.bases[0]}
+        return bool(kinds) and kinds <= {"finite", "none"}
 
     @property
     def is_finite(self) -> bool:
         """Whether it has a limit that counts."""
         return any(limit.limit == "finite" for (base, _), limit in self.limits.items() if base == self.at.bases[0])
+
+    def gives_way(self, base: str, integrator: str) -> bool:
+        """Whether soft constraints give way so far at a limit that the posture is another one: runs are not asked for it."""
+        apart = self.at.robot.coordinates.difference(self.there[base, integrator].q, self.at.q)
+        return bool(np.abs(apart).max() > GIVEN_WAY)
 
     def is_stable(self, base: str, integrator: str, dt: float) -> bool | None:
         """Whether a step is within the limit; None: there is none, or no servo whose step it is."""
@@ -53,26 +70,63 @@ class Predicted(NamedTuple):
 
 def acting_at(reading: Reading, at: Posture, base: str) -> Acting:
     """MuJoCo with the robot's drive and all else off, at a posture, with a base of BASES."""
-    locked = at.base if base == "locked" else ()
-    return Acting(reading.model, at.robot.drive, at.cut, locked=locked, weightless=bool(at.base))
+    locked = (*(at.base if base == "locked" else ()), *at.aside)
+    return Acting(reading.model, at.robot.drive, at.cut, locked, weightless=bool(at.base), limits=at.limits)
 
 
 def predicted_at(robot: Robot, name: str, reading: Reading) -> Predicted:
-    """The limits of every integrator at a posture, with each base; none where it does not rest."""
-    at = Posture(robot, name, Acting(reading.model, robot.drive).along)
+    """The limits of every integrator at a posture, with each base; none where it does not rest.
+
+    Where that tells nothing, without the joints that nothing holds.
+    """
+    found = near_by(robot, name, reading)
+    unheld = () if found.is_known or not robot.drive.servos else found.at.unheld
+    without = near_by(robot, name, reading, unheld) if unheld else found
+    return without if without.is_known else found
+
+
+def near_by(robot: Robot, name: str, reading: Reading, aside: tuple[int, ...] = ()) -> Predicted:
+    """The same with some speeds locked; with the limits of joints where it rests far away beyond them, or not at all, without."""
+
+    def within(limits: tuple[int, ...]) -> Predicted:
+        acting = Acting(reading.model, robot.drive, limits=limits)
+        rows = acting.rows if acting.is_coupled else None
+        return predicted_of(Posture(robot, name, acting.along, rows, reading.dt, aside))
+
+    found, limits = within(()), limits_in_force(reading.model)
+    if not limits or (found.is_known and (found.at.moved < FAR_FROM_POSTURE or not found.at.beyond())):
+        return found
+    limited = within(limits)
+    return limited if limited.is_known else found
+
+
+def predicted_of(at: Posture) -> Predicted:
+    """The same of all joints that are not aside."""
     if at.rest[1]:
         return Predicted(at, {}, {})
-    small = {base: at.small(base) for base in at.bases}
     nothing = Limit("drifts", None, "", None, "")  # free bodies that stand alone, and nothing else
-    return Predicted(
-        at,
-        small,
-        {
-            (base, name): small[base].limit(name) if small[base].names else nothing
-            for base in small
-            for name in INTEGRATORS
-        },
-    )
+    found = {
+        (base, name): limit_at(at, base, name) if at.small(base).names else (at, nothing)
+        for base in at.bases
+        for name in INTEGRATORS
+    }
+    limits = {pair: limit for pair, (_, limit) in found.items()}
+    return Predicted(at, {pair: there for pair, (there, _) in found.items()}, limits)
+
+
+def limit_at(at: Posture, base: str, integrator: str) -> tuple[Posture, Limit]:
+    """The limit, and the posture at rest with a step so long: where soft constraints are loaded, a longer step softens them."""
+    limit = at.small(base).limit(integrator)
+    for _ in range(MOST_RESTS):
+        if limit.dt is None or not at.small(base).is_coupled or abs(limit.dt / at.dt - 1.0) < SAME_REST:
+            break
+        there = replace(
+            at, dt=limit.dt, integrator="discrete" if integrator == "discrete" else "Euler", begin=tuple(at.q)
+        )
+        if there.rest[1] or np.abs(at.robot.coordinates.difference(there.q, at.q)).max() < STILL_THERE:
+            break
+        at, limit = there, there.small(base).limit(integrator)
+    return at, limit
 
 
 def limit_rows(found: Sequence[Predicted], dt: float, integrator: str) -> list[dict]:
@@ -119,9 +173,12 @@ def steps_at(one: Predicted, reading: Reading) -> list[Steps]:
     """Each finite limit of a posture beside the eigenvalues of steps, our own and MuJoCo's."""
     rows = []
     for (base, integrator), limit in one.limits.items():
-        if limit.limit == "finite":
-            small, acting = one.small[base], acting_at(reading, one.at, base)
-            beside = None if integrator == "RK4" else radius_apart(acting, one.at, small, integrator, limit.dt)
+        if limit.limit == "finite" and not one.gives_way(base, integrator):
+            at = one.there[base, integrator]
+            small, acting = at.small(base), acting_at(reading, at, base)
+            # discrete is compared by runs alone where soft constraints are loaded: it takes them as linear only roughly
+            skipped = integrator == "RK4" or (integrator == "discrete" and small.is_coupled)
+            beside = None if skipped else radius_apart(acting, at, small, integrator, limit.dt)
             rows.append(Steps(base, integrator, forms_apart(small, integrator, limit), beside))
     return rows
 
@@ -148,7 +205,7 @@ def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt:
     What is free to move, or held by a rotor, stays as it is: that has the radius 1. Of activations only filters can grow.
     """
     nv = acting.model.nv
-    kept = [k for k in range(2 * nv) if k % nv not in at.lone] + [2 * nv + k for k in acting.filters]
+    kept = [k for k in range(2 * nv) if k % nv not in (*at.lone, *at.aside)] + [2 * nv + k for k in acting.filters]
     least = 1.0 if at.base else 0.0
     found = []
     for step in (dt * (1.0 - ASIDE_OF_LIMIT), dt * (1.0 + ASIDE_OF_LIMIT)):

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from ....engines.mujoco import Reading
 from ....robots import Robot
 from . import response
+from .circumstances import circumstances, constraints_in_words
 from .lifting import Lift
 from .predicted import Predicted, acting_at
 from .sentences import in_digits, in_seconds, known, some_of
@@ -26,7 +27,7 @@ def asked_in_words(found: Sequence[Predicted], dt: float, integrator: str, readi
     where = "" if len(resting) == len(found) and not (good and bad) else f" at {some_of(bad or good)}"
     least = min(resting, key=lambda one: one.limits[one.at.bases[0], integrator].dt or float("inf"))
     limit = least.limits[least.at.bases[0], integrator]
-    text = f"Asked: {step}: {'not stable' if bad else 'stable'}{where}"
+    text = f"Asked: {step}: {'not stable' if bad else 'stable'}{where}{circumstances(found)}"
     if limit.limit == "none":
         text += " (no limit up to 5 s)"
     else:
@@ -93,6 +94,7 @@ def servo_notes(found: Sequence[Predicted], rows: Sequence[dict], full: Sequence
         *bases_in_words(rows),
         *differences_in_words(full),
         *rests_in_words(found, rows),
+        *constraints_in_words(found),
         *drive_in_words(robot, found),
         "All other notes, figures and tables here are of the robot without its actuators, at postures held by a constant torque.",
     ]

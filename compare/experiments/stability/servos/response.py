@@ -82,13 +82,14 @@ def exact_response(at: Posture, base: str, jump: np.ndarray, dt: float, steps: i
     # the state is movement, speed, and a constant 1 that pushes
     A = np.zeros((2 * n + 1, 2 * n + 1))
     A[:n, n : 2 * n] = np.eye(n)
-    A[n : 2 * n] = np.linalg.solve(small.M, np.hstack([-small.K, -small.D, force[:, None]]))
+    by_place, by_speed, by_force = small.equations(dt)
+    A[n : 2 * n] = np.hstack([by_place, by_speed, by_force @ force[:, None]])
     step, state = expm(dt * A), np.eye(2 * n + 1)[-1]
     found = []
     for _ in range(steps):
         state = step @ state
         found.append(state[:n])
-    return np.array([*found, np.linalg.lstsq(small.K, force, rcond=1e-9)[0]])
+    return np.array([*found, np.linalg.lstsq(-by_place, by_force @ force, rcond=1e-9)[0]])
 
 
 def pushed(at: Posture, base: str, jump: np.ndarray) -> np.ndarray:

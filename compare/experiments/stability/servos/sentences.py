@@ -47,10 +47,10 @@ def limit_in_words(row: dict, several: bool, dt: float) -> str:
     return f"limit {in_seconds(row['predicted_dt_s'], dt)}, {row['limiting_joint']}{where}"
 
 
-def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = True) -> str:
+def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = True, where: str = "") -> str:
     """What a robot's engineer wants to know first: whether its own step is stable, and MuJoCo's default Euler with it.
 
-    rows: of step_limits.csv; full: of full_model.csv.
+    rows: of step_limits.csv; full: of full_model.csv; where: without what the limits are, see remarks.circumstances.
     """
     dt, integrator = rows[0]["file_dt_s"], rows[0]["file_integrator"]
     own = known(rows, integrator)
@@ -61,7 +61,7 @@ def at_the_top(rows: Sequence[dict], full: Sequence[dict], has_servos: bool = Tr
     if not own:
         whether = f"Whether its own {in_seconds(dt)} under {integrator} is stable cannot be said"
         return f"{whether}: {kinds_in_words(rows)}{no_rest_in_words(rows)}."
-    words = own_in_words(rows, own, full)
+    words = own_in_words(rows, own, full, where)
     return words if integrator == DEFAULT_INTEGRATOR else f"{words} {default_in_words(rows, own, full)}"
 
 
@@ -73,11 +73,11 @@ def refused_in_words(refused: Mapping[str, str]) -> list[str]:
     )
 
 
-def own_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict]) -> str:
+def own_in_words(rows: Sequence[dict], own: Sequence[dict], full: Sequence[dict], without: str = "") -> str:
     """Whether the file's own step is stable under its own integrator."""
     dt, integrator = own[0]["file_dt_s"], own[0]["file_integrator"]
     name = integrator if integrator != DEFAULT_INTEGRATOR else f"{DEFAULT_INTEGRATOR}, MuJoCo's default"
-    step = f"table at its own {in_seconds(dt)} under {name}"
+    step = f"table at its own {in_seconds(dt)} under {name}{without}"
     postures = {row["posture"] for row in rows}
     bad = [row for row in own if not row["stable_at_file_dt"]]
     if bad:
