@@ -14,7 +14,7 @@ RESPONSE_LEAST = (
 )
 RESPONSE_MOST = 100.0  # fold, of the largest response
 CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
-CURVE_MOST = 50_000  # of a run of a curve
+CURVE_MOST = 10_000  # steps of a run of a curve: it takes no shorter ones
 
 
 def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
@@ -51,9 +51,14 @@ def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: 
 def curve(
     acting: Acting, at: Posture, base: str, integrator: str, file_dt: float, limit: float | None
 ) -> list[tuple[float, float]]:
-    """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response."""
+    """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response.
+
+    Empty where each step up to the limit would be too short.
+    """
     end = min(limit or LASTS, LASTS)
     first = max(min(file_dt, end) / CURVE_FROM, LASTS / CURVE_MOST)
+    if first >= end:
+        return []
     count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
     found = [
         (float(dt), response_error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))
