@@ -69,7 +69,7 @@ def test_sentences_have_their_figures():
     assert texts[NAMES[3]].startswith("Your bias is linear in qd: is damping in it?")
 
 
-@pytest.mark.parametrize("share, met", [(0.999, True), (1.001, False)])
+@pytest.mark.parametrize("share, met", [(0.95, True), (1.05, False)])  # h itself is rounded by some 0.5 %
 def test_the_odd_part_just_inside_and_outside(share, met):
     (even,) = (condition for condition in asked() if condition.name == NAMES[3])
     moved = share * even.tolerance
