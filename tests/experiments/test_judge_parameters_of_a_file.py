@@ -93,7 +93,7 @@ def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale):
 def test_a_force_of_what_is_switched_off_is_a_failed_check():
     reading = read(PATHS["arm6"])
     robot, mujoco = robot_of(reading, "robot.xml"), engine(reading)
-    mujoco.bare = False  # as the file has it
+    mujoco.bare, mujoco.model = False, reading.full_model  # as the file has it
     result = parameters.rows(Setup.small(robot, engines(mujoco), reading=reading))
     failed = [check.quantity for check in result.checks if not check.passed]
     assert "no forces of constraints and contacts" in failed

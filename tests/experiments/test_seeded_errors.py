@@ -85,7 +85,7 @@ IN_THE_METHOD = {
         ["acceleration bias"],
     ),
     "gravity sign": ("b.v_conv - g)", "b.v_conv + g)", ["gravity holding torque", "published c"]),
-    "rotational inertia missing": (" + b.B[i].dot(b.inertia @ b.B[j])", "", ["mass Mbar", "published g"]),
+    "rotational inertia missing": (" + b.B[i].dot(moment)", "", ["mass Mbar", "published g"]),
     "potential sign": (
         "* -1.0).dot(b.x)",
         "* 1.0).dot(b.x)",

@@ -64,8 +64,9 @@ def source_name(source: object) -> str:
     """What a message calls a source."""
     if isinstance(source, type):
         return f"the class {source.__name__}"
-    if isinstance(source, ModuleType) and getattr(source, "__file__", None):
-        return Path(source.__file__).name
+    file = Path(getattr(source, "__file__", None) or "__init__.py").name
+    if isinstance(source, ModuleType) and file != "__init__.py":  # a file of one's own has no other name
+        return file
     name = getattr(source, "__name__", None)
     return name if isinstance(name, str) else f"the {type(source).__name__}"
 
