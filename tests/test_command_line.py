@@ -170,12 +170,18 @@ def test_what_cannot_be_done_gets_one_line_and_status_2(arguments, says, capsys,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_hinges_than_the_arms_get_status_2_where_the_arm_is_asked_for(tmp_path, capsys):
-    model = tmp_path / "other.xml"
-    model.write_text(ARM.mjcf.read_text().replace('name="gamma"', 'name="wrist"'))
-    assert main(["mass", "--reference", "arm", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 2
-    assert "wrist (hinge); hinges alpha, beta, gamma and no others are expected" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+def test_a_hinge_of_another_name_is_matched_and_one_of_another_axis_gets_status_2_where_the_arm_is_asked_for(
+    tmp_path, capsys
+):
+    model, out = tmp_path / "other.xml", tmp_path / "out"
+    named = ARM.mjcf.read_text().replace('name="gamma"', 'name="wrist"')
+    missing = named.replace('type="hinge"', 'type="slide"')
+    for text, status in ((missing, 2), (named, 0)):
+        model.write_text(text)
+        assert not out.exists()
+        assert main(["mass", "--quick", "--reference", "arm", "--mjcf", str(model), "--out", str(out)]) == status
+        printed = capsys.readouterr()
+        assert "wrist" in (printed.err if status else printed.out)
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="permissions bind only who is not root")
