@@ -62,7 +62,8 @@ def test_what_is_of_the_arm_alone_gets_status_2(tmp_path, capsys, arguments, say
 
 
 @pytest.mark.parametrize("text, says", [
-    ("<mujoco><worldbody>", "MuJoCo cannot compile"), ("", "is empty; an MJCF file is expected"), ("no XML", "is not MJCF"), (MESH, "none.stl"),
+    ("<mujoco><worldbody>", "MuJoCo cannot compile"), ("", "is empty; an MJCF file is expected"),
+    ("no XML", "is not MJCF"), (MESH, "none.stl"),
     ('<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>', "it has no joint; at least one is expected"),
     (BODY.format(""), "mass and inertia of moving bodies must be larger"),
     (BODY.format('<inertial pos="0 0 0" mass="inf" diaginertia="1 1 1"/>'), "finite numbers are expected"),
