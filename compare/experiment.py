@@ -135,7 +135,8 @@ def add_problems(result: Result, problems: Sequence, said: set) -> None:
 def own_words(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
     """What an experiment says of itself: its title, its claim, its tolerance."""
     robot = setup.robot
-    title = getattr(experiment, "TITLE_OF_OWN", experiment.TITLE) if robot.own else experiment.TITLE
+    kind = "TITLE_OF_OWN" if robot.own else "TITLE_OF_A_FILE" if robot.is_read and not robot.is_stated else "TITLE"
+    title = getattr(experiment, kind, experiment.TITLE)
     return title, experiment.claim(robot), experiment.tolerance(robot)
 
 

@@ -46,7 +46,7 @@ def test_the_message_in_the_manner_of_numpy_testing(given):
     assert float(lines[3].removeprefix("    yours:  ")) == values[7, 1]
     assert float(lines[4].removeprefix("    MuJoCo: ")) == given.values["bias"][7, 1]
     assert lines[5].startswith("    difference: 0.25, ") and "times its tolerance of" in lines[5]
-    assert lines[6].startswith("Probable cause: None of the changes that are tried, nor two of them, explains this")
+    assert lines[6].startswith("Probable cause: No single change that is tried explains all of this, nor do two")
     assert lines[-1] == (
         "Compared with joints=['hip', 'knee']; another order, or '-hip', 'hip+90deg' and 'hip in deg', can be stated."
     )

@@ -52,7 +52,7 @@ class Diagnosis(NamedTuple):
                 f" The values agree to {int(self.digits)} digits: rounded constants, or noise, would look like this."
             )
         share = f"{self.left:.2g}" if self.left < 0.01 else f"{100 * self.left:.2g} %"
-        said = f"None of the changes that are tried, nor two of them, explains this: {share} is left. {self.where}"
+        said = f"No single change that is tried explains all of this, nor do two: {share} is left. {self.where}"
         return f"{said} {self.details}".rstrip() + rounded
 
     @property

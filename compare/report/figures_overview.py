@@ -234,4 +234,6 @@ def picture_of_limits(results: Mapping[str, Result], robot: object) -> tuple[str
         *ax.plot([], [], "s", color=ORANGE, markersize=4.5, label="observed, MuJoCo"),
     ]
     fig.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=7.5, handletextpad=0.1, columnspacing=0.8)
-    return f"{overview.BEGINNING}limits", fig, methods_compared.limits_at_a_glance(found)
+    caption = methods_compared.limits_at_a_glance(found)
+    own = " Its actuators and equalities do not act here." if robot.is_read and robot.drive.actuators else ""
+    return f"{overview.BEGINNING}limits", fig, caption + own

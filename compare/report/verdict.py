@@ -156,7 +156,7 @@ def outcome(section: Section) -> str:
     checks = section.result.checks
     differing, broke, unstable, unconfirmed = failures([section])
     if differing:
-        return f"It does not hold: {len(differing)} of {len(checks)} checks fail."
+        return f"It does not hold: {sum(not check.passed for check in checks)} of {len(checks)} checks fail."
     if broke:
         return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
     if unstable or unconfirmed:
@@ -171,7 +171,7 @@ def standing(section: Section) -> tuple[bool | None, str]:
     checks = section.result.checks
     differing, broke, unstable, unconfirmed = failures([section])
     if differing:
-        return False, f"{len(differing)} of {len(checks)} fail"
+        return False, f"{sum(not check.passed for check in checks)} of {len(checks)} fail"
     if broke:
         return False, "broke off" if any(check.quantity == ENDS for check in broke) else "not whole"
     if unconfirmed:

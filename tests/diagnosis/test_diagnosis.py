@@ -69,7 +69,7 @@ def test_what_nothing_explains_names_the_entries():
     assert found.differs and found.causes == ()
     assert found.entries == ("M[alpha][beta]", "h[gamma]")
     assert "M[alpha][beta] and h[gamma] differ, the others agree" in found.sentence
-    assert found.sentence.startswith("None of the changes that are tried, nor two of them, explains this: ")
+    assert found.sentence.startswith("No single change that is tried explains all of this, nor do two: ")
     assert 0.0 < found.left <= 1.0
 
 

@@ -69,6 +69,7 @@ from ...setup import Setup
 from . import file, solution
 
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
+TITLE_OF_A_FILE = "Parameters: did MuJoCo compile the numbers that its file states?"
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
 # numbers of the whole file, and those of bodies; the others are of joints
 OF_ALL = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *NOT_HAD)
