@@ -27,7 +27,9 @@ class Compared:
         off, right = np.abs(given - equations.values()[0]), np.abs(equations.values()[0])
         of_entries = np.nan_to_num(off).max(axis=0) <= SMALL_SHARE * right.max(axis=0) + tolerance.max(axis=0)
         every = (off > tolerance).any(axis=0) | np.isnan(off).all(axis=0) | (right.max(axis=0) == 0.0)
-        self.is_small = bool(of_entries.all()) and (bool(every.all()) or all(one.is_small for one in self.differing))
+        self.is_small = bool(of_entries.all()) and (
+            bool(every.all()) or (bool(self.differing) and all(one.is_small for one in self.differing))
+        )
 
     @cached_property
     def expressions(self) -> "Expressions | None":

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..judge.check import ENDS, Check
+from ..judge.check import ENDS, About, Check
 from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_in_words, worst
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def row_of_file(
         outcome, reason = DIFFER, first_cause(causes) if causes else str(differing[0])
     elif broke or lost:
         outcome, reason = BROKE, break_in_words(broke[0]) if broke else lost[0]
-    elif not any(section.result.checks for section in sections):
+    elif not any(check.about == About.MODELS for section in sections for check in section.result.checks):
         outcome, reason = REFUSED, "nothing could be compared"
     else:
         outcome = UNCONFIRMED if unconfirmed else ITSELF if reference.kind == "model" else AGREE

@@ -120,9 +120,10 @@ def verdict(
     also += [f"{capital(unconfirmed_in_words(unconfirmed))}."] if unconfirmed else []
     also += [f"But {robot} is {unstable_in_words(unstable)}."] if unstable else []
     which = "checks that compare them" if broke or unstable or unconfirmed else "checks"
-    comparing = [check for check in checks if check.about == About.MODELS] if " " in which else checks
+    comparing = [check for check in checks if check.about == About.MODELS]
+    counted = comparing if " " in which else checks
     if differing:
-        text = f"{compared} do not agree{ran}: {len(differing)} of {len(comparing)} {which} fail. "
+        text = f"{compared} do not agree{ran}: {len(differing)} of {len(counted)} {which} fail. "
         if causes:
             more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
             others = sum(check.experiment not in ("parameters", "diagnosis") for check in differing)
@@ -137,7 +138,7 @@ def verdict(
     if broke:
         left = "" if is_whole else f" ({some})"
         return " ".join([f"Not everything could be compared{left}; all {len(comparing)} {which} pass.", *also])
-    text = f"{compared} agree{ran}: all {len(comparing)} {which} pass."
+    text = f"{compared} agree{ran}: all {len(counted)} {which} pass."
     text += f" In {empty} nothing was compared." * bool(empty)
     if also:
         return " ".join([text, *also])

@@ -21,6 +21,7 @@ class Feature(NamedTuple):
     names: tuple[str, ...]
     treatment: str  # modelled, switched_off, open_tree
     reason: str
+    numbers: tuple[float, ...] = ()  # of what the equations do not have, those other than 0 in order of size
 
 
 REASONS = {
@@ -49,10 +50,29 @@ def features(model: mujoco.MjModel) -> tuple[Feature, ...]:
     """The inventory of a compiled model: a row for each thing that it has, always in the same order."""
     found = names_of_features(model)
     return tuple(
-        Feature(feature, len(found[feature]), tuple(found[feature]), *REASONS[feature])
+        Feature(feature, len(found[feature]), tuple(found[feature]), *REASONS[feature], numbers_of(model, feature))
         for feature in REASONS
         if found[feature]
     )
+
+
+def numbers_of(m: mujoco.MjModel, feature: str) -> tuple[float, ...]:
+    """The numbers of a feature that do not depend on how frames of bodies are placed."""
+    fields = [np.ravel(getattr(m, name)) for name in FIELDS.get(feature, ()) if hasattr(m, name)]
+    if feature == "fluid":
+        fields = [np.array([m.opt.density, m.opt.viscosity, *m.opt.wind])]
+    if feature == "equality":
+        fields = [m.eq_data[np.isin(m.eq_type, OF_COORDINATES), :5].ravel()]
+    return tuple(sorted(float(x) for field in fields for x in field if x))
+
+
+FIELDS = {
+    "gravcomp": ("body_gravcomp",),
+    "frictionloss": ("dof_frictionloss", "tendon_frictionloss"),
+    "tendon": ("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm"),
+    "other": ("dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield"),
+}
+OF_COORDINATES = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
 
 
 def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:

@@ -8,12 +8,15 @@ import tmt
 
 from ...engines.mujoco.inventory import MODELLED
 from ...judge.check import Result
+from ...judge.scale import EPS, FACTOR
 from ...setup import Setup
 
+MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # of which no equation of motion without them says anything
 CLAIM_OF_SOLUTION = (
     "The model as MuJoCo compiled it has the numbers of {}, joint by joint and body by body: parent, axis, anchor, zero, "
     "damping, armature and spring of each joint; mass, centre of mass and inertia tensor of each body; gravity. Of what the "
-    "equations do not have, limits and actuators for example, it has as many; of contacts only whether there are any."
+    "equations do not have, it has as many, and their numbers, in order of size, are those of the solution; geoms that touch, "
+    "limits and actuators may be others."
 )
 TOLERANCE_OF_SOLUTION = (
     "64 eps x the largest entry of the quantity in the solution, of any joint or body. Counts, and forces of what is switched "
@@ -62,16 +65,24 @@ def compare_features(result: Result, setup: Setup) -> list[dict]:
     """A check for each thing that the equations do not have, how many there are of it; of those that differ the causes."""
     robot, causes = setup.robot, []
     features = {feature.feature: feature for feature in (*robot.features_stated, *robot.features)}
-    stated, found = (
-        {feature.feature: feature.count for feature in each} for each in (robot.features_stated, robot.features)
-    )
+    stated, found = ({feature.feature: feature for feature in each} for each in (robot.features_stated, robot.features))
     for name in (name for name, feature in features.items() if feature.treatment != MODELLED):
-        a, b = (float(counts.get(name, 0)) for counts in (stated, found))
-        if name == "contact":  # their geoms may be others
-            a, b = float(a > 0), float(b > 0)
+        a, b = (float(known[name].count if name in known else 0) for known in (stated, found))
+        if name in MAY_DIFFER:
+            continue
         result.check("file", f"{name}, how many", b, a, "", rule="equal")
-        if a != b:
-            text = f"{name}: {a:g} in {robot.stated_in}, {b:g} in this file"
+        text = f"{name}: {a:g} in {robot.stated_in}, {b:g} in this file" if a != b else ""
+        ours, theirs = (np.array(known[name].numbers if name in known else ()) for known in (found, stated))
+        if not text and (len(ours) or len(theirs)):
+            off = np.abs(ours - theirs).max() if len(ours) == len(theirs) else np.inf
+            check = result.check(
+                "file", f"{name}, its numbers", off, FACTOR * EPS * np.abs(theirs).max(initial=0.0), ""
+            )
+            if not check.passed:
+                k = int(np.argmax(np.abs(ours - theirs))) if len(ours) == len(theirs) else 0
+                values = f": {ours[k]:.9g} in place of {theirs[k]:.9g}" if len(ours) == len(theirs) else ""
+                text = f"{name}: other numbers than in {robot.stated_in}{values}"
+        if text:
             causes.append(
                 {"rank": 2, "place": name, "stated": a, "found": b, "text": text, "size": 1.0, "quantity": name}
             )

@@ -110,7 +110,8 @@ def integrators_run(one: Predicted, own: Sequence[str], every: bool) -> list[str
 
 def observed_limit_at(one: Predicted, base: str, integrator: str, reading: Reading) -> tuple[str, float | None]:
     """The limit that MuJoCo's runs show."""
-    return observed.limit(acting_at(reading, one.at, base), one.at, integrator)
+    at = one.there[base, integrator]  # where it rests with such a step
+    return observed.limit(acting_at(reading, at, base), at, integrator)
 
 
 def errors_at(one: Predicted, reading: Reading) -> dict[tuple[str, str], float | None]:

@@ -176,8 +176,8 @@ def steps_at(one: Predicted, reading: Reading) -> list[Steps]:
         if limit.limit == "finite" and not one.gives_way(base, integrator):
             at = one.there[base, integrator]
             small, acting = at.small(base), acting_at(reading, at, base)
-            # discrete is compared by runs alone where soft constraints are loaded: it takes them as linear only roughly
-            skipped = integrator == "RK4" or (integrator == "discrete" and small.is_coupled)
+            # compared by runs alone where soft constraints act: loaded, they rest elsewhere with each step
+            skipped = integrator == "RK4" or small.is_coupled
             beside = None if skipped else radius_apart(acting, at, small, integrator, limit.dt)
             rows.append(Steps(base, integrator, forms_apart(small, integrator, limit), beside))
     return rows

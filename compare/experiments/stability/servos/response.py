@@ -20,7 +20,8 @@ CURVE_MOST = 10_000  # steps of a run of a curve: it takes no shorter ones
 def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
     """The largest difference from the exact response over the largest response, in 0.2 s, a ratio.
 
-    Of rad and of m each by themselves, the worse of both; None: no servo, or it diverged. The targets of all servos jump by the
+    Of rad and of m each by themselves, the worse of both; None: no servo, nothing moves, or it diverged.
+    The targets of all servos jump by the
     same length, so that nothing moves by more than 1e-4 rad or m; u of those with an activation jumps too. Exact: the matrix
     exponential of the linear equations. Half of the difference of two runs, there and back, has neither an offset nor squares.
     """
@@ -30,7 +31,9 @@ def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: 
     steps = max(1, round(LASTS / dt))
     kept = measured_speeds(acting, at)
     exact = exact_response(at, base, jump, dt, steps)
-    size = RESPONSE_SIZE / max(np.abs(exact).max(), 1e-300)
+    if not np.abs(exact).max() > 0.0:
+        return None
+    size = RESPONSE_SIZE / np.abs(exact).max()
     with np.errstate(over="ignore", invalid="ignore"):
         there, back = (
             next(acting.deviations(at.q, at.u, dt, integrator, [steps], jump=sign * size * jump))
