@@ -31,8 +31,8 @@ def found(tmp_path, text, solution=CART, name="parameters"):
     ('pos="0 0 0.1"', 'pos="0 0 0.11"', "anchor z of tilt: stated 0.1 m, compiled 0.11 m"),
     ('damping="0.5"', 'damping="0.5" armature="0.1"', "armature of x: stated 0 kg, compiled 0.1 kg"),
     ("-9.81", "-9.8", "gravity z: stated -9.81 m/s2, compiled -9.8 m/s2"),
-    ('<motor joint="x"/>', "", "actuator: 1 in {}, 0 in this file"),
-    ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', "limit: 0 in {}, 1 in this file"),
+    ('damping="0.5"', 'damping="0.5" frictionloss="0.1"', "frictionloss: 0 in {}, 1 in this file"),
+    ('<motor joint="x"/>', "", None), ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', None),  # may be others
     (' name="tilt"', "", None),
     ('"pole"', '"stick"', None),
 ])  # fmt: skip
@@ -41,6 +41,13 @@ def test_a_number_that_is_another_one_than_in_the_solution_is_named(tmp_path, ol
     causes = [cause["text"] for cause in result.curves["causes"]]
     assert causes == ([text.format(tmp_path / "solution.xml")] if text else [])
     assert sum(not check.passed for check in result.checks) == len(causes) and len(result.checks) > 20
+
+
+def test_what_no_equation_has_is_compared_by_its_numbers(tmp_path):
+    rubbed = [CART.replace('damping="0.5"', f'damping="0.5" frictionloss="{size}"') for size in (0.1, 0.1, 9.0)]
+    for text, failed in zip(rubbed[1:], ([], ["frictionloss, its numbers"])):
+        result = found(tmp_path, text, rubbed[0])
+        assert [check.quantity for check in result.checks if not check.passed] == failed
 
 
 def test_values_are_compared_with_those_of_the_solution(tmp_path):

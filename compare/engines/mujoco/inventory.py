@@ -50,15 +50,17 @@ def features(model: mujoco.MjModel) -> tuple[Feature, ...]:
     """The inventory of a compiled model: a row for each thing that it has, always in the same order."""
     found = names_of_features(model)
     return tuple(
-        Feature(feature, len(found[feature]), tuple(found[feature]), *REASONS[feature], numbers_of(model, feature))
+        Feature(
+            feature, len(found[feature]), tuple(found[feature]), *REASONS[feature], numbers_of_feature(model, feature)
+        )
         for feature in REASONS
         if found[feature]
     )
 
 
-def numbers_of(m: mujoco.MjModel, feature: str) -> tuple[float, ...]:
+def numbers_of_feature(m: mujoco.MjModel, feature: str) -> tuple[float, ...]:
     """The numbers of a feature that do not depend on how frames of bodies are placed."""
-    fields = [np.ravel(getattr(m, name)) for name in FIELDS.get(feature, ()) if hasattr(m, name)]
+    fields = [np.ravel(getattr(m, name)) for name in FIELDS_OF_FEATURES.get(feature, ()) if hasattr(m, name)]
     if feature == "fluid":
         fields = [np.array([m.opt.density, m.opt.viscosity, *m.opt.wind])]
     if feature == "equality":
@@ -66,7 +68,7 @@ def numbers_of(m: mujoco.MjModel, feature: str) -> tuple[float, ...]:
     return tuple(sorted(float(x) for field in fields for x in field if x))
 
 
-FIELDS = {
+FIELDS_OF_FEATURES = {
     "gravcomp": ("body_gravcomp",),
     "frictionloss": ("dof_frictionloss", "tendon_frictionloss"),
     "tendon": ("tendon_stiffness", "tendon_damping", "tendon_lengthspring", "wrap_prm"),
