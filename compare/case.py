@@ -9,8 +9,8 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.lock import CLOSE_TO_ONE
-from tmt.tree import GAINS
+from tmt.model.lock import CLOSE_TO_ONE
+from tmt.model.tree import GAINS
 
 from .controller import Controller, controller
 from .coordinates import Coordinates

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt import Tree, coordinates
-from tmt.composite import mass_matrix_and_bias
+from tmt import Tree
+from tmt.equations.composite import mass_matrix_and_bias
+from tmt.model import coordinates
 
 
 class Coordinates(NamedTuple):

@@ -4,8 +4,10 @@ from functools import cached_property
 
 import numpy as np
 
-from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
-from tmt.reference import exact
+from tmt.equations.composite import (
+    mass_matrix_and_bias,  # the sum over bodies would take minutes for hundreds of joints
+)
+from tmt.exact.values import exact
 
 from .case import SEED
 from .robots import Robot
@@ -28,7 +30,7 @@ class Sample:
 
     @cached_property
     def truths(self) -> list:
-        """A tmt.reference.Truth for each of the first states."""
+        """A tmt.exact.values.Truth for each of the first states."""
         known = slice(self.exact_states)
         return [exact(self.tree, *state) for state in zip(self.q[known], self.qd[known], self.tau[known])]
 

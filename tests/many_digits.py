@@ -2,8 +2,8 @@
 
 import mpmath
 
-from tmt.exact import exact_tree, of_length_1
-from tmt.method import acceleration
+from tmt.equations.method import acceleration
+from tmt.exact.tree import exact_tree, of_length_1
 
 DIGITS, COLUMNS = 45, 9  # of the extrapolation: order 18
 

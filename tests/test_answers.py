@@ -10,7 +10,8 @@ import pytest
 from trees import random_state, tree_of_kinds
 
 import tmt
-from tmt import answers, cores, literal
+from tmt import answers, literal
+from tmt.compiled import cores
 
 EPS = np.finfo(float).eps
 OF_Q = "com_positions", "jacobians", "mass_matrix", "gravity_balance", "spring_torque", "potential_energy"
@@ -235,7 +236,8 @@ def test_threads_ask_of_models_that_come_and_go(loops, monkeypatch):
 
 AT_THE_END = """
 import atexit, numpy as np, tmt
-from tmt import answers, cores, following
+from tmt import answers, following
+from tmt.compiled import cores
 answers.remembered(tmt.ARM).get_loops()
 cores.cores = following.cores = lambda: 3
 following.SPREAD = 0.0

@@ -8,8 +8,9 @@ import pytest
 import sympy
 
 import tmt
-from tmt import method, space
-from tmt.reference import DIGITS, exact
+from tmt.equations import method
+from tmt.equations import vectors as space
+from tmt.exact.values import DIGITS, exact
 
 space.sin.register(sympy.Expr, sympy.sin)
 space.cos.register(sympy.Expr, sympy.cos)

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from trees import random_state, random_tree, tree_of_kinds
 
 import tmt
-from tmt import composite, kernels, method
-from tmt.exact import exact_tree
+from tmt import kernels
+from tmt.equations import composite, method
+from tmt.exact.tree import exact_tree
 from tmt.sine import LIMIT, sincos
 
 EPS = np.finfo(float).eps

@@ -7,8 +7,8 @@ import pytest
 from trees import random_state, tree_of_kinds
 
 import tmt
-from tmt import METHODS, derivatives
-from tmt.methods import SemiImplicitEuler, amplification
+from tmt import METHODS
+from tmt.methods import SemiImplicitEuler, amplification, derivatives
 
 TREE = tree_of_kinds(np.random.default_rng(5), bodies=3)
 STATES = [np.array(part) for part in zip(*(random_state(np.random.default_rng(k), TREE) for k in range(3)))]

@@ -9,11 +9,12 @@ import sympy
 from trees import random_state, tree_of_kinds
 
 import tmt
-from tmt import composite, kernels, loop_trees, method
-from tmt.derivatives import amplification, linear_system, one_step
+from tmt import kernels, loop_trees
+from tmt.equations import composite, method
+from tmt.exact.motion import trajectory
+from tmt.exact.values import distance, exact
 from tmt.methods import METHODS, method_named
-from tmt.reference import distance, exact
-from tmt.reference_run import trajectory
+from tmt.methods.derivatives import amplification, linear_system, one_step
 from tmt.source import run_source
 
 FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own

@@ -5,7 +5,8 @@ import pytest
 from trees import random_state, random_tree, tree_of_kinds
 
 import tmt
-from tmt import generic, kernels, loop_trees, method
+from tmt import generic, kernels, loop_trees
+from tmt.equations import method
 from tmt.methods import METHODS
 
 

@@ -10,10 +10,10 @@ from trees import random_state, tree_of_kinds, unit_quaternion
 
 import tmt
 from tmt import kernels
-from tmt.coordinates import coordinates_of
+from tmt.exact.motion import trajectory
+from tmt.exact.values import distance, exact
 from tmt.methods import METHODS, amplification, one_step
-from tmt.reference import distance, exact
-from tmt.reference_run import trajectory
+from tmt.model.coordinates import coordinates_of
 
 EPS = np.finfo(float).eps
 

@@ -9,7 +9,8 @@ from cache_folder import new_folder as new_folder
 from cache_folder import posix
 
 import tmt
-from tmt import composite, kept, method, source
+from tmt import kept, source
+from tmt.equations import composite, method
 from tmt.methods import METHODS, RungeKutta
 
 RK4 = METHODS["rk4"]

@@ -12,10 +12,11 @@ from trees import random_tree
 import tmt
 from compare.judge.scale import EPS, FACTOR, bias_scale
 from compare.judge.timing import vectors
-from tmt import composite, kernels, method
+from tmt import kernels
+from tmt.compiled.trace import Tape
+from tmt.equations import composite, method
 from tmt.methods import METHODS, one_step
 from tmt.source import evaluator_source, lanes_source
-from tmt.trace import Tape
 
 
 def python_function(text, name):

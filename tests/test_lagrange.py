@@ -9,7 +9,7 @@ import pytest
 from lagrange import PARTS, Body, Joint, cart, equations, free_body, spherical_pendulum
 from trees import random_tree
 
-from tmt.reference import exact
+from tmt.exact.values import exact
 
 GRAVITY = (1.0, -2.0, -9.0)
 

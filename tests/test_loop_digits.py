@@ -14,8 +14,9 @@ import sys
 from collections import namedtuple
 import mpmath, numpy as np
 from trees import random_state, tree_of_kinds
-from tmt import loop_bodies, loop_trees, loops, method
-from tmt.exact import exact_tree
+from tmt import loop_bodies, loop_trees, loops
+from tmt.equations import method
+from tmt.exact.tree import exact_tree
 
 mpmath.mp.dps, seed = 50, int(sys.argv[1])
 rng = np.random.default_rng(seed)

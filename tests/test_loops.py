@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from trees import random_state, tree_of_kinds
 
-from tmt import composite, generic, loop_runs, loop_stages, loop_states, loop_trees, loops, method, templates
+from tmt import generic, loop_runs, loop_stages, loop_states, loop_trees, loops, templates
 from tmt.eight import WIDTH
+from tmt.equations import composite, method
 from tmt.methods import METHODS, lone_speeds, one_step
 from tmt.sine import LIMIT
 

@@ -12,8 +12,11 @@ from pathlib import Path
 import pytest
 from cache_folder import Planted, new_folder, posix, ran  # noqa: F401 (the fixture `folder`)
 
-from tmt import cache, composite, coordinates, eight, inlined, loop_joints, loop_runs, loops, sine, space
+from tmt import cache, eight, inlined, loop_joints, loop_runs, loops, sine
+from tmt.equations import composite
+from tmt.equations import vectors as space
 from tmt.machine_code import compiled, sources
+from tmt.model import coordinates
 
 ROOT = Path(__file__).resolve().parent.parent
 # one of the loops for any tree, the one that is compiled fastest: whether it was read from the folder, and its result

@@ -11,9 +11,10 @@ from trees import random_tree
 
 import tmt
 from compare.judge.scale import acceleration_scale, bias_scale, gravity_scale, reaches
-from tmt import method, space
-from tmt.dual import jacobian
-from tmt.reference import distance, exact
+from tmt.equations import method
+from tmt.equations import vectors as space
+from tmt.equations.dual import jacobian
+from tmt.exact.values import distance, exact
 
 ALLOWED = 64 * np.finfo(float).eps  # times the scale of each quantity, as in the experiments
 TINY = 1e-30

@@ -6,9 +6,9 @@ import pytest
 from scipy.integrate import DOP853
 
 import tmt
-from tmt import dop853, kernels
-from tmt.implicit import ImplicitRungeKutta
-from tmt.methods import METHODS, RungeKutta, amplification, one_step
+from tmt import kernels
+from tmt.methods import METHODS, RungeKutta, amplification, dop853, one_step
+from tmt.methods.implicit import ImplicitRungeKutta
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)

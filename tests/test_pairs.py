@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from tmt import pairs, series
-from tmt.pairs import pair
+from tmt.exact import pairs, series
+from tmt.exact.pairs import pair
 
 NUMBERS = st.floats(-1e6, 1e6).filter(lambda x: x == 0.0 or abs(x) > 1e-100)
 DIGITS = 1e-31

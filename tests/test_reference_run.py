@@ -16,10 +16,11 @@ from compare.engines.heyoka import variables
 from compare.engines.mujoco import read
 from compare.truth.free_body import free_turning
 from compare.truth.pendulum import exact_swing
-from tmt import composite, reference_run
-from tmt.exact import exact_tree
-from tmt.method import acceleration
-from tmt.reference_run import trajectory, truth
+from tmt.equations import composite
+from tmt.equations.method import acceleration
+from tmt.exact import motion as reference_run
+from tmt.exact.motion import trajectory, truth
+from tmt.exact.tree import exact_tree
 
 BENT = (0.5, 0.3, 1.0)
 ONE_HINGE = tmt.Tree(

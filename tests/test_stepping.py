@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import tmt
-from tmt import kernels, method, source
+from tmt import kernels, source
+from tmt.equations import method
 from tmt.methods import METHODS, RungeKutta, method_named, one_step
-from tmt.stepping import FIELDS, Method
+from tmt.methods.stepping import FIELDS, Method
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)

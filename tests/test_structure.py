@@ -130,7 +130,7 @@ def part(module) -> str:
     return (module.split(".") + [""])[1]
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "tmt").glob("*.py")), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", sorted((ROOT / "tmt").rglob("*.py")), ids=lambda path: path.name)
 def test_tmt_knows_nothing_of_the_engine_or_the_judge(path):
     outer = {name.split(".")[0] for name in imports(path)}
     assert not outer & {"mujoco", "matplotlib", "pandas", "scipy", "rich", "compare", "mjcf"}
@@ -189,7 +189,7 @@ def test_experiments_are_imported_by_name_only():
 
 def test_mujocos_names_are_spoken_only_by_the_engine():
     spoken = re.compile(r"\.(qpos|qvel|qacc|qfrc_\w+|xipos|cvel)\b")
-    for path in [*FILES, *(ROOT / "tmt").glob("*.py")]:
+    for path in [*FILES, *(ROOT / "tmt").rglob("*.py")]:
         if not dotted(path).startswith("compare.engines.mujoco"):
             assert not spoken.search(path.read_text(encoding="utf-8")), path
 
@@ -240,7 +240,7 @@ def test_a_function_has_one_meaning_in_all_of_compare():
 def test_no_file_is_long():
     """Its code: the docstring of an experiment is its help, and does not count."""
     reasons = {"trace.py": "the tape, one class"}
-    for path in [*FILES, *(ROOT / "tmt").glob("*.py")]:
+    for path in [*FILES, *(ROOT / "tmt").rglob("*.py")]:
         text = path.read_text(encoding="utf-8")
         is_help = dotted(path).removeprefix("compare.experiments.") in EXPERIMENTS
         lines = len(text.splitlines()) - (ast.parse(text).body[0].end_lineno if is_help else 0)

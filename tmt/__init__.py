@@ -42,12 +42,12 @@ disk, see cache.py. Without MuJoCo, `pip install numpy numba mpmath && pip insta
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .answers import answered as _answered
-from .answers import prepare
-from .arm import ARM
-from .methods import METHODS
-from .simulation import Motion, simulate
-from .tree import Tree
+from tmt.answers import answered as _answered
+from tmt.answers import prepare
+from tmt.arm import ARM
+from tmt.methods import METHODS
+from tmt.model.tree import Tree
+from tmt.simulation import Motion, simulate
 
 __all__ = [
     "ARM", "METHODS", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions", "convective_terms",

@@ -11,17 +11,18 @@ from functools import lru_cache
 import numpy as np
 from numpy import ndarray
 
-from . import kernels, literal, singular
-from .arm import ARM
-from .cache import is_kept
-from .calls import refused
-from .choice import USUAL_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
-from .cores import side_by_side
-from .given import checked_model
-from .loop_trees import in_parts
-from .source import LANES
-from .tree import Tree
-from .values import real_numbers
+from tmt import kernels, literal
+from tmt.arm import ARM
+from tmt.cache import is_kept
+from tmt.calls import refused
+from tmt.choice import USUAL_LINES, Form, chosen, loop_each, straight_line_each, straight_line_getting
+from tmt.compiled.cores import side_by_side
+from tmt.loop_trees import in_parts
+from tmt.model import singular
+from tmt.model.arguments import checked_model
+from tmt.model.tree import Tree
+from tmt.model.values import real_numbers
+from tmt.source import LANES
 
 # estimates, s: of the literal form an evaluation, for each body and pair of speeds and for each speed, and a call, in
 # evaluations; of the loops their compilation, their reading from the cache folder with numba's import, and for each speed
@@ -206,7 +207,7 @@ def loops():
     """The compiled loops, read or compiled when they are first asked for."""
     from numba.core.compiler_lock import global_compiler_lock
 
-    from . import loop_answers
+    from tmt import loop_answers
 
     # of one state, and of none: compiled for these types and then for no others, which numba would take as they are
     of, zeros, out = in_parts(ARM), np.zeros(3), np.empty(3)

@@ -5,9 +5,9 @@ upper arm points along -z and the forearm along +x. The same numbers stand in mj
 the two models share nothing, and a test ties them.
 """
 
-from .method import joint_frames
-from .space import Vector
-from .tree import Tree
+from tmt.equations.method import joint_frames
+from tmt.equations.vectors import Vector
+from tmt.model.tree import Tree
 
 G = 9.81  # m/s2, along -z
 D = 0.3  # m, upper arm, shoulder to elbow

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from .given import whole
-from .values import shown
+from tmt.model.arguments import whole
+from tmt.model.values import shown
 
 NOT_ASKED = np.zeros((0, 2), np.int64)  # where nobody wants to know why runs ended
 

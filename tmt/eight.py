@@ -14,7 +14,7 @@ from numba.core import cgutils
 from numba.core.typing import signature
 from numba.extending import models, register_model
 
-from .space import arctan, cos, sin, sqrt
+from tmt.equations.vectors import arctan, cos, sin, sqrt
 
 WIDTH = 8
 VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)

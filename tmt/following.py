@@ -7,14 +7,15 @@ decides. Lanes and cores change nothing but the time: all code of one kind gives
 from collections.abc import Callable
 from itertools import pairwise
 
-from . import choice, generic, given, kernels
-from .cache import is_kept
-from .choice import Form, chosen
-from .cores import cores, in_threads
-from .methods import METHODS, method_named
-from .source import LANES
-from .stepping import Method
-from .tree import Tree
+from tmt import choice, generic, kernels
+from tmt.cache import is_kept
+from tmt.choice import Form, chosen
+from tmt.compiled.cores import cores, in_threads
+from tmt.methods import METHODS, method_named
+from tmt.methods.stepping import Method
+from tmt.model import arguments as given
+from tmt.model.tree import Tree
+from tmt.source import LANES
 
 WIDTH = 8  # of eight.py, which imports numba
 SIDE_BY_SIDE = {"straight_line": 1, "loop": 1, "loop_lanes": WIDTH, "straight_line_lanes": LANES}  # runs, of each form

@@ -10,19 +10,19 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from .loop_trees import arrays
+from tmt.loop_trees import arrays
 
 
 def compiled():
     """The module of compiled evaluations; imported when it is first asked for, as numba takes its time."""
-    from . import loop_calls
+    from tmt import loop_calls
 
     return loop_calls
 
 
 def loops() -> dict:
     """The compiled loops of all methods by their names."""
-    from . import loop_runs, loop_semi_implicit, loop_stages
+    from tmt import loop_runs, loop_semi_implicit, loop_stages
 
     return vars(loop_stages) | vars(loop_semi_implicit) | vars(loop_runs)
 

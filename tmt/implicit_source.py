@@ -1,9 +1,9 @@
 """The source of the compiled step of an implicit method: straight-line code inside, Newton's loop around it."""
 
-from .coordinates import FLAT
-from .dual import jacobian
-from .implicit import CLOSE, ITERATIONS, directions
-from .trace import Code, Tape
+from tmt.compiled.trace import Code, Tape
+from tmt.equations.dual import jacobian
+from tmt.methods.implicit import CLOSE, ITERATIONS, directions
+from tmt.model.coordinates import FLAT
 
 STEP = '''
 @njit(error_model="numpy")

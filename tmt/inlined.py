@@ -15,9 +15,9 @@ from numba import types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, overload
 
-from . import space
-from .eight import COMPLEX, DOUBLE, EIGHT, INDEX, VECTOR, WIDTH, Eight, Number, alike
-from .sine import sincos
+from tmt.eight import COMPLEX, DOUBLE, EIGHT, INDEX, VECTOR, WIDTH, Eight, Number, alike
+from tmt.equations import vectors as space
+from tmt.sine import sincos
 
 TUPLES = tuple, space.Vector, space.Matrix
 

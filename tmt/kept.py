@@ -8,9 +8,9 @@ from dataclasses import fields
 from functools import lru_cache, wraps
 from pathlib import Path
 
-from .cache import check_own, own_folder, write_aside
-from .methods import METHODS
-from .tree import Tree
+from tmt.cache import check_own, own_folder, write_aside
+from tmt.methods import METHODS
+from tmt.model.tree import Tree
 
 OF_TMT = dict(METHODS)  # the methods that are tmt's own, whatever is added later
 DIGEST = 64  # characters of a SHA-256, before a text
@@ -38,7 +38,7 @@ def which_of_own(value) -> str | None:
     if isinstance(value, str):
         return repr(value)
     name = next((name for name, method in OF_TMT.items() if method is value), None)
-    if name is None and getattr(value, "__module__", "").split(".")[0] == __package__:
+    if name is None and getattr(value, "__module__", "").split(".")[0] == "tmt":
         name = getattr(value, "__qualname__", None)
         name = name and f"{value.__module__}.{name}"
     return name
@@ -67,6 +67,6 @@ def kept_text(what: str, make: Callable[[], str]) -> str:
 def own_sources() -> str:
     """A name for the contents of tmt's own files."""
     found = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         found.update(path.read_bytes())
     return found.hexdigest()

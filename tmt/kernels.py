@@ -8,16 +8,17 @@ import math
 from collections.abc import Callable
 from functools import lru_cache, partial
 
-from . import composite, generic
-from .cache import is_kept, load, name_of
-from .calls import Evaluator, checked_evaluator, checked_run
-from .given import checked_model
-from .methods import METHODS, method_named
-from .source import LANES as LANES
-from .source import evaluator_source, lanes_source, run_source, slope_code
-from .trace import Code
-from .tree import Tree
-from .values import shown
+from tmt import generic
+from tmt.cache import is_kept, load, name_of
+from tmt.calls import Evaluator, checked_evaluator, checked_run
+from tmt.compiled.trace import Code
+from tmt.equations import composite
+from tmt.methods import METHODS, method_named
+from tmt.model.arguments import checked_model
+from tmt.model.tree import Tree
+from tmt.model.values import shown
+from tmt.source import LANES as LANES
+from tmt.source import evaluator_source, lanes_source, run_source, slope_code
 
 LONGEST = 3_000  # lines of straight-line code that are compiled; beyond, the loops of loops.py are
 INLINED = 0.15  # what a line of a slope counts each time it is called, beside 1 where it stands

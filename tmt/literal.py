@@ -7,11 +7,12 @@ for it by name: what the functions of the package return is compared with it. Ar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import method, singular
-from .arm import ARM
-from .given import quantity, states
-from .space import solve
-from .tree import Tree
+from tmt.arm import ARM
+from tmt.equations import method
+from tmt.equations.vectors import solve
+from tmt.model import singular
+from tmt.model.arguments import quantity, states
+from tmt.model.tree import Tree
 
 
 @quantity

@@ -7,18 +7,18 @@ joints of one about the world's origin.
 
 import numpy as np
 
-from .eight import WIDTH
-from .inlined import get, put
-from .lock import CLOSE_TO_ONE
-from .loop_trees import Arrays
+from tmt.eight import WIDTH
+from tmt.inlined import get, put
+from tmt.loop_trees import Arrays
+from tmt.model.lock import CLOSE_TO_ONE
 
-from .loop_bodies import (  # isort: skip
+from tmt.loop_bodies import (  # isort: skip
     ANGULAR_VELOCITIES, CONVECTIVE_TERMS, ENERGY, JACOBIANS, POSITIONS, POTENTIAL_ENERGY, SPRING_TORQUE, of_bodies,
 )  # fmt: skip
-from .loop_bodies import workspace as workspace_of_bodies
-from .loop_joints import BALL
-from .loops import forward_dynamics, mass_matrix_and_bias, workspace
-from .machine_code import compiled, part
+from tmt.loop_bodies import workspace as workspace_of_bodies
+from tmt.loop_joints import BALL
+from tmt.loops import forward_dynamics, mass_matrix_and_bias, workspace
+from tmt.machine_code import compiled, part
 
 ACCELERATION, MASS_MATRIX, BIAS = 7, 8, 9  # beside those of loop_bodies.py
 QUANTITIES = {  # the public functions

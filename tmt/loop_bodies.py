@@ -8,10 +8,21 @@ both at qdd = 0; all in the axes of the world.
 eight side by side, with the same bits.
 """
 
-from .inlined import get, inlined, put, put_sines, zero
-from .loop_joints import BALL, HINGE, SLIDE, ball_turned, hinge_turned, matrix, moved_from_rest, put_all, vector, world
-from .machine_code import compiled, part
-from .space import Vector
+from tmt.equations.vectors import Vector
+from tmt.inlined import get, inlined, put, put_sines, zero
+from tmt.loop_joints import (
+    BALL,
+    HINGE,
+    SLIDE,
+    ball_turned,
+    hinge_turned,
+    matrix,
+    moved_from_rest,
+    put_all,
+    vector,
+    world,
+)
+from tmt.machine_code import compiled, part
 
 # where a joint's numbers begin in its row of a workspace: its frame, sine and cosine, the axes of its speeds
 FRAME, SINE, AXES, PLACE = 0, 24, 26, 35

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from .eight import WIDTH
-from .inlined import get, put
-from .loop_joints import BALL
-from .loops import forward_dynamics, mass_matrix_and_bias, workspace
-from .machine_code import compiled, part
+from tmt.eight import WIDTH
+from tmt.inlined import get, put
+from tmt.loop_joints import BALL
+from tmt.loops import forward_dynamics, mass_matrix_and_bias, workspace
+from tmt.machine_code import compiled, part
 
 
 @compiled

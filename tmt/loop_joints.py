@@ -3,10 +3,10 @@
 A symmetric matrix is its diagonal and (yz, xz, xy). A body is (n, f, *J, H, *M), or as what is carried (n, f, *J, s).
 """
 
-from .composite import outer, turning
-from .coordinates import conjugate, logarithm, product
-from .inlined import inlined, zero
-from .space import IDENTITY, ZERO, Matrix, Vector, turn_of
+from tmt.equations.composite import outer, turning
+from tmt.equations.vectors import IDENTITY, ZERO, Matrix, Vector, turn_of
+from tmt.inlined import inlined, zero
+from tmt.model.coordinates import conjugate, logarithm, product
 
 HINGE, SLIDE, BALL = 0, 1, 2
 # where a joint's numbers begin in its row of a workspace: what it carries itself (n, f, J, s), sine and cosine, its frame and

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from .eight import WIDTH
-from .inlined import get, put, zero
-from .loop_joints import BALL
-from .loop_states import check, copy, kept, move, put_rates, unsound
-from .loops import forward_dynamics, workspace
-from .machine_code import compiled
-from .templates import SMALL
+from tmt.eight import WIDTH
+from tmt.inlined import get, put, zero
+from tmt.loop_joints import BALL
+from tmt.loop_states import check, copy, kept, move, put_rates, unsound
+from tmt.loops import forward_dynamics, workspace
+from tmt.machine_code import compiled
+from tmt.templates import SMALL
 
 
 @compiled

@@ -6,12 +6,12 @@ along an imaginary part of 1e-100, which is exact but for rounding.
 
 import numpy as np
 
-from .inlined import inlined
-from .loop_joints import LEFT, ROW, SPEED
-from .loop_states import check, copy, kept, move, unsound
-from .loop_trees import Arrays
-from .loops import forward_dynamics, mass_matrix_and_bias, put_forces, workspace
-from .machine_code import compiled
+from tmt.inlined import inlined
+from tmt.loop_joints import LEFT, ROW, SPEED
+from tmt.loop_states import check, copy, kept, move, unsound
+from tmt.loop_trees import Arrays
+from tmt.loops import forward_dynamics, mass_matrix_and_bias, put_forces, workspace
+from tmt.machine_code import compiled
 
 NUDGE = 1e-100
 

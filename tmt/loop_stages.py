@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from .implicit import CLOSE, ITERATIONS
-from .loop_joints import BALL
-from .loop_semi_implicit import NUDGE, solve
-from .loop_states import check, copy, kept, normalize, put_product, unsound
-from .loops import forward_dynamics, workspace
-from .machine_code import compiled, part
-from .templates import NEWTON
+from tmt.loop_joints import BALL
+from tmt.loop_semi_implicit import NUDGE, solve
+from tmt.loop_states import check, copy, kept, normalize, put_product, unsound
+from tmt.loops import forward_dynamics, workspace
+from tmt.machine_code import compiled, part
+from tmt.methods.implicit import CLOSE, ITERATIONS
+from tmt.templates import NEWTON
 
 
 @compiled

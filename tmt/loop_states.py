@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from .coordinates import exponential, inverse_derivative, normalized, product
-from .inlined import get, inlined, put
-from .loop_joints import BALL, HINGE, put_all
-from .machine_code import compiled, part
-from .sine import LIMIT
-from .templates import OVERFLOW, TURNED
+from tmt.inlined import get, inlined, put
+from tmt.loop_joints import BALL, HINGE, put_all
+from tmt.machine_code import compiled, part
+from tmt.model.coordinates import exponential, inverse_derivative, normalized, product
+from tmt.sine import LIMIT
+from tmt.templates import OVERFLOW, TURNED
 
 
 @compiled

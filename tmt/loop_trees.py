@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .composite import carried_by_joint
-from .coordinates import KINDS
+from tmt.equations.composite import carried_by_joint
+from tmt.model.coordinates import KINDS
 
 
 class Arrays(NamedTuple):

@@ -16,13 +16,13 @@ D = S'U + armature, u = Q - S'p. Mbar, of composite bodies: a row is the moment 
 """
 
 # isort: off
-from .inlined import get, put, put_sines, zero
-from .loop_joints import (
+from tmt.inlined import get, put, put_sines, zero
+from tmt.loop_joints import (
     BALL, HINGE, LEFT, MET, OMEGAD, OWN, ROW, SINE, SLIDE, SPEED, TURN, accelerated_along, along, angular_velocity, articulated,
     at_rest, ball_turned, carried, carried_along, frame, gives_way, hinge_turned, moment_and_force, no_body, nothing_carried, own,
     pair, plus, put_acceleration, put_all, slid, spun, take_spring_of_ball, with_own, world,
 )  # fmt: skip
-from .machine_code import compiled, part
+from tmt.machine_code import compiled, part
 
 
 @compiled

@@ -16,7 +16,7 @@ from numba import njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-from .cache import NotOwn, complain, own_folder, own_machine_code
+from tmt.cache import NotOwn, complain, own_folder, own_machine_code
 
 
 class Place(CompileResultCacheImpl):

@@ -8,11 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import following, given, singular
-from .arm import ARM
-from .templates import NEWTON, OVERFLOW, SMALL, TURNED
-from .tree import Tree
-from .values import shown
+from tmt import following
+from tmt.arm import ARM
+from tmt.model import arguments as given
+from tmt.model import singular
+from tmt.model.tree import Tree
+from tmt.model.values import shown
+from tmt.templates import NEWTON, OVERFLOW, SMALL, TURNED
 
 DOUBLE = np.dtype(float)
 FORMS = "straight_line", "straight_line_lanes", "loop", "loop_lanes"  # of compiled code, see following.py
@@ -126,7 +128,7 @@ def starts(model, q, qd, tau) -> tuple:
 
 def by_series(tree, q, qd, tau, dt, steps, every, tolerance) -> tuple[np.ndarray, int]:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
-    from .reference_run import followed  # here, as kernels above
+    from tmt.exact.motion import followed  # here, as kernels above
 
     ended, count = np.full(len(q), None, dtype=object), 0
     for run in range(len(q)):

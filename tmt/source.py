@@ -1,10 +1,12 @@
 """The source of compiled modules: straight-line code that is traced, in the loops of templates.py."""
 
-from . import composite
-from .implicit_source import step_source
-from .kept import kept
-from .method import acceleration
-from .templates import (
+from tmt.compiled.trace import Code, Tape
+from tmt.equations import composite
+from tmt.equations.method import acceleration
+from tmt.implicit_source import step_source
+from tmt.kept import kept
+from tmt.model.values import shown
+from tmt.templates import (
     ADAPTIVE,
     CHECK,
     EVALUATE,
@@ -19,8 +21,6 @@ from .templates import (
     STAGE,
     TURNED,
 )
-from .trace import Code, Tape
-from .values import shown
 
 LANES = 32  # states in a block
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.lock import CLOSE_TO_ONE
-from tmt.values import real_numbers, shown
+from tmt.model.lock import CLOSE_TO_ONE
+from tmt.model.values import real_numbers, shown
 
 from ..coordinates import Coordinates
 from ..engines.own import ARGUMENTS, OwnEquations, is_function

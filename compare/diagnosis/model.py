@@ -1,6 +1,6 @@
 """The equations of motion as functions of a tree's numbers, for many changes of the numbers at once.
 
-Mbar and h by TMT's literal sum over the bodies, as tmt.method writes it: there is no other derivation here. The numbers may be
+Mbar and h by TMT's literal sum over the bodies, as tmt writes it: there is no other derivation here. The numbers may be
 arrays (changes, 1) beside positions (states,), real or complex; derivatives by a number are the imaginary parts that an
 imaginary change of 1e-100 leaves, exact to rounding. Each term of each body has a factor, 1 where nothing is wrong with it.
 """
@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import method
-from tmt.space import Vector
+from tmt.equations import method
+from tmt.equations.vectors import Vector
 
 from ..coordinates import Coordinates
 from ..joint_map import JointMap

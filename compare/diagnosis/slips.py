@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tmt import method
+from tmt.equations import method
 
 from .model import Equations, Path
 from .places import EVERY_BODY, bias_at_rest, entry_name

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import composite
+from tmt.equations import composite
 from tmt.methods import SemiImplicitEuler, method_named, one_step
 
 from ..judge.entries import Entries

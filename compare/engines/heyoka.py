@@ -7,9 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from tmt import Tree, composite, kernels
-from tmt.method import acceleration
-from tmt.space import arctan, cos, sin, sqrt
+from tmt import Tree, kernels
+from tmt.equations import composite
+from tmt.equations.method import acceleration
+from tmt.equations.vectors import arctan, cos, sin, sqrt
 
 from ..case import Case
 from . import GRID, Method, Motion, Prepared, Setting, rows_of_states

@@ -29,8 +29,9 @@ from functools import partial
 import numpy as np
 
 import tmt
-from tmt import literal, method
-from tmt.dual import seeded
+from tmt import literal
+from tmt.equations import method
+from tmt.equations.dual import seeded
 
 from ..engines import LABELS, WHOSE
 from ..engines.tmt import Compiled

@@ -6,7 +6,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from tmt import literal, method
+from tmt import literal
+from tmt.equations import method
 
 from ..judge.words import listed
 from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines, plain

@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.reference import distance, exact
+from tmt.exact.values import distance, exact
 
 from ..engines import Dynamics
 from ..judge.check import Result

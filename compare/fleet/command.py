@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tmt.cores import cores
+from tmt.compiled.cores import cores
 
 from ..command_line import FLEET, PROGRAM, Parser, expected, in_lines, not_empty, process_count
 from ..experiments import EXPERIMENTS

@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt.reference import distance
+from tmt.exact.values import distance
 
 from .scale import EPS, FACTOR
 
@@ -115,7 +115,7 @@ class Result:
         """A row and a check: the worst difference of the two engines over the states, the closest to its tolerance.
 
         values, mujoco_values: (states, ...); scale: a number or (states,), or of as many dimensions as the values, a
-        scale for each entry; truth: the name of a field of tmt.reference.Truth, for one more check of each engine that has an
+        scale for each entry; truth: the name of a field of tmt.exact.values.Truth, for one more check of each engine that has an
         exact state: its distance from the exact value, 64 eps x scale too.
         """
         states = len(sample.q)

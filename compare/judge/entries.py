@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 import tmt
 from tmt import literal
-from tmt.singular import mass_matrices
+from tmt.model.singular import mass_matrices
 
 from .scale import (
     acceleration_scale,

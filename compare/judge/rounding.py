@@ -3,8 +3,8 @@
 import numpy as np
 
 from tmt import Tree
-from tmt.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
-from tmt.stepping import Method, stepped
+from tmt.methods.derivatives import FEW_SPEEDS, amplification, has_residual, linear_system
+from tmt.methods.stepping import Method, stepped
 
 from .scale import EPS, FACTOR, bias_scale, gain_scale, spring_scale
 

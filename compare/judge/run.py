@@ -6,7 +6,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
+from tmt.equations.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 
 from ..case import Case, Coordinates, rates_at
 from .check import About, Result

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import tmt
-from tmt import literal, method
+from tmt import literal
+from tmt.equations import method
 from tmt.literal import gather
 
 EPS = float(np.finfo(float).eps)

@@ -9,8 +9,10 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.composite import mass_matrix_and_bias  # the sum over bodies would take minutes for hundreds of joints
-from tmt.tree import GAINS
+from tmt.equations.composite import (
+    mass_matrix_and_bias,  # the sum over bodies would take minutes for hundreds of joints
+)
+from tmt.model.tree import GAINS
 
 from ..actuators import Drive
 from ..case import Coordinates, Scene, fastest_rates

@@ -5,7 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 import tmt
-from tmt import literal, method
+from tmt import literal
+from tmt.equations import method
 
 from . import Robot
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import method
-from tmt.space import ZERO, Vector
+from tmt.equations import method
+from tmt.equations.vectors import ZERO, Vector
 
 FREE = ("slide", "slide", "slide", "ball")
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 import tmt
-from tmt import literal, method
-from tmt.dual import seeded
+from tmt import literal
+from tmt.equations import method
+from tmt.equations.dual import seeded
 
 
 def stiffness(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:

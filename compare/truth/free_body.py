@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import mpmath
 import numpy as np
 
-from tmt.reference import DIGITS
+from tmt.exact.values import DIGITS
 
 GUARD = 10  # digits more in the calculation
 BESIDE_SEPARATRIX = 1e-20  # L2 - 2 E I2 over the sum of its terms: nearer, too few digits are left

@@ -7,8 +7,9 @@ import numpy as np
 from scipy.linalg import eig, eigh
 
 import tmt
-from tmt import METHODS, composite, literal, method
-from tmt.dual import seeded
+from tmt import METHODS, literal
+from tmt.equations import composite, method
+from tmt.equations.dual import seeded
 
 from ..case import SEED, Case, Coordinates
 from .conserved import floats

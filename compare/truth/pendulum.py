@@ -5,7 +5,7 @@ import numpy as np
 from scipy.special import ellipj, ellipkinc
 
 import tmt
-from tmt.reference import DIGITS
+from tmt.exact.values import DIGITS
 
 
 def pendulum(tree: tmt.Tree) -> tuple[float, float]:

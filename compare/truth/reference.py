@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt.exact.motion import TooManySteps, truth
 from tmt.methods import METHODS
-from tmt.reference_run import TooManySteps, truth
 
 from ..case import Case, Coordinates, rates_at
 from .steps import growth_of

@@ -20,11 +20,11 @@ import mpmath
 import numpy as np
 
 import tmt
-from tmt import method
-from tmt.exact import exact_tree
-from tmt.reference import DIGITS
-from tmt.space import solve
-from tmt.trace import Tape
+from tmt.compiled.trace import Tape
+from tmt.equations import method
+from tmt.equations.vectors import solve
+from tmt.exact.tree import exact_tree
+from tmt.exact.values import DIGITS
 
 from ..case import SEED, Case
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from tmt import METHODS
-from tmt.dual import seeded
-from tmt.implicit import ImplicitRungeKutta
+from tmt.equations.dual import seeded
 from tmt.methods import RungeKutta, SemiImplicitEuler, amplification, by_speed
+from tmt.methods.implicit import ImplicitRungeKutta
 
 
 def is_runge_kutta(stepping) -> bool:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import method
+from tmt.equations import method
 
 from .derivative import moving, slopes
 

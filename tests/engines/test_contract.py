@@ -21,7 +21,7 @@ from compare.judge.scale import (
     reaches,
 )
 from compare.robots.arm import ARM
-from tmt.reference import distance, exact
+from tmt.exact.values import distance, exact
 
 ENGINES = (Tmt, Mujoco, Scipy, Heyoka)
 METHODS = [method for engine in (Tmt(), Mujoco, Scipy, Heyoka) for method in engine.methods.values()]

@@ -10,7 +10,7 @@ from compare.engines.mujoco.calls import MinimalCalls
 from compare.engines.mujoco.linear import differenced, implicit_derivative, left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated
-from tmt.method import bias_rates
+from tmt.equations.method import bias_rates
 
 
 @pytest.fixture(scope="module")

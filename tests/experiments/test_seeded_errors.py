@@ -7,7 +7,7 @@ from edited import XML, setup_of
 
 from compare.experiment import Setup
 from compare.experiments import module
-from tmt import method
+from tmt.equations import method
 
 ALPHA = '<joint name="alpha" type="hinge" axis="0 1 0"/>'
 BETA = '<joint name="beta" type="hinge" axis="1 0 0"/>'

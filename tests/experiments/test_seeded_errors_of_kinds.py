@@ -6,8 +6,9 @@ import pytest
 from jointed import CART, STONE, setup_between
 
 from compare.experiments import module
-from tmt import coordinates, method
-from tmt.tree import coordinates_of  # the one that trees ask, with what it has kept
+from tmt.equations import method
+from tmt.model import coordinates
+from tmt.model.tree import coordinates_of  # the one that trees ask, with what it has kept
 
 IN_THE_MJCF = {
     "a slide's axis 1e-6 off": (

@@ -10,8 +10,8 @@ import tmt
 from compare.judge.rounding import OF_A_BALL, band, growth, slope_rounding, step_rounding
 from compare.judge.scale import gain_scale
 from compare.robots.arm import ARM
-from tmt.coordinates import coordinates_of
 from tmt.methods import METHODS, amplification
+from tmt.model.coordinates import coordinates_of
 
 EPS = 2.0**-52
 TURN = tmt.Tree(  # one hinge without gravity: a linear system, and nothing but a sum of roundings

@@ -10,7 +10,7 @@ import tmt
 from compare.engines.mujoco import reading
 from compare.experiments.acceleration import rate
 from compare.truth.conserved import conserved
-from tmt import method
+from tmt.equations import method
 
 RNG = np.random.default_rng(5)
 

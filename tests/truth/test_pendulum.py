@@ -7,7 +7,7 @@ import tmt
 from compare.robots.arm import ARM
 from compare.truth.linear import modes, small_oscillation, stiffness
 from compare.truth.pendulum import exact_swing, pendulum, swing
-from tmt.reference import distance
+from tmt.exact.values import distance
 
 SWING = next(case for case in ARM.cases if len(case.joints) == 1)
 

@@ -10,7 +10,7 @@ from compare.experiments.speed.settings import coarsest_steps, scenes_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth import reference
-from tmt import reference_run
+from tmt.exact import motion as reference_run
 
 CASES = {case.name: case for case in scenes_of(ARM)}
 BENT = CASES["bent, free"]

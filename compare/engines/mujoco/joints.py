@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from tmt.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
+from tmt.model.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
 
 from ...case import Coordinates
 

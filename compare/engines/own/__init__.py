@@ -6,7 +6,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.stepping import stepped
+from tmt.methods.stepping import stepped
 
 from ...case import Case
 from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states

@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.values import shown
+from tmt.model.values import shown
 
 from ...case import Coordinates
 from ...joint_map import JointMap, JointsError, joint_map

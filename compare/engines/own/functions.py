@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 
 import tmt
-from tmt.values import shown
+from tmt.model.values import shown
 
 from ...case import Coordinates
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.values import real_numbers, shown
+from tmt.model.values import real_numbers, shown
 
 from .functions import STATE, OwnError
 

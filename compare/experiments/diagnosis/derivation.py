@@ -1,6 +1,6 @@
 """A second derivation of Mbar and h, in the world's axes and in NumPy alone, in which single steps can be done wrongly.
 
-It shares nothing with tmt.method or with the search but the numbers of the Tree: faults that are made here are not made by what
+It shares nothing with tmt or with the search but the numbers of the Tree: faults that are made here are not made by what
 looks for them.
 """
 

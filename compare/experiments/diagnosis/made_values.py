@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 import tmt
-from tmt.composite import mass_matrix_and_bias
+from tmt.equations.composite import mass_matrix_and_bias
 
 from .derivation import by_lagrange, derived
 

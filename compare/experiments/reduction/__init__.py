@@ -36,7 +36,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from tmt.reference import DIGITS
+from tmt.exact.values import DIGITS
 
 from ...case import Case
 from ...engines.mujoco import ModelError

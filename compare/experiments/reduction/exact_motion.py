@@ -6,7 +6,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.reference import DIGITS, distance
+from tmt.exact.values import DIGITS, distance
 
 from ...case import SEED, Case
 from ...engines import LABELS

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import tmt
-from tmt.reference import DIGITS
+from tmt.exact.values import DIGITS
 
 from ...case import Case, Coordinates
 from ...engines import LABELS

@@ -6,8 +6,9 @@ from functools import lru_cache
 import numpy as np
 
 import tmt
-from tmt import kernels, method
-from tmt.trace import Code
+from tmt import kernels
+from tmt.compiled.trace import Code
+from tmt.equations import method
 
 from ...case import Case, Coordinates
 from ...engines.tmt import form_of

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import composite, generic, kernels, loop_trees, method
+from tmt import generic, kernels, loop_trees
 from tmt.cache import executed, load
+from tmt.equations import composite, method
 from tmt.source import LANES, evaluator_source
 
 from ...case import SEED

@@ -14,8 +14,8 @@ import numpy as np
 
 import tmt
 from tmt import inlined, kernels, loop_joints, loop_trees, loops, sine
+from tmt.equations.vectors import arctan, sqrt
 from tmt.inlined import zero
-from tmt.space import arctan, sqrt
 
 from .affordable import straight_line
 

@@ -6,8 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 import tmt
-from tmt import answers, generic, kernels, literal, loop_trees, method
-from tmt.cores import cores
+from tmt import answers, generic, kernels, literal, loop_trees
+from tmt.compiled.cores import cores
+from tmt.equations import method
 from tmt.methods import METHODS
 
 from .affordable import MOST_RESULTS, literal_is_compiled

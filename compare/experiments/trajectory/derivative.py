@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tmt import Tree, method
-from tmt.dual import seeded
+from tmt import Tree
+from tmt.equations import method
+from tmt.equations.dual import seeded
 
 from ...engines import Engine
 from ...engines.mujoco.linear import implicit_derivative
@@ -32,7 +33,7 @@ def compare_derivatives(result: Result, robot: Robot, engines: Mapping[str, Engi
 
 
 def bias_rates(tree: Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """dh/dqd at a state, (nv, nv) N m s/rad: as tmt.method has it, in all directions at once."""
+    """dh/dqd at a state, (nv, nv) N m s/rad: as tmt.equations.method has it, in all directions at once."""
     h = method.bias(method.bodies(tree, list(q), seeded(list(v), np.eye(len(v)))), tree.gravity)
     return np.array([np.broadcast_to(getattr(row, "slope", 0.0), len(v)) for row in h])
 

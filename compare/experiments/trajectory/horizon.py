@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import mpmath
 import numpy as np
 
+from tmt.exact.values import DIGITS, distance
 from tmt.methods import METHODS, one_step
-from tmt.reference import DIGITS, distance
 
 from ...case import Case
 from ...engines import Engine

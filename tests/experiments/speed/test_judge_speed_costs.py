@@ -27,7 +27,7 @@ from compare.experiments.speed.ways import of_many_states
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 from tmt import answers
-from tmt.cores import cores
+from tmt.compiled.cores import cores
 
 OF_RK4 = ("mujoco", "RK4", 4), ("tmt", "rk4", 4)
 

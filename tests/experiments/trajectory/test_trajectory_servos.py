@@ -14,8 +14,8 @@ from compare.experiments.trajectory import own_runs, sentences
 from compare.experiments.trajectory.runs import follow
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
-from tmt import kernels, semi_implicit
-from tmt.methods import METHODS, SemiImplicitEuler
+from tmt import kernels
+from tmt.methods import METHODS, SemiImplicitEuler, semi_implicit
 
 LEVELS = {"derivative, TMT to MuJoCo", "one step, TMT to MuJoCo", "open loop, TMT to MuJoCo"}
 GEARED = PATHS["gripper"].read_text(encoding="utf-8").replace('kp="60" kv="6"', 'kp="6" kv="0.6" gear="3"')

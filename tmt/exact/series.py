@@ -9,9 +9,9 @@ this kind too (Jorba and Zou, Experimental Mathematics 14, 2005), from c b = a, 
 import numpy as np
 from numba import njit
 
-from .machine_code import compiled
-from .pairs import add, divide, joined, multiply, root, sincos, two_sum
-from .sine import fma
+from tmt.exact.pairs import add, divide, joined, multiply, root, sincos, two_sum
+from tmt.machine_code import compiled
+from tmt.sine import fma
 
 ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, ROOT, DIVIDE, SINE, COSINE, RATE = range(11)
 

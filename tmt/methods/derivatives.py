@@ -6,9 +6,9 @@ a, with A = dresidual/da. Then dual numbers need not go through the solution, no
 
 import numpy as np
 
-from . import composite
-from .dual import Dual, seeded
-from .stepping import Completed, stepped
+from tmt.equations import composite
+from tmt.equations.dual import Dual, seeded
+from tmt.methods.stepping import Completed, stepped
 
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
@@ -22,7 +22,7 @@ def one_step(stepping, tree, q, qd, tau, dt, *terms):
 def takes_terms(stepping) -> bool:
     """Whether a method's slope is one of tmt's own, which takes another form of the dynamics."""
     kind = next((kind for kind in type(stepping).__mro__ if "slope" in vars(kind)), None)
-    return kind is not None and kind.__module__.split(".")[0] == __package__ and kind is not Completed
+    return kind is not None and kind.__module__.split(".")[0] == __name__.split(".")[0] and kind is not Completed
 
 
 def amplification(stepping, tree, q, qd, tau, dt) -> np.ndarray:

@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .lock import CLOSE_TO_ONE
-from .tree import Tree
-from .values import real_numbers, shown
+from tmt.model.lock import CLOSE_TO_ONE
+from tmt.model.tree import Tree
+from tmt.model.values import real_numbers, shown
 
 SMALL = 1e8  # B, that any machine has
 

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 
-from . import composite, method, series
-from .exact import exact_tree, of_length_1
-from .pairs import pair
-from .trace import Tape
+from tmt.compiled.trace import Tape
+from tmt.equations import composite, method
+from tmt.exact import series
+from tmt.exact.pairs import pair
+from tmt.exact.tree import exact_tree, of_length_1
 
 DIGITS = 60  # of the numbers that are traced
 FORMS = {

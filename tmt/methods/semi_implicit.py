@@ -5,11 +5,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from . import loop_trees
-from .coordinates import FLAT
-from .method import bias_rates, mass_matrix_and_bias, reduced_force
-from .space import solve_any
-from .stepping import Method, advance, increments, left_over
+from tmt import loop_trees
+from tmt.equations.method import bias_rates, mass_matrix_and_bias, reduced_force
+from tmt.equations.vectors import solve_any
+from tmt.methods.stepping import Method, advance, increments, left_over
+from tmt.model.coordinates import FLAT
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import mpmath
 
-from .coordinates import Coordinates, normalized
-from .space import Vector, sqrt
-from .tree import Tree
+from tmt.equations.vectors import Vector, sqrt
+from tmt.model.coordinates import Coordinates, normalized
+from tmt.model.tree import Tree
 
 NUMBERS = (
     "offset", "damping", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference",

@@ -10,9 +10,9 @@ import mpmath
 import numpy as np
 from numba import njit
 
-from .eight import Number
-from .inlined import inlined
-from .sine import fma
+from tmt.eight import Number
+from tmt.inlined import inlined
+from tmt.sine import fma
 
 TERMS = 16  # of the series of sine and cosine up to pi/4: the next is below 1e-36
 

@@ -8,8 +8,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from .method import acceleration, mass_matrix_and_bias
-from .values import real_numbers, shown
+from tmt.equations.method import acceleration, mass_matrix_and_bias
+from tmt.model.values import real_numbers, shown
 
 
 class Method:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from . import singular
-from .coordinates import KINDS, Coordinates, coordinates_of
-from .lock import CLOSE_TO_ONE, locked
-from .values import names, numbers_of, shown
+from tmt.model import singular
+from tmt.model.coordinates import KINDS, Coordinates, coordinates_of
+from tmt.model.lock import CLOSE_TO_ONE, locked
+from tmt.model.values import names, numbers_of, shown
 
 OPTIONAL = ("reference", "armature", "stiffness", "rest")  # fields that may be left out
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none

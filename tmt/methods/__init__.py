@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import dop853
-from .coordinates import FLAT
-from .derivatives import amplification as amplification
-from .derivatives import one_step as one_step
-from .implicit import ImplicitRungeKutta
-from .method import mass_matrix_and_bias, reduced_force
-from .semi_implicit import SemiImplicitEuler as SemiImplicitEuler
-from .semi_implicit import by_speed as by_speed
-from .semi_implicit import lone_speeds as lone_speeds
-from .stepping import Method, advance, checked_sums, checked_tableau, completed, increments, left_over
-from .values import shown
+from tmt.equations.method import mass_matrix_and_bias, reduced_force
+from tmt.methods import dop853
+from tmt.methods.derivatives import amplification as amplification
+from tmt.methods.derivatives import one_step as one_step
+from tmt.methods.implicit import ImplicitRungeKutta
+from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
+from tmt.methods.semi_implicit import by_speed as by_speed
+from tmt.methods.semi_implicit import lone_speeds as lone_speeds
+from tmt.methods.stepping import Method, advance, checked_sums, checked_tableau, completed, increments, left_over
+from tmt.model.coordinates import FLAT
+from tmt.model.values import shown
 
 
 @dataclass(frozen=True)

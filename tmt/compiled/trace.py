@@ -12,7 +12,7 @@ from collections.abc import Callable
 from numbers import Real
 from typing import NamedTuple
 
-from .space import arctan, cos, sin, sqrt
+from tmt.equations.vectors import arctan, cos, sin, sqrt
 
 FOLD = {
     "+": operator.add,

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 
-from . import method
-from .exact import exact_tree
-from .space import ZERO, solve
+from tmt.equations import method
+from tmt.equations.vectors import ZERO, solve
+from tmt.exact.tree import exact_tree
 
 DIGITS = 50
 
