@@ -1,6 +1,6 @@
 """Equations of motion of a tree of rigid bodies on hinges, slides and balls by the TMT method, and their integration.
 
-Stands alone: needs NumPy, mpmath and (for `simulate`) numba, and knows nothing of any physics engine.
+Stands alone: needs NumPy, llvmlite and mpmath, and knows nothing of any physics engine.
 Every function takes states of any leading batch shape, a further argument `model` for another Tree than
 the assignment's arm, and raises ValueError for wrong shapes, values that are not finite, unknown names, a singular Mbar
 and results beyond the largest double.
@@ -34,9 +34,9 @@ Methods of `simulate`: "rk4"; "semi_implicit_euler" (MuJoCo's Euler, implicitfas
 "explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and "dopri8_adaptive" (with steps of its own);
 "implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and "taylor", the true motion.
 
-The functions of states answer with NumPy (literal.py) until compiled code is worth getting, and then with that, see answers.py;
-`prepare` gets it at once. Results differ in the last bits, and what is wrong is said in the same words. Compiled code is kept on
-disk, see cache.py. Without MuJoCo, `pip install numpy numba mpmath && pip install --no-deps .` is enough.
+The functions of states answer the first few hundred with NumPy (literal.py), and then with compiled code, see answers.py;
+`prepare` compiles at once. Results differ in the last bits, and what is wrong is said in the same words. Compiled code is kept on
+disk, see compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is enough.
 """
 
 import numpy as np

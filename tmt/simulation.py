@@ -8,16 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt import following
 from tmt.arm import ARM
+from tmt.compiled.runner import runner_of
+from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED
 from tmt.model import arguments as given
 from tmt.model import singular
 from tmt.model.tree import Tree
 from tmt.model.values import shown
-from tmt.templates import NEWTON, OVERFLOW, SMALL, TURNED
 
 DOUBLE = np.dtype(float)
-FORMS = "straight_line", "straight_line_lanes", "loop", "loop_lanes"  # of compiled code, see following.py
 
 
 class _Path(NamedTuple):
@@ -30,27 +29,25 @@ class Motion(_Path):
     """The t, q, qd of a simulation, and what else is known of it.
 
     ended: why a run ended early, a line that says when, or None; for a batch an array of its shape. Its states are NaN from
-    there on. evaluations: of the dynamics, of all runs; those of an implicit method with their Jacobian. form: what followed
-    it: "straight_line" or "loop", of many runs "straight_line_lanes" or "loop_lanes", or "series".
+    there on. evaluations: of the dynamics, of all runs; those of an implicit method with their Jacobian.
     """
 
     ended: str | np.ndarray | None
     evaluations: int
-    form: str
 
-    def __new__(cls, t, q, qd, ended, evaluations, form):
+    def __new__(cls, t, q, qd, ended, evaluations):
         motion = super().__new__(cls, t, q, qd)
-        motion.ended, motion.evaluations, motion.form = ended, evaluations, form
+        motion.ended, motion.evaluations = ended, evaluations
         return motion
 
     def __reduce__(self):
         """How a copy is made, in this process or another."""
-        return type(self), (*self, self.ended, self.evaluations, self.form)
+        return type(self), (*self, self.ended, self.evaluations)
 
 
 def simulate(
     q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
-    tolerance: float | None = None, every: int = 1, form: str | None = None,
+    tolerance: float | None = None, every: int = 1,
 ) -> Motion:  # fmt: skip
     """Motion under constant torque: t (records,) s, q (..., records, nq) and qd (..., records, nv), rad and rad/s.
 
@@ -58,17 +55,15 @@ def simulate(
     only the states after each so many steps are kept, a divisor of steps: records = steps / every + 1. method: a key of METHODS,
     or "taylor". An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units of
     1 + |value|. "taylor" is the true motion, rounded once (default tolerance 1e-33): a Taylor series in pairs of doubles, whose
-    evaluations are its steps. form: of the compiled code, "straight_line", "loop", or for many runs side by side
-    "straight_line_lanes", "loop_lanes"; None: that which answers soonest, which with much to do is another than with little, and
-    differs in the last bits.
+    evaluations are its steps.
 
     A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar is singular,
     Newton's method does not find the stages of an implicit method, an adaptive method would need steps below 1e-9 dt, or series
     take too many: `ended` of the result says which. Assignment, part i.
     """
     taylor = isinstance(method, str) and method == "taylor"
-    follower = following.runs_of(model, "dopri8_adaptive" if taylor else method)
-    stepping = follower.stepping
+    runner = runner_of(model, "dopri8_adaptive" if taylor else method)
+    stepping = runner.stepping
     steps, every, dt = given.whole("steps", steps), given.whole("every", every), given.positive("dt", dt, "a step in s")
     if steps % every:
         raise ValueError(
@@ -76,10 +71,6 @@ def simulate(
         )
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
-    if form is not None and taylor:
-        raise ValueError("method 'taylor' is not compiled and takes no form")
-    if form is not None and (not isinstance(form, str) or form not in FORMS):
-        raise ValueError(f"form is {shown(form)}; known are {', '.join(FORMS)}")
     usual = 1e-33 if taylor else 1e-9
     tolerance = usual if tolerance is None else given.positive("tolerance", tolerance, "a number")
     batch, *start = starts(model, q, qd, tau)
@@ -89,27 +80,22 @@ def simulate(
         raise ValueError(f"dt is {dt:g} and steps is {shown(steps)}; their product is beyond the largest double")
     path_q[:, 0], path_qd[:, 0], tau = start
     if taylor:
-        form = "series"
         ended, evaluations = by_series(model, path_q, path_qd, tau, dt, steps, every, tolerance)
     else:
-        codes, settings = np.zeros((runs, 2), np.int64), (dt, tolerance) if stepping.adaptive else (dt,)
-        form, evaluations = follower.follow(path_q, path_qd, tau, settings, codes, every, form)
+        codes, evaluations = runner.follow(path_q, path_qd, tau, dt, tolerance, every)
 
         def between(run, record):
             """The states of a run from a record to the next, (every + 1, nq and nv)."""
             paths = [
                 np.repeat(path[run : run + 1, record : record + 1], every + 1, axis=1) for path in (path_q, path_qd)
             ]
-            follower.run(form.removesuffix("_lanes"))(*paths, tau[run : run + 1], *settings)
+            runner.follow(*paths, tau[run : run + 1], dt, tolerance, 1)
             return [path[0] for path in paths]
 
-        if follower.never_singular and not codes.any():
-            ended = np.full(runs, None, dtype=object)
-        else:
-            ended = reasons(model, path_q, path_qd, codes, dt, tolerance, every, between)
+        ended = reasons(model, path_q, path_qd, codes, dt, tolerance, every, between)
     t = dt * np.arange(0, steps + 1, every)
     q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))
-    return Motion(t, q, qd, ended.reshape(batch)[()], evaluations, form)
+    return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
 
 
 def starts(model, q, qd, tau) -> tuple:
@@ -128,7 +114,7 @@ def starts(model, q, qd, tau) -> tuple:
 
 def by_series(tree, q, qd, tau, dt, steps, every, tolerance) -> tuple[np.ndarray, int]:
     """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
-    from tmt.exact.motion import followed  # here, as kernels above
+    from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 
     ended, count = np.full(len(q), None, dtype=object), 0
     for run in range(len(q)):

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
-APART = 1e-3  # s of work from which a further core is worth a thread
-TOGETHER = 32  # evaluations that are not parted
+SHARED = 5_000  # states times speeds from which several cores share them
+TOGETHER = 32  # states that are not parted
 
 
 def cores() -> int:
@@ -14,9 +14,9 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def side_by_side(work: Callable, count: int, each: float) -> list:
-    """work(slice) of parts of so many evaluations, in threads where each has enough to do; each: s of an evaluation."""
-    threads = max(1, min(cores(), int(count * each / APART)))
+def side_by_side(work: Callable, count: int, speeds: int) -> list:
+    """work(slice) of parts of so many states, in threads where each has enough to do."""
+    threads = max(1, min(cores(), count * speeds // SHARED))
     ends = [count * k // threads // TOGETHER * TOGETHER for k in range(threads)] + [count]
     slices = [slice(*pair) for pair in pairwise(ends)]
     return [work(slices[0])] if threads == 1 else in_threads(work, [(part,) for part in slices], threads)

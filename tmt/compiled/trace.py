@@ -1,4 +1,4 @@
-"""A scalar that records arithmetic: run the method once on it, and it yields straight-line code.
+"""A scalar that records arithmetic: run the method once on it, and it yields a tape of operations, which straight.py compiles.
 
 The parameters of a model are plain numbers and fold in; terms with a zero or a one disappear; equal subexpressions are
 computed once; signs are carried outward until a sum takes them up; numbers that meet in a sum or a product become one.
@@ -10,7 +10,6 @@ import operator
 from collections import Counter
 from collections.abc import Callable
 from numbers import Real
-from typing import NamedTuple
 
 from tmt.equations.vectors import arctan, cos, sin, sqrt
 
@@ -25,15 +24,8 @@ FOLD = {
     "sqrt": lambda x: math.sqrt(x) if isinstance(x, float) else sqrt(x),
     "arctan": lambda x: math.atan(x) if isinstance(x, float) else arctan(x),
 }
-FUNCTIONS = ("sqrt", "arctan")  # called by these names
-
-
-class Code(NamedTuple):
-    """Straight-line Python source of one function."""
-
-    text: str
-    operations: int  # + - * / and changes of sign; a sine, a cosine, a root count as one each
-    results: int
+FUNCTIONS = ("sqrt", "arctan")
+LEAVES = ("input", "number")
 
 
 class Tape:
@@ -58,7 +50,7 @@ class Tape:
         return [self.node("input", name) for name in names]
 
     def call(self, function, arguments, count) -> list["Expression"]:
-        """The `count` results of a function of that name, which the generated code calls."""
+        """The `count` results of a function of that name, which compiled code calls."""
         call = self.node("call", function, *(self.lift(a).i for a in arguments))
         return [self.node("item", call.i, k) for k in range(count)]
 
@@ -142,53 +134,6 @@ class Tape:
         rule = {"+": self.add, "-": self.subtract, "*": self.multiply, "/": self.divide, "neg": self.negative}
         return rule[operation](*values)
 
-    def function(self, name, inputs, outputs) -> Code:
-        """Source of `name(inputs) -> outputs`, of a tape of floats.
-
-        It takes sines from sincos(x) -> (sin x, cos x), roots from sqrt, arc tangents from arctan, and a product that only goes
-        into a sum from fma(a, b, c) = a b + c, rounded once: so every compiler does the same arithmetic.
-        """
-        outputs = [self.lift(o) for o in outputs]
-        order = self.needed(outputs)
-        fused = self.fused(order, outputs)
-        text = {i.i: i.name for i in inputs}
-        lines, operations = [], 0
-        for i in order:
-            operation, arguments = self.nodes[i]
-            operations += operation in FOLD or (operation == "item" and self.nodes[arguments[0]][0] == "sincos")
-            if operation == "input":
-                text[i] = arguments[0]
-            elif operation == "number":
-                text[i] = repr(arguments[0])
-            elif operation == "item":
-                text[i] = f"t{arguments[0]}_{arguments[1]}"
-            elif operation == "sincos":
-                lines.append(f"t{i}_0, t{i}_1 = sincos({text[arguments[0]]})")
-            elif operation == "call":
-                count = 1 + max(a[1] for o, a in self.nodes if o == "item" and a[0] == i)
-                results = ", ".join(f"t{i}_{k}" for k in range(count))
-                lines.append(f"{results}, = {arguments[0]}({', '.join(text[a] for a in arguments[1:])})")
-            elif i not in fused.values():
-                text[i] = f"t{i}"
-                lines.append(f"t{i} = {self.written(operation, arguments, fused.get(i), text)}")
-        names = ", ".join(i.name for i in inputs)
-        returns = ", ".join(text[o.i] for o in outputs)
-        body = "".join(f"    {line}\n" for line in [*lines, f"return {returns},"])
-        return Code(f"def {name}({names}):\n{body}", operations, len(outputs))
-
-    def written(self, operation, arguments, product, text) -> str:
-        """The right-hand side for one operation; product: the operand that is fused into it, or None."""
-        if product is None:
-            operands = [text[a] for a in arguments]
-            if operation in FUNCTIONS:
-                return f"{operation}({operands[0]})"
-            return f"-{operands[0]}" if operation == "neg" else f" {operation} ".join(operands)
-        x, y = (text[a] for a in self.nodes[product][1])
-        (other,) = (text[a] for a in arguments if a != product)
-        if operation == "+":
-            return f"fma({x}, {y}, {other})"
-        return f"fma({x}, {y}, -{other})" if arguments[0] == product else f"fma(-{x}, {y}, {other})"
-
     def fused(self, order, outputs) -> dict[int, int]:
         """For each sum or difference that takes one up, a product that is used nowhere else."""
         uses = Counter(o.i for o in outputs)
@@ -215,8 +160,9 @@ class Tape:
 
     def operands(self, i) -> tuple:
         operation, arguments = self.nodes[i]
-        kept = {"input": slice(0), "number": slice(0), "call": slice(1, None), "item": slice(1)}
-        return arguments[kept.get(operation, slice(None))]
+        if operation in LEAVES:
+            return ()
+        return arguments[1:] if operation == "call" else arguments[:1] if operation == "item" else arguments
 
 
 class Expression:

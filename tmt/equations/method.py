@@ -149,7 +149,8 @@ def mass_matrix_and_bias(tree, q, qd) -> tuple[list, list]:
 
 def bias_rates(tree, q, qd, terms=mass_matrix_and_bias) -> list:
     """dh/dqd (nv rows of nv, N m s/rad): the exact derivative of the bias by the speeds, by dual numbers."""
-    return jacobian(lambda rates: terms(tree, q, rates)[1], qd)
+    own = getattr(terms, "bias_rates", None)
+    return own(tree, q, qd) if own else jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 
 
 def spring_torque(tree, q) -> list:

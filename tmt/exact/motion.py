@@ -97,7 +97,7 @@ def followed(
     path = [state]
     while len(path) < len(times):
         high[:n, 0], low[:n, 0] = state
-        series.expand(code, order + 1, high.reshape(-1), low.reshape(-1))
+        series.expand(code, high, low)
         step = step_size(high[:n], tolerance)
         if not step > 0.0:
             error = ValueError(

@@ -6,94 +6,162 @@ result, rows of its operands). With c = a b, c_k is the sum of a_j b_(k-j); quot
 this kind too (Jorba and Zou, Experimental Mathematics 14, 2005), from c b = a, c c = a, s' = c x', c' = -s x'.
 """
 
-import numpy as np
-from numba import njit
+import ctypes
+from functools import lru_cache
 
-from tmt.exact.pairs import add, divide, joined, multiply, root, sincos, two_sum
-from tmt.machine_code import compiled
-from tmt.sine import fma
+import numpy as np
+
+from tmt.compiled import store
+from tmt.compiled.ir import DOUBLE, INDEX, POINTER, Code, Value, Variable, module, wide
+
+from .pairs import add, divide, joined, multiply, root, sincos, two_sum
 
 ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, ROOT, DIVIDE, SINE, COSINE, RATE = range(11)
+BESIDE = 2  # products of a sum of products side by side
 
 
-@njit(forceinline=True, error_model="numpy")
-def convolution(high, low, a, b, first, last):
-    """sum of a_j b_(k-j) for j from first to last, as if in pairs (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26, 2005).
-
-    a: where a_0 stands in the flat arrays, b: where b_k does.
-    """
-    total = error = 0.0
-    for j in range(first, last + 1):
-        i, m = np.uint64(a + j), np.uint64(b - j)  # unsigned: of signed ones the sign would be looked at
-        x, y = high[i], high[m]
-        p = x * y
-        total, e = two_sum(total, p)
-        error += e + fma(x, low[m], fma(low[i], y, fma(x, y, -p)))
-    return joined(total, error)
-
-
-@compiled
-def expand(code, width, high, low):
+def expand(code: np.ndarray, high: np.ndarray, low: np.ndarray) -> None:
     """Write the coefficients of the state (its first are there) and of all that it is computed by.
 
-    width: of a row; high, low: flat. The last operations are those that make the state's next coefficients from their rates.
+    code: (operations, 4); high, low: (rows, order + 1). The last operations make the state's next coefficients from their rates.
     """
-    for k in range(width - 1):
-        for n in range(len(code)):
-            operation, row, of_a, of_b = code[n]
-            r, a, b = row * width, of_a * width, of_b * width
-            c, ah, al = r + k, high[a + k], low[a + k]
-            if operation in (ADD, SUBTRACT):
-                sign = 1.0 if operation == ADD else -1.0
-                high[c], low[c] = add(ah, al, sign * high[b + k], sign * low[b + k])
-                continue
-            if operation == NEGATIVE:
-                high[c], low[c] = -ah, -al
-                continue
-            if operation in (SCALE, SLOPE):  # by a number; of the slope of an angle, times t
-                bh, bl = (high[b], low[b]) if operation == SCALE else (float(k), 0.0)
-                high[c], low[c] = multiply(ah, al, bh, bl)
-                continue
-            if operation == ROOT and k == 0:
-                high[c], low[c] = root(ah, al)
-                continue
-            if operation in (SINE, COSINE) and k == 0:
-                sh, sl, ch, cl = sincos(ah, al)
-                high[c], low[c] = (sh, sl) if operation == SINE else (ch, cl)
-                continue
-
-            first, last = 0, k
-            if operation == ROOT:
-                a, b, first, last = r, r, 1, k - 1
-            elif operation == DIVIDE:
-                a, b, first = b, r, 1
-            elif operation in (
-                SINE,
-                COSINE,
-            ):  # the slope of the angle stands before the sine, and that before the cosine
-                a, b, first = (r - width, r + width, 1) if operation == SINE else (r - 2 * width, r - width, 1)
-            elif operation == RATE:
-                c, last = c + 1, -1
-            h, l = convolution(high, low, a, b + k, first, last)
-
-            if operation > MULTIPLY:
-                bh, bl = -float(k) if operation == COSINE else float(k), 0.0
-                if operation == RATE:
-                    h, l, bh = ah, al, float(k + 1)
-                elif operation in (ROOT, DIVIDE):
-                    h, l = add(ah, al, -h, -l)
-                    of = 2.0 if operation == ROOT else 1.0
-                    bh, bl = of * high[a], of * low[a]
-                h, l = divide(h, l, bh, bl)
-            high[c], low[c] = h, l
+    functions()["expand"](code.ctypes.data, len(code), high.shape[1], high.ctypes.data, low.ctypes.data)
 
 
-@compiled
-def values_at(high, low, th, tl, state):
+def values_at(high: np.ndarray, low: np.ndarray, th: float, tl: float, state: np.ndarray) -> None:
     """Write the state (2, n) at the time (th, tl), s after that of the series."""
-    for i in range(state.shape[1]):
-        h = l = 0.0
-        for k in range(high.shape[1] - 1, -1, -1):
-            h, l = multiply(h, l, th, tl)
-            h, l = add(h, l, high[i, k], low[i, k])
-        state[0, i], state[1, i] = h, l
+    n = state.shape[1]
+    functions()["values_at"](high.ctypes.data, low.ctypes.data, high.shape[1], th, tl, state.ctypes.data, n)
+
+
+@lru_cache(maxsize=1)
+def functions() -> dict:
+    """The two compiled functions."""
+    library, whole, place = store.library(source, "series"), ctypes.c_int64, ctypes.c_void_p
+    return {
+        "expand": library.function("expand", None, place, whole, whole, place, place),
+        "values_at": library.function(
+            "values_at", None, place, place, whole, ctypes.c_double, ctypes.c_double, place, whole
+        ),
+    }
+
+
+def source() -> str:
+    """The module of the interpreter."""
+    return module([sincos_of_pair(), expansion(), evaluation()])
+
+
+def sincos_of_pair() -> Code:
+    """sincos(out, high, low): four doubles."""
+    code = Code("sincos", {"out": POINTER, "high": DOUBLE, "low": DOUBLE}, attributes="noinline", own=True)
+    for k, x in enumerate(sincos(code["high"], code["low"])):
+        code["out"].store(x, k)
+    code.give_back()
+    return code
+
+
+def convolution(code: Code, a: Value, b: Value, first: Value, last: Value) -> tuple[Value, Value]:
+    """sum of a_j b_(k-j) for j from first to last, as if in pairs (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26, 2005).
+
+    a: where a_0 stands in the flat arrays, b: where b_k does. So many side by side; what is left, one after the other.
+    """
+    high, low, count, kind = code["high"], code["low"], last - first + 1, wide(DOUBLE, BESIDE)
+    totals, errors = Variable(code, kind, 0.0), Variable(code, kind, 0.0)
+
+    def take(i, m, total, error, one=lambda place, at: place.load(at)):
+        x, y, of_x, of_y = high.load(i, total.kind), one(high, m), low.load(i, total.kind), one(low, m)
+        p = x * y
+        sum_, rounded = two_sum(total.get(), p)
+        total.set(sum_)
+        error.set(error.get() + (rounded + x.fma(of_y, of_x.fma(y, x.fma(y, -p)))))
+
+    whole = count / BESIDE * BESIDE
+    with code.loop(whole, BESIDE) as loop:
+        at = first + loop.index
+        take(a + at, b - at - (BESIDE - 1), totals, errors, lambda place, at: place.load(at, kind).backward())
+    total, error = Variable(code, DOUBLE, totals.get().lane(0)), Variable(code, DOUBLE, errors.get().lane(0))
+    for l in range(1, BESIDE):
+        sum_, rounded = two_sum(total.get(), totals.get().lane(l))
+        total.set(sum_)
+        error.set(error.get() + (rounded + errors.get().lane(l)))
+    with code.loop(count - whole) as loop:
+        at = first + whole + loop.index
+        take(a + at, b - at, total, error)
+    return joined(total.get(), error.get())
+
+
+def expansion() -> Code:
+    """The function of `expand`."""
+    code = Code("expand", {"code": POINTER, "count": INDEX, "width": INDEX, "high": POINTER, "low": POINTER})
+    high, low, width, both = code["high"], code["low"], code["width"], code.reserve(DOUBLE, 4)
+    with code.loop(width - 1) as orders, code.loop(code["count"]) as operations:
+        k = orders.index
+        times = k.cast("sitofp", DOUBLE)
+        operation, row, of_a, of_b = (code["code"].load(operations.index * 4 + j, INDEX) for j in range(4))
+        r, a, b = row * width, of_a * width, of_b * width
+        ah, al = high.load(a + k), low.load(a + k)
+
+        def put(h, l, at=r + k, high=high, low=low):
+            high.store(h, at)
+            low.store(l, at)
+
+        def when(*kinds, operation=operation):
+            flags = [operation.compare("eq", kind) for kind in kinds]
+            for more in flags[1:]:
+                flags[0] = flags[0].bits("or", more)
+            return flags[0]
+
+        with code.when(when(ADD, SUBTRACT)):
+            sign = when(ADD).choose(code.number(1.0), -1.0)
+            put(*add(ah, al, sign * high.load(b + k), sign * low.load(b + k)))
+        with code.when(when(NEGATIVE)):
+            put(-ah, -al)
+        with code.when(when(SCALE, SLOPE)):  # by a number; of the slope of an angle, times t
+            scaled = when(SCALE)
+            put(*multiply(ah, al, scaled.choose(high.load(b), times), scaled.choose(low.load(b), 0.0)))
+        at_first = k.compare("eq", 0)
+        with code.when(when(ROOT).bits("and", at_first)):
+            put(*root(ah, al))
+        with code.when(when(SINE, COSINE).bits("and", at_first)):
+            code.call("sincos", both, ah, al)
+            place = when(SINE).choose(code.number(0, INDEX), 2)
+            put(both.load(place), both.load(place + 1))
+        with code.when(when(RATE)):
+            put(*divide(ah, al, times + 1.0, code.number(0.0)), at=r + k + 1)
+        with code.when(when(MULTIPLY)):
+            put(*convolution(code, a, b + k, code.number(0, INDEX), k))
+        later = at_first.bits("xor", True)
+        is_root = when(ROOT)
+        with code.when(when(DIVIDE).bits("or", is_root.bits("and", later))):
+            # c_0 and the other factors of c_j, j > 0; of a root c itself
+            first, second, last = is_root.choose(r, b), r, is_root.choose(k - 1, k)
+            h, l = convolution(code, first, second + k, code.number(1, INDEX), last)
+            h, l = add(ah, al, -h, -l)
+            twice = is_root.choose(code.number(2.0), 1.0)
+            put(*divide(h, l, twice * high.load(first), twice * low.load(first)))
+        with code.when(when(SINE, COSINE).bits("and", later)):
+            # the slope of the angle stands before the sine, and that before the cosine
+            sine = when(SINE)
+            slope, other = r - sine.choose(width, width * 2), sine.choose(r + width, r - width)
+            h, l = convolution(code, slope, other + k, code.number(1, INDEX), k)
+            put(*divide(h, l, sine.choose(times, -times), code.number(0.0)))
+    code.give_back()
+    return code
+
+
+def evaluation() -> Code:
+    """The function of `values_at`."""
+    names = {"high": POINTER, "low": POINTER, "width": INDEX, "th": DOUBLE, "tl": DOUBLE, "state": POINTER, "n": INDEX}
+    code = Code("values_at", names)
+    with code.loop(code["n"]) as numbers:
+        h, l = Variable(code, DOUBLE, 0.0), Variable(code, DOUBLE, 0.0)
+        with code.loop(code["width"]) as orders:
+            k = numbers.index * code["width"] + (code["width"] - 1 - orders.index)
+            found = multiply(h.get(), l.get(), code["th"], code["tl"])
+            found = add(*found, code["high"].load(k), code["low"].load(k))
+            h.set(found[0])
+            l.set(found[1])
+        code["state"].store(h.get(), numbers.index)
+        code["state"].store(l.get(), numbers.index + code["n"])
+    code.give_back()
+    return code

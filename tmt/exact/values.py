@@ -1,32 +1,20 @@
 """Every quantity of a state with 50 digits: what values in doubles are compared with."""
 
-from typing import NamedTuple
+from collections import namedtuple
 
 import mpmath
 import numpy as np
 
-from tmt.equations import method
-from tmt.equations.vectors import ZERO, solve
+from tmt.equations.quantities import QUANTITIES, State
 from tmt.exact.tree import exact_tree
 
 DIGITS = 50
 
 
-class Truth(NamedTuple):
-    """Every quantity of one state as object arrays of mpmath numbers; names and units as in `tmt`."""
-
-    com_positions: np.ndarray  # (m, 3)
-    angular_velocities: np.ndarray  # (m, 3)
-    T: np.ndarray  # (m, 3, nv)
-    B: np.ndarray  # (m, 3, nv)
-    v_conv: np.ndarray  # (m, 3)
-    w_conv: np.ndarray  # (m, 3)
-    mass_matrix: np.ndarray  # (nv, nv)
-    bias: np.ndarray  # (nv,)
-    gravity_balance: np.ndarray  # (nv,)
-    acceleration: np.ndarray  # (nv,)
-    potential_energy: np.ndarray  # ()
-    energy: np.ndarray  # ()
+# the fields of a Truth: the quantities, of those with several arrays each by its own name
+FIELDS = {name: (name,) for name in QUANTITIES} | {name: of.parts for name, of in QUANTITIES.items() if of.parts}
+Truth = namedtuple("Truth", [field for fields in FIELDS.values() for field in fields])
+Truth.__doc__ = "Every quantity of one state as object arrays of mpmath numbers; names, shapes and units as in `tmt`."
 
 
 def exact(tree, q, qd, tau) -> Truth:
@@ -37,25 +25,11 @@ def exact(tree, q, qd, tau) -> Truth:
     """
     with mpmath.workdps(DIGITS):
         q, qd, tau = ([mpmath.mpf(float(v)) for v in values] for values in (q, qd, tau))
-        tree = exact_tree(tree, mpmath.mpf)
-        parts = method.bodies(tree, q, qd)
-        at_rest = [b._replace(omega=ZERO, v_conv=ZERO, w_conv=ZERO) for b in parts]
-        mass_matrix, h = method.mass_matrix(parts, tree.armature), method.bias(parts, tree.gravity)
-        potential = method.potential(parts, tree.gravity) + method.spring_energy(tree, q)
-        return Truth(
-            com_positions=_array(b.x for b in parts),
-            angular_velocities=_array(b.omega for b in parts),
-            T=_array(zip(*b.T) for b in parts),
-            B=_array(zip(*b.B) for b in parts),
-            v_conv=_array(b.v_conv for b in parts),
-            w_conv=_array(b.w_conv for b in parts),
-            mass_matrix=_array(mass_matrix),
-            bias=_array(h),
-            gravity_balance=_array(method.bias(at_rest, tree.gravity)),
-            acceleration=_array(solve(mass_matrix, method.reduced_force(tree, h, q, qd, tau))),
-            potential_energy=_array(potential),
-            energy=_array(potential + method.kinetic(parts, qd, tree.armature)),
-        )
+        state, found = State(exact_tree(tree, mpmath.mpf), q, qd, tau), {}
+        for name, fields in FIELDS.items():
+            value = QUANTITIES[name].of(state)
+            found |= zip(fields, value) if len(fields) > 1 else [(name, value)]
+        return Truth(**{name: _array(value) for name, value in found.items()})
 
 
 def _array(nested):

@@ -1,12 +1,10 @@
 """The methods of integration, each a `Method` (see stepping.py) with one step that is written over any scalar.
 
-The same lines integrate floats, dual numbers (their exact Jacobian), mpmath numbers and traced expressions (the compiled
-loop of kernels.py). METHODS may be given further ones, and objects of a user's own that have a `slope` and a `step`.
+The same lines integrate floats, dual numbers (their exact Jacobian), mpmath numbers and traced expressions (machine
+code, see tmt.compiled). METHODS may be given further ones, and objects of a user's own that have a `slope` and a `step`.
 """
 
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from tmt.equations.method import mass_matrix_and_bias, reduced_force
 from tmt.methods import dop853
@@ -36,12 +34,6 @@ class RungeKutta(Method):
     c: tuple  # the time of each stage in units of dt
     # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
     mean_speed: bool = False
-
-    loop = "run_tableau"
-
-    def looped(self, tree):
-        """A, b and `mean_speed` for the compiled loop."""
-        return square(self.A), np.array(self.b), self.mean_speed
 
     def __post_init__(self):
         checked_tableau(self, "A")
@@ -91,11 +83,6 @@ class AdaptiveRungeKutta(RungeKutta):
     errors: tuple = ()  # weights of the stages in the two estimates, of the movement and of the speeds
 
     adaptive = True
-    loop = "run_adaptive"
-
-    def looped(self, tree):
-        """A, b, the weights of the errors and the order for the compiled loop."""
-        return square(self.A), np.array(self.b), np.array(self.errors), float(self.order)
 
     def __post_init__(self):
         super().__post_init__()
@@ -108,11 +95,6 @@ class AdaptiveRungeKutta(RungeKutta):
         slopes = self.stage_slopes(slope, q, qd, dt, joints)
         estimates = [[*advance([0.0] * len(qd), dt, e, part)] for e in self.errors for part in slopes]
         return *self.combined(slopes, q, qd, dt, joints), *estimates
-
-
-def square(A) -> np.ndarray:
-    """The rows of an explicit tableau with zeros on and above its diagonal."""
-    return np.array([[*row, *[0.0] * (len(A) - len(row))] for row in A])
 
 
 CLASSICAL = (  # Kutta (1901): A, b, c

@@ -1,12 +1,13 @@
 """Implicit Runge-Kutta methods: their stages solve an equation, by Newton's method with exact Jacobians.
 
 The unknowns are the accelerations a_i of the stages, a_i = qdd(q_i, qd_i), at
-q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. Newton's method starts from the a_i that
-the equations linearised at (q, qd) have. A ball's quaternions p_i follow from the speeds of the stages by linear equations,
-p_i = p + dt sum_j A_ij p_j o (0, omega_j) / 2.
+q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. Newton's method starts from the solution of the equations made
+linear at (q, qd): of several that a large step has it then finds the one nearby. A ball's quaternions p_i follow from the speeds
+of the stages by linear equations, p_i = p + dt sum_j A_ij p_j o (0, omega_j) / 2.
 """
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -32,11 +33,6 @@ class ImplicitRungeKutta(Method):
     c: tuple  # the time of each stage in units of dt
 
     solves_stages = True
-    loop = "run_implicit"
-
-    def looped(self, tree):
-        """A and b for the compiled loop."""
-        return np.array(self.A), np.array(self.b)
 
     def __post_init__(self):
         checked_tableau(self, "A")
@@ -52,21 +48,27 @@ class ImplicitRungeKutta(Method):
     def step(self, slope, q, qd, dt, joints=FLAT):
         """The state (q, qd) one dt later, on floats, arrays and dual numbers of them.
 
-        Raises ArithmeticError where Newton's method does not find the stages (the compiled loop gives NaN there).
+        Raises ArithmeticError where Newton's method does not find the stages (a compiled run ends there).
         """
-        nq, n = len(q), len(qd)
 
-        def evaluate(q, qd):
-            rows = jacobian(lambda x: slope(x[:nq], x[nq:]), [*q, *qd], directions(joints, q, n))
-            return slope(q, qd), [row[:n] for row in rows], [row[n:] for row in rows]
+        def linear(q_i, qd_i):
+            """The slope as it would be if it were linear, as at (q, qd)."""
+            x = seeded([*q, *qd], [new - old for old, new in zip((*q, *qd), (*q_i, *qd_i))])
+            return [sum(x[0].parts(f)) for f in slope(x[: len(q)], x[len(q) :])]
 
-        a, last = self.start(evaluate, q, qd, dt, joints), False
-        for _ in range(ITERATIONS):
-            change = self.newton(evaluate, q, qd, dt, a, joints)
+        def left_over(a, slope=slope):
+            """qdd - a of the stages."""
+            slopes = [slope(*state) for state in self.stage_states(q, qd, dt, a, joints)]
+            return [f - x for f, x in zip((f for part in slopes for f in part), a)]
+
+        a, last = [0.0] * (len(qd) * self.stages), False
+        for function in (partial(left_over, slope=linear), *[left_over] * ITERATIONS):
+            matrix = [[x * -1.0 for x in row] for row in jacobian(function, a)]
+            change = solve_any(matrix, function(a))
             a = [old + new for old, new in zip(a, change)]
             if last:  # once more after the values are found: only then are their derivatives exact
                 return self.finish(q, qd, dt, a, joints)
-            last = largest(change) <= CLOSE * (1.0 + largest(a))
+            last = function is left_over and largest(change) <= CLOSE * (1.0 + largest(a))
         raise ArithmeticError(f"Newton's method does not find the stages at dt = {dt} s")
 
     def stage_states(self, q, qd, dt, a, joints):
@@ -92,66 +94,6 @@ class ImplicitRungeKutta(Method):
         found = solve_any(matrix, [*p] * len(s))
         return [found[4 * i : 4 * i + 4] for i in s]
 
-    def start(self, evaluate, q, qd, dt, joints):
-        """The accelerations of the stages from which Newton's method starts: exact if the equations were linear.
-
-        They take one evaluation, at (q, qd). The acceleration there would be a start too, but with a large step the stages of
-        a stiff motion are far from it.
-        """
-        f, by_q, by_qd = evaluate(q, qd)
-
-        def linear(q_i, qd_i):
-            off = joints.tangent(q, [x - y for x, y in zip(q_i, q)])
-            faster = [x - y for x, y in zip(qd_i, qd)]
-            changes = [weighted(by_q[k], off) + weighted(by_qd[k], faster) for k in range(len(qd))]
-            return [value + change for value, change in zip(f, changes)], by_q, by_qd
-
-        return self.newton(linear, q, qd, dt, [0.0] * (len(qd) * self.stages), joints)
-
-    def newton(self, evaluate, q, qd, dt, a, joints):
-        """The change of the accelerations a by one step of Newton's method.
-
-        evaluate(q, qd): qdd and its exact derivatives by q and by qd, nv rows of nv each.
-        """
-        n, s = len(qd), range(self.stages)
-        matrix, right = [], []
-        turned = self.turned(q, qd, dt, a, joints) if joints.balls else [{}] * len(s)
-        for i, (q_i, qd_i) in zip(s, self.stage_states(q, qd, dt, a, joints)):
-            f, by_q, by_qd = evaluate(q_i, qd_i)
-            for k in range(n):
-                row = []
-                for j in s:
-                    twice = sum(self.A[i][m] * self.A[m][j] for m in s)
-                    own = [1.0 if (j, l) == (i, k) else 0.0 for l in range(n)]
-                    row += [
-                        own[l] - dt * (self.A[i][j] * by_qd[k][l] + dt * (twice * by_q[k][l]))
-                        if l not in turned[i]
-                        else own[l] - dt * (self.A[i][j] * by_qd[k][l]) - weighted(*across(by_q[k], turned[i][l][j]))
-                        for l in range(n)
-                    ]
-                matrix.append(row)
-                right.append(f[k] - a[i * n + k])
-        return solve_any(matrix, right)
-
-    def turned(self, q, qd, dt, a, joints):
-        """How balls turn with the accelerations of speeds l: each stage's {l: [of each stage j {m: d theta_m / d a_jl}]}."""
-        n, s = len(qd), range(self.stages)
-        values = [state for state, _ in self.stage_states(q, qd, dt, a, joints)]
-        result = [{} for _ in s]
-        for joint in joints.balls:
-            by = range(joint.qd.start, joint.qd.stop)
-            for l in by:
-                columns = []
-                for j in s:
-                    nudged = seeded(a, [1.0 if k == j * n + l else 0.0 for k in range(len(a))])
-                    states = self.stage_states(q, qd, dt, nudged, joints)
-                    slopes = [[nudged[0].parts(x)[1] for x in state] for state, _ in states]
-                    moved = [joints.tangent(value, slope) for value, slope in zip(values, slopes)]
-                    columns.append([{m: of[m] for m in by} for of in moved])
-                for i in s:
-                    result[i][l] = [columns[j][i] for j in s]
-        return result
-
     def finish(self, q, qd, dt, a, joints):
         """The state (q, qd) one dt later, from the accelerations of the stages."""
         n, s = len(qd), range(self.stages)
@@ -175,18 +117,6 @@ def placed(joints, q, moved, balls) -> list:
     for kind, at, by in joints.joints:
         result += next(balls) if kind == "ball" else [q[at.start] + moved[by.start]]
     return result
-
-
-def across(row, chosen):
-    """The entries of a row at the keys of a dict, and its values."""
-    return [row[m] for m in chosen], list(chosen.values())
-
-
-def directions(joints, q, n):
-    """The 2 nv directions of a state (q, qd): a movement along each speed, then each speed."""
-    still = [0.0] * n
-    along = [[*joints.component_rates(q, unit), *still] for unit in unit_vectors(n)]
-    return along + [[*[0.0] * len(q), *unit] for unit in unit_vectors(n)]
 
 
 def weighted(weights, values):

@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
-from tmt import loop_trees
+from tmt.equations import articulated
 from tmt.equations.method import bias_rates, mass_matrix_and_bias, reduced_force
 from tmt.equations.vectors import solve_any
 from tmt.methods.stepping import Method, advance, increments, left_over
@@ -31,13 +29,6 @@ class SemiImplicitEuler(Method):
     implicit_gains: bool = False
 
     damps_implicitly = True
-    loop = "run_semi_implicit"
-
-    def looped(self, tree):
-        """For the compiled loop: whose bias is implicit, (nv,), whether springs are, and which gains, of position and speed."""
-        lone = lone_speeds(tree) if self.lone_bodies else set()
-        own = np.array([self.implicit_bias or v in lone for v in range(len(tree.axis))])
-        return own, self.implicit_springs and tree.has_springs, *map(loop_trees.matrix, self.gains_held(tree))
 
     def gains_held(self, tree) -> tuple:
         """The implicit entries of a controller's gains, of position and of speed: (nv, nv) each, () where there are none."""
@@ -101,7 +92,28 @@ class SemiImplicitEuler(Method):
             force = [f - dt * k * v for f, k, v in zip(force, by_speed(tree, tree.stiffness), qd)]
         if position_gain := self.gains_held(tree)[0]:
             force = [f - weighted(row, [dt * v for v in qd]) for f, row in zip(force, position_gain)]
-        return solve_any(self.matrix(tree, q, qd, dt, terms), force)
+        solution = getattr(terms, "solve_any", solve_any)
+        return solution(self.matrix(tree, q, qd, dt, terms), force)
+
+    def articulates(self, tree) -> bool:
+        """Whether all that is implicit acts at single joints alone: then it counts as armature."""
+        across = any(
+            g for gain in self.gains_held(tree) for i, row in enumerate(gain) for j, g in enumerate(row) if i != j
+        )
+        return not (self.implicit_bias or (self.lone_bodies and lone_speeds(tree)) or across)
+
+    def articulated(self, tree, q, qd, tau, dt):
+        """The slope with dt D + dt^2 k and the gains' dt S + dt^2 P as armature, and dt k and dt P as damping."""
+        force, stiffness = reduced_force(tree, [0.0] * len(qd), q, qd, tau), by_speed(tree, tree.stiffness)
+        held, (position_gain, speed_gain) = [0.0] * len(qd), self.gains_held(tree)
+        if self.implicit_springs:
+            held = [k + (position_gain[i][i] if position_gain else 0.0) for i, k in enumerate(stiffness)]
+        force = [f - dt * k * v if k else f for f, k, v in zip(force, held, qd)]
+        armature = [
+            rotor + dt * (d + (speed_gain[i][i] if speed_gain else 0.0) + dt * k)
+            for i, (rotor, d, k) in enumerate(zip(tree.armature, tree.damping, held))
+        ]
+        return articulated.acceleration(tree, q, qd, force, armature)
 
     def step(self, slope, q, qd, dt, joints=FLAT):
         """The state (q, qd) one dt later."""

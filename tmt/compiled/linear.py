@@ -1,0 +1,87 @@
+"""Loops that traced functions call: solutions of linear systems, and derivatives in all directions, several side by side."""
+
+from .ir import DOUBLE, INDEX, POINTER, Code, Value, wide
+from .machine import lanes
+
+WIDTH = lanes()  # directions, states or runs that are taken side by side
+
+
+def solve() -> Code:
+    """solve(matrix, stride, right, n): the solution of matrix x = right in place of right, by L U without pivots.
+
+    matrix: n rows, of so many numbers each, of which n belong to it; it is written over.
+    """
+    code = Code(
+        "solve", {"matrix": POINTER, "stride": INDEX, "right": POINTER, "n": INDEX}, attributes="noinline", own=True
+    )
+    matrix, stride, right, n = (code[name] for name in code.arguments)
+    with code.loop(n) as outer:
+        k = outer.index
+        pivot, at_k = k * stride + k, k * stride
+        inverse = matrix.load(pivot)
+        with code.loop(n - k - 1) as inner:
+            i = inner.index + k + 1
+            row = i * stride
+            factor = matrix.load(row + k) / inverse
+            with code.when(factor.compare("ne", 0.0)):
+                with code.loop(n - k - 1) as last:
+                    j = last.index + k + 1
+                    matrix.store(matrix.load(row + j) - factor * matrix.load(at_k + j), row + j)
+                right.store(right.load(i) - factor * right.load(k), i)
+    with code.loop(n) as outer:
+        i = n - 1 - outer.index
+        with code.loop(outer.index) as inner:
+            j = inner.index + i + 1
+            right.store(right.load(i) - matrix.load(i * stride + j) * right.load(j), i)
+        right.store(right.load(i) / matrix.load(i * stride + i), i)
+    code.give_back()
+    return code
+
+
+def solution(n: int) -> Code:
+    """solution(in, out): of n rows of n numbers and the right-hand side."""
+    code = Code("solution", {"in": POINTER, "out": POINTER}, attributes="noinline", own=True)
+    matrix = code.reserve(DOUBLE, n * n)
+    with code.loop(n * n) as loop:
+        matrix.store(code["in"].load(loop.index), loop.index)
+    with code.loop(n) as loop:
+        code["out"].store(code["in"].load(loop.index + n * n), loop.index)
+    size = code.number(n, INDEX)
+    code.call("solve", matrix, size, code["out"], size)
+    code.give_back()
+    return code
+
+
+def bias_rates(nq: int, n: int, width: int) -> Code:
+    """bias_rates(in, out): dh/dqd (n, n) from (q, qd), by `bias_rate` in so many directions at a time."""
+    code = Code("bias_rates", {"in": POINTER, "out": POINTER}, attributes="noinline", own=True)
+    state = code.reserve(wide(DOUBLE, width), nq + 2 * n)
+    found = code.reserve(wide(DOUBLE, width), n)
+    for k in range(nq + n):
+        state.store(code["in"].load(k).everywhere(width), k * width)
+    with code.loop(n, width) as loop:
+        put_directions(state, nq + n, n, loop.index, width)
+        code.call("bias_rate", state, found)
+        for l in range(width):
+            with code.when((loop.index + l).compare("lt", n)), code.loop(n) as rows:
+                code["out"].store(found.load(rows.index * width + l), rows.index * n + loop.index + l)
+    code.give_back()
+    return code
+
+
+def put_directions(state: Value, at: int, n: int, first: Value, width: int) -> None:
+    """Put unit vectors (n,), lane l the one along `first` + l, to the numbers of a state from `at` on."""
+    code = state.code
+    lanes = first.everywhere(width)
+    if width > 1:
+        numbers = Value(code, lanes.kind, "<" + ", ".join(f"i64 {l}" for l in range(width)) + ">")
+        lanes = lanes + numbers
+    kind = wide(DOUBLE, width)
+    with code.loop(n) as loop:
+        chosen = lanes.compare("eq", loop.index.everywhere(width))
+        state.store(chosen.choose(code.number(1.0, kind), code.number(0.0, kind)), (loop.index + at) * width)
+
+
+def any_of(flags: Value, width: int) -> Value:
+    """Whether one of several flags is true."""
+    return flags if width == 1 else flags.cast("bitcast", f"i{width}").compare("ne", 0)

@@ -1,0 +1,74 @@
+"""Machine code from LLVM's text, by llvmlite: for this processor, optimised, and as functions that ctypes can call."""
+
+import ctypes
+from functools import lru_cache
+from threading import Lock
+
+import llvmlite
+import llvmlite.binding as llvm
+
+MUCH = 300_000  # characters of a module that is not optimised before it becomes machine code
+lock = Lock()  # LLVM's passes are not made for several threads at once
+
+
+@lru_cache(maxsize=1)
+def processor() -> tuple[str, str]:
+    """The name of this processor and what it can do."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+def lanes() -> int:
+    """How many doubles are taken side by side: what one register of this processor holds, at least four."""
+    return 8 if "+avx512f" in processor()[1] else 4
+
+
+def versions() -> str:
+    """What machine code depends on beside its text."""
+    return repr((llvmlite.__version__, llvm.llvm_version_info, llvm.get_default_triple(), *processor()))
+
+
+def target() -> llvm.TargetMachine:
+    """A new one each time: an engine takes its own over."""
+    cpu, features = processor()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=cpu, features=features, opt=1, codemodel="jitdefault"
+    )
+
+
+def object_code(text: str) -> bytes:
+    """The object file of a module."""
+    with lock:
+        machine = target()
+        module = llvm.parse_assembly(text)
+        # straight lines are as short as they can be: of much code LLVM's passes take long and leave it as fast as it was
+        level = 2 if len(text) < MUCH else 0
+        passes = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=level))
+        passes.getModulePassManager().run(module, passes)
+        if not level:
+            passes = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=2))
+            for function in module.functions:
+                if len(list(function.blocks)) > 1:  # it has loops
+                    passes.getFunctionPassManager().run(function, passes)
+        return machine.emit_object(module)
+
+
+class Library:
+    """Compiled functions, from LLVM's text or from an object file that was made of it."""
+
+    def __init__(self, text: str = "", code: bytes | None = None):
+        code = object_code(text) if code is None else code
+        with lock:
+            self.engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target())
+            self.engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+            self.engine.finalize_object()
+
+    def function(self, name: str, result, *arguments, keeps_lock: bool = False):
+        """A function of that name as ctypes calls it; keeps_lock: Python's other threads wait meanwhile."""
+        address = self.engine.get_function_address(name)
+        if not address:
+            raise KeyError(name)
+        made = (ctypes.PYFUNCTYPE if keeps_lock else ctypes.CFUNCTYPE)(result, *arguments)(address)
+        made.library = self  # the code lives as long as it
+        return made

@@ -1,0 +1,165 @@
+"""Compiled runs of a tree by a method: what a user gives is checked, and many runs are spread over the cores."""
+
+import ctypes
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+from numpy import ndarray
+
+from tmt.methods import METHODS, method_named
+from tmt.model.arguments import checked_model, whole
+from tmt.model.tree import Tree
+from tmt.model.values import shown
+
+from .cores import cores, in_threads
+
+SPREAD = 20_000  # evaluations of the dynamics from which several cores share them
+PIECES = 4  # for each core, as one of them may be busy with something else
+MOST = 64  # trees and methods whose compiled runs are held
+DIRECT = ctypes.c_void_p
+ARGUMENTS = [DIRECT, DIRECT, DIRECT, ctypes.c_double, ctypes.c_double, DIRECT, *[ctypes.c_int64] * 3]
+known = {}
+
+
+class Runner:
+    """The runs of a tree by a method, of one state at a time or of several side by side with the same bits."""
+
+    def __init__(self, tree: Tree, stepping, given):
+        self.tree, self.stepping, self.given, self.runs = tree, stepping, given, {}
+
+    def compiled(self, width: int) -> Callable:
+        """The compiled function for so many runs side by side."""
+        if width not in self.runs:
+            from . import runs, store  # here, so that `import tmt` need not wait for llvmlite
+
+            source = partial(runs.source, self.tree, self.stepping, width)
+            made = store.library(source, "run", self.tree, self.stepping, width)
+            self.runs[width] = made.function("run", None, *ARGUMENTS)
+        return self.runs[width]
+
+    def follow(self, q, qd, tau, dt: float, tolerance: float, every: int) -> tuple[np.ndarray, int]:
+        """Fill the paths q (runs, records, nq) and qd (runs, records, nv) from their first states; tau (runs, nv).
+
+        Returns why each run ended, 0 where it did not, and after how many steps, (runs, 2); and the evaluations of the dynamics.
+        Where a run ended, its path is NaN from there on.
+        """
+        from .machine import lanes
+
+        count, steps = len(q), (q.shape[1] - 1) * every
+        width = lanes() if self.stepping.lanes and count >= lanes() else 1
+        run, info = self.compiled(width), np.zeros((count, 3), np.int64)
+
+        def follow_some(part):
+            size = len(q[part])
+            if size % width:  # too few for a register: their last one again
+                chosen = np.minimum(np.arange(-(-size // width) * width), size - 1)
+                arrays = [np.ascontiguousarray(array[part][chosen]) for array in (q, qd, tau, info)]
+            else:
+                arrays = [array[part] for array in (q, qd, tau, info)]
+            *paths, torque, found = arrays
+            run(
+                *(x.ctypes.data for x in (*paths, torque)),
+                dt,
+                tolerance,
+                found.ctypes.data,
+                every,
+                q.shape[1],
+                len(found),
+            )
+            if size % width:
+                for array, own in zip((q, qd, info), (*paths, found)):
+                    array[part] = own[:size]
+
+        spread = count > width and steps * count * self.stepping.stages > SPREAD and cores() > 1
+        pieces = min(-(-count // width), PIECES * cores()) if spread else 1
+        blocks = -(-count // width)
+        parts = [slice(*pair) for pair in pairwise(min(blocks * k // pieces * width, count) for k in range(pieces + 1))]
+        if pieces > 1:
+            in_threads(follow_some, [(part,) for part in parts], cores())
+        else:
+            follow_some(slice(0, count))
+        for i in np.flatnonzero(info[:, 0]):
+            first = info[i, 1] // every + 1
+            q[i, first:], qd[i, first:] = np.nan, np.nan
+        if self.stepping.adaptive or self.stepping.solves_stages:
+            return info[:, :2], int(info[:, 2].sum())
+        taken = np.where(info[:, 0], info[:, 1] + 1, steps)
+        return info[:, :2], int(taken.sum()) * self.stepping.stages
+
+
+def runner_of(tree: Tree, name: str) -> Runner:
+    """The Runner of a tree and the method of that name as it is now."""
+    found = known.get((id(tree), name)) if type(name) is str else None
+    # whose tree is held, so that no other has its id
+    if found is None or found.given is not METHODS.get(name):
+        checked_model(tree)
+        stepping = method_named(name)
+        if len(known) >= MOST:
+            known.clear()
+        known[id(tree), name] = found = Runner(tree, stepping, METHODS[name])
+    return found
+
+
+def runner(tree: Tree, method: str) -> Callable:
+    """Compiled `run(q, qd, tau, dt)` of a tree and one of METHODS: fills the paths q and qd from their first states.
+
+    q, qd: (runs, records, nq and nv), of which [:, 0] is given; tau (runs, nv); all contiguous, float64; rad, s, N m. It
+    returns how often the dynamics were evaluated (an implicit method: with their Jacobian). An adaptive method takes its
+    tolerance too: `run(q, qd, tau, dt, tolerance)`. Two arguments more: `ended` (runs, 2) of int64 is filled with why each run
+    ended, see runs.py, and after how many steps; `every`: the paths hold each `every`-th state alone. ValueError for anything
+    else.
+    """
+    own = runner_of(tree, method)
+    nq, nv = tree.coordinates.nq, tree.coordinates.nv
+
+    def run(q, qd, tau, dt, *more, **named):
+        tolerance, ended, every = settings(own.stepping.adaptive, *more, **named)
+        records = q.shape[1] if isinstance(q, ndarray) and q.ndim == 3 else "records"
+        count = len(tau) if isinstance(tau, ndarray) and tau.ndim else "runs"
+        check("tau", tau, (count, nv))
+        check("q", q, (count, records, nq))
+        check("qd", qd, (count, records, nv))
+        if ended is not None:
+            check("ended", ended, (count, 2), np.int64)
+        found, evaluations = own.follow(q, qd, tau, real("dt", dt), tolerance, every)
+        if ended is not None:
+            ended[:] = found
+        return evaluations
+
+    own.compiled(1)
+    return run
+
+
+def settings(adaptive: bool, *more, ended=None, every=1, tolerance=None) -> tuple:
+    """The tolerance, `ended` and `every` of a run's further arguments."""
+    names = ["tolerance"] * adaptive + ["ended", "every"]
+    if len(more) > len(names):
+        raise TypeError(f"run takes {', '.join(['q', 'qd', 'tau', 'dt', *names])}")
+    found = {"ended": ended, "every": every, "tolerance": tolerance} | dict(zip(names, more))
+    return real("tolerance", found["tolerance"]) if adaptive else 0.0, found["ended"], whole("every", found["every"])
+
+
+def check(name: str, array, shape: tuple, dtype=np.float64) -> None:
+    """Raise ValueError unless compiled code can take an array: its type, shape and how it lies in memory."""
+    if not isinstance(array, ndarray) or isinstance(array, np.ma.MaskedArray):
+        found = f"is {shown(array)}"
+    elif array.dtype != dtype or array.shape != shape:
+        found = f"has shape {array.shape} and numbers of type {array.dtype}"
+    elif not array.flags.carray:
+        found = "is not contiguous, aligned and writable"
+    else:
+        return
+    wanted = f"a contiguous array of {np.dtype(dtype)} of shape ({', '.join(map(str, shape))}) that can be written"
+    raise ValueError(f"{name} {found}; {wanted} is expected")
+
+
+def real(name: str, value) -> float:
+    """The value as a float."""
+    if isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:
+            pass
+    raise ValueError(f"{name} is {shown(value)}; a number is expected")

@@ -1,0 +1,299 @@
+"""Motions in compiled code: the loops over runs, records and steps around the traced step of a method.
+
+run(q, qd, tau, dt, tolerance, info, every, records, runs): paths q (runs, records, nq) and qd (runs, records, nv) are filled from
+their first states, of which each `every`-th is kept; tau (runs, nv). info (runs, 3) of whole numbers: why each run ended, 0 where
+it did not, after how many steps, and how often the dynamics were evaluated. What a path holds after its end says nothing.
+"""
+
+from collections.abc import Callable
+
+from tmt.methods.implicit import CLOSE, ITERATIONS
+from tmt.methods.stepping import NEWTON, OVERFLOW, SMALL, TURNED, Method
+from tmt.model.coordinates import FLAT
+
+from . import forms, linear
+from .ir import DOUBLE, FLAG, INDEX, POINTER, Code, Value, Variable, module, wide
+from .sine import LIMIT
+from .straight import Traced, functions, trace
+
+INLINED = 1_500  # nodes of the slopes of a step that are put in the place of their calls
+SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = (
+    1e-9,
+    6.0,
+    0.333,
+    0.9,
+)  # of an adaptive method, in units of dt and of the step before
+
+
+def source(tree, stepping: Method, width: int) -> str:
+    """The module that follows runs of a tree, `width` side by side."""
+    step = Step(tree, stepping, width)
+    if stepping.solves_stages:
+        advance = step.solving()
+    elif stepping.adaptive:
+        advance = step.adaptive()
+    else:
+        advance = step.explicit()
+    return module([*step.functions, run(step, advance)])
+
+
+class Step:
+    """The functions of one step, and the lines that call them."""
+
+    def __init__(self, tree, stepping: Method, width: int):
+        self.tree, self.stepping, self.width = tree, stepping, width
+        self.nq, self.n = tree.coordinates.nq, tree.coordinates.nv
+        self.joints = tree.coordinates if tree.coordinates.balls else FLAT
+        self.functions = []
+
+    def add(self, traced: Traced, width: int, inline: bool = False) -> str:
+        """The functions of a traced one and of what it calls; its name."""
+        self.functions += functions(traced, width, inline)
+        called = {
+            arguments[0] for kind, arguments in map(traced.tape.nodes.__getitem__, traced.nodes) if kind == "call"
+        }
+        known = {code.name for code in self.functions}
+        if "solution" in called and "solution" not in known:
+            self.functions += [linear.solve(), linear.solution(self.n)]
+        if "bias_rates" in called and "bias_rates" not in known:
+            self.functions += functions(forms.bias_rate(self.tree), linear.WIDTH)
+            self.functions.append(linear.bias_rates(self.nq, self.n, linear.WIDTH))
+        return traced.name
+
+    def add_step(self, name: str) -> int:
+        """The slope, and the step or attempt that asks it; how many results that has."""
+        nq, n, stepping = self.nq, self.n, self.stepping
+        slope = forms.slope(self.tree, stepping)
+        self.add(slope, self.width, inline=len(slope.nodes) * stepping.stages <= INLINED)
+
+        def function(q, qd, tau, dt):
+            def asked(q, qd):
+                return q[0].tape.call("slope", [*q, *qd, *tau, *dt], n)
+
+            joints = [self.joints] if self.joints is not FLAT else []
+            return forms.flat(list(getattr(stepping, name)(asked, q, qd, dt[0], *joints)))
+
+        traced = trace(name, (nq, n, n, 1), function)
+        self.add(traced, self.width, inline=True)
+        return len(traced.outputs)
+
+    def explicit(self) -> Callable:
+        """A step of a method that solves nothing."""
+        self.add_step("step")
+
+        def advance(code, state, new, dt, evaluations):
+            code.call("step", state, new)
+            return unsound(code, self.tree, new, self.width)
+
+        return advance
+
+    def adaptive(self) -> Callable:
+        """As many steps as the tolerance wants between two times."""
+        nq, n, order = self.nq, self.n, self.stepping.order
+        count = self.add_step("attempt")
+        scales = []  # of each component of an error: the number of the state in whose units it is; None: an angle of a turn
+        for kind, at, by in self.tree.coordinates.joints:
+            scales += [None if kind == "ball" else at.start] * (by.stop - by.start)
+        scales += range(nq, nq + n)
+
+        def advance(code, state, new, dt, evaluations):
+            wanted, left, why = self.wanted, Variable(code, DOUBLE, dt), Variable(code, INDEX, 0)
+            found = code.reserve(DOUBLE, count)
+            with code.loop(2**62) as loop:
+                loop.leave(left.get().compare("le", 0.0))
+                loop.leave(why.get().compare("ne", 0))
+                pieces = (left.get() / wanted.get()).function("ceil")
+                h = left.get() / pieces
+                state.store(h, nq + 2 * n)
+                code.call("attempt", state, found)
+                evaluations.set(evaluations.get() + self.stepping.stages)
+                sums = []
+                for first in (nq + n, nq + 3 * n):
+                    total = None
+                    for k, scale in enumerate(scales):
+                        size = code.number(2.0)
+                        if scale is not None:
+                            a, b = state.load(scale).function("fabs"), found.load(scale).function("fabs")
+                            size = 1.0 + b.compare("gt", a).choose(b, a)
+                        one = found.load(first + k) / (code["tolerance"] * size)
+                        total = one * one if total is None else total + one * one
+                    sums.append(total)
+                e5, e3 = sums
+                root = (2.0 * n * (e5 + 0.01 * e3)).function("sqrt")
+                error = e5.compare("gt", 0.0).choose(e5 / root, 0.0)
+                accepted = error.compare("lt", 1.0)
+                with code.when(accepted):
+                    for k in code.each(nq + n):
+                        state.store(found.load(k), k)
+                    left.set(pieces.compare("gt", 1.0).choose(left.get() - h, 0.0))
+                factor = SAFETY * code.intrinsic("pow", error, code.number(-1.0 / order))
+                factor = factor.compare("gt", SHRINKING).choose(factor, SHRINKING)
+                factor = factor.compare("lt", GROWTH).choose(factor, GROWTH)
+                factor = error.compare("gt", 0.0).choose(
+                    factor, error.compare("eq", 0.0).choose(code.number(GROWTH), SHRINKING)
+                )
+                wanted.set(h * factor)
+                off = unsound(code, self.tree, state, 1)
+                short = h.compare("gt", dt * SHORTEST_STEP).choose(code.number(0, INDEX), SMALL)
+                why.set(off.compare("ne", 0).choose(off, short))
+            for k in code.each(nq + n):
+                new.store(state.load(k), k)
+            state.store(dt, nq + 2 * n)
+            return why.get()
+
+        return advance
+
+    def solving(self) -> Callable:
+        """A step whose stages solve an equation, by Newton's method with the exact Jacobian, several columns at a time."""
+        nq, n, stepping, width = self.nq, self.n, self.stepping, linear.WIDTH
+        unknown = n * stepping.stages
+        columns = -(-unknown // width) * width
+        directional = forms.directional(self.tree, stepping)
+        self.add(directional, width, inline=len(directional.nodes) * stepping.stages <= INLINED)
+        for made_linear in (False, True):
+            self.add(residual(self.tree, stepping, self.joints, made_linear), width, inline=not made_linear)
+        self.functions.append(linear.solve()) if "solve" not in {c.name for c in self.functions} else None
+
+        def finish(q, qd, dt, a):
+            return forms.flat(list(stepping.finish(q, qd, dt[0], a, self.joints)))
+
+        self.add(trace("finish", (nq, n, 1, unknown), finish), 1, inline=True)
+
+        def advance(code, state, new, dt, evaluations):
+            inputs = nq + 2 * n + 1
+            given = code.reserve(wide(DOUBLE, width), inputs + 2 * unknown)
+            found = code.reserve(wide(DOUBLE, width), 2 * unknown)
+            matrix, right = code.reserve(DOUBLE, unknown * columns), code.reserve(DOUBLE, unknown)
+            last = code.reserve(DOUBLE, nq + n + 1 + unknown)  # what `finish` takes
+            a = last.at(nq + n + 1)
+            each = code.number(unknown, INDEX)
+            why = Variable(code, INDEX, NEWTON)
+            for k in code.each(inputs):
+                given.store(state.load(k).everywhere(width), k * width)
+            with code.loop(each) as loop:
+                a.store(0.0, loop.index)
+            with code.loop(ITERATIONS + 1) as iteration:
+                is_linear = iteration.index.compare("eq", 0)
+                with code.loop(each) as loop:
+                    given.store(a.load(loop.index).everywhere(width), (loop.index + inputs) * width)
+                with code.loop(each, width) as loop:
+                    linear.put_directions(given, inputs + unknown, unknown, loop.index, width)
+                    with code.when(is_linear):
+                        code.call("linear_residual", given, found)
+                    with code.when(is_linear.bits("xor", True)):
+                        code.call("residual", given, found)
+                    with code.loop(each) as rows:
+                        change = found.load((rows.index + unknown) * width, wide(DOUBLE, width))
+                        matrix.store(-change, rows.index * columns + loop.index)
+                with code.loop(each) as rows:
+                    right.store(found.load(rows.index * width), rows.index)
+                code.call("solve", matrix, code.number(columns, INDEX), right, each)
+                evaluations.set(evaluations.get() + stepping.stages)
+                size, most = Variable(code, DOUBLE, 0.0), Variable(code, DOUBLE, 0.0)
+                with code.loop(each) as loop:
+                    change = right.load(loop.index)
+                    a.store(a.load(loop.index) + change, loop.index)
+                    for largest, value in ((size, a.load(loop.index)), (most, change)):
+                        value, so_far = value.function("fabs"), largest.get()
+                        # not a number stays so
+                        largest.set(value.compare("le", so_far).choose(so_far, value))
+                close = most.get().compare("le", CLOSE * (1.0 + size.get()))
+                close = close.bits("and", is_linear.bits("xor", True))
+                with code.when(close):
+                    why.set(0)
+                iteration.leave(close)
+                iteration.leave(size.get().compare("lt", float("inf")).bits("xor", True))
+            with code.when(why.get().compare("eq", 0)):
+                for k in code.each(nq + n):
+                    last.store(state.load(k), k)
+                last.store(dt, nq + n)
+                code.call("finish", last, new)
+                why.set(unsound(code, self.tree, new, 1))
+            return why.get()
+
+        return advance
+
+
+def residual(tree, stepping, joints, linear: bool) -> Traced:
+    """What accelerations a of the stages leave of their equations, and its derivative along da: (q, qd, tau, dt, a, da).
+
+    linear: of the equations made linear at (q, qd).
+    """
+    nq, n = tree.coordinates.nq, tree.coordinates.nv
+
+    def function(q, qd, tau, dt, a, da):
+        a = forms.seeded(a, da)
+        values, slopes = [], []
+        for i, state in enumerate(stepping.stage_states(q, qd, dt[0], a, joints)):
+            values_of, slopes_of = zip(*(a[0].parts(x) for part in state for x in part))
+            at = [*q, *qd] if linear else values_of
+            found = q[0].tape.call("directional", [*at, *tau, *dt, *slopes_of], 2 * n)
+            if linear:
+                off = [new - old for old, new in zip(at, values_of)]
+                change = q[0].tape.call("directional", [*at, *tau, *dt, *off], 2 * n)
+                found = [*(value + more for value, more in zip(change, change[n:])), *found[n:]]
+            for k in range(n):
+                values.append(found[k] - a[i * n + k].value)
+                slopes.append(found[n + k] - da[i * n + k])
+        return [*values, *slopes]
+
+    return trace(
+        "linear_residual" if linear else "residual", (nq, n, n, 1, n * stepping.stages, n * stepping.stages), function
+    )
+
+
+def run(step: Step, advance: Callable) -> Code:
+    """The loops over runs, records and steps."""
+    names = {"q": POINTER, "qd": POINTER, "tau": POINTER, "dt": DOUBLE, "tolerance": DOUBLE, "info": POINTER}
+    code = Code("run", names | dict.fromkeys(("every", "records", "runs"), INDEX))
+    nq, n, width = step.nq, step.n, step.width
+    kind, flags = wide(DOUBLE, width), wide(FLAG, width)
+    state, new = code.reserve(kind, nq + 2 * n + 1), code.reserve(kind, nq + n)
+    paths, info = (("q", nq, 0), ("qd", n, nq)), code["info"]
+    state.store(code["dt"].everywhere(width), (nq + 2 * n) * width)
+    with code.loop(code["runs"], width) as runs:
+        alive, evaluations = Variable(code, flags, True), Variable(code, INDEX, 0)
+        step.wanted = Variable(code, DOUBLE, code["dt"] / 8.0)
+        for l in range(width):
+            run = runs.index + l
+            for name, size, first in paths:
+                for k in code.each(size):
+                    state.store(code[name].load(run * code["records"] * size + k), (k + first) * width + l)
+            for k in code.each(n):
+                state.store(code["tau"].load(run * n + k), (k + nq + n) * width + l)
+        with code.loop(code["records"] - 1) as records:
+            with code.loop(code["every"]) as steps:
+                why = advance(code, state, new, code["dt"], evaluations)
+                for k in code.each(nq + n):
+                    state.store(new.load(k * width, kind), k * width)
+                ends = why.compare("ne", 0).bits("and", alive.get())
+                with code.when(linear.any_of(ends, width)):
+                    for l in range(width):
+                        with code.when(ends.lane(l)):
+                            info.store(why.lane(l), (runs.index + l) * 3)
+                            info.store(records.index * code["every"] + steps.index, (runs.index + l) * 3 + 1)
+                    alive.set(alive.get().bits("and", ends.bits("xor", True)))
+                steps.leave(linear.any_of(alive.get(), width).bits("xor", True))
+            records.leave(linear.any_of(alive.get(), width).bits("xor", True))
+            for l in range(width):
+                for name, size, first in paths:
+                    place = ((runs.index + l) * code["records"] + records.index + 1) * size
+                    for k in code.each(size):
+                        code[name].store(state.load((k + first) * width + l), place + k)
+        if width == 1:
+            info.store(evaluations.get(), runs.index * 3 + 2)
+    code.give_back()
+    return code
+
+
+def unsound(code: Code, tree, state: Value, width: int) -> Value:
+    """Why a state cannot be gone on from; 0: it can."""
+    kind, whole = wide(DOUBLE, width), wide(INDEX, width)
+    hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]
+    total, angles = Variable(code, kind, 0.0), code.number(0.0, kind)
+    for k in code.each(tree.coordinates.nq + tree.coordinates.nv):
+        total.set(total.get() + state.load(k * width, kind))
+    for k in hinges:
+        angles = angles + state.load(k * width, kind).function("fabs")
+    turned = angles.compare("lt", LIMIT).choose(code.number(0, whole), TURNED)
+    return total.get().function("fabs").compare("lt", float("inf")).choose(turned, OVERFLOW)

@@ -1,0 +1,176 @@
+"""Object files on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
+
+The name of a file is the hash of all that its machine code depends on: tmt's sources, the versions of llvmlite and LLVM, the
+processor, the tree and what is compiled for it. What lies there is run, so the folder must be the user's own: others may neither
+write to it nor put another in its place. Without such a folder, with a damaged file or a full disk, the code is compiled anew: it
+only costs time. To clear it is to delete the folder.
+"""
+
+import hashlib
+import logging
+import os
+import stat
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from tmt.methods.stepping import Method
+from tmt.model.tree import Tree
+
+from .machine import Library, object_code, versions
+
+DIGEST = 32  # bytes of a SHA-256, before the object code
+ABANDONED = 3600.0  # s: a file takes milliseconds to write, but the clocks of a shared disk differ
+complaints = []  # about the folder, of this process
+
+
+class NotOwn(OSError):
+    """What lies there can be written by others, or belongs to somebody else."""
+
+
+def library(source: Callable[[], str], *what) -> Library:
+    """The compiled module of a source, from the folder if it lies there; what: all that the source follows from, with tmt itself.
+
+    Of what is the user's own (a class of trees, a method, a function) nothing is kept, as it may have changed.
+    """
+    words = [word_of(one) for one in what]
+    if None in words:
+        return Library(source())
+    name = hashlib.sha256("\n".join([own_sources(), versions(), *words]).encode()).hexdigest()[:32]
+    try:
+        folder = own_folder()
+        found = read(folder / f"{name}.o")
+    except NotOwn as error:
+        complain(error)
+        return Library(source())
+    except Exception:  # whatever is wrong with the folder or the file
+        return Library(source())
+    if found is not None:
+        with suppress(RuntimeError):  # of LLVM: no object file
+            return Library(code=found)
+    code = object_code(source())
+    with suppress(OSError):
+        clear(folder)
+        write_aside(folder / f"{name}.o", hashlib.sha256(code).digest() + code)
+    return Library(code=code)
+
+
+def word_of(value) -> str | None:
+    """What stands for a value in the name of a file; None if it may mean something else another time."""
+    if isinstance(value, (str, int)) or value is None:
+        return repr(value)
+    if type(value) is Tree:
+        return repr([getattr(value, field.name) for field in fields(Tree)])
+    own = type(value).__module__.split(".")[0] == __name__.split(".")[0]
+    if own and isinstance(value, Method) and is_dataclass(value):
+        return f"{type(value).__qualname__}({[getattr(value, field.name) for field in fields(value)]!r})"
+    return None
+
+
+def read(path: Path) -> bytes | None:
+    """The object code of a file, None where there is none or it is damaged; NotOwn if others could have written it."""
+    try:
+        check_own(path)
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    digest, code = content[:DIGEST], content[DIGEST:]
+    return code if digest == hashlib.sha256(code).digest() else None
+
+
+@lru_cache(maxsize=1)
+def own_sources() -> str:
+    """A name for the contents of tmt's own files."""
+    found = hashlib.sha256()
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def complain(error) -> None:
+    """Say once in a process why the folder is not used; on stderr, unless logging is set up otherwise."""
+    if not complaints:
+        complaints.append(error)
+        logging.getLogger("tmt").warning(
+            "%s: nothing there is run, code is compiled in memory; remove it, or set TMT_CACHE to a folder of your own",
+            error,
+        )
+
+
+def cache_folder() -> Path:
+    """Where object files are kept."""
+    if os.environ.get("TMT_CACHE"):
+        return Path(os.environ["TMT_CACHE"])
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tmt"
+
+
+def size_of_cache() -> int:
+    """Bytes of what lies there."""
+    found = 0
+    for path in cache_folder().rglob("*"):
+        with suppress(OSError):  # another process was sooner
+            found += path.lstat().st_size * path.is_file()
+    return found
+
+
+def own_folder(folder: Path | None = None) -> Path:
+    """The cache folder (or another), its links resolved, made if it is not there; NotOwn unless it is the user's own."""
+    folder = Path(os.path.realpath(folder or cache_folder()))
+    for path in (*reversed(folder.parents), folder):
+        if not path.exists():
+            path.mkdir(mode=0o700, exist_ok=True)
+        # in a folder like /tmp everybody makes entries, but moves only his own
+        check_own(path, on_the_way=path != folder)
+    return folder
+
+
+def check_own(path, on_the_way=False) -> None:
+    """Raise NotOwn if a file or folder belongs to somebody else or others can write to it.
+
+    on_the_way: a parent folder; it may be root's, and in it others may make entries of their own (as in /tmp).
+    """
+    if os.name != "posix":
+        return  # elsewhere these bits say nothing
+    about = os.lstat(path)
+    if about.st_uid != os.geteuid() and not (on_the_way and about.st_uid == 0):
+        raise NotOwn(f"{path} belongs to user {about.st_uid}")
+    if stat.S_ISLNK(about.st_mode):
+        raise NotOwn(f"{path} is a link")
+    writers = about.st_mode & (0o002 if private(path, about.st_gid) else 0o022)
+    if writers and not (on_the_way and about.st_mode & stat.S_ISVTX):
+        raise NotOwn(f"{path} can be written by others (mode {stat.S_IMODE(about.st_mode):04o})")
+
+
+def private(path, group) -> bool:
+    """Whether the group of a path is the user's own, without other members, as many systems make one for each user.
+
+    Where there are further access rights the group's bits stand for those.
+    """
+    import grp  # POSIX only
+    import pwd
+
+    try:
+        user, group = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
+        further = "system.posix_acl_access" in os.listxattr(path)
+    except (KeyError, OSError, AttributeError):  # no such user or group; not known here
+        return False
+    return group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name} and not further
+
+
+def write_aside(path, content) -> None:
+    """Write a file aside and move it, so that a process that reads meanwhile sees all of it or nothing."""
+    with tempfile.NamedTemporaryFile("wb", dir=path.parent, suffix=".new", delete=False) as file:
+        file.write(content)
+    os.replace(file.name, path)
+
+
+def clear(folder) -> None:
+    """Remove what writers that were killed have left."""
+    for file in folder.glob("*.new"):
+        with suppress(OSError):
+            if time.time() - file.lstat().st_mtime > ABANDONED:
+                file.unlink()

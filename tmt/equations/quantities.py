@@ -1,0 +1,96 @@
+"""Every quantity of a state, in one table: what it takes, its shape and unit, and how it follows from the bodies; any scalar.
+
+The literal form (literal.py), the compiled one (compiled/evaluator.py) and the truth in many digits (exact/values.py) are all
+served from it.
+"""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import NamedTuple
+
+from . import method
+from .vectors import ZERO, solve
+
+
+class State:
+    """A state of a tree, and what follows from it: each part once.
+
+    q (nq), qd, tau (nv): sequences of scalars; at rest and without torque where they are not given.
+    """
+
+    def __init__(self, tree, q, qd=None, tau=None):
+        nothing = [0.0] * len(tree.axis)
+        self.tree, self.q, self.moves = tree, q, qd is not None
+        self.qd, self.tau = qd or nothing, tau or nothing
+
+    @cached_property
+    def bodies(self) -> list[method.Body]:
+        return method.bodies(self.tree, self.q, self.qd if self.moves else None)
+
+    @cached_property
+    def mass_matrix(self) -> list:
+        return method.mass_matrix(self.bodies, self.tree.armature)
+
+    @cached_property
+    def bias(self) -> list:
+        return method.bias(self.bodies, self.tree.gravity)
+
+    @property
+    def gravity_balance(self) -> list:
+        at_rest = [b._replace(omega=ZERO, v_conv=ZERO, w_conv=ZERO) for b in self.bodies]
+        return method.bias(at_rest, self.tree.gravity)
+
+    @property
+    def force(self) -> list:
+        """Qbar."""
+        return method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
+
+    @property
+    def acceleration(self) -> list:
+        return solve(self.mass_matrix, self.force)
+
+    @property
+    def potential_energy(self):
+        return method.potential(self.bodies, self.tree.gravity) + method.spring_energy(self.tree, self.q)
+
+    @property
+    def energy(self):
+        return self.potential_energy + method.kinetic(self.bodies, self.qd, self.tree.armature)
+
+
+class Quantity(NamedTuple):
+    """A quantity of a state."""
+
+    takes: tuple  # of "q", "qd", "tau"
+    shape: tuple  # m bodies, nv speeds
+    unit: str
+    of: Callable  # State -> nested lists of scalars in that shape
+    parts: tuple = ()  # the names of the arrays of which there are several, in that order
+
+
+Q, QD, TAU = ("q",), ("q", "qd"), ("q", "qd", "tau")
+QUANTITIES = {
+    "com_positions": Quantity(Q, ("m", 3), "m", lambda s: [list(b.x) for b in s.bodies]),
+    "angular_velocities": Quantity(QD, ("m", 3), "rad/s", lambda s: [list(b.omega) for b in s.bodies]),
+    "jacobians": Quantity(
+        Q, (2, "m", 3, "nv"), "m/rad; 1",
+        lambda s: [[list(zip(*b.T)) for b in s.bodies], [list(zip(*b.B)) for b in s.bodies]], ("T", "B"),
+    ),
+    "convective_terms": Quantity(
+        QD, (2, "m", 3), "m/s2; rad/s2",
+        lambda s: [[list(b.v_conv) for b in s.bodies], [list(b.w_conv) for b in s.bodies]], ("v_conv", "w_conv"),
+    ),
+    "mass_matrix": Quantity(Q, ("nv", "nv"), "kg m2", lambda s: s.mass_matrix),
+    "bias": Quantity(QD, ("nv",), "N m", lambda s: s.bias),
+    "gravity_balance": Quantity(Q, ("nv",), "N m", lambda s: s.gravity_balance),
+    "spring_torque": Quantity(Q, ("nv",), "N m", lambda s: method.spring_torque(s.tree, s.q)),
+    "acceleration": Quantity(TAU, ("nv",), "rad/s2", lambda s: s.acceleration),
+    "potential_energy": Quantity(Q, (), "J", lambda s: s.potential_energy),
+    "energy": Quantity(QD, (), "J", lambda s: s.energy),
+}  # fmt: skip
+
+
+def shape_of(name: str, tree) -> tuple:
+    """The shape of a quantity of a tree."""
+    sizes = {"m": len(tree.mass), "nv": len(tree.axis)}
+    return tuple(sizes.get(size, size) for size in QUANTITIES[name].shape)
