@@ -25,7 +25,7 @@ from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import in_one_line
 
-COMPUTING = ("compare.experiment", "scipy.optimize", "tmt.kernels")  # modules that take long to load
+COMPUTING = ("compare.experiment", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
 LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a word
 
@@ -87,7 +87,7 @@ class Refused(ValueError):
 def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compute, draw, write; the exit status."""
     started = time.perf_counter()
-    from tmt.cache import cache_folder, size_of_cache
+    from tmt.compiled.store import cache_folder, size_of_cache
 
     from .engines.mujoco import ModelError
     from .fleet.calls import door_opened
@@ -130,7 +130,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference
-                of_run |= {"alone": options.experiment != "all", "asked": asked, "growth": options.growth}
+                of_run |= {"alone": options.experiment != "all", "asked": asked}
                 of_run |= {"door": door}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)

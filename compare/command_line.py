@@ -16,7 +16,7 @@ PROGRAM = "python -m compare"
 FLEET = "fleet"  # the word that is no experiment: it is of many files
 FOLDER = Path(__file__).resolve().parent / "experiments"
 LONGEST_ASKED = 5.0  # s, that can be asked about
-WITH_LISTS = ("diagnosis", "speed")  # which have long lists, that go to other processes
+WITH_LISTS = ("diagnosis",)  # which have long lists, that go to other processes
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
 OF_OWN = tuple(name for name in EXPERIMENTS if name not in NOT_OF_OWN)  # which can serve equations of one's own
 LINE_WIDTH = 80
@@ -41,7 +41,6 @@ EXAMPLES = """examples:
   python -m compare stability --mjcf robot.xml --integrator Euler --dt 0.001
                                               whether that step is stable
   python -m compare speed --scenes my.toml    scenes of your own
-  python -m compare speed --growth            a chain of 1 to 64 joints
   python -m compare speed --help              what one experiment asks and finds
   python -m compare fleet models              every model in a folder, one table
                                               (its options: fleet --help)
@@ -141,16 +140,12 @@ OPTIONS_OF_ALL = {
         "type": not_empty, "metavar": "NAME",
         "help": "stability: the same with this integrator of MuJoCo (default: the file's)",
     }),
-    "--growth": (("speed",), {
-        "action": "store_true",
-        "help": "speed: what a chain costs as it grows to 64 joints, not to 8 as in a whole run for the arm",
-    }),
     "--workers": (WITH_LISTS, {
-        "type": process_count, "metavar": "N", "help": "the made faults of diagnosis, or the chains of --growth, in N processes",
+        "type": process_count, "metavar": "N", "help": "the made faults of diagnosis in N processes",
     }),
     "--dask": (WITH_LISTS, {
         "type": not_empty, "metavar": "ADDRESS",
-        "help": "the same on the Dask cluster of this scheduler; chains by a worker of one thread with the resource timing=1",
+        "help": "the same on the Dask cluster of this scheduler",
     }),
 }  # fmt: skip
 
@@ -250,11 +245,9 @@ def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace)
         whole.error("--joints is for equations of your own (--reference FILE.py:OBJECT or MODULE:OBJECT)")
     if (options.dt, options.integrator) != (None, None) and name != "stability":
         whole.error(f"--dt and --integrator are for stability; {name} answers for no other step")
-    if options.growth and name != "speed":
-        whole.error(f"--growth is for speed; it does not go with {name}")
     given = "--dask" if options.dask else "--workers" if options.workers else None
     if options.dask and options.workers:
         whole.error("--workers is for processes on this machine; a cluster has its own (--dask)")
     of_itself = name == "diagnosis" and not (options.mjcf or options.reference)
-    if given and not (of_itself or options.growth):
-        whole.error(f"{given} is for speed --growth, for diagnosis without --mjcf and --reference, and for fleet")
+    if given and not of_itself:
+        whole.error(f"{given} is for diagnosis without --mjcf and --reference, and for fleet")

@@ -43,7 +43,6 @@ class Setup:
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     faults: bool = False  # diagnosis: of made faults, in place of the robot's own differences
     alone: bool = False  # whether an experiment is asked for by itself, and may take longer than in `all`
-    growth: bool = False  # speed: whether a chain is to grow to the most joints
     # where the calls of a long list go, see fleet.calls.Calls; None: wherever `map` has them made
     door: object | None = None
     asked: tuple[float, str] | None = None  # stability: a step, s, and an integrator of MuJoCo that are asked about

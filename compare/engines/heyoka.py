@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from tmt import Tree, kernels
+from tmt import Tree
+from tmt.compiled import evaluator
 from tmt.equations import composite
 from tmt.equations.method import acceleration
 from tmt.equations.vectors import arctan, cos, sin, sqrt
@@ -41,7 +42,7 @@ class Heyoka:
         many = f"with {len(tree.axis)} speeds its compilation would take minutes"
         if len(tree.axis) > MOST_JOINTS:
             return many
-        count = kernels.slope_source(tree, "rk4").operations
+        count = evaluator(tree, "acceleration").operations
         return None if count <= MOST_OPERATIONS else f"{many}: its equations have {count} operations"
 
     def of(self, case: Case) -> "HeyokaDynamics":

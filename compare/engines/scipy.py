@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tmt import kernels
+from tmt.compiled import evaluator
 
 from ..case import Case, Coordinates
 from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
@@ -46,18 +46,29 @@ class ScipyDynamics(TmtDynamics):
         return self.evaluated("mass_matrix_and_bias", n * (n + 3) // 2, q, v)[..., -n:]
 
     def acceleration(self, q, v, tau) -> np.ndarray:
-        return self.evaluated("forward_dynamics", self.coordinates.nv, q, v, tau)
+        return self.evaluated("acceleration", self.coordinates.nv, q, v, tau)
 
     def rate(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """rate(y, tau): dy/dt of y = (q, v), (nq + nv,)."""
-        return kernels.evaluator(self.tree, "forward_dynamics").rate
+        acceleration, tree, nq = evaluator(self.tree, "acceleration").of_one, self.tree, self.coordinates.nq
+        flat = not tree.coordinates.balls
+
+        def rate(y, tau):
+            q, v = y[:nq], y[nq:]
+            # between its steps a solver lets quaternions drift
+            a = acceleration(q if flat else of_length_1(self.coordinates, q[None])[0], v, tau)
+            if a is None:  # whatever is wrong there
+                a = np.full(len(v), np.nan)
+            return np.concatenate((v if flat else tree.coordinates.component_rates(q, v), a))
+
+        return rate
 
     def evaluated(self, quantity, size, q, v=None, tau=None) -> np.ndarray:
         """A compiled quantity of so many numbers at each state, (..., size)."""
         none = np.zeros(self.coordinates.nv)
         batch, states = rows_of_states(q, none if v is None else v, none if tau is None else tau)
         result = np.empty((len(states[0]), size))
-        kernels.evaluator(self.tree, quantity).each(*states, result)
+        evaluator(self.tree, quantity).each(*states, result)
         return result.reshape(*batch, size)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
@@ -99,8 +110,6 @@ class ScipyDynamics(TmtDynamics):
                 found, evaluations = solution.y.T, int(solution.nfev)
                 why = why if solution.success else solution.message
             path, ended = as_far_as_it_goes(t, found, start, why)
-            for ball in self.coordinates.places.balls:
-                path[:, ball.q] /= np.linalg.norm(path[:, ball.q], axis=1, keepdims=True)
             q, v = np.split(path, [self.coordinates.nq], axis=1)
             return Motion(t, of_length_1(self.coordinates, q), v, evaluations, ended)
 

@@ -6,7 +6,8 @@ from functools import partial
 import numpy as np
 
 import tmt
-from tmt import answers, kernels, literal
+from tmt import literal
+from tmt.compiled import runner
 from tmt.methods import method_named
 from tmt.simulation import reasons
 
@@ -84,9 +85,7 @@ class TmtDynamics:
         return literal.energy(q, v, self.tree)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        # the same code in every process, but for controllers, of which a robot may have many
-        form = None if self.tree.has_gains else form_of(self.tree, method)
-        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance, form=form)
+        motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
         return Motion(*motion, motion.evaluations, motion.ended, None if method_named(method).adaptive else steps)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
@@ -100,7 +99,7 @@ class TmtDynamics:
         paths[0][0, 0], paths[1][0, 0] = q, v
         codes = np.zeros((1, 2), int)
         tolerance = () if setting.tolerance is None else (setting.tolerance,)
-        run = partial(kernels.stepper(self.tree, method), *paths, np.array(tau, float)[None], dt, *tolerance, codes)
+        run = partial(runner(self.tree, method), *paths, np.array(tau, float)[None], dt, *tolerance, codes)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(evaluations):
@@ -111,17 +110,12 @@ class TmtDynamics:
         return run, read
 
 
-def form_of(tree: tmt.Tree, method: str) -> str:
-    """The compiled code that follows runs of a Tree here, one of tmt.simulate's forms."""
-    return "straight_line" if kernels.is_traced(tree, method_named(method)) else "loop"
-
-
 class Compiled:
-    """A Tree's quantities as who calls tmt gets them once the compiled loops answer; they are got here if they are not there."""
+    """A Tree's quantities by tmt's functions once machine code answers."""
 
     def __init__(self, tree: tmt.Tree):
+        tmt.prepare(tree)
         self.tree = tree
-        answers.remembered(tree).get_loops()
 
     def __getattr__(self, quantity: str) -> Callable:
         return partial(getattr(tmt, quantity), model=self.tree)

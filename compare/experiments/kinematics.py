@@ -28,9 +28,6 @@ from functools import partial
 
 import numpy as np
 
-import tmt
-from tmt.cache import is_kept
-
 from ..engines import LABELS
 from ..engines.mujoco.accelerations import convective_accelerations
 from ..engines.tmt import Compiled
@@ -98,12 +95,6 @@ def origin_in_words(robot: Robot) -> str:
     return next((name for name, point in landmarks.items() if not np.any(point)), "origin")
 
 
-def begin(setup: Setup) -> None:
-    """Compile the loops beside other work, if that is still to be done: they lie in the cache folder then."""
-    if not setup.robot.own and not is_kept("loop_answers.many-*"):
-        setup.background["loops"] = setup.map(tmt.prepare, [setup.robot.tree])
-
-
 def rows(setup: Setup) -> Result:
     """Six quantities, or those that a user's own equations give, at the named postures and at random states."""
     result, tree = Result("kinematics", label=LABELS[setup.robot.compared[0]]), setup.robot.tree
@@ -128,7 +119,6 @@ def rows(setup: Setup) -> Result:
                 result.notes.append(wrong)
             found["v_conv"], found["w_conv"] = zip(*convective)
         if sample is setup.random and not setup.robot.own:
-            list(setup.background.pop("loops", ()))  # until they are there
             compiled = Compiled(tree)
             values = compiled.com_positions(q), compiled.angular_velocities(q, qd), *compiled.jacobians(q)
             faster = dict(zip(OF_COMPILED, (*values, *compiled.convective_terms(q, qd))))

@@ -6,7 +6,7 @@ from functools import cache
 from ..process.crash import ROOT
 from ..version import installed
 
-COMPUTE_WITH = ("mujoco", "numpy", "scipy", "numba", "mpmath")  # whose versions may change what is found
+COMPUTE_WITH = ("mujoco", "numpy", "scipy", "llvmlite", "mpmath")  # whose versions may change what is found
 
 
 @cache

@@ -12,7 +12,7 @@ from ..process.clock import Clock
 from ..process.streams import readable
 from ..version import OURS, installed, own_version
 
-PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "numba", "mpmath", "rich", "heyoka")
+PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
 PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # what beside them has changed is no other program
 
 

@@ -87,9 +87,6 @@ class Robot:
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     conditioning: Conditioning | None = None
-    aims: Mapping[tuple[str, float], float] = field(
-        default_factory=dict
-    )  # (scene, rad): MuJoCo's time over tmt's, aimed at
     questions: tuple[Question, ...] = ()
     remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
     # what a file has and how it is treated, see engines.mujoco.inventory; then the numbers are those that MuJoCo compiled

@@ -66,11 +66,6 @@ CLAIMS = Claims(
     },
     figures={"ball catch, held": 2, "bent, held": 3},
 )
-AIMS = {
-    ("zero, free", 1e-6): 50, ("zero, free", 1e-9): 200, ("zero, free", 1e-12): 500,
-    ("bent, free", 1e-6): 50, ("bent, free", 1e-9): 200, ("bent, free", 1e-12): 500,
-    ("ball catch, free", 1e-6): 50, ("ball catch, free", 1e-9): 200,
-}  # fmt: skip
 
 
 def landmarks(q: np.ndarray) -> dict:
@@ -131,7 +126,6 @@ ARM = Robot(
     printed=PRINTED,
     claims=CLAIMS,
     conditioning=Conditioning(("beta", "gamma"), (90.0, 90.0)),
-    aims=AIMS,
     questions=QUESTIONS,
     remarks=remarks,
 )

@@ -1,6 +1,6 @@
 """MuJoCo's own functions called from a compiled loop, for timing: no Python between two calls.
 
-The C library that the Python package brings is called through its function pointers from a loop that numba compiles.
+The C library that the Python package brings is called by its functions' addresses from a few lines of LLVM's text.
 """
 
 import ctypes
@@ -10,7 +10,8 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numba import njit
+
+from tmt.compiled import Library
 
 from .. import rows_of_states
 from .dynamics import MujocoDynamics
@@ -89,24 +90,24 @@ class MinimalCalls:
         """
         self.place(q, v, tau)
         mujoco.mj_forward(self.model, self.data)
-        call = self.functions
-        force, solution = self.force.ctypes.data, self.solution.ctypes.data
+        arrays = self.force.ctypes.data, self.solution.ctypes.data
 
-        def run(loop, *arguments):
+        def run(*names):
+            loop = repeated(library(), names)
             # what the addresses point to must live as long as the call
-            return lambda count, _=self: loop(*arguments, count)
+            return lambda count, _=self: loop(*self.addresses, *arrays, count)
 
         def called(count):
             for _ in range(count):
                 mujoco.mj_forward(self.model, self.data)
 
-        terms, dynamics = equal_work(library())
+        terms = (*BEFORE_RNE, "mj_rne")
         return {
             "MuJoCo, mj_forward called from Python": ("forward_dynamics", called),
-            "MuJoCo, mj_forward": ("forward_dynamics", run(repeated, call["mj_forward"], *self.addresses)),
-            "MuJoCo, equal work": ("forward_dynamics", run(dynamics, *self.addresses, force, solution)),
-            "MuJoCo, equal work, no solve": ("mass_matrix_and_bias", run(terms, *self.addresses, force)),
-            "MuJoCo, mj_step": ("rk4_step", run(repeated, call["mj_step"], *self.addresses)),
+            "MuJoCo, mj_forward": ("forward_dynamics", run("mj_forward")),
+            "MuJoCo, equal work": ("forward_dynamics", run(*terms[:3], "mj_factorM", *terms[3:], "mj_solveM")),
+            "MuJoCo, equal work, no solve": ("mass_matrix_and_bias", run(*terms)),
+            "MuJoCo, mj_step": ("rk4_step", run("mj_step")),
         }
 
     @property
@@ -147,37 +148,29 @@ def functions(lib: ctypes.CDLL) -> dict[str, Callable]:
     return found
 
 
-@njit
-def repeated(function, model, data, count):
-    for _ in range(count):
-        function(model, data)
-
-
 @cache
-def equal_work(lib: ctypes.CDLL) -> tuple[Callable, Callable]:
-    """Compiled loops over a library's functions, of any model: mass matrix and bias; and the acceleration from them."""
-    call = functions(lib)
-    kinematics, com, inertia, velocities = (call[name] for name in BEFORE_RNE)
-    factor, rne, solve = call["mj_factorM"], call["mj_rne"], call["mj_solveM"]
-
-    @njit
-    def terms(m, d, bias, count):
-        for _ in range(count):
-            kinematics(m, d)
-            com(m, d)
-            inertia(m, d)
-            velocities(m, d)
-            rne(m, d, 0, bias)
-
-    @njit
-    def dynamics(m, d, bias, acceleration, count):
-        for _ in range(count):
-            kinematics(m, d)
-            com(m, d)
-            inertia(m, d)
-            factor(m, d)
-            velocities(m, d)
-            rne(m, d, 0, bias)
-            solve(m, d, acceleration, bias, 1)
-
-    return terms, dynamics
+def repeated(lib: ctypes.CDLL, names: tuple[str, ...]) -> Callable:
+    """run(model, data, bias, acceleration, count): functions of the library one after the other, so many times."""
+    more = {"mj_rne": ", i32 0, ptr %bias", "mj_solveM": ", ptr %acceleration, ptr %bias, i32 1"}
+    calls = []
+    for k, name in enumerate(names):
+        address = ctypes.cast(functions(lib)[name], ctypes.c_void_p).value
+        calls.append(f"  %f{k} = inttoptr i64 {address} to ptr")
+        calls.append(f"  call void %f{k}(ptr %model, ptr %data{more.get(name, '')})")
+    lines = "\n".join(calls)
+    text = f"""define void @run(ptr %model, ptr %data, ptr %bias, ptr %acceleration, i64 %count) {{
+entry:
+  br label %head
+head:
+  %i = phi i64 [0, %entry], [%next, %body]
+  %more = icmp slt i64 %i, %count
+  br i1 %more, label %body, label %done
+body:
+{lines}
+  %next = add i64 %i, 1
+  br label %head
+done:
+  ret void
+}}
+"""
+    return Library(text).function("run", None, *[ctypes.c_void_p] * 4, ctypes.c_int64)

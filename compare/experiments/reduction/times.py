@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import tmt
-from tmt.kernels import slope_source
+from tmt.compiled import evaluator
 
 from ...case import Case
 from ...engines import Engine, Setting, same_scheme
@@ -60,7 +60,7 @@ def time_rows(
         for engine, steps in TIMED_STEPS.items():
             for integrator in TWO_INTEGRATORS:
                 taken = seconds.get((name, joints, engine, integrator))
-                count = operations(case.tree, scheme_of(setup.engines, integrator)) if case else 0
+                count = operations(case.tree) if case else 0
                 rows.append(
                     {
                         "scene": name,
@@ -78,6 +78,6 @@ def time_rows(
 
 
 @lru_cache
-def operations(tree: tmt.Tree, method: str = "rk4") -> int | None:
-    """Operations of one evaluation of the accelerations in straight-line code of a tree and a method; None: of many joints."""
-    return slope_source(tree, method)[1] if len(tree.axis) <= MOST_TRACED else None
+def operations(tree: tmt.Tree) -> int | None:
+    """Operations of one evaluation of the accelerations in straight-line code of a tree; None: of many joints."""
+    return evaluator(tree, "acceleration").operations if len(tree.axis) <= MOST_TRACED else None

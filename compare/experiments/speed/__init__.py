@@ -14,28 +14,19 @@ much the compiled code.
 Then what one evaluation of the forward dynamics costs: mj_forward, the calls of
 MuJoCo that do the same work, tmt's compiled code for independent states, for
 states where each waits for the last, and for many side by side; heyoka's and
-Pinocchio's where they are installed; and how near that is to what the processor
-can multiply and add. Timed are compiled loops: a call of tmt.simulate from
-Python adds some microseconds. Aims that were set beforehand stand in
-speed_targets.csv, the missed ones too.
-
-How cost grows with the joints: a chain of hinges, none along a coordinate axis,
-of 1 to 8 joints in a whole run for the arm, and to 64 with --growth:
-straight-line code, loops over any tree, side by side, MuJoCo's calls. With
---dask ADDRESS, or --workers N, each number of joints is timed by a worker that
-does nothing else meanwhile, and the notes say on which machine.
+Pinocchio's where they are installed. Timed are compiled loops: a call of
+tmt.simulate from Python adds some microseconds.
 
 A robot with servos answers to a step of their targets: which integrator and
 step come to 1e-3 rad (not with --quick).
 
 Tables: speed.csv (each run), what_should_i_use.csv (the cheapest setting for
 each error, of MuJoCo, of tmt, of all), speed_orders.csv (measured orders),
-evaluations.csv (what one evaluation costs), speed_targets.csv (the aims),
-growth.csv (the chain).
+evaluations.csv (what one evaluation costs).
 
 Figures: speed_SCENE (time against error), speed_evaluations (evaluations
 against error), speed_energy (drift of energy against time),
-speed_evaluation_cost, speed_growth.
+speed_evaluation_cost.
 
 Tolerance: times make no checks. Checked is that each method has its order, that
 MuJoCo and the same scheme in tmt make the same error but for rounding, and that
@@ -43,7 +34,6 @@ errors which have stopped falling are of the size of rounding.
 
 Examples:
     python -m compare speed
-    python -m compare speed --growth
     python -m compare speed --scenes my.toml
     python -m compare speed --mjcf robot.xml --quick
 """
@@ -52,7 +42,6 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 
 from ...engines import COMPARED, GRID
-from ...judge import timing
 from ...judge.check import Result
 from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import FACTOR
@@ -61,9 +50,8 @@ from ...judge.words import scene_begins
 from ...robots import Robot
 from ...setup import Setup
 from ...truth.reference import has_no_reference
-from . import accuracy, advice, evaluations, growth, growth_elsewhere, targets, tumbling
+from . import accuracy, advice, evaluations, tumbling
 from .accuracy import reference_in_words
-from .affordable import forms_in_words
 from .runs import measured
 from .settings import (
     absent_in_words,
@@ -156,8 +144,6 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.notes += accuracy.true_errors_in_words(result.rows, steps, setup.robot)
     result.notes += accuracy.references_in_words(known, floors)
     result.notes += accuracy.floors_in_words(result.rows, floors)
-    followed = forms_in_words(cases, [method.name for method in taking if method.engine == "tmt"])
-    result.notes += [followed] * bool(followed)
     if timed:
         add_times(result, setup, of_scenes)
     result.notes += accuracy.first_order_in_words(result.rows, floors)
@@ -173,8 +159,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
 
 
 def add_times(result: Result, setup: Setup, of_scenes: Mapping[str, list[dict]]) -> None:
-    """The seconds of all rows, what one evaluation costs, and what follows: what to use, and which aims are met."""
-    chains, ways = growth.chains_of(setup), evaluations.made_ways(setup)
+    """The seconds of all rows, what one evaluation costs, and what follows: what to use."""
+    ways = evaluations.made_ways(setup)
     runs = [prepared(of_scene, setup) for of_scene in of_scenes.values()]
     setup.quiet()  # nothing else may run beside a timing
     spread = []
@@ -188,20 +174,13 @@ def add_times(result: Result, setup: Setup, of_scenes: Mapping[str, list[dict]])
     setup.progress("speed: one evaluation")
     result.tables["evaluations"], sentences = evaluations.costs(setup, ways)
     result.notes += [*sentences, *spread_in_words(spread), PARTS]
-    if setup.growth and setup.door:
-        growth_elsewhere.add_growth_elsewhere(result, setup)
-    growth.add_growth(result, chains, setup.progress)
-    if not setup.robot.is_read:  # of a file nothing was aimed at
-        aims = targets.targets(result, floors, timing.vectors(), setup.robot.aims)
-        result.tables["speed_targets"] = aims
-        result.notes += targets.aims_in_words(aims)
     result.notes += accuracy.smaller_models_in_words(result.rows)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     """Error against time, against evaluations, energy against time: calls that draw one figure each."""
     # matplotlib is for the process that draws
-    from . import figures_evaluations, figures_growth, figures_panels, figures_times
+    from . import figures_evaluations, figures_panels, figures_times
 
     if "what_should_i_use" not in result.tables:  # nothing was timed
         return
@@ -210,5 +189,3 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     yield partial(figures_panels.draw_evaluations, result)
     yield partial(figures_panels.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)
-    if "growth" in result.tables:
-        yield partial(figures_growth.draw_chain, result)

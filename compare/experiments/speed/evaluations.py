@@ -1,4 +1,4 @@
-"""What one evaluation of the dynamics costs: MuJoCo three ways, tmt from plain Python to lanes in two threads, and others."""
+"""What one evaluation of the dynamics costs: MuJoCo's calls, tmt from Python to several states side by side, and others."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import kernels
+from tmt.compiled import evaluator, runner
+from tmt.equations import method
 
-from ...case import SEED, Case
+from ...case import SEED, Case, Coordinates
 from ...judge import timing
 from ...setup import Setup
-from . import operations, processor
-from .affordable import left_out_in_words, lengths, most_states, states_of
 from .peers import FEWER, Peers, peers_in_words
 from .settings import coarsest_steps, regular_of
 from .ways import (
@@ -22,9 +21,10 @@ from .ways import (
     EACH,
     FORWARD,
     IN_LANES,
-    LOOP,
-    LOOP_IN_LANES,
+    IN_PYTHON,
     MOST_CALLS,
+    MOST_RESULTS,
+    NAMES,
     RK4_STEP,
     WAITING,
     of_many_states,
@@ -34,8 +34,9 @@ from .ways import (
 STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that are evaluated at least, before the turn of the next
 TAKEN = 1e-3  # s: a call that is timed does the same often enough to take so long
-COLUMNS_OF_COSTS = ("quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
-                    "share_of_peak", "why_not")  # fmt: skip
+COLUMNS_OF_COSTS = (
+    "quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns", "why_not",
+)  # fmt: skip
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
 WHOLE_CALLED = "MuJoCo, mj_forward called from Python"
 
@@ -52,7 +53,7 @@ class Ways(NamedTuple):
 
 def made_ways(setup: Setup) -> Ways:
     """All that is compiled for `costs`."""
-    from ...engines.mujoco.calls import MinimalCalls  # here, for numba takes its time
+    from ...engines.mujoco.calls import MinimalCalls  # here, for MuJoCo takes its time
 
     rng = np.random.default_rng([SEED, 2])
     tree = setup.robot.tree
@@ -82,27 +83,41 @@ def costs(setup: Setup, made: Ways) -> tuple[list[dict], list[str]]:
     """The rows of evaluations.csv, and sentences about them."""
     repeated, of_many, pool, peers, missing = made
     tree, calls = setup.robot.tree, {key: counted(loop) for key, loop in repeated.items()}
-    for name, side_by_side, loop in processor.peaks():
-        run, count = counted(loop)
-        calls[processor.PEAK, name, side_by_side, 1] = run, count * side_by_side
     calls |= of_many
     with pool:
         taken = timing.in_turns([run for run, _ in calls.values()], rounds=setup.of(12, 5, 2))
     nanoseconds = per_state({key: count for key, (_, count) in calls.items()}, taken)
     overhead = simulate_overhead(regular_of(setup.robot))
     words = costs_in_words(nanoseconds, overhead, lengths(tree), setup.robot.name, missing)
-    known = known_operations(tree)
-    words += processor.near_in_words(nanoseconds, known, operations.OF_SINE)
-    lanes = in_lanes_of(nanoseconds) or in_lanes_of(nanoseconds, LOOP_IN_LANES)
-    words += peers_in_words(nanoseconds, lanes, peers) if peers else []
-    return evaluation_rows(nanoseconds, known, peers.absent if peers else {}), words + left_out_in_words(tree)
+    words += peers_in_words(nanoseconds, in_lanes_of(nanoseconds), peers) if peers else []
+    return evaluation_rows(nanoseconds, known_operations(tree), peers.absent if peers else {}), words
 
 
 def known_operations(tree: tmt.Tree) -> dict[tuple[str, str], int]:
-    """Floating-point operations of one state, {(quantity, implementation): so many}, where they are counted."""
-    found = operations.operations_of(tree)
-    ways = {"straight_line": (IN_LANES, EACH, WAITING), "loop": (LOOP_IN_LANES, LOOP)}
-    return {(FORWARD, name): found[form] for form, names in ways.items() if form in found for name in names}
+    """Operations of one state, {(quantity, implementation): so many}, of compiled code."""
+    found = {quantity: evaluator(tree, name).operations for quantity, name in NAMES.items()}
+    return {(quantity, name): found[quantity] for quantity in found for name in (IN_LANES, EACH, WAITING)}
+
+
+def lengths(tree: tmt.Tree) -> tuple[int, int] | None:
+    """The operations of an acceleration in the literal form and in the one that is compiled; None of many speeds."""
+    if len(tree.axis) > IN_PYTHON:
+        return None
+    literal = evaluator(tree, "acceleration", method.mass_matrix_and_bias)
+    return literal.operations, evaluator(tree, "acceleration").operations
+
+
+def states_of(coordinates: Coordinates, rng: np.random.Generator, count: int) -> list[np.ndarray]:
+    """Random positions (count, nq), speeds and torques (count, nv)."""
+    if set(coordinates.all_kinds) == {"hinge"}:
+        return list(rng.uniform(-3.0, 3.0, (3, count, coordinates.nv)))
+    return [coordinates.random(rng, count), *rng.uniform(-3.0, 3.0, (2, count, coordinates.nv))]
+
+
+def most_states(tree: tmt.Tree) -> int:
+    """How many states are evaluated at once at most, a power of ten."""
+    n = len(tree.axis)
+    return int(10.0 ** np.floor(np.log10(MOST_RESULTS / (n * (n + 3) // 2))))
 
 
 def in_lanes_of(ns: Mapping[tuple, float], name: str = IN_LANES) -> dict[int, float]:
@@ -122,12 +137,11 @@ def evaluation_rows(
 
     operations: of one state, absent: why it does not, by quantity and implementation.
     """
-    peak, rows = max(processor.rates(ns).values(), default=None), []
+    rows = []
     for key, value in sorted(ns.items(), key=lambda item: (item[0][0], -item[1])):
-        count = 2 if key[0] == processor.PEAK else operations.get(key[:2])
-        rate = count / value if count else None
-        rows.append((*key, value, count, rate, rate / peak if rate and peak else None, None))
-    rows += [(*key, *[None] * 6, why) for key, why in absent.items()]
+        count = operations.get(key[:2])
+        rows.append((*key, value, count, count / value if count else None, None))
+    rows += [(*key, *[None] * 5, why) for key, why in absent.items()]
     return [dict(zip(COLUMNS_OF_COSTS, row)) for row in rows]
 
 
@@ -151,7 +165,7 @@ def simulate_overhead(case: Case) -> tuple[float, float, int]:
     dt, paths = case.duration / steps, [np.zeros((1, steps + 1, len(part))) for part in case.start]
     for path, part in zip(paths, case.start):
         path[0, 0] = part
-    run = kernels.stepper(case.tree, "rk4")
+    run = runner(case.tree, "rk4")
     calls = {
         "call": lambda: tmt.simulate(*case.start, case.tau, dt, steps, model=case.tree),
         "loop": lambda: run(*paths, case.tau[None], dt),
@@ -169,12 +183,12 @@ def lanes_in_words(by_states: dict[int, float]) -> str:
 
 
 def costs_in_words(
-    ns: dict, overhead: tuple, operations: list | None, name: str, missing: str | None = None
+    ns: dict, overhead: tuple, operations: tuple | None, name: str, missing: str | None = None
 ) -> list[str]:
     """The ratios in words.
 
-    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal and composite form, or None;
-    name: of the robot; missing: why MuJoCo's calls were not timed, or None.
+    overhead: seconds of tmt.simulate and of its loop, and their steps; operations: of the literal form and of the compiled one,
+    or None; name: of the robot; missing: why MuJoCo's calls were not timed, or None.
     """
     sentences = [f"Processor: {timing.vectors()}."]
     lanes = in_lanes_of(ns)
@@ -192,8 +206,8 @@ def costs_in_words(
         return sentences
     literal, composite = operations
     sentences.append(
-        f"Straight-line code of the literal method has {literal} operations, that of the composite form {composite}; the kernel "
-        f"is made for this one {name}, MuJoCo for any model."
+        f"The literal method has {literal} operations, the form that is compiled {composite}; that code is made for this one "
+        f"{name}, MuJoCo for any model."
     )
     return sentences
 
@@ -218,23 +232,16 @@ def beside_mujoco_in_words(ns: dict, lanes: dict[int, float], name: str) -> list
     whole, equal, step = (ns[key, way, 1, 1] for key, way in ((FORWARD, WHOLE), (FORWARD, EQUAL), (RK4_STEP, MJ_STEP)))
     start = f"Forward dynamics of the {name}: mj_forward takes {whole:.0f} ns, "
     start += f"MuJoCo's calls that do the same work {equal:.0f} ns, "
-    if not lanes:
-        loop, kernel = ns[FORWARD, LOOP, 1, 1], ns[RK4_STEP, LOOP, 1, 1]
-        return [
-            f"{start}tmt's compiled loop over any tree {loop:.0f} ns ({less(whole, loop)}; than the same work "
-            f"{less(equal, loop)}).",
-            f"A step of RK4: mj_step {step:.0f} ns, the loop {kernel:.0f} ns ({less(step, kernel)}).",
-        ]
     best = min(lanes, key=lanes.get)
     one, apart = ns[FORWARD, WAITING, 1, 1], ns[FORWARD, EACH, 1000, 1]
     kernel = ns[RK4_STEP, EACH, 1, 1]
-    of_steps = {states: ns[RK4_STEP, IN_LANES, states, 1] for states in lanes if (RK4_STEP, IN_LANES, states, 1) in ns}
-    in_lanes = f", in lanes {lanes_in_words(of_steps)} ns a run" if of_steps else ""
+    of_steps = {key[2]: value for key, value in ns.items() if key[:2] == (RK4_STEP, IN_LANES)}
+    in_lanes = f", side by side on all cores {lanes_in_words(of_steps)} ns a run" if of_steps else ""
     return [
-        f"{start}the kernel {one:.1f} ns where each evaluation waits for the last ({less(whole, one)}; than the "
+        f"{start}tmt's compiled code {one:.1f} ns where each evaluation waits for the last ({less(whole, one)}; than the "
         f"same work {less(equal, one)}), {apart:.1f} ns where they are independent ({less(whole, apart)}; "
-        f"{less(equal, apart)}), in lanes {lanes_in_words(lanes)} ns a state ({less(whole, lanes[best])}).",
-        f"A step of RK4: mj_step {step:.0f} ns, the kernel {kernel:.0f} ns ({less(step, kernel)}){in_lanes}.",
+        f"{less(equal, apart)}), side by side {lanes_in_words(lanes)} ns a state ({less(whole, lanes[best])}).",
+        f"A step of RK4: mj_step {step:.0f} ns, tmt {kernel:.0f} ns ({less(step, kernel)}){in_lanes}.",
     ]
 
 

@@ -3,8 +3,6 @@
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from tmt.source import LANES
-
 from ...judge.check import Result
 from ...report.style import BLUE, GREY, ORANGE, WIDTH
 from .evaluations import FORWARD, WHOLE
@@ -46,7 +44,7 @@ def draw_cost(result: Result, name: str) -> tuple[str, Figure, str]:
     caption += f" MuJoCo's mj_forward takes {spelled(whole)} ns." if whole else ""
     caption += " Blue is tmt, orange MuJoCo, grey are others."
     if EACH in {r["implementation"] for r in rows}:
-        caption += f" The kernel is code made for this one {name}, the lanes are {LANES} states of it side by side."
+        caption += f" tmt's compiled code is made for this one {name}."
     return "speed_evaluation_cost", fig, caption
 
 

@@ -1,10 +1,11 @@
-"""Others beside kernels and lanes, each where it is installed: heyoka's compiled function, Pinocchio's aba, MuJoCo's batches."""
+"""Others beside tmt, each where it is installed: heyoka's compiled function, Pinocchio's aba, MuJoCo's batches."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from tmt import kernels, literal
+from tmt import literal
+from tmt.compiled import evaluator
 
 from ...engines.heyoka import Heyoka, compiled_accelerations
 from ...engines.pinocchio import PinocchioCalls
@@ -67,7 +68,7 @@ class Peers:
             for name, fastest in ((COMPILED, False), (COMPILED_FAST, True)):
                 function = compiled_accelerations(self.tree, fastest)
                 runs[FORWARD, name, out.shape[1], 1] = lambda function=function: function(given, outputs=out)
-            lanes, found = kernels.evaluator(self.tree, FORWARD).lanes, np.empty(out.shape)
+            lanes, found = evaluator(self.tree, "acceleration").lanes, np.empty(out.shape)
             runs[FORWARD, IN_LANES, out.shape[1], 1] = lambda: lanes(*wide, found)
         if self.pinocchio and (run := self.pinocchio.aba_of_many(*some)):
             runs[FORWARD, ABA_OF_MANY, len(some[0]), 1] = run
@@ -118,9 +119,7 @@ def peers_in_words(ns: Mapping[tuple, float], lanes: Mapping[int, float], peers:
             )
             if (value := ns.get((FORWARD, name, count, threads)))
         ]
-        found.append(
-            f"Of {count:,} states in one call each takes: tmt's lanes {lanes[count]:.1f} ns; {', '.join(parts)}."
-        )
+        found.append(f"Of {count:,} states in one call each takes: tmt {lanes[count]:.1f} ns; {', '.join(parts)}.")
     return found + [f"{why}." for why in peers.absent.values()]
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from tmt import Tree, kernels
+from tmt import Tree
 from tmt.methods import method_named
 
 from ...case import Case
@@ -22,7 +22,7 @@ FEW_SETTINGS, FEW_OTHERS = (
 )  # settings of a run that is not full: the coarsest; of further engines
 NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
 # of the robot of a file, whose number of joints has no bound: seconds of one evaluation are about a constant times nv^1.5
-IN_LOOPS, TRACED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: of tmt's compiled loops, of its straight-line code, of MuJoCo
+CALLED, COMPILED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: called from Python, of tmt's compiled code, of MuJoCo
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of any method, whatever they take
@@ -133,14 +133,13 @@ def estimated(method: Method, tree: Tree) -> float:
     if method.engine == "mujoco":
         return IN_MUJOCO * n**1.5 * (4 if method.name == "RK4" else 1)
     if method.engine != "tmt":
-        return IN_LOOPS * n**1.5
+        return CALLED * n**1.5
     stepping = method_named(method.name)
-    straight = kernels.is_evaluated_straight(tree) and not stepping.solves_stages
-    evaluation = (TRACED if straight else IN_LOOPS) * n**1.5
+    evaluation = COMPILED * n**1.5
     if method.adaptive:
         return evaluation
     if stepping.solves_stages:
-        return evaluation * stepping.stages * 2 * n * ITERATIONS
+        return evaluation * stepping.stages**2 * n * ITERATIONS
     return evaluation * stepping.stages * (n if getattr(stepping, "implicit_bias", False) else 1)
 
 
