@@ -126,7 +126,6 @@ def jobs(folder) -> list[tuple]:
     """All of these and some of test modules, which are collected by now, in the order in which the tests ask for them."""
     from test_reduction import leg
     from test_seeded_errors import IN_THE_MJCF, failing_in
-    from test_speed_growth import by_command
     from test_speed_run import with_and_without
     from test_stability_small import SPARE, lacking
     from test_trajectory_other_models import MODELS, said_of
@@ -134,7 +133,6 @@ def jobs(folder) -> list[tuple]:
     return [
         (of_arm, "reduction"),
         (leg,),
-        (by_command, folder / "grown"),
         (with_and_without,),
         (of_arm, "stability"),
         (on_the_moon, "stability"),

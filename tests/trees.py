@@ -1,5 +1,7 @@
 """Random trees and their MJCF, so that the method is tested on more than one arm."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tmt import Tree
@@ -76,6 +78,21 @@ def tree_of_kinds(rng, bodies=4, along_axes=False, kinds=("hinge", "slide", "bal
     )
 
 
+def small_tree() -> Tree:
+    """A hinge and a ball on a slide, with springs, damping and a controller."""
+    rng = np.random.default_rng(48)
+    tree = tree_of_kinds(rng, bodies=3, kinds=("hinge", "slide", "ball"))
+    flat = [kind != "ball" for kind, _, by in tree.coordinates.joints for _ in range(by.start, by.stop)]
+    gains = (np.eye(len(flat)) + 0.2 * rng.normal(size=(2, len(flat), len(flat)))) * np.outer(flat, flat)
+    return replace(tree, stiffness=(1.0, 2.0, 3.0), position_gain=gains[0], speed_gain=gains[1])
+
+
+def large_tree() -> Tree:
+    """20 speeds, with every kind of joint, on a free body without springs."""
+    tree = tree_of_kinds(np.random.default_rng(16), bodies=6)
+    return replace(tree, stiffness=[0.0] * 4 + list(tree.stiffness[4:]))
+
+
 def possible_tensor(rng) -> np.ndarray:
     """A tensor that a body can have: that of six point masses."""
     return sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in rng.uniform(-0.1, 0.1, (6, 3)))
@@ -112,6 +129,11 @@ def random_state(rng, tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         )
     ]
     return np.array(q), *rng.uniform(-3.0, 3.0, (2, len(tree.axis)))
+
+
+def random_states(rng, tree, count) -> list[np.ndarray]:
+    """Rows of q (count, nq), qd and tau (count, nv)."""
+    return [np.array(rows) for rows in zip(*(random_state(rng, tree) for _ in range(count)))]
 
 
 def mjcf(tree) -> str:

@@ -3,7 +3,7 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from compare.robots.chain import chain
+from .chain import chain
 
 from .seeded import KINDS, random_tree
 

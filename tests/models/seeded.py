@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from compare.robots.chain import add_element, empty_model, mjcf_of, oblique_axis, turned_body
+from .chain import add_element, empty_model, mjcf_of, oblique_axis, turned_body
 
 KINDS = ("hinge", "slide", "ball", "free")
 

@@ -21,7 +21,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import cache_from_source
 from pathlib import Path
 
-from tmt.cache import cache_folder
+from tmt.compiled.store import cache_folder
 
 # what tests need besides the program: without it, or with other versions, they fail and have noticed nothing
 OF_TESTS = ("pytest", "hypothesis", "sympy", "gymnasium")

@@ -96,6 +96,6 @@ def test_a_run_is_of_the_scheme_in_both_engines(engines):
     case, setup = ARM.case("short", posture="bent", duration=0.25, dt=1 / 64), experiment.Setup.small(ARM, engines)
     for integrator, scheme in (("Euler", "semi_implicit_euler"), ("RK4", "rk4")):
         paths = needs.states_of_run(case, setup, integrator)
-        path = tmt.simulate(*case.start, case.tau, 1 / 1024, 256, scheme, form="straight_line")
+        path = tmt.simulate(*case.start, case.tau, 1 / 1024, 256, scheme)
         assert np.array_equal(paths["tmt"], np.concatenate([path.q, path.qd], axis=1))
         assert np.abs(paths["mujoco"] - paths["tmt"]).max() < 1e-12

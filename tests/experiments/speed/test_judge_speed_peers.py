@@ -1,4 +1,4 @@
-"""Others beside kernels and lanes: timed where they take part, else a reason."""
+"""Others beside tmt: timed where they take part, else a reason."""
 
 import pytest
 from speed_rows import NS
@@ -55,7 +55,7 @@ def test_who_is_not_here_has_a_reason_and_no_time(engines, states, monkeypatch):
     assert len(words) == 3 and "Pinocchio is not installed; the extra `peers` brings it." in words
     rows = evaluations.evaluation_rows({}, absent=nobody.absent)
     assert [row["why_not"] for row in rows] == list(nobody.absent.values())
-    assert all(row["ns_per_state"] is row["states"] is row["share_of_peak"] is None for row in rows)
+    assert all(row["ns_per_state"] is row["states"] is None for row in rows)
 
 
 def test_who_is_here_evaluates_these_states(engines, states):
@@ -89,9 +89,7 @@ def test_what_others_take_in_words():
         in text
     )
     assert "820 ns each. Its accelerations are tmt's within 3.1 % of the tolerance of rounding." in text
-    assert (
-        "tmt's lanes 10.0 ns; heyoka's compiled function 20.0 ns (2 times), with fast math 5.0 ns (0.5 times)." in text
-    )
+    assert "tmt 10.0 ns; heyoka's compiled function 20.0 ns (2 times), with fast math 5.0 ns (0.5 times)." in text
     assert text.endswith("there are no batches.")
     batched = NS | {(FORWARD, BATCH, 1000, 1): 1500.0, (FORWARD, BATCH, 1000, 2): 800.0}
     assert "MuJoCo's batch 1500.0 ns (150 times), on two threads 800.0 ns (80 times)" in " ".join(

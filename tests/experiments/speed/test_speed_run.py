@@ -85,15 +85,14 @@ def test_a_small_run_takes_every_path(engines, small):
     evaluations = pd.DataFrame(result.tables["evaluations"])
     assert list(evaluations.columns) == [
         "quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
-        "share_of_peak", "why_not",
+        "why_not",
     ]  # fmt: skip
     timed = evaluations[evaluations.why_not.isna()]
-    assert {"mass_matrix_and_bias", "forward_dynamics", "rk4_step", "multiply_add"} <= set(timed.quantity)
+    assert {"mass_matrix_and_bias", "forward_dynamics", "rk4_step"} <= set(timed.quantity)
     assert (timed.ns_per_state > 0.0).all() and evaluations[evaluations.why_not.notna()].ns_per_state.isna().all()
     counted = timed[timed.operations.notna()].set_index("implementation")
-    assert {"lanes", "traced kernel", "generic compiled loop", "generic compiled loop, lanes"} < set(counted.index)
+    assert {"compiled", "compiled, side by side"} < set(counted.index)
     assert np.allclose(counted.operations_per_ns, counted.operations / counted.ns_per_state)
-    assert counted.share_of_peak.max() == 1.0 and any("How near the processor" in note for note in result.notes)
     everybody = {name.split(",")[0] for name in evaluations.implementation} & {"MuJoCo", "heyoka", "Pinocchio"}
     assert everybody == {"MuJoCo", "heyoka", "Pinocchio"}  # by a time or by a reason
     errors = accuracy.true_error(result.rows, dict.fromkeys(("zero, free", "bent, free"), 64))

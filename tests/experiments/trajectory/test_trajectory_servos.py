@@ -14,7 +14,8 @@ from compare.experiments.trajectory import own_runs, sentences
 from compare.experiments.trajectory.runs import follow
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
-from tmt import kernels
+from tmt.compiled import Library, store
+from tmt.compiled.runner import known as compiled_runs
 from tmt.methods import METHODS, SemiImplicitEuler, semi_implicit
 
 LEVELS = {"derivative, TMT to MuJoCo", "one step, TMT to MuJoCo", "open loop, TMT to MuJoCo"}
@@ -43,10 +44,11 @@ def altered(monkeypatch):
 
     def replace(of, name, value):
         (monkeypatch.setitem if isinstance(of, dict) else monkeypatch.setattr)(of, name, value)
-        kernels.stepper.cache_clear()
+        monkeypatch.setattr(store, "library", lambda source, *what: Library(source()))
+        compiled_runs.clear()
 
     yield replace
-    kernels.stepper.cache_clear()
+    compiled_runs.clear()
 
 
 def test_every_integrator_is_its_scheme_held_and_in_a_step(gripper):

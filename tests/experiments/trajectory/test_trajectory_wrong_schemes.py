@@ -12,7 +12,6 @@ from compare.judge.scale import EPS
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
-from tmt import kernels
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler
 
 
@@ -58,11 +57,7 @@ def test_a_wrong_scheme_leaves_the_band(scheme, wrong, where, engines, monkeypat
     case = next(case for case in ARM.cases if where.startswith(case.name))
     assert [str(check) for check in follow(case, engines, (1,)).checks if not check.passed] == []
     monkeypatch.setitem(METHODS, scheme, wrong)
-    kernels.stepper.cache_clear()
-    try:
-        checks = follow(case, engines, (1,)).checks
-    finally:
-        kernels.stepper.cache_clear()
+    checks = follow(case, engines, (1,)).checks
     failed = {check.quantity for check in checks if not check.passed and check.scene.startswith(where)}
     assert {"one step, TMT to MuJoCo", "open loop, TMT to MuJoCo"} <= failed
 
@@ -75,10 +70,6 @@ def test_a_body_that_tumbles_tells_how_a_quaternion_is_moved(monkeypatch):
     case, (scheme,) = Case(robot, scene), {engines["mujoco"].methods["RK4"].scheme}
     assert [str(check) for check in follow(case, engines, (1,)).checks if not check.passed] == []
     monkeypatch.setitem(METHODS, scheme, METHODS["rk4_mean_speed" if scheme == "rk4" else "rk4"])
-    kernels.stepper.cache_clear()
-    try:
-        checks = follow(case, engines, (1,)).checks
-    finally:
-        kernels.stepper.cache_clear()
+    checks = follow(case, engines, (1,)).checks
     failed = {(check.scene.split(", ")[1], check.quantity) for check in checks if not check.passed}
     assert failed == {("RK4", "one step, TMT to MuJoCo"), ("RK4", "open loop, TMT to MuJoCo")}

@@ -13,7 +13,7 @@ import pytest
 import tmt
 from compare.judge.rounding import band
 from tmt.methods import METHODS, one_step
-from tmt.simulation import FORMS, singular_in
+from tmt.simulation import reasons, singular_in
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
@@ -25,21 +25,6 @@ def test_shapes_and_start():
     assert t[-1] == 5.0
     assert np.array_equal(q[0], BENT) and np.array_equal(qd[0], REST)
     assert np.abs(q[-1] - BENT).max() > 0.1
-
-
-def test_a_batch_of_runs_is_each_run(rng):
-    starts = rng.uniform(-1, 1, (2, 3, 3))
-    _, q, qd = tmt.simulate(starts, REST, REST, 0.01, 20)
-    assert q.shape == (2, 3, 21, 3)
-    _, single_q, single_qd = tmt.simulate(starts[1, 2], REST, REST, 0.01, 20)
-    assert np.array_equal(q[1, 2], single_q) and np.array_equal(qd[1, 2], single_qd)
-
-
-def test_a_diverged_run_is_nan_from_there_on():
-    _, q, _ = tmt.simulate(BENT, [1e3, 1e3, 1e3], REST, 10.0, 200)
-    finite = np.isfinite(q).all(axis=1)
-    assert finite[0] and not finite[-1]
-    assert not finite[np.argmin(finite) :].any()
 
 
 def test_damping_takes_energy():
@@ -56,20 +41,15 @@ def test_the_assignments_bent_posture_holds():
     assert (np.abs(q - BENT) <= width[:, :3]).all()
 
 
-def test_an_adaptive_method_ends_where_it_cannot_go_on():
-    _, q, _ = tmt.simulate(BENT, [1e200, 0.0, 0.0], REST, 0.1, 3, "dopri8_adaptive")
-    assert np.isfinite(q[0]).all() and np.isnan(q[1:]).all()
-    _, q, _ = tmt.simulate(BENT, REST, REST, 0.1, 3, "dopri8_adaptive", tolerance=1e-300)
-    assert np.isnan(q[1:]).all()
-
-
 def test_where_newton_fails_the_run_is_nan_and_says_so():
     motion = tmt.simulate(BENT, REST, REST, 0.5, 20, "implicit_midpoint")
     last = np.isfinite(motion.q).all(axis=1).sum() - 1
     assert 0 < last < 20 and np.abs(motion.qd[last]).max() < 1e3  # finite and modest until there
     assert motion.ended == f"at t = {last * 0.5:g} s: Newton's method does not find the stages of a step of 0.5 s"
-    with pytest.raises(ArithmeticError, match=r"dt = 0\.5 s"):
-        one_step(METHODS["implicit_midpoint"], tmt.ARM, list(motion.q[last]), list(motion.qd[last]), [0.0] * 3, 0.5)
+    fast = BENT.tolist(), [1e6] * 3
+    assert "Newton's method" in tmt.simulate(*fast, REST, 10.0, 1, "implicit_midpoint").ended
+    with pytest.raises(ArithmeticError, match="Newton's method"):
+        one_step(METHODS["implicit_midpoint"], tmt.ARM, *fast, [0.0] * 3, 10.0)
 
 
 def wrist(damping=0.0):
@@ -106,18 +86,10 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("form", [*FORMS])
-@pytest.mark.parametrize("name", ["overflow", "diverged", "turned"])
-def test_every_form_says_the_same_of_an_end(name, form):
-    method, start, more, says = ENDS[name]
-    motion = tmt.simulate(*start, **({"dt": 0.1, "steps": 200, "method": method} | more), form=form)
-    assert motion.form == form and says in motion.ended
-
-
 @pytest.mark.parametrize("method, start, more, says", ENDS.values(), ids=ENDS)
 def test_a_run_says_why_it_ended(method, start, more, says):
-    # the loops take the library's sine far out, so that there a hinge turns where here numbers overflow
-    arguments = {"dt": 0.1, "steps": 200, "method": method, "form": "straight_line"} | more
+    """Alone, between the states that are kept, and among others, which go on."""
+    arguments = {"dt": 0.1, "steps": 200, "method": method} | more
     dt = arguments["dt"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -125,19 +97,54 @@ def test_a_run_says_why_it_ended(method, start, more, says):
     last = int(np.isfinite(motion.q).all(axis=1).sum()) - 1
     assert motion.ended.startswith(f"at t = {last * dt:g} s: ") and says in motion.ended and "\n" not in motion.ended
     assert 0 <= last < 200 and np.isnan(motion.q[last + 1 :]).all() and np.isnan(motion.qd[last + 1 :]).all()
+    some = tmt.simulate(*start, **arguments, every=40)
+    assert some.ended == motion.ended and np.array_equal(some.q, motion.q[::40], equal_nan=True)
+    rows = [np.array([value] * 9, dtype=float) for value in ([0.5, 1.0, 1.0], REST, REST)]
+    for row, value in zip(rows, start):
+        row[4] = value
+    short = arguments | {"steps": min(200, last + 2)}
+    if "tolerance" not in more:
+        among = tmt.simulate(*rows, **short)
+        assert among.ended[4] == motion.ended and np.array_equal(
+            among.q[4], motion.q[: short["steps"] + 1], equal_nan=True
+        )
+        assert [k for k in range(9) if k != 4 and among.ended[k]] == [] or dt > 0.1 or "model" in more
+
+
+def test_a_run_ends_at_its_own_step_between_those_that_are_kept():
+    fast = [2.0**49 - 20.0, 0.0, 0.0], [100.0, 0.0, 0.0]
+    each, some = (tmt.simulate(*fast, REST, 0.01, 60, every=k) for k in (1, 20))
+    last = int(np.isfinite(each.q[:, 0]).sum()) - 1
+    assert last % 20 and each.ended == some.ended and each.ended.startswith(f"at t = {last * 0.01:g} s: a hinge turns")
+    assert np.isfinite(some.q[:, 0]).tolist() == [k * 20 <= last for k in range(4)]
+
+
+def test_a_singular_state_between_those_that_are_kept_is_found():
+    q, qd = np.zeros((1, 9, 3)), np.zeros((1, 9, 3))
+    q[0, :, 1] = [1.0, 0.8, 0.6, 0.4, 0.0, -0.4, -0.6, -0.8, -1.0]
+    qd[0, 5:] = 1.0  # the rates jump after it
+    tree, none = wrist(), np.zeros((1, 2), int)
+    (each,) = reasons(tree, q.copy(), qd.copy(), none, 0.1, 1e-9)
+    assert singular_in(tree, q[0], qd[0])[0] == 4 and each.startswith("at t = 0.4 s: Mbar is singular: hinges 'a', 'c'")
+    kept = q[:, ::3].copy(), qd[:, ::3].copy()
+    (third,) = reasons(tree, *kept, none, 0.1, 1e-9, 3, lambda run, k: [x[run, 3 * k : 3 * k + 4] for x in (q, qd)])
+    # 8 is no multiple of 3: the records are those after 0, 3 and 6 steps
+    assert third == each and np.isfinite(kept[0][0, :, 0]).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("name", ["implicit_midpoint", "gauss_legendre_4"])
+def test_stages_of_a_singular_state_end_their_run(name):
+    singular = tmt.simulate(np.zeros(3), [0.1, 0.2, 0.3], [1.0, 0.0, 0.0], 0.01, 2, name, wrist())
+    assert singular.ended.startswith("at t = 0 s: Mbar is singular: hinges 'a', 'c'")
 
 
 def test_in_a_batch_each_run_says_why_it_ended():
     qd = np.zeros((2, 20, 3))
     qd[1, 3], qd[0, 4] = 1e8, np.nextafter(np.inf, 0)
-    single = tmt.simulate(BENT, qd, REST, 0.01, 30, form="straight_line")
-    assert single.ended.shape == (2, 20)
-    assert {place for place in np.ndindex(2, 20) if single.ended[place]} == {(1, 3), (0, 4)}
-    for form in FORMS:
-        other = tmt.simulate(BENT, qd, REST, 0.01, 30, form=form)
-        assert other.form == form and np.array_equal(other.ended != None, single.ended != None)  # noqa: E711
-        if form.startswith("straight"):
-            assert np.array_equal(other.ended, single.ended)
+    batch = tmt.simulate(BENT, qd, REST, 0.01, 30)
+    assert batch.ended.shape == (2, 20)
+    assert {place for place in np.ndindex(2, 20) if batch.ended[place]} == {(1, 3), (0, 4)}
+    assert batch.ended[1, 3] == tmt.simulate(BENT, qd[1, 3], REST, 0.01, 30).ended
 
 
 def test_a_motion_is_three_arrays_and_more():
@@ -187,7 +194,7 @@ def test_evaluations_are_counted(name):
     if stepping.adaptive:
         assert one >= steps * stepping.stages and one % stepping.stages == 0
     elif stepping.solves_stages:
-        assert one > steps * stepping.stages and (one - steps) % stepping.stages == 0
+        assert one > steps * stepping.stages and one % stepping.stages == 0
     else:
         assert one == steps * stepping.stages
 
@@ -227,3 +234,24 @@ def test_taylor_ends_with_a_reason():
     assert np.array_equal(motion.q[0], BENT)
     stiff = dataclasses.replace(tmt.ARM, damping=(1e6, 0.0, 0.0))
     assert "a series takes steps of" in tmt.simulate(BENT, REST, REST, 0.1, 5, "taylor", stiff).ended
+
+
+# which states are kept
+
+
+def test_taylor_keeps_each_so_manyth_state_too():
+    each, second = (tmt.simulate(BENT, REST, REST, 0.05, 6, "taylor", every=k) for k in (1, 2))
+    assert np.array_equal(each.q[::2], second.q) and np.array_equal(each.t[::2], second.t)
+
+
+@pytest.mark.parametrize("every", [3, 20, 0, -1, 2.5, True, None, "2"])
+def test_what_is_no_every_is_refused_in_one_line(every):
+    with pytest.raises(ValueError, match=r"^every is ") as error:
+        tmt.simulate(BENT, REST, REST, 0.1, 10, every=every)
+    assert "\n" not in str(error.value)
+
+
+def test_every_state_that_is_asked_for_needs_its_memory():
+    with pytest.raises(ValueError, match="with every=k each k-th of them is kept"):
+        tmt.simulate(BENT, REST, REST, 1e-3, 10**12)
+    assert tmt.simulate(np.zeros((3, 3)), REST, REST, 1e-3, 10**5, every=10**5).q.shape == (3, 2, 3)

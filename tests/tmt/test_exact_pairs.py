@@ -1,12 +1,15 @@
 """Pairs of doubles: what they compute beside numbers of many digits; and series of each operation."""
 
+import ctypes
+
 import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 
+from tmt.compiled import Library
+from tmt.compiled.ir import DOUBLE, POINTER, Code, module
 from tmt.exact import pairs, series
 from tmt.exact.pairs import pair
 
@@ -14,11 +17,25 @@ NUMBERS = st.floats(-1e6, 1e6).filter(lambda x: x == 0.0 or abs(x) > 1e-100)
 DIGITS = 1e-31
 
 
-compiled = {
-    "add": njit(lambda ah, al, bh, bl: pairs.add(ah, al, bh, bl)),
-    "multiply": njit(lambda ah, al, bh, bl: pairs.multiply(ah, al, bh, bl)),
-    "divide": njit(lambda ah, al, bh, bl: pairs.divide(ah, al, bh, bl)),
-}
+def compiled(function, inputs):
+    """A function of pairs.py in machine code."""
+    code = Code("f", {"out": POINTER} | {f"x{k}": DOUBLE for k in range(inputs)})
+    results = function(*(code[f"x{k}"] for k in range(inputs)))
+    for k, x in enumerate(results):
+        code["out"].store(x, k)
+    code.give_back()
+    own = Library(module([code])).function("f", None, ctypes.c_void_p, *[ctypes.c_double] * inputs)
+
+    def call(*given):
+        out = np.empty(len(results))
+        own(out.ctypes.data, *given)
+        return tuple(out.tolist())
+
+    return call
+
+
+IN_CODE = {name: compiled(getattr(pairs, name), 4) for name in ("add", "multiply", "divide")}
+root, sincos = compiled(pairs.root, 2), compiled(pairs.sincos, 2)
 
 
 def exact(high, low=0.0):
@@ -35,25 +52,25 @@ def test_sums_products_and_quotients(x, y, share):
     with mpmath.workdps(60):
         a, b = of_many_digits(x, share), of_many_digits(y, -share)
         p, r = exact(*a), exact(*b)
-        assert abs(exact(*compiled["add"](*a, *b)) - (p + r)) <= DIGITS * abs(p + r)
-        assert abs(exact(*compiled["multiply"](*a, *b)) - p * r) <= DIGITS * abs(p * r) + 1e-300
+        assert abs(exact(*IN_CODE["add"](*a, *b)) - (p + r)) <= DIGITS * abs(p + r)
+        assert abs(exact(*IN_CODE["multiply"](*a, *b)) - p * r) <= DIGITS * abs(p * r) + 1e-300
         if y:
-            assert abs(exact(*compiled["divide"](*a, *b)) - p / r) <= DIGITS * abs(p / r) + 1e-300
-        assert all(compiled[name](*a, *b) == getattr(pairs, name)(*a, *b) for name in compiled if y)
-        assert abs(exact(*pairs.root(*compiled["multiply"](*a, *a))) - abs(p)) <= DIGITS * abs(p)
+            assert abs(exact(*IN_CODE["divide"](*a, *b)) - p / r) <= DIGITS * abs(p / r) + 1e-300
+        assert all(IN_CODE[name](*a, *b) == getattr(pairs, name)(*a, *b) for name in IN_CODE if y)
+        assert abs(exact(*root(*IN_CODE["multiply"](*a, *a))) - abs(p)) <= DIGITS * abs(p)
 
 
 @given(st.floats(-1e4, 1e4) | st.integers(-1000, 1000).map(lambda n: n * np.pi / 4), st.floats(-1.0, 1.0))
 def test_sines_and_cosines(x, share):
     with mpmath.workdps(60):
         angle = of_many_digits(x, share)
-        sh, sl, ch, cl = pairs.sincos(*angle)
+        sh, sl, ch, cl = sincos(*angle)
         assert abs(exact(sh, sl) - mpmath.sin(exact(*angle))) <= DIGITS
         assert abs(exact(ch, cl) - mpmath.cos(exact(*angle))) <= DIGITS
 
 
 def test_a_root_of_nothing_is_nothing_and_one_of_less_is_no_number():
-    assert pairs.root(0.0, 0.0) == (0.0, 0.0) and np.isnan(pairs.root(-1.0, 0.0)[0])
+    assert root(0.0, 0.0) == (0.0, 0.0) and np.isnan(root(-1.0, 0.0)[0])
 
 
 # series
@@ -104,7 +121,7 @@ def expanded(code, rates):
     code = [*code, *((series.RATE, k, rate, 0) for k, rate in enumerate(rates))]
     high, low = np.zeros((2, ROWS, ORDER + 1))
     high[:4, 0] = FIRST
-    series.expand(np.array(code), ORDER + 1, high.reshape(-1), low.reshape(-1))
+    series.expand(np.array(code), high, low)
     with mpmath.workdps(60):
         return [[exact(*c) for c in zip(*row)] for row in zip(high.tolist(), low.tolist())]
 

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from trees import random_state, tree_of_kinds
+from trees import random_state, small_tree
 
 import tmt
 from tmt import METHODS
 from tmt.methods import SemiImplicitEuler, amplification, derivatives
 
-TREE = tree_of_kinds(np.random.default_rng(5), bodies=3)
+TREE = small_tree()
 STATES = [np.array(part) for part in zip(*(random_state(np.random.default_rng(k), TREE) for k in range(3)))]
 DESCRIBED = [name for name, method in METHODS.items() if derivatives.has_residual(method) and "dopri8" not in name]
 

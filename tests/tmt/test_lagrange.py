@@ -91,23 +91,17 @@ def state(rng, kinds):
 @pytest.mark.parametrize(
     "kinds, parents",
     [
-        ("slide hinge", (-1, 0)),
-        ("ball", (-1,)),
         ("hinge slide ball", (-1, 0, 1)),
-        ("ball hinge ball", (-1, 0, 1)),
         ("slide ball slide hinge", (-1, 0, 1, 0)),
-        ("ball ball slide", (-1, 0, -1)),
     ],
 )
 def test_trees_of_every_kind_of_joint_in_mujoco(rng, kinds, parents):
     kinds = kinds.split()
     joints, bodies = random_joints(rng, kinds, parents)
-    model = in_mujoco(joints, bodies)
-    for _ in range(2):
-        q, u = state(rng, kinds)
-        found = equations(joints, bodies, GRAVITY, q, u)
-        assert_mujoco_agrees(found, model, q, u)
-        assert np.abs(found.spring_force).min() > 1e-3
+    q, u = state(rng, kinds)
+    found = equations(joints, bodies, GRAVITY, q, u)
+    assert_mujoco_agrees(found, in_mujoco(joints, bodies), q, u)
+    assert np.abs(found.spring_force).min() > 1e-3
 
 
 def test_a_cart_on_a_tilted_rail_with_a_pendulum_in_mujoco(rng):
@@ -134,7 +128,7 @@ def test_a_cart_on_a_tilted_rail_with_a_pendulum_in_mujoco(rng):
 def test_a_free_body_in_mujoco(rng):
     com, inertia = rng.normal(size=3), random_inertia(rng)
     model = loaded(f'<body><joint type="free" armature="0.4"/>{inertial(1.3, com, inertia)}</body>')
-    for _ in range(2):
+    for _ in range(1):
         x, p, v, w = rng.normal(size=3), quaternion(rng), rng.normal(size=3), 3.0 * rng.normal(size=3)
         found = free_body(x, p, v, w, 1.3, com, inertia, GRAVITY, 0.4)
         assert_mujoco_agrees(found, model, [*x, *p], [*v, *w])

@@ -6,16 +6,14 @@ import math
 import numpy as np
 import pytest
 import sympy
-from trees import random_state, tree_of_kinds
+from trees import random_state, small_tree
 
 import tmt
-from tmt import kernels, loop_trees
+from tmt.compiled import evaluator
 from tmt.equations import composite, method
-from tmt.exact.motion import trajectory
 from tmt.exact.values import distance, exact
-from tmt.methods import METHODS, method_named
+from tmt.methods import METHODS
 from tmt.methods.derivatives import amplification, linear_system, one_step
-from tmt.source import run_source
 
 FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own
     tmt.ARM,
@@ -34,11 +32,7 @@ q, qd, tau = np.array([0.4, -0.7, 1.1]), np.array([1.2, -0.5, 2.0]), np.array([3
 @pytest.fixture(scope="module")
 def kinds():
     """A tree with hinges, slides and balls, and gains at all but the balls."""
-    rng = np.random.default_rng(3)
-    tree = tree_of_kinds(rng)
-    flat = [kind != "ball" for kind, _, by in tree.coordinates.joints for _ in range(by.start, by.stop)]
-    gains = rng.normal(size=(2, len(flat), len(flat))) * np.outer(flat, flat)
-    return dataclasses.replace(tree, position_gain=gains[0], speed_gain=gains[1])
+    return small_tree()
 
 
 def torque_of(tree, q, qd):
@@ -98,30 +92,13 @@ def test_every_form_of_the_dynamics_has_it(kinds, rng):
         assert np.allclose(tmt.acceleration(place, speed, torque, tree), wanted, rtol=1e-10, atol=1e-10)
         assert np.allclose(composite_acceleration(tree, place, speed, torque), wanted, rtol=1e-10, atol=1e-10)
         assert distance(wanted, exact(tree, place, speed, torque).acceleration).max() < 1e-9 * (1 + abs(wanted).max())
-        for evaluator in (kernels._loop_evaluator, *[kernels.evaluator] * (tree is DRIVEN)):
-            out = np.empty((1, len(speed)))
-            evaluator(tree, "forward_dynamics").each(*(np.array([part]) for part in (place, speed, torque)), out)
-            assert np.allclose(out[0], wanted, rtol=1e-9, atol=1e-9)
+        out = np.empty((1, len(speed)))
+        evaluator(tree, "acceleration").each(place[None], speed[None], torque[None], out)
+        assert np.allclose(out[0], wanted, rtol=1e-9, atol=1e-9)
 
 
 def composite_acceleration(tree, q, qd, tau):
     return method.acceleration(tree, list(q), list(qd), list(tau), composite.mass_matrix_and_bias)
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_every_loop_takes_the_methods_own_steps(name):
-    stepping, dt, steps = method_named(name), 1e-3, 5
-    state = list(q), list(qd)
-    if not stepping.adaptive:
-        for _ in range(steps):
-            state = one_step(stepping, DRIVEN, *state, list(tau), dt)
-    for stepper in (kernels._loop_stepper, *[kernels._stepper] * (name in ("rk4", "discrete"))):
-        paths = np.full((2, 1, steps + 1, 3), np.nan)
-        paths[:, 0, 0] = q, qd
-        stepper(DRIVEN, stepping)(*paths, tau[None], dt, *([1e-12] if stepping.adaptive else []))
-        if stepping.adaptive:
-            state = trajectory(DRIVEN, q, qd, tau, steps * dt, 1).high[-1].reshape(2, 3)
-        assert np.allclose(paths[:, 0, -1], state, rtol=1e-12, atol=1e-12), stepper
 
 
 @pytest.mark.parametrize(
@@ -153,7 +130,7 @@ def test_which_gains_are_implicit(name, speed, position):
     assert np.allclose(slope, np.linalg.solve(wanted, force[0]), atol=1e-11)
 
 
-@pytest.mark.parametrize("name", ["semi_implicit_euler", "implicitfast", "implicit", "discrete", "rk4"])
+@pytest.mark.parametrize("name", ["implicitfast", "implicit", "discrete", "rk4"])
 def test_the_derivative_of_a_step_is_that_of_differences(name):
     stepping, dt, nudge = METHODS[name], 0.01, 1e-6
     J, state = amplification(stepping, DRIVEN, q, qd, tau, dt), np.concatenate([q, qd])
@@ -173,11 +150,8 @@ def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
         DRIVEN.lock({"beta": 0.3})
 
 
-def test_the_code_of_a_tree_without_gains_is_what_it_was():
-    """No operation more: of a controller nothing is traced where there is none."""
-    for name in ("semi_implicit_euler", "implicit", "rk4"):
-        assert run_source(FORK, METHODS[name]).count("\n") < run_source(DRIVEN, METHODS[name]).count("\n")
-    assert loop_trees.arrays(FORK).position_gain.shape == loop_trees.arrays(FORK).speed_gain.shape == (0, 0)
+def test_a_tree_without_gains_has_no_operation_for_them():
+    assert evaluator(FORK, "acceleration").operations < evaluator(DRIVEN, "acceleration").operations
 
 
 def test_a_servo_settles_where_its_torque_balances_the_weight():

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from trees import random_tree
@@ -135,6 +135,7 @@ def test_forward_and_inverse_dynamics_close(q, qd, tau):
     assert np.abs(back - tau).max() <= ALLOWED * np.linalg.cond(tmt.mass_matrix(q)) * force
 
 
+@settings(max_examples=8)
 @given(arrays(float, (2, 4, 3), elements=st.floats(-4, 4)))
 def test_a_batch_is_its_states_one_by_one(q):
     for function in (tmt.mass_matrix, tmt.com_positions, tmt.gravity_balance, tmt.potential_energy):

@@ -1,0 +1,255 @@
+"""The public functions: NumPy answers few states and machine code all others, with what the literal form returns and raises."""
+
+import json
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from inspect import signature
+
+import numpy as np
+import pytest
+from trees import random_states, small_tree
+
+import tmt
+from tmt import answers, literal
+from tmt.compiled import cores
+from tmt.equations.quantities import QUANTITIES
+
+EPS = np.finfo(float).eps
+SMALL = small_tree()
+
+
+def given_to(quantity, *state):
+    """The arguments of a function among q, qd, tau."""
+    return state[: len(QUANTITIES[quantity].takes)]
+
+
+def in_parts(found):
+    return found if isinstance(found, tuple) else (found,)
+
+
+@pytest.fixture
+def compiled():
+    """Machine code answers for a Tree and a quantity from now on, which takes more than a few questions."""
+
+    def got(tree, *quantities):
+        for quantity in quantities or ("acceleration",):
+            answers.answers_of(tree).get(quantity)
+            answers.answers_of(tree).asked[quantity] = answers.SMALL
+        return tree
+
+    return got
+
+
+def test_every_quantity_has_a_public_function():
+    for name, quantity in QUANTITIES.items():
+        assert (*signature(getattr(tmt, name)).parameters,) == (*quantity.takes, "model")
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_machine_code_answers_what_the_literal_form_returns(quantity, compiled, rng):
+    """Of any batch; and a state has the same bits alone and among others."""
+    tree, states = compiled(SMALL, quantity), random_states(rng, SMALL, 21)
+    given = given_to(quantity, *states)
+    expected = in_parts(getattr(literal, quantity)(*given, tree))
+    condition = np.linalg.cond(literal.mass_matrix(states[0], tree)).max() if quantity == "acceleration" else 1.0
+    whole = in_parts(getattr(tmt, quantity)(*given, tree))
+    for batch in ((), (1,), (21,), (3, 7), (0,), (2, 0)):
+        size = int(np.prod(batch))
+        some = [rows[0] if batch == () else rows[:size].reshape(*batch, rows.shape[1]) for rows in given]
+        found = in_parts(getattr(tmt, quantity)(*some, tree))
+        assert len(found) == len(expected)
+        for one, all_of_it, same in zip(found, expected, whole):
+            other, bits = (x[0] if batch == () else x[:size].reshape(*batch, *x.shape[1:]) for x in (all_of_it, same))
+            assert type(one) is np.ndarray and one.shape == other.shape and one.dtype == other.dtype
+            assert one.flags.c_contiguous and one.flags.writeable and np.array_equal(one, bits)
+            assert np.abs(one - other).max(initial=0.0) <= 64 * EPS * condition * np.abs(all_of_it).max()
+    assert quantity == "spring_torque" or not all(map(np.array_equal, whole, expected))  # so it was machine code
+
+
+def test_few_states_are_answered_by_the_literal_form(rng):
+    tree = replace(tmt.ARM, mass=(1.75, 1.5))
+    q, qd, tau = rng.uniform(-2, 2, (3, 400, 3))
+    known = answers.answers_of(tree)
+    few = q[:90], qd[:90], tau[:90]
+    assert np.array_equal(tmt.acceleration(*few, tree), literal.acceleration(*few, tree))
+    assert known.asked["acceleration"] == 90 and not known.ready
+    assert "together" not in vars(known.compiled["acceleration"])
+    late = tmt.acceleration(np.tile(q, (2, 1)), np.tile(qd, (2, 1)), np.tile(tau, (2, 1)), tree)
+    assert "together" in vars(known.compiled["acceleration"])
+    assert late[:400] == pytest.approx(literal.acceleration(q, qd, tau, tree), rel=1e-10, abs=1e-10)
+
+
+def test_one_row_of_speeds_or_torques_may_stand_for_all(compiled, rng):
+    tree, (q, qd, tau) = compiled(SMALL), random_states(rng, SMALL, 9)
+    repeated = np.broadcast_to(qd[0], qd.shape), np.broadcast_to(tau[0], tau.shape)
+    assert np.array_equal(tmt.acceleration(q, qd[0], tau[0], tree), tmt.acceleration(q, *repeated, tree))
+    assert tmt.acceleration(q[0], qd[:, None], tau, tree).shape == (9, 9, qd.shape[1])
+
+
+def test_threads_change_no_bit(compiled, monkeypatch, rng):
+    tree, (q, qd, tau) = compiled(SMALL), random_states(rng, SMALL, 200)
+    alone = tmt.acceleration(q, qd, tau, tree)
+    used = []
+    monkeypatch.setattr(cores, "cores", lambda: 3)
+    monkeypatch.setattr(cores, "ThreadPoolExecutor", lambda n: used.append(n) or ThreadPoolExecutor(n))
+    monkeypatch.setattr(cores, "SHARED", 1)
+    assert np.array_equal(tmt.acceleration(q, qd, tau, tree), alone) and used == [3]
+    assert np.array_equal(tmt.acceleration(q[:7], qd[:7], tau[:7], tree), alone[:7])
+
+
+@pytest.mark.parametrize(
+    "convert", [np.ndarray.tolist, np.asfortranarray, np.float32, lambda a: a[..., ::-1].copy()[..., ::-1]]
+)
+def test_numbers_in_any_form_are_taken(convert, compiled):
+    compiled(tmt.ARM, "acceleration")
+    q, qd, tau = np.random.default_rng(0).integers(-8, 9, (3, 5, 3)) / 8.0
+    expected = tmt.acceleration(q, qd, tau)
+    assert np.array_equal(tmt.acceleration(convert(q), convert(qd), tau), expected)
+    assert np.array_equal(tmt.acceleration(convert(q[0]), convert(qd[0]), tau[0]), expected[0])
+    for rows in (q, qd, tau):
+        rows.flags.writeable = False
+    assert np.array_equal(tmt.acceleration(q, qd, tau), expected)
+    assert np.array_equal(tmt.acceleration(q[0], qd[0], tau[0]), expected[0])
+
+
+BALL = tmt.Tree(
+    hinge_names=("ball",), parent=(-1,), offset=((0, 0, 0),), axis=np.eye(3), damping=(0, 0, 0), body_names=("body",),
+    body_hinge=(0,), mass=(1,), com=((0, 0, 0.1),), inertia=(np.eye(3),), gravity=(0, 0, -9.81), kind=("ball",),
+)  # fmt: skip
+WRIST = tmt.Tree(  # three hinges through one point: Mbar is singular where the second is at zero
+    hinge_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
+    damping=(0, 0, 0), body_names=("hand",), body_hinge=(2,), mass=(1,), com=((0.1, 0, 0.2),), inertia=(np.eye(3),),
+    gravity=(0, 0, -9.81),
+)  # fmt: skip
+Z = np.zeros(3)
+WRONG = {
+    "no numbers": (tmt.ARM, (["a"] * 3, [0.0] * 3, [0.0] * 3)),
+    "truth values": (tmt.ARM, ([True] * 3, [0.0] * 3, [0.0] * 3)),
+    "masked": (tmt.ARM, (np.ma.array([0.0] * 3, mask=[1, 0, 0]), Z, Z)),
+    "nothing": (tmt.ARM, (None, None, None)),
+    "no speeds": (tmt.ARM, (Z, None, Z)),
+    "no torques of many": (tmt.ARM, (np.zeros((40, 3)), Z, None)),
+    "too few": (tmt.ARM, (np.zeros(2), Z, Z)),
+    "too few speeds": (tmt.ARM, (Z, np.zeros(2), Z)),
+    "a number": (tmt.ARM, (0.0, Z, Z)),
+    "not finite": (tmt.ARM, (np.array([0.0, np.nan, 0.0]), Z, Z)),
+    "a speed that is not finite": (tmt.ARM, (Z, np.array([0.0, np.inf, 0.0]), Z)),
+    "a torque among many": (tmt.ARM, (np.zeros((40, 3)), Z, np.full((40, 3), np.inf))),
+    "batches that do not fit": (tmt.ARM, (np.zeros((4, 3)), np.zeros((5, 3)), Z)),
+    "beyond the largest double": (tmt.ARM, (Z, np.full(3, 1e200), Z)),
+    "no unit quaternion": (BALL, (np.array([1.0, 1.0, 0.0, 0.0]), Z, Z)),
+    "one of many no unit quaternion": (BALL, (np.array([[1, 0, 0, 0]] * 9 + [[1, 0.01, 0, 0]]), Z, Z)),
+    "singular": (WRIST, (Z, Z, Z)),
+    "singular but for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), Z, Z)),
+    "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z)),
+    "no model": ("arm", (Z, Z, Z)),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_said_in_the_same_words(name, compiled):
+    model, given = WRONG[name]
+    if isinstance(model, tmt.Tree):
+        compiled(model, "acceleration", "mass_matrix")
+    with pytest.raises(ValueError) as expected:
+        literal.acceleration(*given, model)
+    with pytest.raises(ValueError) as found:
+        tmt.acceleration(*given, model)
+    assert str(found.value) == str(expected.value)
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_beyond_the_largest_double(compiled):
+    compiled(tmt.ARM, "mass_matrix", "energy")
+    for q in (np.full(3, 1e300, np.longdouble) ** 10, np.full((2, 3), 1e300, np.longdouble) ** 10):
+        with pytest.raises(ValueError, match="q has values that are not finite"):
+            tmt.mass_matrix(q)
+    for qd in (np.full(3, 1e200), np.full((2, 3), 1e200)):
+        assert np.array_equal(tmt.energy(Z, qd), literal.energy(Z, qd)) and np.isinf(tmt.energy(Z, qd)).all()
+    far = np.array([0.0, 1e17, 0.0])  # beyond 2^49 rad
+    assert np.array_equal(tmt.mass_matrix(far), literal.mass_matrix(far))
+
+
+def test_threads_ask_of_models_that_come_and_go(monkeypatch):
+    monkeypatch.setattr(answers, "MOST", 2)
+    monkeypatch.setattr(answers, "known", {})
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+
+    def masses(seed):
+        models = [replace(tmt.ARM, mass=(1.0 + seed + k, 1.0)) for k in range(2)]
+        return [(tmt.mass_matrix(np.zeros((1, 3)), model), model) for _ in range(12) for model in models]
+
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            found = [one for of_thread in pool.map(masses, range(8)) for one in of_thread]
+    finally:
+        sys.setswitchinterval(before)
+    expected = {model: literal.mass_matrix(np.zeros((1, 3)), model) for _, model in found}
+    assert all(np.abs(M - expected[model]).max() <= 1e-12 * np.abs(M).max() for M, model in found)
+
+
+def test_threads_ask_at_once_for_one_state(compiled, rng):
+    """Each has a place of its own for the result."""
+    compiled(SMALL)
+    states = random_states(rng, SMALL, 8)
+    expected = tmt.acceleration(*states, SMALL)
+
+    def ask(k):
+        return all(np.array_equal(tmt.acceleration(*(x[k] for x in states), SMALL), expected[k]) for _ in range(300))
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(ask, range(8)))
+
+
+def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one(compiled):
+    compiled(BALL)
+    inside, outside = (np.array([1.0 + off, 0.0, 0.0, 0.0]) for off in (0.99e-6, 1.01e-6))
+    for many in (1, 20):
+        q = [np.tile(x, (many, 1)) if many > 1 else x for x in (inside, outside)]
+        assert np.isfinite(tmt.acceleration(q[0], Z, Z, BALL)).all()
+        with pytest.raises(ValueError, match="quaternion"):
+            tmt.acceleration(q[1], Z, Z, BALL)
+
+
+def test_who_cannot_wait_has_it_prepared(monkeypatch):
+    tree = tmt.ARM.lock({"alpha": 0.0, "beta": 0.5})
+    assert tmt.prepare(tree) is None and set(answers.answers_of(tree).ready) == set(QUANTITIES)
+    monkeypatch.setattr(literal, "acceleration", None)
+    assert np.isfinite(tmt.acceleration(Z[:1], Z[:1], Z[:1], tree)).all()
+
+
+ASKED = """
+import atexit, json, sys, numpy as np, tmt
+from tmt.compiled import cores
+q = np.array([0.1, 0.2, 0.3])
+few = tmt.acceleration(q, q, q)
+light = "llvmlite" not in sys.modules
+many = np.tile(q, (100_000, 1))
+cores.cores = sys.modules["tmt.compiled.runner"].cores = lambda: 3
+sys.modules["tmt.compiled.runner"].SPREAD = 0
+def both():
+    return tmt.acceleration(many, many, many), tmt.simulate(many[:40], many[:40], many[:40], 0.01, 5).q
+before = both()
+def late():  # where no thread can be started any more
+    same = bool(all(map(np.array_equal, before, both())))
+    print(json.dumps([light, "llvmlite" in sys.modules, float(abs(before[0] - few).max()), same]))
+atexit.register(late)
+"""
+
+
+def test_a_short_question_never_waits_for_a_compiler_and_a_late_one_for_no_thread():
+    run = subprocess.run([sys.executable, "-c", ASKED], capture_output=True, text=True, check=True)
+    light, later, off, same = json.loads(run.stdout)
+    assert light and later and off <= 1e-12 and same
+
+
+def test_of_two_models_each_has_its_own_answer(monkeypatch, compiled):
+    monkeypatch.setattr(answers, "MOST", 2)
+    for seed in range(3):  # more than are held
+        heavy = compiled(replace(tmt.ARM, mass=(2.0 + seed, 1.5)), "potential_energy")
+        assert tmt.potential_energy(Z, heavy) == pytest.approx(literal.potential_energy(Z, heavy), rel=1e-13)
+        assert tmt.potential_energy(np.zeros((2, 3)), heavy)[1] == tmt.potential_energy(Z, heavy)
+    assert len(answers.known) <= 2

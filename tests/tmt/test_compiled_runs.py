@@ -1,0 +1,177 @@
+"""Compiled runs: the steps of the methods, several side by side and in threads with the bits of each alone."""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+
+import numpy as np
+import pytest
+from trees import large_tree, random_states, small_tree
+
+import tmt
+from tmt.compiled import forms, runner, runs
+from tmt.compiled.machine import lanes
+from tmt.compiled.runner import Runner, known
+from tmt.exact.motion import trajectory
+from tmt.methods import METHODS, one_step
+from tmt.simulation import Motion
+
+MODULE = import_module("tmt.compiled.runner")  # the package has the function of that name
+SMALL = small_tree()
+
+
+def starts(count, tree=SMALL, seed=0) -> list[np.ndarray]:
+    return random_states(np.random.default_rng(seed), tree, count)
+
+
+def assert_is_the_step(name, tree, motion, tau, dt):
+    """The first run of a motion is that of the method over floats."""
+    state = motion.q[0, 0].tolist(), motion.qd[0, 0].tolist()
+    for k in (1, 2):
+        state = one_step(METHODS[name], tree, *state, tau[0].tolist(), dt)
+        assert np.allclose(motion.q[0, k], state[0], rtol=0, atol=1e-11)
+        assert np.allclose(motion.qd[0, k], state[1], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_runs_together_have_the_bits_of_each_alone(name):
+    """Two of them diverge, one at once; some batches are no multiple of what a register holds."""
+    counts = (*range(1, 10), 17) if name in ("rk4", "implicit", "discrete") else (1, 3)
+    most, dt = counts[-1], 0.3 if METHODS[name].adaptive else 0.02  # of the steps of its own some are refused
+    q, qd, tau = starts(most)
+    qd[1], tau[most // 2 + 1] = 1e200, 1e300
+    alone = [tmt.simulate(*run, dt, 6, name, SMALL) for run in zip(q, qd, tau)]
+    for count in counts:
+        batch = tmt.simulate(q[:count], qd[:count], tau[:count], dt, 6, name, SMALL)
+        assert np.array_equal(batch.q, [one.q for one in alone[:count]], equal_nan=True)
+        assert np.array_equal(batch.qd, [one.qd for one in alone[:count]], equal_nan=True)
+        assert batch.ended.tolist() == [one.ended for one in alone[:count]]
+        assert batch.evaluations == sum(one.evaluations for one in alone[:count])
+    assert [k for k in range(most) if batch.ended[k]] == [1, most // 2 + 1]
+    third = tmt.simulate(q, qd, tau, dt, 6, name, SMALL, every=3)
+    assert np.array_equal(batch.q[:, ::3], third.q, equal_nan=True) and np.array_equal(batch.t[::3], third.t)
+    assert np.array_equal(batch.qd[:, ::3], third.qd, equal_nan=True)
+    assert batch.evaluations == third.evaluations and np.array_equal(batch.ended, third.ended)
+    if not METHODS[name].adaptive:
+        assert_is_the_step(name, SMALL, batch, tau, dt)
+    ball = SMALL.coordinates.balls[0].q
+    assert np.abs(np.linalg.norm(batch.q[0, :, ball], axis=-1) - 1.0).max() < 1e-15
+
+
+def test_a_large_tree_is_followed_as_stated():
+    tree = large_tree()
+    q, qd, tau = starts(lanes() + 1, tree)
+    assert_is_the_step("rk4", tree, tmt.simulate(q, qd, tau, 0.01, 2, "rk4", tree), tau, 0.01)
+
+
+@pytest.mark.parametrize("name", ["implicit", "implicit_midpoint"])
+def test_the_code_of_larger_trees_does_the_same(name, folder, monkeypatch):
+    """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call."""
+    q, qd, tau = starts(9)
+    for module, field in ((forms, "DENSE"), (forms, "FEW"), (runs, "INLINED")):
+        monkeypatch.setattr(module, field, 0)
+    batch = runner_paths(SMALL, name, q, qd, tau, 0.02, 3)
+    alone = runner_paths(SMALL, name, *(rows[4:5] for rows in (q, qd, tau)), 0.02, 3)
+    assert np.array_equal(batch.q[4], alone.q[0]) and np.array_equal(batch.qd[4], alone.qd[0])
+    assert_is_the_step(name, SMALL, batch, tau, 0.02)
+
+
+def runner_paths(tree, name, q, qd, tau, dt, steps) -> Motion:
+    """What a new runner follows."""
+    paths = [np.concatenate([x[:, None], np.full((len(x), steps, x.shape[1]), np.nan)], axis=1) for x in (q, qd)]
+    ended, evaluations = Runner(tree, METHODS[name], METHODS[name]).follow(*paths, tau, dt, 0.0, 1)
+    return Motion(None, *paths, ended, evaluations)
+
+
+# a method that chooses its own steps
+
+
+def controlled(tree, q, qd, tau, dt, tolerance):
+    """The state one dt later by dopri8_adaptive over floats, and its attempts (Hairer, Norsett, Wanner, section II.10)."""
+    stepping, joints, left, wanted, attempts = METHODS["dopri8_adaptive"], tree.coordinates, dt, dt / 8.0, 0
+    while left > 0.0:
+        pieces = math.ceil(left / wanted)
+        h, attempts = left / pieces, attempts + 1
+        new_q, new_qd, *estimates = stepping.attempt(
+            lambda q, qd, h=h: stepping.slope(tree, q, qd, tau, h), q, qd, h, joints
+        )
+        sizes = []  # of a ball's movement 2
+        for kind, at, _ in joints.joints:
+            sizes += [2.0] * 3 if kind == "ball" else [1.0 + max(abs(q[at.start]), abs(new_q[at.start]))]
+        sizes += [1.0 + max(abs(x), abs(y)) for x, y in zip(qd, new_qd)]
+        e5, e3 = (
+            sum((x / (tolerance * size)) ** 2 for x, size in zip([*of_q, *of_qd], sizes))
+            for of_q, of_qd in (estimates[:2], estimates[2:])
+        )
+        error = e5 / math.sqrt(len(sizes) * (e5 + 0.01 * e3))
+        if error < 1.0:
+            q, qd, left = new_q, new_qd, left - h if pieces > 1 else 0.0
+        wanted = h * min(6.0, max(0.333, 0.9 * error ** (-1 / 8)))
+    return q, qd, attempts
+
+
+def test_the_steps_of_an_adaptive_method_are_controlled_as_stated():
+    (q,), (qd,), (tau,) = starts(1)
+    for tolerance in (1e-5, 1e-9):
+        motion = tmt.simulate(q, qd, tau, 0.5, 1, "dopri8_adaptive", SMALL, tolerance=tolerance)
+        *state, attempts = controlled(SMALL, q.tolist(), qd.tolist(), tau.tolist(), 0.5, tolerance)
+        assert motion.evaluations == 12 * attempts and attempts > 3
+        assert np.allclose(motion.q[1], state[0], rtol=0, atol=1e-12)
+        assert np.allclose(motion.qd[1], state[1], rtol=0, atol=1e-11)
+
+
+def test_an_adaptive_method_comes_as_near_as_its_tolerance_says():
+    (q,), (qd,), (tau,) = starts(1)
+    truth = trajectory(SMALL, q, qd, tau, 0.5, 1).high[-1]
+    errors = []
+    for tolerance in (1e-4, 1e-8, 1e-13):
+        motion = tmt.simulate(q, qd, tau, 0.5, 1, "dopri8_adaptive", SMALL, tolerance=tolerance)
+        errors.append(np.abs(np.concatenate([motion.q[1], motion.qd[1]]) - truth).max())
+    assert errors[0] < 1e-3 and 0.0 < errors[1] < 1e-7 and errors[2] < 1e-12
+
+
+# who asks
+
+
+def test_several_cores_give_the_bits_of_one(monkeypatch):
+    q, qd, tau = starts(75)
+    qd[40] = 1e200
+    arguments = q, qd, tau, 0.02, 6
+    for name in ("rk4", "implicit_midpoint"):
+        monkeypatch.setattr(MODULE, "cores", lambda: 1)
+        one = tmt.simulate(*arguments, name, SMALL)
+        monkeypatch.setattr(MODULE, "cores", lambda: 3)
+        monkeypatch.setattr(MODULE, "SPREAD", 0)
+        three = tmt.simulate(*arguments, name, SMALL)
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three))
+        assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended) and one.ended[40]
+
+
+def test_threads_ask_at_once_for_what_is_not_compiled(folder):
+    tree = tmt.ARM.lock({"alpha": 0.1, "gamma": 0.25})
+    q = np.random.default_rng(0).uniform(-1, 1, (9, 1))
+    with ThreadPoolExecutor(4) as pool:
+        asked = [pool.submit(tmt.simulate, q[k % 2 :], q[k % 2 :], q[k % 2 :], 0.01, 3, model=tree) for k in range(8)]
+        found = [one.result().q for one in asked]
+    assert all(np.array_equal(one, found[k % 2]) for k, one in enumerate(found))
+    assert np.array_equal(found[0][1:], found[1])
+
+
+def test_of_trees_and_methods_the_last_ones_are_held(monkeypatch):
+    monkeypatch.setattr(MODULE, "MOST", 2)
+    for gamma in (0.1, 0.2, 0.3, 0.1):
+        tree = tmt.ARM.lock({"alpha": 0.0, "gamma": gamma})
+        assert np.isfinite(tmt.simulate([0.1], [0.2], [0.3], 0.01, 2, model=tree).q).all() and len(known) <= 2
+
+
+def test_a_runner_fills_paths():
+    run, (q, qd, tau) = runner(SMALL, "dopri8_adaptive"), starts(2)
+    q, qd = (np.concatenate([x[:, None], np.full((2, 2, x.shape[1]), np.nan)], axis=1) for x in (q, qd))
+    qd[1, 0] = 1e200
+    ended = np.full((2, 2), -1)
+    count = run(q, qd, tau, 0.1, 1e-6, ended, 3)
+    motion = tmt.simulate(q[:, 0], qd[:, 0], tau, 0.1, 6, "dopri8_adaptive", SMALL, tolerance=1e-6, every=3)
+    assert count == motion.evaluations and np.array_equal(q, motion.q, equal_nan=True)
+    assert ended[0].tolist() == [0, 0] and ended[1, 0] > 0
+    again = [np.ascontiguousarray(np.concatenate([x[:, :1], 0.0 * x[:, :1]], axis=1)) for x in (q, qd)]
+    assert run(*again, tau, 0.1, tolerance=1e-6) > 0 and np.isfinite(again[0][0]).all()
