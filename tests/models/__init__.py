@@ -4,7 +4,6 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from .chain import chain
-
 from .seeded import KINDS, random_tree
 
 __all__ = ["KINDS", "PATHS", "chain", "gymnasium_files", "random_tree"]

@@ -125,5 +125,6 @@ def test_every_evaluation_of_an_implicit_method_is_counted(name):
     path[:, 0, 0] = BENT, [1.0, 2.0, 3.0]
     evaluations = runner(tmt.ARM, name)(*path, np.zeros((1, 3)), 0.1)
     assert np.allclose(path[:, 0, -1], state, rtol=0, atol=1e-12)
-    # over any scalar the stages are found once more, for the sake of their derivatives
-    assert evaluations == counted - 4 * stepping.stages
+    # over any scalar the stages are found once more, for the sake of their derivatives; compiled code counts the
+    # linear equations that it starts from, which are made of dual numbers: as many in each step
+    assert evaluations == counted

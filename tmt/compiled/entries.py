@@ -22,10 +22,8 @@ def source(tree, quantity: str, width: int, terms=None, chain: bool = False) -> 
     """The module of a quantity for one state at a time, or for several side by side; chain: of that function alone."""
     traced = forms.quantity(tree, quantity, terms)
     entries = Entries(tree, quantity, traced, width)
-    if chain:
-        made = [entries.chain()]
-    else:
-        made = [entries.many("rows"), entries.one() if width == 1 else entries.many("columns")]
+    made = [entries.many("rows"), entries.one() if width == 1 else entries.many("columns")]
+    made = [entries.chain()] if chain else made
     return module([*functions(traced, width, inline=len(traced.nodes) <= INLINED), *made])
 
 

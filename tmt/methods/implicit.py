@@ -1,9 +1,11 @@
 """Implicit Runge-Kutta methods: their stages solve an equation, by Newton's method with exact Jacobians.
 
 The unknowns are the accelerations a_i of the stages, a_i = qdd(q_i, qd_i), at
-q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. Newton's method starts from the solution of the equations made
-linear at (q, qd): of several that a large step has it then finds the one nearby. A ball's quaternions p_i follow from the speeds
-of the stages by linear equations, p_i = p + dt sum_j A_ij p_j o (0, omega_j) / 2.
+q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. A ball's quaternions p_i follow from the
+speeds of the stages by linear equations, p_i = p + dt sum_j A_ij p_j o (0, omega_j) / 2.
+
+A large step has several solutions. Newton's method starts from that of the equations made linear at (q, qd), and finds
+the one nearby.
 """
 
 from dataclasses import dataclass, field
