@@ -158,7 +158,7 @@ def reasons(
         if code in (OVERFLOW, NEWTON) and reach > 2.0**48:
             code = TURNED  # within the step: there is no sine at its stages
         elif code == TURNED and not reach > 2.0**48:
-            code = OVERFLOW  # within the step: where the loops take the library's sine, numbers stay finite
+            code = OVERFLOW  # neither the state nor its speed leads there: what it turned by came from within the step
         why[run] = f"at t = {steps[run] * dt:g} s: {why[run] or words[code]}"
     return why
 

@@ -79,7 +79,6 @@ def test_numbers_of_steps(steps):
         tmt.simulate(REST, REST, REST, 0.1, steps)
 
 
-@pytest.mark.xfail(strict=True, reason="OverflowError, or nothing is done: no bound for what C's counters hold")
 @pytest.mark.parametrize("steps", [2**63, 2**64 + 5, 10**400])
 def test_more_steps_than_can_be_counted(steps):
     refused(tmt.simulate, [1.0, 1.0, 1.0], REST, REST, 1e-30, steps, "rk4", tmt.ARM, None, steps)
@@ -225,20 +224,19 @@ def test_results_are_not_written_over_arguments():
     assert "shares memory" in refused(call, both[:40], both[:40].copy(), both[:40].copy(), both[1:])
 
 
-@pytest.mark.xfail(strict=True, reason="they are taken, though compiled code trusts that they share nothing")
 def test_paths_that_share_memory_are_refused():
     path = np.zeros((1, 3, 3))
     refused(runner(tmt.ARM, "rk4"), path, path, np.zeros((1, 3)), 0.1)
 
 
-@pytest.mark.xfail(strict=True, reason="what the function or Python raises comes through: TypeError, IndexError")
 def test_wrong_terms_are_refused():
-    for terms in (lambda: None, lambda tree, q, qd: 3, lambda tree, q, qd: ([[1.0]], [1.0]), type):
+    returned = (None, 3, ([[1.0]], [1.0]), (["abc"] * 3, [0.0] * 3))
+    for terms in (lambda: None, type, *(lambda tree, q, qd, found=found: found for found in returned)):
         refused(lambda terms=terms: evaluator(tmt.ARM, "acceleration", terms).alone)
 
 
 def test_paths_that_do_not_fit_into_memory():
-    for exponent in (12, 15, 18, 30, 400, 5000):
+    for exponent in (12, 15, 18):
         message = refused(tmt.simulate, REST, REST, REST, 1e-3, 10**exponent)
         assert "of memory, more than there is" in message
     assert "would take 4.8e+04 GB of memory" in refused(tmt.simulate, REST, REST, REST, 1e-3, 10**12)

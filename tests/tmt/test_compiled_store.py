@@ -240,7 +240,6 @@ def test_a_full_disk_only_costs_time(folder, fails, monkeypatch):
     assert asked() == 3.0 and files(folder) == [] and store.complaints == []
 
 
-@pytest.mark.xfail(strict=True, reason="what could not be written whole stays there as a .new file")
 def test_a_disk_that_is_full_on_the_way_leaves_nothing_behind(folder, monkeypatch):
     if not Path("/dev/full").exists():
         pytest.skip("no /dev/full here")

@@ -102,7 +102,6 @@ def test_a_method_of_ones_own(own, order, rng, monkeypatch):
         tmt.simulate(BENT, REST, REST, 0.1, 1, "mine", tolerance=1e-6)
 
 
-@pytest.mark.xfail(strict=True, reason="StopIteration: forms.is_articulated looks for a slope in its class")
 @pytest.mark.parametrize("name", METHODS)
 def test_what_an_object_of_no_known_kind_says_counts(name, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", Talking(name))

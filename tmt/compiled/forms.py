@@ -5,14 +5,16 @@ beyond, those in the axes of the world (articulated.py), whose number grows with
 """
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from tmt.equations import articulated, composite
 from tmt.equations.dual import seeded
 from tmt.equations.quantities import QUANTITIES, State
 from tmt.methods.stepping import Completed, Method
+from tmt.model.values import shown
 
 from .straight import Traced, trace
+from .trace import Expression
 
 FEW, MANY = 5, 20  # speeds: up to so many the composite form alone is traced, from so many on the articulated one alone
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
@@ -69,20 +71,37 @@ def of_terms(tree, terms) -> Traced:
 def quantity(tree, name: str, terms: Callable | None = None) -> Traced:
     """A quantity as a function of (q, qd, tau), flat; or "mass_matrix_and_bias", see `of_terms`.
 
-    terms: another form of Mbar and h.
+    terms: another form of Mbar and h; ValueError if they are not what a function of tmt's would return.
     """
+    terms = partial(checked_terms, terms) if terms else Terms(tree)
     if name == "mass_matrix_and_bias":
-        return of_terms(tree, terms or Terms(tree))
-    if name == "acceleration" and terms is None:
+        return of_terms(tree, terms)
+    if name == "acceleration" and isinstance(terms, Terms):
         return slope(tree, Method(), "quantity", with_step=False)
 
     def function(q, qd, tau):
         state = State(tree, q, qd if "qd" in QUANTITIES[name].takes else None, tau)
         if name in DYNAMICS:
-            state.mass_matrix, state.bias = (terms or Terms(tree))(tree, q, state.qd)
+            state.mass_matrix, state.bias = terms(tree, q, state.qd)
         return flat(state.bias if name == "gravity_balance" else QUANTITIES[name].of(state))
 
     return trace("quantity", (tree.coordinates.nq, len(tree.axis), len(tree.axis)), function)
+
+
+def checked_terms(terms, tree, q, qd) -> tuple[list, list]:
+    """Mbar and h as a user's function gives them."""
+    n = len(tree.axis)
+    try:
+        M, h = terms(tree, q, qd)
+        M, h = [[row[j] for j in range(n)] for row in (M[i] for i in range(n))], [h[i] for i in range(n)]
+        if wrong := [x for x in (*h, *(x for row in M for x in row)) if not isinstance(x, int | float | Expression)]:
+            raise TypeError(f"{shown(wrong[0])} is no scalar")
+        return M, h
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise ValueError(
+            f"terms(tree, q, qd) does not return Mbar, {n} rows of {n}, and h, {n} numbers: {why}"
+        ) from error
 
 
 def flat(nested) -> list:
@@ -110,8 +129,8 @@ def is_articulated(stepping: Method, tree) -> bool:
     """Whether the slope of a method can be had from articulated bodies; not if it is another since."""
     if isinstance(stepping, Completed):
         return False
-    kind = next(kind for kind in type(stepping).__mro__ if {"slope", "articulated"} & vars(kind).keys())
-    return "articulated" in vars(kind) and stepping.articulates(tree)
+    kind = next((kind for kind in type(stepping).__mro__ if {"slope", "articulated"} & vars(kind).keys()), None)
+    return kind is not None and "articulated" in vars(kind) and stepping.articulates(tree)
 
 
 def directional(tree, stepping: Method) -> Traced:

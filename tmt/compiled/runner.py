@@ -121,6 +121,8 @@ def runner(tree: Tree, method: str) -> Callable:
         check("tau", tau, (count, nv))
         check("q", q, (count, records, nq))
         check("qd", qd, (count, records, nv))
+        if any(np.may_share_memory(*pair) for pair in ((q, qd), (q, tau), (qd, tau))):
+            raise ValueError("q, qd and tau share memory; arrays of their own are expected")
         if ended is not None:
             check("ended", ended, (count, 2), np.int64)
         found, evaluations = own.follow(q, qd, tau, real("dt", dt), tolerance, every)

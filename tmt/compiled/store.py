@@ -50,8 +50,7 @@ def library(source: Callable[[], str], *what) -> Library:
     except Exception:  # whatever is wrong with the folder or the file
         return Library(source())
     if found is not None:
-        with suppress(RuntimeError):  # of LLVM: no object file
-            return Library(code=found)
+        return Library(code=found)
     code = object_code(source())
     with suppress(OSError):
         clear(folder)
@@ -164,8 +163,14 @@ def private(path, group) -> bool:
 def write_aside(path, content) -> None:
     """Write a file aside and move it, so that a process that reads meanwhile sees all of it or nothing."""
     with tempfile.NamedTemporaryFile("wb", dir=path.parent, suffix=".new", delete=False) as file:
-        file.write(content)
-    os.replace(file.name, path)
+        aside = Path(file.name)
+        try:
+            file.write(content)
+            file.close()
+            os.replace(aside, path)
+        except OSError:
+            aside.unlink(missing_ok=True)
+            raise
 
 
 def clear(folder) -> None:

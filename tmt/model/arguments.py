@@ -91,11 +91,11 @@ def positive(name, value, kind) -> float:
 
 
 def whole(name, value) -> int:
-    """The value as an int of at least 1."""
-    if type(value) is int and value >= 1:
-        return value
+    """The value as an int of at least 1 that compiled code can count to."""
     if not isinstance(value, numbers.Integral) or isinstance(value, bool) or value < 1:
         raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
+    if value >= 2**63:
+        raise ValueError(f"{name} is {shown(value)}; a whole number below 2^63 is expected")
     return int(value)
 
 
