@@ -1,3 +1,5 @@
+import signal
+
 import numpy as np
 import pytest
 from aside import Aside, is_waiting
@@ -7,6 +9,11 @@ from small_runs import Beside, jobs, of_arm
 from compare import experiment
 from compare.engines.mujoco import load
 from compare.robots.arm import ARM
+
+# what is started in the background or by nohup ignores these, and its children do too: tests that send them would wait
+signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # no example database in the checkout; the same examples in every run
 settings.register_profile("project", database=None, derandomize=True, deadline=None, max_examples=50)

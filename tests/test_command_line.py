@@ -128,17 +128,15 @@ def test_page_is_one_file_and_markdown_finds_its_figures(ran):
             ["mass", "--scenes", "my.toml"],
             "--scenes is for trajectory, speed, reduction and all; mass follows no scene",
         ),
-        (["mass", "--growth"], "--growth is for speed; it does not go with mass"),
-        (["all", "--growth"], "--growth is for speed; it does not go with all"),
         (
             ["mass", "--dask", "tcp://x:1"],
-            "--dask is for speed --growth, for diagnosis without --mjcf and --reference,",
+            "--dask is for diagnosis without --mjcf and --reference,",
         ),
-        (["all", "--workers", "2"], "--workers is for speed --growth, for diagnosis without --mjcf"),
-        (["speed", "--dask", "tcp://x:1"], "--dask is for speed --growth, for diagnosis"),
+        (["all", "--workers", "2"], "--workers is for diagnosis without --mjcf"),
+        (["speed", "--dask", "tcp://x:1"], "--dask is for diagnosis"),
         (
             ["diagnosis", "--mjcf", "a.xml", "--dask", "tcp://x:1"],
-            "--dask is for speed --growth, for diagnosis without --mjcf",
+            "--dask is for diagnosis without --mjcf",
         ),
         (
             ["diagnosis", "--reference", "model", "--workers", "2"],

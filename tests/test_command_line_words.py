@@ -88,9 +88,9 @@ def test_the_version_is_that_of_a_report(arguments, capsys):
     assert answered(["mas", "--version"], capsys)[0] == 2
 
 
-TAKEN = {"--scenes": {"trajectory", "speed", "reduction"}, "--dt": {"stability"}, "--growth": {"speed"},
+TAKEN = {"--scenes": {"trajectory", "speed", "reduction"}, "--dt": {"stability"},
          "--joints": {"kinematics", "mass", "gravity", "acceleration", "trajectory", "diagnosis"},
-         "--integrator": {"stability"}, "--workers": {"diagnosis", "speed"}, "--dask": {"diagnosis", "speed"}}  # fmt: skip
+         "--integrator": {"stability"}, "--workers": {"diagnosis"}, "--dask": {"diagnosis"}}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)

@@ -24,7 +24,7 @@ from .ways import (
     IN_PYTHON,
     MOST_CALLS,
     MOST_RESULTS,
-    NAMES,
+    NAMES_IN_TMT,
     RK4_STEP,
     WAITING,
     of_many_states,
@@ -95,7 +95,7 @@ def costs(setup: Setup, made: Ways) -> tuple[list[dict], list[str]]:
 
 def known_operations(tree: tmt.Tree) -> dict[tuple[str, str], int]:
     """Operations of one state, {(quantity, implementation): so many}, of compiled code."""
-    found = {quantity: evaluator(tree, name).operations for quantity, name in NAMES.items()}
+    found = {quantity: evaluator(tree, name).operations for quantity, name in NAMES_IN_TMT.items()}
     return {(quantity, name): found[quantity] for quantity in found for name in (IN_LANES, EACH, WAITING)}
 
 

@@ -22,7 +22,11 @@ FEW_SETTINGS, FEW_OTHERS = (
 )  # settings of a run that is not full: the coarsest; of further engines
 NEARER = slice(3, 7)  # of the settings: coarse ones that come near the reference where the motion is tame
 # of the robot of a file, whose number of joints has no bound: seconds of one evaluation are about a constant times nv^1.5
-CALLED, COMPILED, IN_MUJOCO = 4e-7, 5e-8, 2e-7  # s: called from Python, of tmt's compiled code, of MuJoCo
+CALL_SECONDS, COMPILED_SECONDS, MUJOCO_SECONDS = (
+    4e-7,
+    5e-8,
+    2e-7,
+)  # s: called from Python, of tmt's compiled code, of MuJoCo
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # of the finest run of a method, by this estimate
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of any method, whatever they take
@@ -131,11 +135,11 @@ def estimated(method: Method, tree: Tree) -> float:
     """Seconds of a step, or of an evaluation of a method that chooses its own steps: about, whatever the machine."""
     n = tree.coordinates.nv
     if method.engine == "mujoco":
-        return IN_MUJOCO * n**1.5 * (4 if method.name == "RK4" else 1)
+        return MUJOCO_SECONDS * n**1.5 * (4 if method.name == "RK4" else 1)
     if method.engine != "tmt":
-        return CALLED * n**1.5
+        return CALL_SECONDS * n**1.5
     stepping = method_named(method.name)
-    evaluation = COMPILED * n**1.5
+    evaluation = COMPILED_SECONDS * n**1.5
     if method.adaptive:
         return evaluation
     if stepping.solves_stages:

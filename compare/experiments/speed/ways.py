@@ -16,7 +16,7 @@ MOST_RESULTS = 10_000_000  # numbers, the results of many states, of a robot of 
 IN_PYTHON = 12  # speeds up to which the literal form is timed
 # what is evaluated
 FORWARD, TERMS, MASS_MATRIX, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "mass_matrix", "rk4_step"
-NAMES = {FORWARD: "acceleration", TERMS: TERMS}  # of tmt.compiled
+NAMES_IN_TMT = {FORWARD: "acceleration", TERMS: TERMS}  # of tmt.compiled
 CALLED, MASS_CALLED = "tmt.acceleration, called from Python", "tmt.mass_matrix, called from Python"
 WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "compiled, side by side"
 
@@ -42,7 +42,7 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     tmt.prepare(tree)
     yield FORWARD, CALLED, calling(tmt.acceleration, q, qd, tau, tree)
     yield MASS_MATRIX, MASS_CALLED, calling(tmt.mass_matrix, q, tree)
-    for quantity, name in NAMES.items():
+    for quantity, name in NAMES_IN_TMT.items():
         chain = evaluator(tree, name).chain
         yield quantity, WAITING, lambda count, chain=chain: chain(q, qd, tau, count)
     yield RK4_STEP, EACH, steps
@@ -63,7 +63,7 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoo
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
     count, n = qd.shape
     runs = {}
-    for quantity, name in NAMES.items() if count > 1 else ():
+    for quantity, name in NAMES_IN_TMT.items() if count > 1 else ():
         compiled = evaluator(tree, name)
         out = np.ones((count, compiled.size))
         wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]

@@ -53,7 +53,6 @@ CHECKS = (
     ("long_runs", "check_minutes", "quantity"),
     ("equilibria", "check_amplification", "quantity"),
     ("fault_table", "rows_by_pieces", "ENDS"),
-    ("growth_elsewhere", "add_growth_elsewhere", "ENDS"),
 )
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (

@@ -1,4 +1,4 @@
-"""Edits of what tmt refuses and of what its loops report."""
+"""Edits of what tmt refuses and of what its compiled code reports."""
 
 from ..edit import Edit
 
@@ -14,16 +14,19 @@ EDITS = (
     Edit("reference", "distance", "np.abs(_1)", "0.5 * np.abs(_1)", "the distance from 50 digits is halved"),
     Edit("tree", "_direction", "_1 == 0.0", "False", "an axis may be zero"),
     Edit("simulation", "singular_in", "alive - 1", "0", "the last state is not looked at", nth=1),
-    Edit("loop_bodies", "slid_along", "2.0 * speed", "speed", "half of Coriolis' acceleration of a slide"),
-    Edit("loop_bodies", "point", "omegad.cross(arm) + _1", "_1", "no angular acceleration in the convective terms of a point"),
-    Edit("loop_bodies", "put_energy", "0.5 * joint.armature[k]", "joint.armature[k]", "rotors have twice their energy"),
-    Edit("loop_bodies", "of_bodies", "3 * len(bodies) * n + at", "at", "B_b is written over T_b"),
-    Edit("loop_answers", "finite", "others == 0", "True", "compiled code answers what is not finite"),
-    Edit("loop_answers", "of_length_1", "not SHORTEST <= _1 <= LONGEST", "False", "a quaternion may have any length"),
-    Edit("loop_answers", "to_rows", "out[first + l, j * n + i]", "out[first + l, i * n + j]", "Mbar of many is a triangle"),
-    Edit("answers", "Known.of_one", "self.may_be_singular", "False", "compiled code answers where Mbar is singular"),
-    Edit("answers", "Known.has_loops", "CALL + count", "count", "a call of the literal form costs nothing", nth=0),
-    Edit("choice", "chosen", "wanted + before", "wanted", "what was asked before does not count"),
-    Edit("loop_trees", "in_parts", "(inner.position_gain, inner.speed_gain)", "(inner.speed_gain, inner.position_gain)",
-         "gains of positions act on speeds"),
+    Edit("articulated", "outward", "2.0 * qd[by.start]", "qd[by.start]", "half of Coriolis' acceleration of a slide"),
+    Edit("articulated", "about_point", "J.times(omegad) + _1", "_1", "no angular acceleration in Euler's equation"),
+    Edit("articulated", "mass_matrix_and_bias", "M[k][k] + tree.armature[k]", "M[k][k]", "large trees have no armature"),
+    Edit("entries", "Entries.wrong", "float('inf')", "2.0 * float('nan')", "compiled code finds every state wrong"),
+    Edit("entries", "Entries.wrong", "size.get().compare('lt', float('inf'))", "size.get().compare('ge', 0.0)",
+         "compiled code answers what is infinite"),
+    Edit("entries", "Entries.wrong", "square.compare('ge', SHORTEST)", "square.compare('ge', 0.0)",
+         "a quaternion may be shorter than 1"),
+    Edit("forms", "directional", "[*(_1), *(slope for _, slope in parts)]", "[*(_1), *(2 * slope for _, slope in parts)]",
+         "Newton's method has twice the Jacobian"),
+    Edit("runs", "unsound", "angles.compare('lt', LIMIT)", "angles.compare('lt', float('inf'))", "turns have no limit"),
+    Edit("semi_implicit", "SemiImplicitEuler.gains_held", "(tree.position_gain, tree.speed_gain)",
+         "(tree.speed_gain, tree.position_gain)", "gains of positions act on speeds"),
+    Edit("answers", "Answers.of_one", "self.may_be_singular", "False", "compiled code answers where Mbar is singular"),
+    Edit("answers", "Answers.of_any", "self.asked[quantity] <= SMALL", "True", "machine code never answers unasked"),
 )  # fmt: skip
