@@ -47,7 +47,11 @@ def limits_and_growths(
         tolerance = limit_tolerance(at, method.scheme, predicted, steps) if predicted else LIMIT_TOLERANCE
         dt = 1e-2 if predicted is None else 1.001 * predicted  # just above the limit its mode grows fastest
         _, shape, _ = at.fastest_growing(method.scheme, dt)
-        open_end = why_undecided(at, tolerance if predicted else 0.0)
+        open_end = (
+            why_undecided(at, tolerance, predicted * quarter_of(at, predicted, steps), at.rate(shape))
+            if predicted
+            else why_undecided(at)
+        )
         seen, observed = (
             (None, None) if open_end else observed_limit(method, engines, at, steps, tried_at(at, predicted))
         )
@@ -163,16 +167,21 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
     return float(excess)
 
 
-def why_undecided(at: Held, tolerance: float) -> str | None:
-    """Why runs of a file's robot cannot show a limit, or None. tolerance: how far above it they show the growth, relative.
+def why_undecided(at: Held, tolerance: float = 0.0, duration: float = np.inf, rate: float = np.nan) -> str | None:
+    """Why runs of a file's robot cannot show a limit, or None.
 
-    One eps of the forces pushes a mode of the rate r by an acceleration, and its equilibrium by that over r^2.
+    tolerance: how far above the limit they show the growth, relative; duration: of a quarter of a run at the limit, s; rate: of
+    the mode that grows beyond it, 1/s. One eps of the forces pushes a mode of the rate r by an acceleration, and its equilibrium
+    by that over r^2.
     """
     if not at.case.robot.is_read:
         return None
     if tolerance > MOST_TOLERANCE:
         return f"a run of this length shows growth only more than {100 * MOST_TOLERANCE:g} % above them"
-    rates = np.abs(at.modes[0])[~at.without_stiffness]
+    modes = at.modes[0][~at.without_stiffness]
+    rates = np.abs(modes)
+    if np.isclose(rates, rate)[~is_seen(modes, at.small, duration)].any():
+        return f"a quarter of a run of this length is shorter than a swing of the mode of {rate:.2g} per second"
     pushed = slope_rounding(METHODS["rk4"], at.tree, at.q[None], np.zeros((1, at.nv)), at.tau, 1.0)[2][0] / FACTOR
     if len(rates) and pushed > GROWTH_MARGIN * LINEAR_DEVIATION * rates.min() ** 2:
         return (
