@@ -52,41 +52,35 @@ class Runner:
         run, info = self.compiled(width), np.zeros((count, 3), np.int64)
 
         def follow_some(part):
-            size = len(q[part])
-            if size % width:  # too few for a register: their last one again
-                chosen = np.minimum(np.arange(-(-size // width) * width), size - 1)
-                arrays = [np.ascontiguousarray(array[part][chosen]) for array in (q, qd, tau, info)]
-            else:
-                arrays = [array[part] for array in (q, qd, tau, info)]
-            *paths, torque, found = arrays
-            run(
-                *(x.ctypes.data for x in (*paths, torque)),
-                dt,
-                tolerance,
-                found.ctypes.data,
-                every,
-                q.shape[1],
-                len(found),
-            )
-            if size % width:
-                for array, own in zip((q, qd, info), (*paths, found)):
-                    array[part] = own[:size]
+            arrays = [q[part], qd[part], tau[part], info[part]]
+            if missing := -len(arrays[0]) % width:  # too few for a register: their last one again
+                arrays = [np.concatenate([array, *[array[-1:]] * missing]) for array in arrays]
+            *given, found = map(address, arrays)
+            run(*given, dt, tolerance, found, every, q.shape[1], len(arrays[0]))
+            if missing:
+                for array, filled in zip((q, qd, info), (arrays[0], arrays[1], arrays[3])):
+                    array[part] = filled[:-missing]
 
-        spread = count > width and steps * count * self.stepping.stages > SPREAD and cores() > 1
-        pieces = min(-(-count // width), PIECES * cores()) if spread else 1
-        blocks = -(-count // width)
-        parts = [slice(*pair) for pair in pairwise(min(blocks * k // pieces * width, count) for k in range(pieces + 1))]
-        if pieces > 1:
-            in_threads(follow_some, [(part,) for part in parts], cores())
+        if count > width and steps * count * self.stepping.stages > SPREAD and cores() > 1:
+            blocks = -(-count // width)
+            pieces = min(blocks, PIECES * cores())
+            bounds = [min(blocks * k // pieces * width, count) for k in range(pieces + 1)]
+            in_threads(follow_some, [(slice(*pair),) for pair in pairwise(bounds)], cores())
         else:
-            follow_some(slice(0, count))
-        for i in np.flatnonzero(info[:, 0]):
-            first = info[i, 1] // every + 1
-            q[i, first:], qd[i, first:] = np.nan, np.nan
+            follow_some(slice(None))
+        taken, codes = steps * count, info[:, :2]
+        if codes[:, 0].any():
+            taken = int(np.where(codes[:, 0], codes[:, 1] + 1, steps).sum())
+            for i in np.flatnonzero(codes[:, 0]):
+                first = codes[i, 1] // every + 1
+                q[i, first:], qd[i, first:] = np.nan, np.nan
         if self.stepping.adaptive or self.stepping.solves_stages:
-            return info[:, :2], int(info[:, 2].sum())
-        taken = np.where(info[:, 0], info[:, 1] + 1, steps)
-        return info[:, :2], int(taken.sum()) * self.stepping.stages
+            return codes, int(info[:, 2].sum())
+        return codes, taken * self.stepping.stages
+
+
+def address(array) -> int:
+    return array.__array_interface__["data"][0]
 
 
 def runner_of(tree: Tree, name: str) -> Runner:
@@ -114,33 +108,27 @@ def runner(tree: Tree, method: str) -> Callable:
     own = runner_of(tree, method)
     nq, nv = tree.coordinates.nq, tree.coordinates.nv
 
-    def run(q, qd, tau, dt, *more, **named):
-        tolerance, ended, every = settings(own.stepping.adaptive, *more, **named)
+    def adaptive(q, qd, tau, dt, tolerance, ended=None, every=1):
         records = q.shape[1] if isinstance(q, ndarray) and q.ndim == 3 else "records"
         count = len(tau) if isinstance(tau, ndarray) and tau.ndim else "runs"
         check("tau", tau, (count, nv))
         check("q", q, (count, records, nq))
         check("qd", qd, (count, records, nv))
-        if any(np.may_share_memory(*pair) for pair in ((q, qd), (q, tau), (qd, tau))):
+        if np.may_share_memory(q, qd) or np.may_share_memory(q, tau) or np.may_share_memory(qd, tau):
             raise ValueError("q, qd and tau share memory; arrays of their own are expected")
         if ended is not None:
             check("ended", ended, (count, 2), np.int64)
-        found, evaluations = own.follow(q, qd, tau, real("dt", dt), tolerance, every)
+        dt, tolerance, every = real("dt", dt), real("tolerance", tolerance), whole("every", every)
+        codes, evaluations = own.follow(q, qd, tau, dt, tolerance, every)
         if ended is not None:
-            ended[:] = found
+            ended[:] = codes
         return evaluations
 
+    def fixed(q, qd, tau, dt, ended=None, every=1):
+        return adaptive(q, qd, tau, dt, 0.0, ended, every)
+
     own.compiled(1)
-    return run
-
-
-def settings(adaptive: bool, *more, ended=None, every=1, tolerance=None) -> tuple:
-    """The tolerance, `ended` and `every` of a run's further arguments."""
-    names = ["tolerance"] * adaptive + ["ended", "every"]
-    if len(more) > len(names):
-        raise TypeError(f"run takes {', '.join(['q', 'qd', 'tau', 'dt', *names])}")
-    found = {"ended": ended, "every": every, "tolerance": tolerance} | dict(zip(names, more))
-    return real("tolerance", found["tolerance"]) if adaptive else 0.0, found["ended"], whole("every", found["every"])
+    return adaptive if own.stepping.adaptive else fixed
 
 
 def check(name: str, array, shape: tuple, dtype=np.float64) -> None:
@@ -159,6 +147,8 @@ def check(name: str, array, shape: tuple, dtype=np.float64) -> None:
 
 def real(name: str, value) -> float:
     """The value as a float."""
+    if type(value) is float:
+        return value
     if isinstance(value, (float, int, np.floating, np.integer)) and not isinstance(value, bool):
         try:
             return float(value)

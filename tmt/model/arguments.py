@@ -92,6 +92,8 @@ def positive(name, value, kind) -> float:
 
 def whole(name, value) -> int:
     """The value as an int of at least 1 that compiled code can count to."""
+    if type(value) is int and 1 <= value < 2**63:
+        return value
     if not isinstance(value, numbers.Integral) or isinstance(value, bool) or value < 1:
         raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
     if value >= 2**63:
