@@ -110,13 +110,6 @@ def test_the_gradient_of_the_potential_energy_is_the_holding_torque(text):
     )  # the cart's ball has a spring
 
 
-def test_few_states_have_a_gradient_where_there_are_many_joints(monkeypatch):
-    monkeypatch.setattr(gravity, "MOST_ENERGIES", 40)
-    result = gravity.rows(setup_between(STONE, states=9))
-    states = {row["quantity"]: row["states"] for row in result.rows if row["scene"] == "random states"}
-    assert states["holding torque"] == 9 and states["MuJoCo: torque - dV/dq"] == 40 // 14
-
-
 def test_a_wrong_rate_of_mujocos_jacobian_is_named_and_decides_nothing():
     """mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it: found by central differences."""
     setup = setup_between(
