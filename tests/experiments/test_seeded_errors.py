@@ -71,10 +71,6 @@ IN_THE_METHOD_OF_KINDS = {
         "(qd[by.start] * 2.0)", "(qd[by.start] * 1.0)", ["kinematics v_conv", "acceleration bias", "acceleration dE/dt"]),
     "a slide that turns its body": (
         "ZERO if not moved or f.slides else", "ZERO if not moved else", ["kinematics B_b", "mass Mbar"]),
-    "a slide from zero": (
-        "own[0] * (q[at.start] - tree.reference[i])", "own[0] * (q[at.start] - tree.reference[i] + 1e-9)",
-        ["kinematics x_b", "mass Mbar"]),
-    "the spring's sign": ("[Q - s for Q, s in", "[Q + s for Q, s in", ["acceleration qdd"]),
     "springs from half their rest": (
         "tree.coordinates.difference(q, tree.rest) if tree",
         "tree.coordinates.difference(q, [x * 0.5 for x in tree.rest]) if tree",

@@ -65,25 +65,6 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     assert 0.85 < implicit[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
 
 
-def test_the_rounding_of_a_step_is_the_largest_of_its_stages():
-    """RK4 on the elbow: the force is larger at the stages ahead, where it has become faster, than at the state."""
-    tree = ARM.case("elbow", posture=(0.0, 0.0, 30.0), locked=("alpha", "beta")).tree
-    stepping, q, qd, tau, dt = METHODS["rk4"], np.array([[0.3]]), np.array([[1.0]]), np.array([2.0]), 0.2
-    stages = []
-
-    def slope(q, qd):
-        a, size, bound = slope_rounding(stepping, tree, np.stack(q, axis=-1), np.stack(qd, axis=-1), tau, dt)
-        stages.append((size, bound))
-        return a
-
-    stepping.step(slope, [*q.T], [*qd.T], dt)
-    size, bound = np.max(stages, axis=0)
-    rates = dt * bound + 8 * EPS * (1.0 + dt * size)
-    found = step_rounding(stepping, tree, q, qd, tau, dt)
-    assert len(stages) == 4 and found[0, 1] == pytest.approx(rates[0], rel=1e-12)
-    assert np.ptp([bound for _, bound in stages]) > 0.1 * stages[0][1][0]
-
-
 @pytest.mark.parametrize("every", [1, 4, 64])
 def test_the_band_is_the_sum_of_what_each_step_adds_carried_to_the_present(every):
     """J of the disc is ((1, dt), (0, 1)): an error of rate becomes m dt times as much of angle after m steps."""

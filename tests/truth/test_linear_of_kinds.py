@@ -154,14 +154,6 @@ def test_the_swing_is_its_elliptic_function():
     assert np.isnan(swing(t, 0.0, 20.0, hanging, frequency)).all()  # turns over
 
 
-def test_a_pendulum_in_any_posture_of_the_locked_hinges():
-    case = ARM.case("tilted", posture=(30, 20, 60), speed=(0, 0, 100), locked=("alpha", "beta"))
-    hanging, frequency = pendulum(case.tree)
-    assert tmt.gravity_balance([hanging], case.tree)[0] == pytest.approx(0.0, abs=1e-14)
-    about = stiffness(case.tree, np.array([hanging])) / tmt.mass_matrix([0.0], case.tree)
-    assert frequency**2 == pytest.approx(about[0, 0])
-
-
 def test_modes_and_small_oscillations():
     q = ARM.posture("hanging")
     frequencies, shapes = modes(tmt.ARM, q)
