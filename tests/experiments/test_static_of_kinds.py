@@ -125,14 +125,3 @@ def test_a_wrong_rate_of_mujocos_jacobian_is_named_and_decides_nothing():
         bool(wrong) == (np.abs(by_rates - by_accelerations).max() > 1e-3) == any("mj_jacDot" in n for n in result.notes)
     )
     assert not right and "mj_jacDot" in kinematics.wrong_rates(setup, sample, by_accelerations + 0.1, scale)
-
-
-def test_accelerations_of_bodies_are_the_convective_terms_too():
-    setup = setup_between(random_tree(3), states=5, exact_states=0)
-    sample, tree, dynamics = setup.random, setup.robot.tree, setup.compared()["mujoco"]
-    ours, of = tmt.convective_terms(sample.q, sample.qd, tree), scales(tree, True, sample.q, sample.qd)
-    weight = dynamics.model.opt.gravity.copy()
-    theirs = convective_accelerations(dynamics, sample.q, sample.qd)
-    for found, known, scale in zip(theirs, ours, (of.v_conv, of.w_conv)):
-        assert (np.abs(found - known) <= 64 * 2.3e-16 * scale).all()
-    assert np.array_equal(dynamics.model.opt.gravity, weight)

@@ -143,20 +143,6 @@ def test_damping_of_an_actuator_itself_is_the_joints_and_goes_with_the_square_of
     assert_the_same_map(source)
 
 
-@pytest.mark.parametrize("law", ['<motor joint="a"/>', '<velocity joint="a" kv="3"/>',
-                                 '<general joint="a" gaintype="affine" gainprm="1 0 -2" ctrlrange="1 2"/>'])  # fmt: skip
-def test_without_stiffness_it_drifts_unless_it_is_braked(law):
-    found = limit(one(law))
-    assert found.limit == ("drifts" if "motor" in law else "finite")
-
-
-def test_a_posture_upright_is_a_saddle_and_says_how_fast_it_is_left():
-    text = one('<motor joint="a"/>', gravity=9.81).replace('pos="0.3 0 0"', 'pos="0 0 -0.3"')
-    found = limit(text)
-    assert found.limit == "saddle" and found.joint == "a"
-    assert found.rate == pytest.approx(np.sqrt(9.81 * 0.3 / (0.3**2 + 0.4 * 0.1**2)))
-
-
 def test_the_filter_of_an_actuator_that_limits_is_named():
     servo = (
         '<general name="slow" joint="a" dyntype="{}" dynprm="0.01" gainprm="30" biastype="affine" biasprm="0 -30 0"/>'

@@ -6,7 +6,7 @@ import pytest
 import tmt
 from compare.engines.mujoco import read
 from compare.experiments.speed.floors import floor
-from compare.experiments.speed.settings import coarsest_steps, scenes_of
+from compare.experiments.speed.settings import scenes_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth import reference
@@ -40,15 +40,6 @@ def test_errors_are_taken_from_both_halves():
     assert known.error(known.high[:, :3] + known.low[:, :3], range(3)).max() <= 1e-15
     off = known.high[:, [0, 2]] + [[0.0, 1e-3]]
     assert known.error(off, [0, 2]) == pytest.approx(1e-3) and known.error(off, [0, 1]).max() > 1e-2
-
-
-def test_it_is_read_at_the_times_of_the_runs():
-    """Where 64 steps of the scene's do not fill it: at those of the coarsest run."""
-    case = BENT.changed(duration=0.7, dt=0.007)
-    assert reference.first_steps(case) == coarsest_steps(case) == 128
-    known = reference.reference(case)
-    run = tmt.simulate(*case.start, case.tau, 0.7 / 4096, 4096, "dopri8", case.tree)
-    assert np.abs(run.t[::64] - known.t).max() < 1e-15 and known.error(run.q[::64], range(3)).max() < 1e-13
 
 
 def test_a_changed_scene_has_another_motion_and_an_equal_one_is_not_computed_again():

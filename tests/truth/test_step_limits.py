@@ -201,11 +201,6 @@ def test_the_joint_that_limits_is_the_fast_one(coupling, name):
     assert (limit.joint, limit.kind, limit.rate) == ("joint1", "swing", pytest.approx(30.0, rel=1e-3))
 
 
-def test_an_implicit_brake_that_is_faster_does_not_limit():
-    limit = small(np.eye(2), np.diag([900.0, 1.0]), np.diag([1e-3, 1e5])).limit("implicitfast")
-    assert (limit.joint, limit.rate) == ("joint0", pytest.approx(30.0, rel=1e-3))
-
-
 # free bases
 
 
@@ -229,19 +224,6 @@ def test_a_free_base_moves_so_that_no_momentum_arises(rng):
                 # with the zero modes left in, the same
                 assert whole.growth(name, 0.999 * limit.dt) <= 1.0 + 1e-6 < whole.growth(name, 1.001 * limit.dt)
                 assert limit.dt <= (whole.locked([0, 1]).limit(name).dt or np.inf)
-
-
-def test_a_base_that_something_holds_stays_and_may_drift_elsewhere(rng):
-    whole = chain_of(rng)
-    K = whole.K.copy()
-    K[0, 0] = 3.0
-    held = small(whole.M, K, whole.D)
-    assert held.free([0, 1]).names == ("joint0", "joint2", "joint3", "joint4")
-    # a direction of the base that is held by no single speed
-    K[:2, :2] = 3.0
-    across = small(whole.M, K, whole.D).free([0, 1])
-    assert across.base == (0, 1) and not across.drifts and across.limit("Euler").limit == "finite"
-    assert small(whole.M, K, whole.D).drifts
 
 
 def test_without_speeds_there_is_no_limit_but_that_of_filters():
