@@ -1,6 +1,5 @@
-"""Parameters of a robot's file: stated beside compiled, what an option changed, the inventory, and what is switched off."""
+"""Parameters of a robot's file, beside what the file states and beside a solution; and what is switched off."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,10 +8,11 @@ from models import PATHS
 
 from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.stated import Stated
-from compare.experiments import parameters
-from compare.experiments.parameters.file import changes_in_words, compare_number, tolerance_of, treatments_in_words
+from compare.experiments import mass, parameters
+from compare.experiments.parameters.file import compare_number, tolerance_of, treatments_in_words
 from compare.judge.check import Result
 from compare.judge.scale import EPS
+from compare.reference import compared_with
 from compare.robots.file import robot_of
 from compare.setup import Setup, engines
 
@@ -30,64 +30,52 @@ def result_of(source):
     return parameters.rows(Setup.small(robot, engines(engine(reading)), reading=reading))
 
 
+def failing(result):
+    return [check.quantity for check in result.checks if not check.passed]
+
+
 @pytest.mark.parametrize("name", PATHS)
 def test_the_models_are_as_their_files_state_and_nothing_more_acts(name):
     result = result_of(PATHS[name])
-    assert result.checks and all(check.passed for check in result.checks)
-    assert result.curves["causes"] == []
+    assert result.checks and failing(result) == [] and result.curves["causes"] == []
     features = [row["feature"] for row in result.tables["inventory"]]
     assert features == [feature.feature for feature in read(PATHS[name]).features]
-    columns = {"of", "quantity", "component", "stated", "compiled", "difference", "unit", "asked_by"}
-    assert {key for row in result.rows for key in row} == columns
     forces = [check.quantity for check in result.checks if check.scene == "random states"]
     assert forces == [f"no forces of {what}" for what in ("fluid and tendons", "actuators", "constraints and contacts")]
+    for row in (row for row in result.rows if row["of"] != "file"):
+        changed = row["stated"] is None or abs(row["difference"]) > 1e-5 * max(1, abs(row["stated"]))
+        assert row["asked_by"] or not changed
 
 
-def test_numbers_that_an_option_changes_are_no_checks_and_are_said():
+def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
     result = result_of(TOTAL)
-    assert all(check.passed for check in result.checks)
-    assert not [check for check in result.checks if check.quantity in ("mass", "inertia")]
+    assert failing(result) == [] and not {"mass", "inertia"} & {check.quantity for check in result.checks}
     asked = {(row["of"], row["quantity"]): row["asked_by"] for row in result.rows if row["of"] != "file"}
     assert asked["arm", "mass"] == asked["rod", "mass"] == asked["arm", "inertia"] == "settotalmass"
-    assert asked["rod", "com"] == "inertia from geoms" and asked["lift", "damping"] == ""
-    said = next(note for note in result.notes if note.startswith("By settotalmass the compiler sets "))
-    assert "mass of 2 bodies (most: arm, 1 to 2 kg)" in said and "inertia of 1 body (most: arm, by 0.25 kg m2)" in said
+    assert asked["rod", "com"] and asked["rod", "com"] != "settotalmass" and asked["lift", "damping"] == ""
+    said = next(note for note in result.notes if "settotalmass" in note)
+    assert "arm, 1 to 2 kg" in said and "0.25 kg m2" in said  # the most that a mass and an inertia are changed by
     units = {(row["of"], row["quantity"]): row["unit"] for row in result.rows}
     assert units["lift", "damping"] == "N s/m" and units["turn", "damping"] == "N m s/rad"
-
-
-@pytest.mark.parametrize("source", [TOTAL, *PATHS.values()], ids=["total", *PATHS])
-def test_a_number_that_is_not_the_stated_one_has_what_asked_for_it(source):
-    rows = [row for row in result_of(source).rows if row["of"] != "file"]
-    assert rows and all(isinstance(row["asked_by"], str) for row in rows)
-    changed = [
-        row for row in rows if row["stated"] is None or abs(row["difference"]) > 1e-5 * max(1, abs(row["stated"]))
-    ]
-    assert all(row["asked_by"] for row in changed) and (source is not TOTAL or changed)
-
-
-def test_a_number_that_differs_for_no_reason_is_a_failed_check_and_a_cause():
-    result = Result("parameters")
-    number = Stated("arm", "mass", 2.0, 2.5, "")
-    (cause,) = compare_number(result, number, "kg")
-    assert cause["text"] == "mass of arm: the file states 2 kg, compiled 2.5 kg"
-    assert (cause["rank"], cause["place"], cause["stated"], cause["found"]) == (2, "mass of arm", 2.0, 2.5)
-    assert [check.passed for check in result.checks] == [False]
-    vector = Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]), "")
-    assert [cause["place"] for cause in compare_number(result, vector, "m")] == ["com y of arm", "com z of arm"]
-    assert not result.checks[-1].passed
 
 
 @pytest.mark.parametrize("quantity, stated, scale", [
     ("mass", 2.0, 2.0), ("com", np.array([0.0, -3.0, 1.0]), 3.0), ("inertia", np.diag([1.0, 2.0, 2.5]), 5.5),
 ])  # fmt: skip
-def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale):
-    for share, passes in ((0.9, True), (1.1, False)):
-        number = Stated("arm", quantity, stated, stated + share * 64 * EPS * scale, "")
-        assert tolerance_of(number) == pytest.approx(64 * EPS * scale)
-        result = Result("parameters")
-        causes = compare_number(result, number, "")
-        assert (result.checks[0].passed, not causes) == (passes, passes)
+@pytest.mark.parametrize("share, passes", [(0.9, True), (1.1, False)])
+def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale, share, passes):
+    number, result = Stated("arm", quantity, stated, stated + share * 64 * EPS * scale, ""), Result("parameters")
+    assert tolerance_of(number) == pytest.approx(64 * EPS * scale)
+    causes = compare_number(result, number, "")
+    assert (result.checks[0].passed, not causes) == (passes, passes)
+
+
+def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
+    (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5, ""), "kg")
+    assert (cause["rank"], cause["place"], cause["stated"], cause["found"]) == (2, "mass of arm", 2.0, 2.5)
+    vector, result = Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]), ""), Result("parameters")
+    assert [cause["place"] for cause in compare_number(result, vector, "m")] == ["com y of arm", "com z of arm"]
+    assert failing(result) == ["com"]
 
 
 def test_a_force_of_what_is_switched_off_is_a_failed_check():
@@ -95,29 +83,69 @@ def test_a_force_of_what_is_switched_off_is_a_failed_check():
     robot, mujoco = robot_of(reading, "robot.xml"), engine(reading)
     mujoco.bare, mujoco.model = False, reading.full_model  # as the file has it
     result = parameters.rows(Setup.small(robot, engines(mujoco), reading=reading))
-    failed = [check.quantity for check in result.checks if not check.passed]
-    assert "no forces of constraints and contacts" in failed
+    assert "no forces of constraints and contacts" in failing(result)
 
 
-def test_what_is_switched_off_is_said_with_its_reason():
+def test_what_is_modelled_switched_off_and_left_open_are_three_sentences():
     known = {"count": 2, "names": ("a", "b")}
-    features = [
-        SimpleNamespace(feature="hinge", treatment="modelled", reason="", **known),
-        SimpleNamespace(feature="limit", treatment="switched_off", reason="there are none", **known),
-        SimpleNamespace(feature="equality", treatment="open_tree", reason="", **known),
-    ]
-    assert treatments_in_words(features) == [
-        "Modelled: hinge (2).", "Switched off in MuJoCo for the comparison: limit (2), there are none.",
-        "The open tree is compared: the equalities a and b are off.",
-    ]  # fmt: skip
-    assert treatments_in_words(features[:1]) == ["Modelled: hinge (2)."]
-    assert changes_in_words([]) == []
+    treatments = {"hinge": "modelled", "limit": "switched_off", "equality": "open_tree"}
+    features = [SimpleNamespace(feature=name, treatment=of, reason="why", **known) for name, of in treatments.items()]
+    modelled, off, tree = treatments_in_words(features)
+    assert "hinge (2)" in modelled and "limit" not in modelled and "limit (2), why" in off and "a and b" in tree
+    assert treatments_in_words(features[:1]) == [modelled]
 
 
-def test_the_claim_is_that_of_a_file_and_the_arm_keeps_its_own():
-    robot = robot_of(read(PATHS["loop"]), "loop.xml")
-    stated = replace(robot, features=())
-    assert "the file states" in parameters.claim(robot) and "the file states" not in parameters.claim(stated)
-    assert "principal moments" in parameters.tolerance(robot) and "principal moments" not in parameters.tolerance(
-        stated
-    )
+# beside a solution
+
+CART = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
+<body name="cart"><joint name="x" type="slide" axis="1 0 0" damping="0.5"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<body name="pole" pos="0 0 0.1"><joint name="tilt" axis="0 1 0" stiffness="3" springref="0.2"/>
+<inertial pos="0 0 0.4" mass="1" diaginertia="0.1 0.2 0.3"/></body></body></worldbody>
+<actuator><motor joint="x"/></actuator></mujoco>"""
+
+
+def beside_solution(tmp_path, text, solution=CART, experiment=parameters):
+    """What an experiment finds of a file with a text beside a solution."""
+    (tmp_path / "solution.xml").write_text(solution)
+    (tmp_path / "file.xml").write_text(text)
+    known = compared_with(str(tmp_path / "solution.xml"), str(tmp_path / "file.xml"))
+    return experiment.rows(Setup.small(known.robot, engines(known.mujoco), reading=known.reading))
+
+
+@pytest.mark.parametrize("old, new, causes", [
+    ('mass="2"', 'mass="3"', [("mass of cart", 2, 3, " kg")]),
+    ('damping="0.5"', 'damping="0.6"', [("damping of x", 0.5, 0.6, "N s/m")]),
+    ('axis="1 0 0"', 'axis="-1 0 0"', [("axis x of x", 1, -1, "")]),
+    ('stiffness="3"', 'stiffness="4"', [("stiffness of tilt", 3, 4, "N m/rad")]),
+    ('springref="0.2"', 'springref="0.3"', [("rest of tilt", 0.2, 0.3, " rad")]),
+    ('pos="0 0 0.1"', 'pos="0 0 0.11"', [("anchor z of tilt", 0.1, 0.11, " m")]),
+    ('damping="0.5"', 'damping="0.5" armature="0.1"', [("armature of x", 0, 0.1, " kg")]),
+    ("-9.81", "-9.8", [("gravity z", -9.81, -9.8, "m/s2")]),
+    ('damping="0.5"', 'damping="0.5" frictionloss="0.1"', [("frictionloss", 0, 1, "solution.xml")]),
+    ('<motor joint="x"/>', "", []), ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', []),  # may be others
+    (' name="tilt"', "", []), ('"pole"', '"stick"', []),
+])  # fmt: skip
+def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path, old, new, causes):
+    result = beside_solution(tmp_path, CART.replace(old, new))
+    known = result.curves["causes"]
+    assert [(c["place"], c["stated"], pytest.approx(c["found"])) for c in known] == [cause[:3] for cause in causes]
+    assert all(cause[-1] in one["text"] for cause, one in zip(causes, known))
+    assert len(failing(result)) == len(causes) and len(result.checks) > 20
+
+
+def test_what_no_equation_has_is_compared_by_its_numbers(tmp_path):
+    solution, other = (CART.replace('damping="0.5"', f'damping="0.5" frictionloss="{size}"') for size in (0.1, 9.0))
+    assert failing(beside_solution(tmp_path, solution, solution)) == []
+    assert failing(beside_solution(tmp_path, other, solution)) == ["frictionloss, its numbers"]
+
+
+def test_values_are_compared_with_those_of_the_solution(tmp_path):
+    for text, passes in ((CART, True), (CART.replace('mass="1"', 'mass="1.001"'), False)):
+        assert (failing(beside_solution(tmp_path, text, experiment=mass)) == []) == passes
+
+
+@pytest.mark.parametrize("name", ["mixed", "loop"])
+def test_a_file_is_its_own_solution(name):
+    known = compared_with(str(PATHS[name]), str(PATHS[name]))
+    result = parameters.rows(Setup.small(known.robot, engines(known.mujoco), reading=known.reading))
+    assert failing(result) == [] and result.curves["causes"] == []

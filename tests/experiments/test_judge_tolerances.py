@@ -1,4 +1,4 @@
-"""Tolerances of what is compared at states, from the stated numbers written out."""
+"""Tolerances and rules of what is compared at states, from the stated numbers written out."""
 
 import dataclasses
 
@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from crane import TREE, crane
 from crane import XML as CRANE
-from edited import setup_of
+from edited import XML, setup_of
+from judged import verdicts
 
 import tmt
 from compare.engines.mujoco import parse
 from compare.experiment import Setup, engines
 from compare.experiments import acceleration, gravity, kinematics, mass
+from compare.judge.check import Result
 from compare.robots.arm import ARM
 from compare.states import Sample
 
@@ -19,10 +21,10 @@ EPS = 2.0**-52
 WEIGHT = 9.81 * (1.9 * 0.15 + 1.5 * 0.45)  # N m: sum of m g reach
 
 
-def one_state(qd) -> Setup:
-    """A setup whose random states are one: zero, at these rates."""
-    setup = setup_of(make=Setup, states=1, exact_states=1)
-    sample = Sample(ARM.tree, "random states", np.zeros((1, 3)), np.array([qd]), np.zeros((1, 3)), 1)
+def at_zero(setup, qd) -> Setup:
+    """The setup, its random states one: zero, at these rates."""
+    n = len(qd)
+    sample = Sample(setup.robot.tree, "random states", np.zeros((1, n)), np.array([qd]), np.zeros((1, n)), 1)
     setup.__dict__["random"] = sample
     return setup
 
@@ -33,22 +35,29 @@ def tolerances(module, setup) -> dict:
     return {check.quantity: check.tolerance / (64 * EPS) for check in checks if check.scene == "random states"}
 
 
+def of_arm(module, qd) -> dict:
+    return tolerances(module, at_zero(setup_of(make=Setup, states=1, exact_states=1), qd))
+
+
+def failing(result) -> set:
+    return {check.quantity for check in result.checks if not check.passed}
+
+
 def test_tolerances_are_64_eps_of_the_sums_that_are_added_up():
-    found = tolerances(gravity, one_state([0.0, 0.0, 0.0]))
+    found = of_arm(gravity, [0.0, 0.0, 0.0])
     torques = [found[name] for name in found if "torque" in name and "qdd" not in name]
     assert len(torques) == 6 and torques == pytest.approx([WEIGHT] * 6)
     least, most = np.linalg.eigvalsh(tmt.mass_matrix(np.zeros(3)))[[0, -1]]
     assert found["qdd of MuJoCo under TMT's torque"] == pytest.approx((most / least + 1.0) / least * WEIGHT)
-    found = tolerances(kinematics, one_state([1.0, -2.0, 3.0]))
+    found = of_arm(kinematics, [1.0, -2.0, 3.0])
     expected = {"x_b": 0.45, "omega_b": 6.0, "T_b": 0.45, "B_b": 1.0, "v_conv": 0.45 * 36.0, "w_conv": 36.0}
     assert {name: found[name] for name in expected} == pytest.approx(expected)
-    assert tolerances(mass, one_state([0.0, 0.0, 0.0]))["Mbar"] == pytest.approx(0.24450, abs=1e-5)
+    assert of_arm(mass, [0.0, 0.0, 0.0])["Mbar"] == pytest.approx(0.24450, abs=1e-5)
 
 
 def test_tolerances_in_motion_grow_with_the_terms_of_the_bias():
     """Only gamma turns: the forearm's centripetal term 1.5 kg x 0.15 m x w^2 acts on alpha by 0.3 m."""
     rate = 8.0
-    found = tolerances(acceleration, one_state([0.0, 0.0, rate]))
     size = WEIGHT + 1.5 * 0.15 * rate**2 * 0.3
     M = tmt.mass_matrix(np.zeros(3))
     least, most = np.linalg.eigvalsh(M)[[0, -1]]
@@ -64,12 +73,72 @@ def test_tolerances_in_motion_grow_with_the_terms_of_the_bias():
         "dp_alpha/dt at TMT's qdd, no gravity": most / least * M.max() * rate**2,
         "dp_alpha/dt at MuJoCo's qdd, no gravity": most / least * M.max() * rate**2,
     }
+    found = of_arm(acceleration, [0.0, 0.0, rate])
     assert {name: found[name] for name in expected} == pytest.approx(expected)
 
 
-def test_texts_name_the_scales_of_the_stated_arm():
-    assert "9.42 N m" in gravity.tolerance(ARM) and "9.42 J" in acceleration.tolerance(ARM)
-    assert kinematics.tolerance(ARM).count("0.45 m") == 2 and "from the shoulder" in kinematics.tolerance(ARM)
+# rules of the mass matrix
+
+
+@pytest.mark.parametrize("least, passes", [(1.01, True), (0.99, False), (0.0, False), (-1.0, False)])
+def test_a_mass_matrix_is_definite_by_more_than_rounding(least, passes):
+    result, small = Result("mass"), least * 64 * EPS
+    mass.check_definiteness(result, "TMT", np.array([np.eye(3), np.diag([1.0, 1.0, small])]))
+    assert verdicts(result) == {"TMT: least eigenvalue of Mbar over the largest": passes}
+    # in units of its diagonal: eigenvalues 1 - c and 1 + c of ((1, c), (c, 1)), whatever the units
+    c, units = (1 - small) / (1 + small), np.sqrt([1e-9, 1.0])
+    result = Result("mass")
+    mass.check_definiteness(
+        result, "TMT", (np.array([[1.0, c], [c, 1.0]]) * np.outer(units, units))[None], in_units=True
+    )
+    assert list(verdicts(result).values()) == [passes]
+
+
+@pytest.mark.parametrize("share, passes", [(0.99, True), (1.01, False)])
+def test_a_mass_matrix_is_symmetric_within_the_scale_of_all_or_of_each_entry(share, passes):
+    M, result = 2.0 * np.eye(3)[None], Result("mass")
+    M[0, 0, 1] = share * 2.0 * 64 * EPS
+    mass.check_symmetry(result, M)
+    assert verdicts(result) == {"TMT: Mbar - Mbar' over its largest entry": passes}
+    M, result = np.ones((1, 2, 2)), Result("mass")
+    M[0, 0, 1] += share * 64 * EPS * 2.0**10
+    mass.check_symmetry(result, M, np.array([[[9e3, 1.0], [1.0, 9e3]]]) * 2.0**10)
+    assert list(verdicts(result).values()) == [passes]
+
+
+BOUND = 64 * EPS * 126.8333**2
+
+
+@pytest.mark.parametrize("off, worst, passes", [
+    (0.0, (-90.0, 90.0), [True, True]),
+    (0.99 * BOUND, (-90.0, 90.0), [True, True]),
+    (1.01 * BOUND, (-90.0, 90.0), [False, True]),
+    (0.0, (90.0099, 90.0), [True, True]),
+    (0.0, (90.0101, 90.0), [True, False]),
+    (0.0, (90.0, 90.0101), [True, False]),
+    (0.0, (90.0, -90.0), [True, False]),
+])  # fmt: skip
+def test_the_worst_posture_and_its_condition_number_are_those_of_the_stated_arm(off, worst, passes):
+    largest, result = mass.largest_condition(ARM), Result("mass")
+    assert largest == pytest.approx(126.8333, abs=1e-4)
+    mass.check_conditioning(result, ARM, "MuJoCo", largest + off, np.radians(worst))
+    assert [check.passed for check in result.checks] == passes
+
+
+def test_every_rule_of_the_mass_matrix_is_applied_to_both_engines():
+    result = mass.rows(setup_of())
+    compared = "Mbar", "Mbar, compiled", "Mbar, TMT to exact", "Mbar, MuJoCo to exact"
+    rules = "least eigenvalue of Mbar over the largest", "condition number - 126.83", "distance from (+-90, 90) deg"
+    of_each = {f"{name}: {rule}" for name in ("TMT", "MuJoCo") for rule in rules}
+    assert {check.quantity for check in result.checks} == {
+        *compared,
+        "TMT: Mbar - Mbar' over its largest entry",
+    } | of_each
+    axis = '"gamma" type="hinge" axis="0 {}1'
+    flipped = failing(mass.rows(setup_of(XML.replace(axis.format(""), axis.format("-")))))
+    assert "MuJoCo: distance from (+-90, 90) deg" in flipped and not any(name.startswith("TMT") for name in flipped)
+    worst = mass.rows(setup_of(XML.replace('mass="1.5"', 'mass="2.5"'))).curves["worst"]
+    assert worst["tmt"][0] == pytest.approx(126.83, abs=0.01) and worst["mujoco"][0] > 190.0
 
 
 # a robot with damping
@@ -84,27 +153,12 @@ def damped(tmp_path, stated=0.3, compiled=0.3):
 
 
 def test_damping_takes_from_energy_and_momentum_what_it_must(tmp_path):
-    checks = acceleration.rows(damped(tmp_path)).checks
-    assert [str(check) for check in checks if not check.passed] == []
-    found = {check.quantity for check in checks}
-    for name in ("TMT", "MuJoCo"):
-        assert f"dE/dt - (tau - D qd).qd at {name}'s qdd" in found
-        assert f"dp_swing/dt + D qd at {name}'s qdd, no gravity" in found
-    failed = {check.quantity for check in acceleration.rows(damped(tmp_path, compiled=0.31)).checks if not check.passed}
-    assert {"qdd", "tau from MuJoCo's qdd by TMT", "tau from TMT's qdd by mj_inverse"} <= failed
-    assert {"dE/dt - (tau - D qd).qd at MuJoCo's qdd", "dp_swing/dt + D qd at MuJoCo's qdd, no gravity"} <= failed
+    result = acceleration.rows(damped(tmp_path))
+    of = {
+        name: {f"dE/dt - (tau - D qd).qd at {name}'s qdd", f"dp_swing/dt + D qd at {name}'s qdd, no gravity"}
+        for name in ("TMT", "MuJoCo")
+    }
+    assert failing(result) == set() and of["TMT"] | of["MuJoCo"] <= {check.quantity for check in result.checks}
+    failed = failing(acceleration.rows(damped(tmp_path, compiled=0.31)))
+    assert {"qdd", "tau from MuJoCo's qdd by TMT", "tau from TMT's qdd by mj_inverse"} | of["MuJoCo"] <= failed
     assert not any("at TMT's qdd" in name for name in failed)
-
-
-def test_damping_is_one_of_the_terms_of_a_tolerance(tmp_path):
-    """A thousand N m s/rad: all other terms are small beside it."""
-    setup = damped(tmp_path, 1e3, 1e3)
-    sample = Sample(setup.robot.tree, "random states", np.zeros((1, 4)), np.eye(4)[:1], np.zeros((1, 4)), 1)
-    setup.__dict__["random"] = sample
-    found = tolerances(acceleration, setup)
-    least, most = np.linalg.eigvalsh(tmt.mass_matrix(np.zeros(4), setup.robot.tree))[[0, -1]]
-    for name in ("tau from MuJoCo's qdd by TMT", "dE/dt - (tau - D qd).qd at TMT's qdd"):
-        assert found[name] == pytest.approx(1e3 * most / least, rel=0.05)
-    assert found["dp_swing/dt + D qd at TMT's qdd, no gravity"] == pytest.approx(1e3 * most / least, rel=0.05)
-    assert "|D rates|" in acceleration.tolerance(setup.robot) and "|D rates|" not in acceleration.tolerance(ARM)
-    assert "damping" in acceleration.claim(setup.robot) and "damping" not in acceleration.claim(ARM)

@@ -1,4 +1,4 @@
-"""The scales of tolerances, from the stated numbers written out."""
+"""The scales of tolerances: of the stated arm from its numbers written out, of any robot each entry's own, body by body."""
 
 import dataclasses
 
@@ -6,24 +6,141 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.judge import scale
+from compare.judge import entries, scale
 from tmt import literal
 
-TREE = tmt.ARM
-Q = np.random.default_rng(3).uniform(-3, 3, (20, 3))
-QD = np.random.default_rng(4).uniform(-5, 5, (20, 3))
+MOMENTS = ((0.02, 0.03, 0.04), (0.001, 0.002, 0.002), (0.01, 0.01, 0.02))
+TREE = tmt.Tree(  # a slide, on it a hinge, on that a ball; and a hinge of its own beside them
+    hinge_names=("rail", "swing", "wrist", "lid"),
+    parent=(-1, 0, 1, -1),
+    offset=((0.0, 0.0, 0.3), (0.0, 0.2, 0.0), (0.4, 0.0, 0.0), (0.0, -0.6, 0.0)),
+    axis=((1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+    damping=(0.4, 0.0, 0.1, 0.1, 0.1, 0.0),
+    body_names=("cart", "bob", "door"),
+    body_hinge=(0, 2, 3),
+    mass=(2.0, 0.5, 1.5),
+    com=((0.0, 0.0, 0.1), (0.0, 0.0, -0.2), (0.3, 0.0, 0.0)),
+    inertia=tuple(tuple(map(tuple, np.diag(moments))) for moments in MOMENTS),
+    gravity=(0.0, 3.0, -4.0),
+    kind=("slide", "hinge", "ball", "hinge"),
+    armature=(0.3, 0.02, 0.0, 0.0, 0.0, 0.0),
+    stiffness=(20.0, 5.0, 2.0, 0.0),
+    rest=(0.1, -0.3, 1.0, 0.0, 0.0, 0.0, 0.0),
+    reference=(0.05, 0.0, 0.0, 0.0),
+)  # fmt: skip
+SLIDES = np.array([[1, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]])
+TURNS = np.array([[0, 0, 0, 0, 0, 0], [0, 1, 1, 1, 1, 0], [0, 0, 0, 0, 0, 1]])
+COUNT = (1, 2, 1)  # of hinges and balls on the way to each body, at least 1
+LARGEST = (0.04, 0.002, 0.02)  # moments of inertia
+Q = np.array([[-0.7, 0.4, *np.array([1.0, 2.0, 0.0, 2.0]) / 3.0, 1.0], [0.05, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
+QD = np.array([[0.5, -1.0, 2.0, 0.0, 1.0, -3.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+LENGTH = np.array([0.3 + 0.75 + 0.2 + 0.4 + 0.2, 0.3 + 0.2 + 0.4 + 0.2])  # of the bob, the farthest
+OF = entries.Entries(TREE, Q, QD)
 
 
-def test_reaches_and_the_scale_of_gravity():
-    assert np.allclose(scale.reaches(TREE), [0.15, 0.3 + 0.15], rtol=1e-15)
-    assert scale.gravity_scale(TREE) == pytest.approx(9.81 * (1.9 * 0.15 + 1.5 * 0.45), rel=1e-15)
-    doubled = dataclasses.replace(tmt.ARM, gravity=(0.0, 3.0, -4.0))
-    assert scale.gravity_scale(doubled) == pytest.approx(5.0 * (1.9 * 0.15 + 1.5 * 0.45), rel=1e-15)
+def summed(of_body) -> np.ndarray:
+    """The sum over states and bodies of what a body's number and L give, each k times."""
+    return np.array([sum(COUNT[b] * of_body(b, s, L) for b in range(3)) for s, L in enumerate(LENGTH)])
+
+
+def test_the_reach_has_what_slides_have_moved():
+    assert np.allclose(scale.reaches(TREE, Q)[0], [0.3 + 0.75 + 0.1, LENGTH[0], 0.6 + 0.3], rtol=1e-14)
+    assert np.allclose(scale.reaches(TREE), [0.4, LENGTH[1], 0.9], rtol=1e-14)
+    assert scale.gravity_scale(TREE, Q)[0] == pytest.approx(5.0 * np.dot(TREE.mass, [1.15, LENGTH[0], 0.9]), rel=1e-14)
+    assert np.allclose(OF.length, LENGTH, rtol=1e-14)
+
+
+def test_a_column_of_a_slide_has_no_length():
+    T = np.broadcast_to(OF.T, (2, 3, 3, 6))
+    for b in range(3):
+        assert np.allclose(T[0, b, 1], COUNT[b] * (SLIDES[b] + LENGTH[0] * TURNS[b]))
+        assert np.allclose(OF.B[0, b], COUNT[b]) and np.allclose(OF.positions[:, b, 0], COUNT[b] * LENGTH)
+
+
+def test_the_mass_matrix_sums_every_term_where_it_is_largest():
+    expected = summed(
+        lambda b, s, L: (
+            TREE.mass[b] * np.outer(SLIDES[b] + L * TURNS[b], SLIDES[b] + L * TURNS[b])
+            + LARGEST[b] * np.outer(TURNS[b], TURNS[b])
+        )
+    ) + np.diag(TREE.armature)
+    assert np.allclose(OF.mass_matrix, expected, rtol=1e-13)
+    assert (OF.mass_matrix >= np.abs(tmt.mass_matrix(Q, TREE))).all()
+    assert OF.mass_matrix[0, 1, 5] == 0.0  # no body is moved by both
+
+
+def test_forces_sum_weight_springs_and_what_moves():
+    weight = summed(lambda b, s, L: 5.0 * TREE.mass[b] * (SLIDES[b] + L * TURNS[b]))
+    assert np.allclose(OF.weight, weight, rtol=1e-14)
+    springs = np.array([[20.0 * 0.8, 5.0 * 0.7, 2 * np.pi, 2 * np.pi, 2 * np.pi, 0.0]])
+    assert np.allclose(OF.holding[0], weight[0] + springs[0], rtol=1e-14)
+
+    def moving(b, s, L):
+        S, V = np.abs(QD[s]) @ TURNS[b], np.abs(QD[s]) @ SLIDES[b]
+        newton = 2 * TREE.mass[b] * S * (L * S + V)
+        return newton * (SLIDES[b] + L * TURNS[b]) + (TREE.mass[b] * V**2 + LARGEST[b] * S**2) * TURNS[b]
+
+    assert np.allclose(OF.bias, summed(moving) + weight, rtol=1e-13)
+    assert np.array_equal(OF.bias[1], OF.weight[1])  # at rest
+    tau, drag = np.full(6, 3.0), np.array(TREE.damping) * np.abs(QD)
+    assert np.allclose(OF.force(tau)[0], OF.bias[0] + 3.0 + drag[0] + springs[0], rtol=1e-14)
+
+
+def test_energies_have_the_springs():
+    g = 5.0 * np.dot(COUNT, TREE.mass) * LENGTH[0]
+    springs = 20.0 * 0.8**2 / 2 + 5.0 * 0.7**2 / 2 + 3 * 2.0 * np.pi**2 / 2
+    assert OF.potential_energy[0] == pytest.approx(g + springs, rel=1e-14)
+    speeds = np.abs(QD[0])
+    assert OF.energy[0] == pytest.approx(g + springs + speeds @ OF.mass_matrix[0] @ speeds / 2, rel=1e-14)
+
+
+def test_errors_go_through_the_inverse_entry_by_entry():
+    M, force, qdd = tmt.mass_matrix(Q, TREE)[0], OF.force(1.0), np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0]] * 2)
+    root = np.sqrt(np.diag(M))
+    residual = (OF.mass_matrix[0] + np.outer(root, root)) @ np.abs(qdd[0]) + force[0]
+    assert np.allclose(OF.acceleration(force, qdd)[0], np.abs(np.linalg.inv(M)) @ residual, rtol=1e-12)
+    assert np.allclose(OF.closing(force, qdd)[0], 2 * residual, rtol=1e-13)
+    assert OF.power(force, qdd)[0] == pytest.approx(2 * residual @ np.abs(QD[0]), rel=1e-13)
+    assert np.allclose(OF.change(qdd)[0], OF.closing(OF.force(), qdd)[0])
+
+
+def test_without_gravity_at_rest_nothing_is_allowed():
+    weightless = dataclasses.replace(TREE, gravity=(0.0, 0.0, 0.0))
+    of = entries.Entries(weightless, Q[1:], QD[1:])
+    assert not of.bias.any() and not of.weight.any() and of.acceleration(of.force(1.0), 0.0).min() > 0.0
+
+
+def test_units_are_those_of_the_joints_that_there_are():
+    assert entries.unit(tmt.ARM, "N m", "N") == "N m" and entries.unit(TREE, "N m", "N") == "N m or N"
+    sliding = dataclasses.replace(tmt.ARM, kind=("slide",) * 3)
+    assert entries.unit(sliding, "N m", "N") == "N"
+
+
+# the stated arm: one number for each state
+
+ANGLES, RATES = np.random.default_rng(3).uniform(-4, 4, (2, 20, 3))
+
+
+def test_stated_hinges_alone_keep_one_number_for_each_state():
+    of = entries.scales(tmt.ARM, False, ANGLES, RATES)
+    assert np.array_equal(of.mass_matrix, scale.mass_scale(tmt.ARM, ANGLES))
+    assert of.weight == scale.gravity_scale(tmt.ARM) and of.positions == scale.reaches(tmt.ARM).max()
+    for changed in ("kind", ("slide", "hinge", "hinge")), ("armature", (0.0, 0.1, 0.0)), ("stiffness", (0.0, 0.0, 1.0)):
+        tree = dataclasses.replace(tmt.ARM, **dict([changed]))
+        assert isinstance(entries.scales(tree, False, ANGLES, RATES), entries.Entries)
+    assert isinstance(entries.scales(tmt.ARM, True, ANGLES, RATES), entries.Entries)
+
+
+def test_the_scale_of_gravity_is_the_sum_of_weights_times_reaches():
+    assert np.allclose(scale.reaches(tmt.ARM), [0.15, 0.3 + 0.15], rtol=1e-15)
+    assert scale.gravity_scale(tmt.ARM) == pytest.approx(9.81 * (1.9 * 0.15 + 1.5 * 0.45), rel=1e-15)
+    other = dataclasses.replace(tmt.ARM, gravity=(0.0, 3.0, -4.0))
+    assert scale.gravity_scale(other) == pytest.approx(5.0 * (1.9 * 0.15 + 1.5 * 0.45), rel=1e-15)
 
 
 def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
     """State by state and body by body, without the sums of the code under test."""
-    for q, qd, size in zip(Q, QD, scale.bias_scale(TREE, Q, QD)):
+    for q, qd, size in zip(ANGLES, RATES, scale.bias_scale(tmt.ARM, ANGLES, RATES)):
         T, B = tmt.jacobians(q)
         v, w = tmt.convective_terms(q, qd)
         terms = np.zeros(3)
@@ -32,17 +149,14 @@ def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
             moment = np.abs(inertia @ w[b]) + np.abs(np.cross(omega, inertia @ omega))
             terms += np.abs(T[b]).T @ (tmt.ARM.mass[b] * np.abs(v[b])) + np.abs(B[b]).T @ moment
         assert size == pytest.approx(terms.max() + 9.4176, rel=1e-12)
-    at_rest = scale.bias_scale(TREE, Q, 0.0 * QD)
-    assert np.allclose(at_rest, 9.4176, rtol=1e-14)
+    assert np.allclose(scale.bias_scale(tmt.ARM, ANGLES, 0.0 * RATES), 9.4176, rtol=1e-14)
 
 
 def test_the_scales_of_mass_and_acceleration():
-    M = literal.mass_matrix(Q)
-    assert np.array_equal(scale.mass_scale(TREE, Q), [abs(m).max() for m in M])
-    assert np.allclose(
-        scale.condition(TREE, Q), [np.linalg.norm(m, 2) * np.linalg.norm(np.linalg.inv(m), 2) for m in M]
-    )
-    inverse, norm = (np.array([np.linalg.norm(f(m), 2) for m in M]) for f in (np.linalg.inv, lambda m: m))
+    M = literal.mass_matrix(ANGLES)
+    assert np.array_equal(scale.mass_scale(tmt.ARM, ANGLES), [abs(m).max() for m in M])
+    norm, inverse = (np.array([np.linalg.norm(m, 2) for m in of]) for of in (M, np.linalg.inv(M)))
+    assert np.allclose(scale.condition(tmt.ARM, ANGLES), norm * inverse)
     force = np.linspace(1.0, 20.0, 20)
-    assert np.allclose(scale.acceleration_scale(TREE, Q, force), (inverse * norm + 1.0) * inverse * force)
-    assert np.allclose(scale.acceleration_scale(TREE, Q, force, 2.0), inverse * (norm * 2.0 + force))
+    assert np.allclose(scale.acceleration_scale(tmt.ARM, ANGLES, force), (inverse * norm + 1.0) * inverse * force)
+    assert np.allclose(scale.acceleration_scale(tmt.ARM, ANGLES, force, 2.0), inverse * (norm * 2.0 + force))

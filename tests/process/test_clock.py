@@ -1,4 +1,4 @@
-"""What each task takes itself: in this process and in those that compute for it, and not what it waits for others."""
+"""Seconds of the processor that each task takes: in this process and in those that compute for it, not what it waits for."""
 
 import time
 
@@ -11,7 +11,7 @@ LONG = 0.2  # s
 
 
 def busy(seconds):
-    """Use so many seconds of the processor."""
+    """Use the processor for these seconds."""
     began = time.process_time()
     while time.process_time() - began < seconds:
         pass

@@ -9,7 +9,6 @@ from servo_models import posture_of
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting
 from compare.engines.mujoco.flags import INTEGRATORS
-from compare.experiments.stability.servos.circumstances import circumstances
 from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at, predicted_at
 from compare.robots.file import robot_of
@@ -22,15 +21,14 @@ def predicted(source, posture=None):
     return predicted_at(robot, posture or next(iter(robot.positions)), reading), reading
 
 
-def gripper(kv=40, polycoef="0 1 0 0 0", solref=0.02, integrator="Euler"):
-    return GRIPPER.format(kv=kv, polycoef=polycoef, solref=solref, integrator=integrator)
+def gripper(kv=40, polycoef="0 1 0 0 0", solref=0.02):
+    return GRIPPER.format(kv=kv, polycoef=polycoef, solref=solref, integrator="Euler")
 
 
 SOURCES = {
     "mimic": gripper(),
     "the other way and faster": gripper(polycoef="0 -2 0 0 0"),
     "bent": gripper(polycoef="0.01 1 20 0 0"),
-    "stiff": gripper(solref=0.004),
     "a loop": FOUR_BARS.format(kv=1, solref=0.01, integrator="Euler"),
 }
 
@@ -65,14 +63,6 @@ def test_a_rigid_mimic_has_the_limit_of_both_masses():
     assert small.limit("Euler").dt < 0.99 * small.rigid.limit("Euler").dt
 
 
-def test_without_its_equality_the_second_finger_would_drift():
-    one, _ = predicted(gripper())
-    apart, _ = predicted(gripper().replace('name="mimic"', 'name="mimic" active="false"'))
-    assert {limit.limit for limit in apart.limits.values()} != {
-        limit.limit for limit in one.limits.values()
-    } or apart.at.aside
-
-
 def test_constraints_at_rest_carry_what_mujoco_says():
     source = SOURCES["a loop"]
     at, reading = posture_of(source)
@@ -105,20 +95,17 @@ def test_a_finger_rests_at_its_limit_and_not_far_away():
     assert data.qpos == pytest.approx(one.at.q, abs=2e-3)
 
 
-def test_what_nothing_holds_is_set_aside_by_name_and_the_rest_is_answered():
-    for floor in ("", '<geom type="plane" size="1 1 1" pos="0 0 -1"/>'):
-        one, _ = predicted(LOOSE.format(floor=floor), "qpos0")
-        assert one.is_known and [one.at.robot.coordinates.speeds[k] for k in one.at.aside] == ["finger"]
-        held, _ = predicted(
-            LOOSE.format(floor=floor).replace('<joint name="finger" type="slide" axis="0 0 1"/>', ""), "qpos0"
-        )
-        for name in INTEGRATORS:
-            found, alone = one.limits["fixed", name], held.limits["fixed", name]
-            assert found.limit == alone.limit
-            assert found.dt is None or found.dt == pytest.approx(alone.dt, rel=1e-3)
-        said = circumstances([one])
-        assert ("contacts" in said) == bool(floor) and "without finger" in said
-        assert "finger" not in circumstances([held])
+@pytest.mark.parametrize("floor", ["", '<geom type="plane" size="1 1 1" pos="0 0 -1"/>'])
+def test_what_nothing_holds_is_set_aside_by_name_and_the_rest_is_answered(floor):
+    source = LOOSE.format(floor=floor)
+    one, _ = predicted(source, "qpos0")
+    held, _ = predicted(source.replace('<joint name="finger" type="slide" axis="0 0 1"/>', ""), "qpos0")
+    assert (
+        one.is_known and [one.at.robot.coordinates.speeds[k] for k in one.at.aside] == ["finger"] and not held.at.aside
+    )
+    for name in INTEGRATORS:
+        found, alone = one.limits["fixed", name], held.limits["fixed", name]
+        assert found.limit == alone.limit and (found.dt is None or found.dt == pytest.approx(alone.dt, rel=1e-3))
 
 
 def test_a_keyframe_without_a_name_is_a_posture_with_its_controls():

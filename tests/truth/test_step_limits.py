@@ -45,20 +45,20 @@ def random_small(rng):
     return small(root @ root.T + 0.1 * np.eye(n), K, D, damping, springs, on_path | on_path.T | np.eye(n, dtype=bool))
 
 
-def test_the_closed_form_is_where_the_spectral_radius_passes_one(rng):
-    finite = 0
-    for _ in range(120):
+def test_a_limit_is_where_the_spectral_radius_passes_one(rng):
+    finite = dict.fromkeys(EVERY, 0)
+    for _ in range(40):
         one = random_small(rng)
         assert one.is_symmetric and one.growing is None
-        for name in FAMILY:
+        for name in EVERY:
             limit = one.limit(name)
             if limit.limit == "finite":
-                finite += 1
-                assert one.has_closed_form(name)
+                finite[name] += 1
+                assert one.has_closed_form(name) or name == "RK4"
                 assert one.growth(name, 0.999 * limit.dt) <= 1.0 + 1e-9 < one.growth(name, 1.001 * limit.dt)
             elif limit.limit == "none":
                 assert all(one.growth(name, dt) <= 1.0 + 1e-9 for dt in (0.01, 0.3, 4.9))
-    assert finite > 200
+    assert min(finite.values()) > 5 and sum(finite.values()) > 80
 
 
 @pytest.mark.parametrize("kv", [0.0, 0.3, 40.0])
@@ -86,31 +86,23 @@ def test_damping_across_branches_is_explicit():
 
 
 def test_rk4_has_the_limit_of_its_region():
-    for rate, most in ((30.0j, np.sqrt(8.0) / 30.0), (40.0, POLE_RK4 / 40.0)):
-        one = small(1.0, abs(rate) ** 2, 0.0) if np.iscomplexobj(rate) else small(1.0, 0.0, rate)
-        assert one.limit("RK4").dt == pytest.approx(most, rel=1e-6)
-    swing = small(1.0, 900.0, 0.0).limit("RK4")
+    swing, decay = small(1.0, 900.0, 0.0).limit("RK4"), small(1.0, 0.0, 40.0).limit("RK4")
+    assert swing.dt == pytest.approx(np.sqrt(8.0) / 30.0, rel=1e-6) and decay.dt == pytest.approx(
+        POLE_RK4 / 40.0, rel=1e-6
+    )
     assert (swing.rate, swing.kind) == (pytest.approx(30.0), "swing")
 
 
-def test_rk4_has_the_smallest_of_all_modes(rng):
-    for _ in range(20):
-        one = random_small(rng)
-        limit = one.limit("RK4")
-        if limit.limit == "finite":
-            assert one.growth("RK4", 0.999 * limit.dt) <= 1.0 + 1e-9 < one.growth("RK4", 1.001 * limit.dt)
-
-
-def test_springs_that_are_implicit_have_no_limit():
-    assert small(1.0, 400.0, 0.0, springs=400.0).limit("discrete").limit == "none"
-    # half of them: 4 + dt^2 (400 - 400) - 0
-    assert small(1.0, 400.0, 0.0, springs=200.0).limit("discrete").limit == "none"
-    assert small(1.0, 400.0, 0.0, springs=100.0).limit("discrete").dt == pytest.approx(np.sqrt(4.0 / 200.0))
+@pytest.mark.parametrize("implicit, longest", [(400.0, None), (200.0, None), (100.0, np.sqrt(4.0 / 200.0))])
+def test_springs_of_which_half_is_implicit_have_no_limit(implicit, longest):
+    """4 + dt^2 (2 x implicit - 400) = 0."""
+    limit = small(1.0, 400.0, 0.0, springs=implicit).limit("discrete")
+    assert limit.limit == "none" if longest is None else limit.dt == pytest.approx(longest)
 
 
 def test_a_stiffness_that_is_not_symmetric_goes_by_the_eigenvalues(rng):
     several = 0
-    for _ in range(40):
+    for _ in range(25):
         one = random_small(rng)
         n = len(one.M)
         turned = small(
@@ -124,7 +116,7 @@ def test_a_stiffness_that_is_not_symmetric_goes_by_the_eigenvalues(rng):
             elif limit.limit == "finite":
                 several += 1
                 assert turned.growth(name, 0.99 * limit.dt) <= 1.0 + 1e-9 < turned.growth(name, 1.01 * limit.dt)
-    assert several > 10
+    assert several > 4
 
 
 def test_a_force_that_turns_can_make_two_swings_grow():
@@ -160,24 +152,18 @@ def test_what_is_left_slowly_beside_a_stiff_servo_is_a_saddle_and_no_limit(name)
     assert slow.limit == "saddle" and slow.rate == pytest.approx(0.002, rel=1e-3)
     loose = small(np.eye(2), [[1e10, 0.0], [5e4, -1e-7]], np.diag([1e5, 0.0])).limit(name)
     assert loose.limit == "drifts"
+    grows = small(np.eye(2), np.diag([1e8, 100.0]), np.diag([1e9, -0.05])).limit(name)
+    assert grows.limit == "saddle" and grows.rate == pytest.approx(0.025, rel=1e-4)
     held = small(np.eye(2), [[1e10, 5e4], [0.0, 0.02]], np.diag([1e5, 10.0])).limit(name)
     assert held.limit in ("finite", "none")
 
 
-def test_a_limit_is_one_up_to_five_seconds():
-    assert small(1.0, 4.0 / 4.99**2, 0.0).limit("Euler").dt == pytest.approx(4.99, rel=1e-6)
-    assert small(1.0, 4.0 / 5.01**2, 0.0).limit("Euler").limit == "none"
-    turned = [[1.0, 0.01], [0.0, 0.5]]  # K is not symmetric: by eigenvalues
-    for longest, kind in ((4.99, "finite"), (5.01, "none")):
-        limit = small(np.eye(2), 4.0 / longest**2 * np.array(turned), 0.0 * np.eye(2)).limit("Euler")
-        assert limit.limit == kind and (limit.dt is None or limit.dt == pytest.approx(4.99, rel=1e-4))
-    for constant, kind in ((2.49, "finite"), (2.51, "none")):
-        assert small(1.0, 1e-3, 1.0, [1.0], poles=(("servo", constant, False),)).limit("Euler").limit == kind
-
-
-def test_a_little_that_speeds_up_beside_much_that_brakes_is_a_saddle():
-    grows = small(np.eye(2), np.diag([1e8, 100.0]), np.diag([1e9, -0.05])).limit("implicitfast")
-    assert grows.limit == "saddle" and grows.rate == pytest.approx(0.025, rel=1e-4)
+@pytest.mark.parametrize("longest, kind", [(4.99, "finite"), (5.01, "none")])
+def test_a_limit_is_one_up_to_five_seconds(longest, kind):
+    turned = small(np.eye(2), 4.0 / longest**2 * np.array([[1.0, 0.01], [0.0, 0.5]]), 0.0 * np.eye(2))  # by eigenvalues
+    filtered = small(1.0, 1e-3, 1.0, [1.0], poles=(("servo", longest / 2.0, False),))
+    for one in (small(1.0, 4.0 / longest**2, 0.0), turned, filtered):
+        assert one.limit("Euler").limit == kind
 
 
 def test_a_fast_servo_leaves_the_limit_of_a_slow_joint_as_it_is():
@@ -191,39 +177,28 @@ def test_a_filter_has_a_limit_of_its_own(exact):
     one = small(1.0, 1.0, 1.0, damping=[1.0], poles=(("servo", 0.05, exact),))
     euler, rk4 = one.limit("Euler"), one.limit("RK4")
     assert (rk4.joint, rk4.dt) == ("servo", pytest.approx(POLE_RK4 * 0.05))
-    if exact:
-        assert euler.joint == "joint0"
-    else:
-        assert (euler.joint, euler.dt, euler.rate, euler.kind) == (
-            "servo",
-            pytest.approx(0.1),
-            pytest.approx(20.0),
-            "real",
-        )
+    assert euler.joint == ("joint0" if exact else "servo")
+    if not exact:
+        assert (euler.dt, euler.rate, euler.kind) == (pytest.approx(0.1), pytest.approx(20.0), "real")
         assert one.is_stable("Euler", 0.099) and not one.is_stable("Euler", 0.101)
 
 
-def test_the_kind_is_that_of_the_equations_and_the_joint_that_of_the_mode():
-    one = small(np.diag([1.0, 1e-3]), np.diag([4.0, 100.0]), np.diag([0.1, 5.0]), damping=[0.1, 0.0])
-    limit = one.limit("Euler")  # the second joint decays and does not swing
-    assert (limit.joint, limit.kind) == ("joint1", "real")
-    assert limit.rate == pytest.approx(np.abs(np.roots([1e-3, 5.0, 100.0])).max())
-    softer = small(np.diag([1.0, 1e-3]), np.diag([4.0, 100.0]), np.diag([0.1, 0.01]), damping=[0.1, 0.0]).limit("Euler")
-    assert (softer.joint, softer.kind) == ("joint1", "swing")
+@pytest.mark.parametrize("damping, kind", [(5.0, "real"), (0.01, "swing")])
+def test_the_kind_of_a_limit_is_that_of_the_equations(damping, kind):
+    M, D = np.diag([1.0, 1e-3]), np.diag([0.1, damping])
+    limit = small(M, np.diag([4.0, 100.0]), D, damping=[0.1, 0.0]).limit("Euler")
+    assert (limit.joint, limit.kind) == ("joint1", kind)
+    assert limit.rate == pytest.approx(np.abs(np.roots([1e-3, damping, 100.0])).max())
 
 
 @pytest.mark.parametrize("coupling", [0.0, 1.0])
-def test_the_joint_that_limits_is_the_fast_one_wherever_the_fastest_decay_is(coupling):
+@pytest.mark.parametrize("name", EVERY)
+def test_the_joint_that_limits_is_the_fast_one(coupling, name):
     """Of three swings, one of them fast; K is symmetric or not."""
     K = np.diag([4.0, 900.0, 25.0])
     K[0, 2] = coupling
-    for name in EVERY:
-        one = small(np.eye(3), K, 1e-3 * np.eye(3), springs=0.1 * K)
-        limit = one.limit(name)
-        assert (limit.joint, limit.kind, limit.rate) == ("joint1", "swing", pytest.approx(30.0, rel=1e-3))
-    # an implicit brake is faster than the swing that limits
-    braked = small(np.eye(2), np.diag([900.0, 1.0]), np.diag([1e-3, 1e5])).limit("implicitfast")
-    assert (braked.joint, braked.rate) == ("joint0", pytest.approx(30.0, rel=1e-3))
+    limit = small(np.eye(3), K, 1e-3 * np.eye(3), springs=0.1 * K).limit(name)
+    assert (limit.joint, limit.kind, limit.rate) == ("joint1", "swing", pytest.approx(30.0, rel=1e-3))
 
 
 # free bases
@@ -233,15 +208,13 @@ def chain_of(rng, n=5, base=2):
     """Deviations with `base` speeds that nothing holds, and the others held."""
     root = rng.normal(size=(n, n))
     K, D = np.zeros((2, n, n))
-    K[base:, base:], D[base:, base:] = (
-        not_negative(rng, n - base, n - base),
-        0.1 * not_negative(rng, n - base, n - base),
-    )
+    K[base:, base:] = not_negative(rng, n - base, n - base)
+    D[base:, base:] = 0.1 * not_negative(rng, n - base, n - base)
     return small(root @ root.T + 0.1 * np.eye(n), K, D)
 
 
 def test_a_free_base_moves_so_that_no_momentum_arises(rng):
-    for _ in range(20):
+    for _ in range(8):
         whole = chain_of(rng)
         without = whole.free([0, 1])
         assert without.names == ("joint2", "joint3", "joint4")
@@ -251,19 +224,6 @@ def test_a_free_base_moves_so_that_no_momentum_arises(rng):
                 # with the zero modes left in, the same
                 assert whole.growth(name, 0.999 * limit.dt) <= 1.0 + 1e-6 < whole.growth(name, 1.001 * limit.dt)
                 assert limit.dt <= (whole.locked([0, 1]).limit(name).dt or np.inf)
-
-
-def test_a_base_that_something_holds_stays_and_may_drift_elsewhere(rng):
-    whole = chain_of(rng)
-    K = whole.K.copy()
-    K[0, 0] = 3.0
-    held = small(whole.M, K, whole.D)
-    assert held.free([0, 1]).names == ("joint0", "joint2", "joint3", "joint4")
-    # a direction of the base that is held by no single speed
-    K[:2, :2] = 3.0
-    across = small(whole.M, K, whole.D).free([0, 1])
-    assert across.base == (0, 1) and not across.drifts and across.limit("Euler").limit == "finite"
-    assert small(whole.M, K, whole.D).drifts
 
 
 def test_without_speeds_there_is_no_limit_but_that_of_filters():
