@@ -27,25 +27,6 @@ def test_quantities_are_those_of_the_state_that_is_asked_for(dynamics, rng):
     assert np.array_equal(dynamics.bias(q, v), before)
 
 
-def test_a_run_starts_at_the_start_and_feels_the_torque(dynamics):
-    q, tau = np.array([0.5, 0.4, 0.3]), np.array([3.0, -2.0, 1.0])
-    motion = dynamics.run(q, REST, tau, 0.001, 10, "RK4")
-    assert motion.t.shape == (11,) and np.array_equal(motion.q[0], q)
-    assert np.allclose(motion.v[1] / 0.001, tmt.acceleration(q, REST, tau), rtol=0.02)
-    unpushed = dynamics.run(q, REST, REST, 0.001, 10, "RK4")
-    assert np.abs(unpushed.q[-1] - motion.q[-1]).max() > 1e-4
-
-
-def test_a_diverged_run_is_nan_from_there_on_and_leaves_no_log(dynamics, tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    motion = dynamics.run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4")
-    finite = np.isfinite(motion.q).all(axis=1)
-    assert finite[0] and not finite[-1] and not finite[np.argmin(finite) :].any()
-    assert motion.ended.startswith(f"at t = {motion.t[np.argmin(finite) - 1]:g} s: ")
-    assert list(tmp_path.iterdir()) == []
-    assert capfd.readouterr() == ("", "")
-
-
 def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert XML.count(' autoreset="disable"') == 1

@@ -16,46 +16,33 @@ def edited(old, new):
 
 
 def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(ModelError, match=r"cannot read .*no\.xml: No such file"):
+    with pytest.raises(ModelError, match=r"no\.xml"):
         load(tmp_path / "no.xml", ARM.tree)
 
 
+JOINTS = 'name="gamma" type="hinge"'
+
+
 @pytest.mark.parametrize(
-    "content, says",
+    "content, word",
     [
-        (b"not xml", "is not MJCF"),
-        (b"<robot/>", "has the joints none"),
-        (b"\xff\xfe\x00", "is not MJCF"),
-        (b"<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo cannot compile"),
-        (b"<mujoco/>", "has the joints none; hinges alpha, beta, gamma and no others are expected"),
+        (b"not xml", "MJCF"),
+        (b"\xff\xfe\x00", "MJCF"),
+        (b"<robot/>", "none"),
+        (b"<mujoco/>", "none.*alpha, beta, gamma"),
+        (b"<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "compile"),
+        (edited('name="gamma"', 'name="elbow"').encode(), r"elbow \(hinge\)"),
+        (edited('name="gamma"', "").encode(), r"joint 2 \(hinge\)"),
+        (edited(JOINTS, JOINTS.replace("hinge", "slide")).encode(), r"gamma \(slide\)"),
+        (edited('"upper_arm" pos="0 0 0">', '"upper_arm"><freejoint name="loose"/>').encode(), "compile|loose"),
     ],
 )
-def test_a_file_that_is_not_the_arm(tmp_path, content, says):
+def test_a_file_that_is_not_the_arm(tmp_path, content, word):
     path = tmp_path / "model.xml"
     path.write_bytes(content)
-    with pytest.raises(ModelError, match=says) as error:
+    with pytest.raises(ModelError, match=word) as error:
         load(path, ARM.tree)
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    "old, new, says",
-    [
-        ('name="gamma"', 'name="elbow"', r"elbow \(hinge\)"),
-        ('name="gamma"', "", r"joint 2 \(hinge\)"),
-        ('name="gamma" type="hinge"', 'name="gamma" type="slide"', r"gamma \(slide\)"),
-        (
-            '<body name="upper_arm" pos="0 0 0">',
-            '<body name="upper_arm"><freejoint name="loose"/>',
-            "cannot compile|loose",
-        ),
-    ],
-)
-def test_other_hinges(tmp_path, old, new, says):
-    path = tmp_path / "model.xml"
-    path.write_text(edited(old, new))
-    with pytest.raises(ModelError, match=says):
-        load(path, ARM.tree)
 
 
 def test_body_axes_are_those_of_the_world_at_zero(rng):

@@ -58,10 +58,6 @@ def test_a_change_of_the_case_reaches_mujoco(rng):
     assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng)
 
 
-def test_a_heavy_body_that_never_moves_takes_no_digits(rng):
-    compared(mjcf('<body pos="1 2 1e6"><geom size="1" mass="1e9"/></body>' + TWO), rng)
-
-
 def test_a_flag_of_the_file_counts(rng):
     text = '<joint name="j" damping="1" stiffness="3"/>'
     for flag, field in (("gravity", "gravity"), ("damper", "damping"), ("spring", "stiffness")):
@@ -106,13 +102,6 @@ def test_each_feature_is_listed_and_modelled_or_switched_off(feature, rng):
     row = next(row for row in compared(text, rng).features if row.feature == feature)
     assert (row.count, row.names) == (len(names), names)
     assert (row.treatment, row.reason) == REASONS[feature] and row.reason
-
-
-def test_a_file_without_a_feature_has_no_row_of_it():
-    assert [row.feature for row in read(mjcf()).features] == ["hinge"]
-    off = '<option><flag contact="disable" limit="disable"/></option>'
-    text = mjcf(PLAIN.replace('name="j"', 'name="j" range="-1 1"') + '<geom type="plane" size="1 1 1"/>', off)
-    assert [row.feature for row in read(text).features] == ["hinge"]
 
 
 def test_equalities_open_the_tree():
@@ -185,12 +174,6 @@ def test_what_has_no_name_is_called_as_nothing_else():
     found = read(f"<mujoco><worldbody>{body}</worldbody>{key}</mujoco>")
     assert found.tree.hinge_names == ("joint 1", "unnamed joint 1")
     assert {name: q[0] for name, q in found.keyframes.items()} == {"key 1": 1.0, "unnamed key 1": 2.0}
-
-
-def test_keyframes_keep_their_names():
-    keys = '<keyframe><key name="a" qpos="1"/><key qpos="2"/><key name="c" qpos="3"/></keyframe>'
-    found = read(mjcf(after=keys)).keyframes
-    assert {name: q.tolist() for name, q in found.items()} == {"a": [1.0], "key 1": [2.0], "c": [3.0]}
 
 
 def test_what_the_compiler_warns_of_is_one_line(capfd):

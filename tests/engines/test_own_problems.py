@@ -129,11 +129,3 @@ def test_a_singular_mass_matrix_has_no_acceleration(rng):
     own = OwnEquations({"mass_matrix": lambda q: np.zeros((3, 3)), "bias": tmt.bias}, COORDINATES)
     assert np.isnan(own.acceleration(q, v, tau)).all()
     assert own.problems[0].text.startswith("mass_matrix is singular at q = [")
-
-
-def test_one_that_prints_is_left_alone(capsys, rng):
-    def mass_matrix(q):
-        print("here")
-        return tmt.mass_matrix(q)
-
-    assert problems(mass_matrix, states(rng)[0])[1] == [] and "here" in capsys.readouterr().out

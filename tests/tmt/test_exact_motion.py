@@ -157,11 +157,3 @@ def test_the_last_two_terms_of_a_step_are_at_most_the_tolerance():
     assert reference_run.step_size(high, 1e-20) == pytest.approx((1e-20 / 2.0) ** (1 / 4), rel=1e-12)
     high[1, [0, 5]] = 1.0, 64.0  # 64 t^5 in units of 1 + 1
     assert reference_run.step_size(high, 1e5) == pytest.approx((1e5 / 32.0) ** (1 / 5), rel=1e-12)
-
-
-def test_equations_that_allow_few_steps_are_given_up_after_these(monkeypatch):
-    start = np.zeros(3), np.full(3, 10.0), np.zeros(3)
-    code = reference_run.equations(tmt.ARM, start[2], "composite").code
-    monkeypatch.setattr(reference_run, "MOST_OPERATIONS", 5 * (reference_run.BESIDE + len(code)))
-    _, count, error = reference_run.followed(tmt.ARM, *start, 1.0, 100)
-    assert count == 5 and isinstance(error, reference_run.TooManySteps)

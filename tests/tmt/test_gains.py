@@ -47,8 +47,6 @@ def test_a_tree_without_a_controller_says_nothing_of_it():
     assert hash(DRIVEN) != hash(FORK)
 
 
-
-
 def test_the_generalized_force_is_that_of_lagrange():
     """-d/dq of the energy q' P q / 2 and -d/dqd of Rayleigh's function qd' S qd / 2, by SymPy."""
     x, v = sympy.symbols("x:3"), sympy.symbols("v:3")

@@ -130,7 +130,7 @@ def test_the_jacobian_of_a_step_is_that_of_small_movements(name):
 
 
 def test_methods_keep_their_order_with_balls():
-    tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball", "free"))
+    tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball",))
     q, qd, tau = random_state(np.random.default_rng(6), tree)
     truth = trajectory(tree, q, qd, tau, 0.25, 1).high[-1]
 

@@ -98,7 +98,7 @@ def test_a_state_of_a_ball_is_refused_by_its_name():
     tree = slide_on_a_ball()
     with pytest.raises(ValueError, match=r"'b'.*quaternion"):
         tmt.mass_matrix([1.1, 0.0, 0.0, 0.0, 0.0], tree)
-    with pytest.raises(ValueError, match="5.*slide.*ball"):
+    with pytest.raises(ValueError, match=r"5.*slide.*ball"):
         tmt.mass_matrix(np.zeros(4), tree)
 
 
