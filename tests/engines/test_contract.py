@@ -78,16 +78,6 @@ def arm(request, engines):
     return request.param, available(engines, request.param.engine).of(CASES["as it is"])
 
 
-def test_coordinates_are_those_of_the_case(dynamics, case, rng):
-    coordinates, n = dynamics.coordinates, len(case.joints)
-    assert coordinates.names == case.joints and coordinates.nq == coordinates.nv == n
-    assert coordinates.units == ("rad",) * n
-    q = coordinates.random(rng, 4)
-    assert q.shape == (4, n) and np.abs(q).max() <= np.pi
-    step = rng.uniform(-1.0, 1.0, (4, n))
-    assert np.allclose(coordinates.difference(coordinates.move(q, step), q), step)
-
-
 @pytest.mark.parametrize("batch", [(), (2, 3)])
 def test_quantities_have_the_shape_of_the_states(dynamics, case, rng, batch):
     n = len(case.joints)

@@ -1,6 +1,5 @@
 """Slides, balls and free joints, or parts of these, locked in MuJoCo: the smaller model is the Tree without them."""
 
-import numpy as np
 import pytest
 from files import EVERYTHING, TENDON, TWO, assert_the_same, case_of, mjcf, random_mjcf
 from trees import random_state
@@ -72,14 +71,3 @@ def test_a_free_body_aligned_with_its_inertia_is_compared_and_not_locked(rng):
     with pytest.raises(ModelError, match="free joint 'f' is aligned with the inertia of its body") as error:
         assert_locked(reading, ["f x"], rng)
     assert "\n" not in str(error.value)
-
-
-def test_bodies_that_the_file_fuses_keep_their_numbers(rng):
-    tip = '<body pos="0.3 0 0"><joint name="k" axis="0 1 0"/><geom size="0.1"/></body>'
-    body = f'<body name="c" pos="0.1 0 0"><geom size="0.2"/>{tip}</body>'
-    content = f'<body><joint name="j"/><geom size="0.1" pos="0.2 0 0"/>{body}</body>'
-    reading = read(mjcf(content, '<compiler fusestatic="true"/>'))
-    assert reading.tree.body_names == ("body 1", "c", "body 3")
-    for names in (["j"], ["k"]):
-        assert_locked(reading, names, rng)
-    assert np.allclose(reading.tree.mass[1], 8 * reading.tree.mass[2])

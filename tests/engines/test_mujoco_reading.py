@@ -143,24 +143,6 @@ def test_what_else_changes_a_motion_is_switched_off_by_name(name, rng):
         assert np.array_equal(run_of(text, integrator), run_of(without, integrator))
 
 
-WITHOUT_EFFECT = {
-    "servo": mjcf(after='<actuator><position joint="j" kp="100" kv="3"/></actuator>'),
-    "servo with a delay": mjcf(after='<actuator><position joint="j" kp="100" delay="0.02" nsample="3"/></actuator>'),
-    "dc motor": mjcf(after='<actuator><dcmotor joint="j" motorconst="0.1" resistance="1"/></actuator>'),
-    "motor with damping": mjcf(after='<actuator><general joint="j" damping="3"/></actuator>'),
-    "floor": mjcf(PLAIN + '<geom type="plane" size="1 1 1"/>'),
-    "limit": mjcf(PLAIN.replace('name="j"', 'name="j" range="-1 1"')),
-    "friction": mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')),
-    "water": mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'),
-}
-
-
-@pytest.mark.parametrize("name", WITHOUT_EFFECT)
-def test_a_run_is_that_of_the_plain_file(name):
-    for integrator in ("implicitfast", "RK4"):
-        assert np.array_equal(run_of(WITHOUT_EFFECT[name], integrator), run_of(mjcf(), integrator))
-
-
 def test_a_run_has_the_whole_weight():
     weightless = mjcf(LEVER.replace('name="b"', 'name="b" gravcomp="1"'))
     for integrator in ("implicitfast", "RK4"):

@@ -100,8 +100,6 @@ def with_part(method, name):
 
 PLACES = {
     **CALLS,
-    **{f"{name}, other argument": lambda q, name=name: getattr(tmt, name)(q, REST)
-       for name in ("angular_velocities", "convective_terms", "bias", "energy")},
     "acceleration, q": lambda q: tmt.acceleration(q, REST, REST),
     "acceleration, qd": lambda qd: tmt.acceleration(REST, qd, REST),
     "simulate, qd": lambda qd: tmt.simulate(REST, qd, REST, 0.1, 1),

@@ -1,6 +1,5 @@
 """Compiled runs: the steps of the methods, several side by side and in threads with the bits of each alone."""
 
-import math
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 
@@ -82,40 +81,6 @@ def runner_paths(tree, name, q, qd, tau, dt, steps) -> Motion:
 
 
 # a method that chooses its own steps
-
-
-def controlled(tree, q, qd, tau, dt, tolerance):
-    """The state one dt later by dopri8_adaptive over floats, and its attempts (Hairer, Norsett, Wanner, section II.10)."""
-    stepping, joints, left, wanted, attempts = METHODS["dopri8_adaptive"], tree.coordinates, dt, dt / 8.0, 0
-    while left > 0.0:
-        pieces = math.ceil(left / wanted)
-        h, attempts = left / pieces, attempts + 1
-        new_q, new_qd, *estimates = stepping.attempt(
-            lambda q, qd, h=h: stepping.slope(tree, q, qd, tau, h), q, qd, h, joints
-        )
-        sizes = []  # of a ball's movement 2
-        for kind, at, _ in joints.joints:
-            sizes += [2.0] * 3 if kind == "ball" else [1.0 + max(abs(q[at.start]), abs(new_q[at.start]))]
-        sizes += [1.0 + max(abs(x), abs(y)) for x, y in zip(qd, new_qd)]
-        e5, e3 = (
-            sum((x / (tolerance * size)) ** 2 for x, size in zip([*of_q, *of_qd], sizes))
-            for of_q, of_qd in (estimates[:2], estimates[2:])
-        )
-        error = e5 / math.sqrt(len(sizes) * (e5 + 0.01 * e3))
-        if error < 1.0:
-            q, qd, left = new_q, new_qd, left - h if pieces > 1 else 0.0
-        wanted = h * min(6.0, max(0.333, 0.9 * error ** (-1 / 8)))
-    return q, qd, attempts
-
-
-def test_the_steps_of_an_adaptive_method_are_controlled_as_stated():
-    (q,), (qd,), (tau,) = starts(1)
-    for tolerance in (1e-5, 1e-9):
-        motion = tmt.simulate(q, qd, tau, 0.5, 1, "dopri8_adaptive", SMALL, tolerance=tolerance)
-        *state, attempts = controlled(SMALL, q.tolist(), qd.tolist(), tau.tolist(), 0.5, tolerance)
-        assert motion.evaluations == 12 * attempts and attempts > 3
-        assert np.allclose(motion.q[1], state[0], rtol=0, atol=1e-12)
-        assert np.allclose(motion.qd[1], state[1], rtol=0, atol=1e-11)
 
 
 # who asks

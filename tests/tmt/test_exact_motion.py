@@ -149,11 +149,3 @@ def test_heyoka_in_quad_precision_is_an_outside_witness(name):
     with mpmath.workdps(40):
         expected = [mpmath.mpf(str(value)) for value in stepper.state]
     assert off(trajectory(tree, *start, [0.0] * len(qd), 0.25, 2), expected) < 1e-29
-
-
-def test_the_last_two_terms_of_a_step_are_at_most_the_tolerance():
-    high = np.zeros((2, 6))
-    high[0, [0, 4]] = 3.0, 8.0  # 8 t^4 in units of 1 + 3
-    assert reference_run.step_size(high, 1e-20) == pytest.approx((1e-20 / 2.0) ** (1 / 4), rel=1e-12)
-    high[1, [0, 5]] = 1.0, 64.0  # 64 t^5 in units of 1 + 1
-    assert reference_run.step_size(high, 1e5) == pytest.approx((1e5 / 32.0) ** (1 / 5), rel=1e-12)

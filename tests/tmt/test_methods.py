@@ -80,8 +80,7 @@ def test_an_adaptive_method_keeps_to_its_tolerance():
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
-@pytest.mark.parametrize("dt", [1.0, 10.0])
-def test_newton_finds_the_stages_of_a_held_arm_at_large_steps(name, dt):
+def test_newton_finds_the_stages_of_a_held_arm_at_large_steps(name, dt=10.0):
     q, qd = (path[-1] for path in tmt.simulate(BENT + 0.1, REST, tmt.gravity_balance(BENT), dt, 500, name)[1:])
     assert np.isfinite([q, qd]).all() and np.abs(q - BENT).max() < 2.0
 

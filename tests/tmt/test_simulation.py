@@ -86,14 +86,6 @@ def test_a_run_says_why_it_ended(method, start, more, says):
         assert [k for k in range(9) if k != 4 and among.ended[k]] == [] or dt > 0.1 or "model" in more
 
 
-def test_a_run_ends_at_its_own_step_between_those_that_are_kept():
-    fast = [2.0**49 - 20.0, 0.0, 0.0], [100.0, 0.0, 0.0]
-    each, some = (tmt.simulate(*fast, REST, 0.01, 60, every=k) for k in (1, 20))
-    last = int(np.isfinite(each.q[:, 0]).sum()) - 1
-    assert last % 20 and each.ended == some.ended and each.ended.startswith(f"at t = {last * 0.01:g} s: ")
-    assert np.isfinite(some.q[:, 0]).tolist() == [k * 20 <= last for k in range(4)]
-
-
 def test_a_singular_state_between_those_that_are_kept_is_found():
     q, qd = np.zeros((1, 9, 3)), np.zeros((1, 9, 3))
     q[0, :, 1] = [1.0, 0.8, 0.6, 0.4, 0.0, -0.4, -0.6, -0.8, -1.0]
@@ -131,20 +123,6 @@ def test_a_copy_of_a_motion_is_whole(protocol):
         assert type(again) is tmt.Motion and again.evaluations == motion.evaluations
         assert np.array_equal(again.ended, motion.ended) and type(again.ended) is type(motion.ended)
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(again, motion, strict=True))
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_evaluations_are_counted(name):
-    """Those of a method that solves its stages, one by one: see test_methods."""
-    stepping, steps = METHODS[name], 7
-    one = tmt.simulate(BENT, REST, REST, 0.1, steps, name).evaluations
-    assert type(one) is int and tmt.simulate([BENT, BENT], REST, REST, 0.1, steps, name).evaluations == 2 * one
-    if stepping.adaptive:
-        assert one >= steps * stepping.stages and one % stepping.stages == 0
-    elif stepping.solves_stages:
-        assert one > steps * stepping.stages and one % stepping.stages == 0
-    else:
-        assert one == steps * stepping.stages
 
 
 def test_the_last_state_of_a_run_is_looked_at():
