@@ -19,21 +19,6 @@ def minimal(mujoco):
     return found, found.loops(*STATE)
 
 
-def test_the_loops_do_the_work(mujoco, minimal):
-    minimal, ways = minimal
-    dynamics = mujoco.of(ARM.case())
-    assert {quantity for quantity, _ in ways.values()} == {"forward_dynamics", "mass_matrix_and_bias", "rk4_step"}
-    for name, (_, loop) in ways.items():
-        minimal.place(*STATE)
-        minimal.force[:] = minimal.solution[:] = np.nan
-        loop(3)
-        if "equal work" in name:
-            assert np.array_equal(minimal.force, dynamics.bias(*STATE[:2])[dynamics.dofs])
-        if name == "MuJoCo, equal work":
-            assert np.allclose(minimal.solution, -dynamics.acceleration(*STATE), rtol=1e-12)
-    assert dynamics.model.opt.timestep == mujoco.model.opt.timestep  # nothing of the engine has changed
-
-
 @pytest.mark.parametrize("name", ["MuJoCo, equal work, no solve", "MuJoCo, equal work"])
 def test_the_loops_do_all_of_it_at_the_state_that_is_there(mujoco, minimal, rng, name):
     """Nothing is left of what was found at the state before."""

@@ -20,16 +20,7 @@ def compared(text, rng, states=3):
 def test_a_file_with_everything_is_the_same_in_both(rng):
     reading = compared(EVERYTHING, rng)
     tree = reading.tree
-    assert tree.hinge_names[:8] == (
-        "float x",
-        "float y",
-        "float z",
-        "float turn",
-        "joint 1",
-        "rail",
-        "turn",
-        "shoulder",
-    )
+    assert ", ".join(tree.hinge_names[:8]) == "float x, float y, float z, float turn, joint 1, rail, turn, shoulder"
     assert tree.kind == ("slide",) * 3 + ("ball", "hinge", "slide", "hinge", "ball", "hinge", "ball")
     assert tree.body_names == ("base", "upper", "body 4", "arm", "hand")
     assert tree.parent == (-1, 0, 1, 2, 3, 4, 5, -1, 7, 8)
@@ -48,7 +39,7 @@ def test_a_file_with_everything_is_the_same_in_both(rng):
 
 
 def test_random_files_are_the_same_in_both(rng):
-    for _ in range(12):
+    for _ in range(6):
         compared(random_mjcf(rng), rng)
 
 

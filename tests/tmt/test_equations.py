@@ -34,7 +34,9 @@ def test_fifty_digits_contain_the_floats(rng):
 
 def test_the_distance_from_many_digits_is_that_of_all_digits():
     with mpmath.workdps(50):
-        assert distance(np.array([3.0]), np.array([mpmath.mpf("3.0000000000000000001")]))[0] == pytest.approx(1e-19, rel=1e-9, abs=0.0)
+        assert distance(np.array([3.0]), np.array([mpmath.mpf("3.0000000000000000001")]))[0] == pytest.approx(
+            1e-19, rel=1e-9, abs=0.0
+        )
 
 
 def test_nested_dual_numbers_are_not_confused():
