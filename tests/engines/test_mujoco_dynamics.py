@@ -5,7 +5,6 @@ import pytest
 from edited import XML
 
 import tmt
-from compare.engines import GRID, Setting
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.robots.arm import ARM
@@ -49,12 +48,3 @@ def test_the_files_own_integrator_does_not_matter_where_states_are_evaluated(dyn
         other, same = (parse(of, tmt.ARM).of(sticky) for of in (text, XML))
         assert np.array_equal(other.acceleration(q, v, tau), same.acceleration(q, v, tau))
         assert np.array_equal(other.inverse(q, v, tau), same.inverse(q, v, tau))
-
-
-def test_a_run_is_made_anew_each_time(dynamics):
-    """What is timed is the work: nothing is kept of the run before."""
-    run, read = dynamics.prepare(np.ones(3), REST, REST, Setting(0.5, GRID), "RK4")
-    states = run()
-    first = read(states)
-    states[:] = 0.0
-    assert np.array_equal(read(run()).q, first.q)

@@ -65,19 +65,3 @@ def test_a_comment_in_another_encoding_is_no_obstacle(tmp_path):
     path = tmp_path / "model.xml"
     path.write_bytes(XML.encode().replace(b"<!--", b"<!-- \xe9 ", 1))
     assert load(path, ARM.tree).of(ARM.case()).mass_matrix(np.zeros(3))[0, 0] == pytest.approx(0.2445)
-
-
-def test_joints_are_those_of_the_tree_in_its_order(rng):
-    """What a file calls beta is beta, though it stands before alpha."""
-    lines = [
-        f'<joint name="{name}" type="hinge" axis="{axis}"/>' for name, axis in (("alpha", "0 1 0"), ("beta", "1 0 0"))
-    ]
-    text = XML.replace(lines[0], "first").replace(lines[1], lines[0].replace("0 1 0", "1 0 0"))
-    text = text.replace("first", lines[1].replace("1 0 0", "0 1 0"))  # beta first, about y; then alpha, about x
-    q, v = rng.uniform(-3, 3, (2, 20, 3))
-    other, arm = (parse(text, ARM.tree).of(ARM.case()) for text in (text, XML))
-    swapped = [1, 0, 2]
-    assert np.allclose(other.bias(q, v), arm.bias(q[:, swapped], v[:, swapped])[:, swapped], atol=1e-12)
-    engine = parse(XML, ARM.tree)
-    assert engine.joints == ARM.joints and engine.bodies == [1, 2] and engine.source == XML
-    assert load(ARM.mjcf, ARM.tree).source == ARM.mjcf

@@ -157,15 +157,6 @@ def test_every_form_in_50_digits(seed, monkeypatch):
         assert abs(M).max() > 0.1 and abs(h).max() > 0.1
 
 
-def test_mass_on_a_hinge_axis_belongs_to_the_parent():
-    outer = composite.carried_by_joint(tmt.ARM)[2]
-    assert outer.mass == 0 and list(outer.moment)[1:] == [0, 0]
-    assert [float(row.y) for row in outer.second] == [0.0, 0.0, 0.0]
-    assert float(outer.moment.x) == pytest.approx(1.5 * 0.15)
-    inner = composite.carried_by_joint(tmt.ARM)[0]
-    assert inner.mass == 0 and list(inner.moment) == [0, 0, 0]
-
-
 # balls
 
 

@@ -27,11 +27,6 @@ def test_tree_converts_arrays_and_scales_axes():
     assert hash(tree) != hash(tmt.ARM)
 
 
-def test_tree_knows_which_hinges_move_a_body():
-    assert tmt.ARM.moves(0) == [True, True, False]
-    assert tmt.ARM.moves(1) == [True, True, True]
-
-
 REFUSED = [  # changes of the arm, and a word of what is said
     ({"mass": (1.9,)}, "shape"),
     ({"mass": (1.9, np.nan)}, "finite"),
