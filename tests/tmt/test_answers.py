@@ -166,6 +166,12 @@ def test_what_is_wrong_is_said_in_the_same_words(name, compiled):
 @pytest.mark.filterwarnings("error")
 def test_numbers_beyond_the_largest_double(compiled):
     compiled(tmt.ARM, "mass_matrix", "energy")
+    slide = compiled(
+        replace(BALL, axis=[(0, 0, 1)], damping=(0,), kind=("slide",), rest=(), armature=()), "potential_energy"
+    )
+    for q in (np.array([1.7e308]), np.full((2, 1), 1.7e308)):  # its energy is infinite, and nothing is NaN
+        with pytest.raises(ValueError, match="largest double"):
+            tmt.potential_energy(q, slide)
     for q in (np.full(3, 1e300, np.longdouble) ** 10, np.full((2, 3), 1e300, np.longdouble) ** 10):
         with pytest.raises(ValueError, match="q has values that are not finite"):
             tmt.mass_matrix(q)
