@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+from trees import random_state, unit_quaternion
 
 import tmt
 
@@ -67,9 +68,6 @@ def random_mjcf(rng: np.random.Generator, bodies: int = 5) -> str:
     def numbers(values):
         return " ".join(map(repr, np.atleast_1d(values).tolist()))
 
-    def turn():
-        return numbers((q := rng.normal(size=4)) / np.linalg.norm(q))
-
     def joint(kind, number):
         given = {
             "armature": rng.uniform(0.01, 0.1),
@@ -92,10 +90,10 @@ def random_mjcf(rng: np.random.Generator, bodies: int = 5) -> str:
         chosen = chosen[: rng.integers(1, 3)]
         moments = rng.uniform(0.02, 0.04, 3)  # each below the sum of the others
         texts.append(
-            f'<body name="b{b}" pos="{numbers(rng.uniform(-0.3, 0.3, 3))}" quat="{turn()}">'
+            f'<body name="b{b}" pos="{numbers(rng.uniform(-0.3, 0.3, 3))}" quat="{numbers(unit_quaternion(rng))}">'
             + "".join(joint(kind, f"{b}{i}") for i, kind in enumerate(chosen))
-            + f'<inertial pos="{numbers(rng.uniform(-0.1, 0.1, 3))}" quat="{turn()}" mass="{numbers(rng.uniform(0.5, 2.0))}"'
-            + f' diaginertia="{numbers(moments)}"/>'
+            + f'<inertial pos="{numbers(rng.uniform(-0.1, 0.1, 3))}" quat="{numbers(unit_quaternion(rng))}"'
+            + f' mass="{numbers(rng.uniform(0.5, 2.0))}" diaginertia="{numbers(moments)}"/>'
         )
         if b and rng.random() < 0.7:
             inside[rng.integers(b)].append(b)
@@ -138,15 +136,6 @@ def case_of(tree: tmt.Tree, locked=None, damping=0.0, gravity=True):
     )
 
 
-def random_state(tree: tmt.Tree, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q (nq,), v and tau (nv,)."""
-    q = []
-    for kind, reference in zip(tree.kind, tree.reference):
-        quaternion = rng.normal(size=4)
-        q += list(quaternion / np.linalg.norm(quaternion)) if kind == "ball" else [reference + rng.uniform(-2.0, 2.0)]
-    return np.array(q), rng.uniform(-3.0, 3.0, len(tree.axis)), rng.uniform(-1.0, 1.0, len(tree.axis))
-
-
 def assert_the_same(dynamics, tree, rng, states=3):
     """Every quantity of MuJoCo and tmt within 64 eps of the scale of what is summed."""
 
@@ -154,7 +143,7 @@ def assert_the_same(dynamics, tree, rng, states=3):
         assert np.abs(np.asarray(found) - expected).max() <= 64 * EPS * scale
 
     for _ in range(states):
-        q, v, tau = random_state(tree, rng)
+        q, v, tau = random_state(rng, tree)
         M, h = tmt.mass_matrix(q, tree), tmt.bias(q, v, tree)
         largest, reach = np.abs(M).max(), 1.0 + np.abs(tmt.com_positions(q, tree)).max()
         force = largest * (v @ v) + sum(tree.mass) * np.linalg.norm(tree.gravity) * reach

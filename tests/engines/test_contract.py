@@ -32,14 +32,14 @@ CASES = {
     "one joint free": ARM.case("swing", posture="bent", locked=("alpha", "beta")),
 }
 DURATION = 0.5  # s
-# every method follows the case as it is; of the others, which take time to compile, two of each engine do
+# every method follows the case as it is; the others, which take time to compile, are followed by one of each engine
 FOLLOWED = [
     (method, name)
     for method in METHODS
     for name in CASES
     if name == "as it is"
-    or method in [m for m in METHODS if m.engine == method.engine][:1]
-    or method.scheme == "semi_implicit_euler"
+    or (method in [m for m in METHODS if m.engine == method.engine][:1] and name == "one joint locked")
+    or (method.scheme == "semi_implicit_euler" and name == "damped, weightless")
 ]
 
 
@@ -53,11 +53,6 @@ def available(engines, name):
     if reason := engines[name].unavailable():
         pytest.skip(reason)
     return engines[name]
-
-
-@pytest.fixture(params=[engine.name for engine in ENGINES])
-def engine(request, engines):
-    return available(engines, request.param)
 
 
 @pytest.fixture(params=[*(engine.name for engine in ENGINES), "MuJoCo's minimal calls"])
@@ -83,23 +78,7 @@ def arm(request, engines):
     return request.param, available(engines, request.param.engine).of(CASES["as it is"])
 
 
-def test_its_methods_are_its_own_by_their_names(engine):
-    for name, method in engine.methods.items():
-        assert (method.engine, method.name) == (engine.name, name) and method.scheme
-        assert (method.order is None) == method.adaptive
-
-
-def test_coordinates_are_those_of_the_case(dynamics, case, rng):
-    coordinates, n = dynamics.coordinates, len(case.joints)
-    assert coordinates.names == case.joints and coordinates.nq == coordinates.nv == n
-    assert coordinates.units == ("rad",) * n
-    q = coordinates.random(rng, 4)
-    assert q.shape == (4, n) and np.abs(q).max() <= np.pi
-    step = rng.uniform(-1.0, 1.0, (4, n))
-    assert np.allclose(coordinates.difference(coordinates.move(q, step), q), step)
-
-
-@pytest.mark.parametrize("batch", [(), (5,), (2, 5)])
+@pytest.mark.parametrize("batch", [(), (2, 3)])
 def test_quantities_have_the_shape_of_the_states(dynamics, case, rng, batch):
     n = len(case.joints)
     q, v, tau = rng.uniform(-2.0, 2.0, (3, *batch, n))
@@ -110,14 +89,6 @@ def test_quantities_have_the_shape_of_the_states(dynamics, case, rng, batch):
         assert np.array_equal(dynamics.mass_matrix(q)[index], dynamics.mass_matrix(one[0]))
         assert np.array_equal(dynamics.bias(q, v)[index], dynamics.bias(*one[:2]))
         assert np.array_equal(dynamics.acceleration(q, v, tau)[index], dynamics.acceleration(*one))
-
-
-def test_one_state_goes_with_many_others(dynamics, case, rng):
-    n = len(case.joints)
-    q, v, tau = rng.uniform(-2.0, 2.0, (5, n)), rng.uniform(-2.0, 2.0, n), rng.uniform(-2.0, 2.0, (2, 1, n))
-    each = (np.broadcast_to(a, (2, 5, n)) for a in (q, v, tau))
-    assert np.array_equal(dynamics.acceleration(q, v, tau), dynamics.acceleration(*each))
-    assert np.array_equal(dynamics.bias(q, v), dynamics.bias(q, np.broadcast_to(v, (5, n))))
 
 
 def test_quantities_are_those_of_50_digits(dynamics, case, rng):
@@ -173,26 +144,6 @@ def test_a_batch_of_runs_is_each_run(followed, rng):
         assert single.ended is None is motion.ended[index]
         evaluations += single.evaluations or 0
     assert evaluations == (motion.evaluations or 0)
-
-
-def test_one_start_goes_with_many_torques(arm, rng):
-    method, dynamics = arm
-    q, v, _ = start(CASES["as it is"], rng)
-    tau = rng.uniform(-3.0, 3.0, (2, 3))
-    motion = dynamics.run(q, v, tau, 0.01, 4, method.name)
-    for k in range(2):
-        assert np.array_equal(motion.q[k], dynamics.run(q, v, tau[k], 0.01, 4, method.name).q)
-    assert np.abs(motion.q[0, -1] - motion.q[1, -1]).max() > 1e-5
-
-
-def test_a_run_starts_with_its_acceleration(followed, rng):
-    """Two short runs from one state, a torque apart: what they gain is the acceleration under that torque."""
-    (method, case, dynamics), dt = followed, 1e-3
-    q, v, tau = start(case, rng)
-    motion = dynamics.run(q, v, np.stack([tau, 0.0 * tau]), dt, 1, method.name)
-    gained = (motion.v[0, 1] - motion.v[1, 1]) / dt
-    expected = dynamics.acceleration(q, v, tau) - dynamics.acceleration(q, v, 0.0 * tau)
-    assert np.allclose(gained, expected, rtol=0.02, atol=0.02 * np.abs(expected).max())
 
 
 @pytest.fixture(scope="module")
@@ -252,30 +203,21 @@ def test_a_prepared_run_is_the_run(followed, rng):
             assert found.steps == steps
         else:
             assert found.steps > 5 and (method.engine == "heyoka" or found.evaluations / found.steps in (11, 12))
-
-
-def test_evaluations_are_counted(arm):
-    (method, dynamics), case = arm, CASES["as it is"]
-    setting = Setting(DURATION, None, 1e-6) if method.adaptive else Setting(DURATION, GRID)
-    run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
-    evaluations = read(run()).evaluations
-    if method.engine == "heyoka":  # its Taylor series have none
-        assert evaluations is None
-    elif method.adaptive:
-        assert evaluations > 10
-    else:
-        stages = {"rk4": 4, "dopri8": 12}.get(method.scheme, 1)
-        newton = method.engine == "tmt" and tmt.METHODS[method.name].solves_stages
-        assert evaluations == stages * GRID or (newton and evaluations > stages * GRID)
+        if method.engine == "heyoka":  # its Taylor series have none
+            assert found.evaluations is None
+        elif not method.adaptive:
+            each = {"rk4": 4, "dopri8": 12}.get(method.scheme, 1) * steps
+            newton = method.engine == "tmt" and tmt.METHODS[method.name].solves_stages
+            assert found.evaluations == each or (newton and found.evaluations > each)
 
 
 def test_a_tolerance_is_taken_only_by_what_chooses_its_own_steps(arm):
     (method, dynamics), case = arm, CASES["as it is"]
     if method.adaptive:
         coarse, fine = (
-            dynamics.run(*case.start, case.tau, 0.5, 4, method.name, tolerance).q[-1] for tolerance in (1e-3, 1e-10)
+            dynamics.run(*case.start, case.tau, 0.5, 4, method.name, tolerance).q[-1] for tolerance in (1e-3, 1e-7)
         )
-        assert 1e-12 < np.abs(coarse - fine).max() < 0.1
+        assert 1e-10 < np.abs(coarse - fine).max() < 0.1
         lasts = 32.0 if method.engine == "tmt" else 2.0  # its steps are no longer than what is recorded
         prepared = (
             dynamics.prepare(*case.start, case.tau, Setting(lasts, None, 10.0**-k), method.name) for k in (3, 5)
@@ -283,12 +225,12 @@ def test_a_tolerance_is_taken_only_by_what_chooses_its_own_steps(arm):
         coarse, fine = (read(run()) for run, read in prepared)
         assert np.abs(coarse.q[-1] - fine.q[-1]).max() > 1e-9
         return
-    with pytest.raises(ValueError, match="fixed step and takes no tolerance"):
+    with pytest.raises(ValueError, match="tolerance"):
         dynamics.run(*case.start, case.tau, 0.01, 4, method.name, 1e-6)
-    with pytest.raises(ValueError, match="fixed step and takes no tolerance"):
+    with pytest.raises(ValueError, match="tolerance"):
         dynamics.prepare(*case.start, case.tau, Setting(DURATION, GRID, 1e-6), method.name)
     for steps in (GRID + 1, 0, None):
-        with pytest.raises(ValueError, match=f"steps is {steps}; a multiple of 64 is expected"):
+        with pytest.raises(ValueError, match=f"{steps}.*64"):
             dynamics.prepare(*case.start, case.tau, Setting(DURATION, steps), method.name)
 
 

@@ -69,11 +69,3 @@ def test_the_whole_model_is_run_as_the_file_has_it(tmp_path, monkeypatch):
     silent = whole_run(reading.model, limited.robot.drive, at.start, np.array([0.1]), 0.06, "Euler", 30.0, 0.5)
     assert (silent.warnings, silent.resets) == (0, 0) and silent.rms_speed > 0.1
     assert not list(tmp_path.iterdir())
-
-
-def test_the_activation_of_an_integrator_is_where_its_u_stands():
-    servo = '<intvelocity name="s" joint="turn" kp="20" kv="2" actrange="-1 1"/>'
-    at, reading = posture_of(hinge(actuator=servo))
-    far = whole_run(reading.model, at.robot.drive, at.start, np.array([0.5]), 0.002, "implicitfast", 0.1, 0.1)
-    near = whole_run(reading.model, at.robot.drive, at.start, np.array([0.0]), 0.002, "implicitfast", 0.1, 0.1)
-    assert far.rms_speed > 0.1 and near.rms_speed == 0.0

@@ -1,11 +1,9 @@
 """What drives a file's robot, read from its compiled model."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
-from files import TWO, mjcf
+from files import TENDON, TWO, mjcf
 
 import tmt
 from compare.engines.mujoco import read
@@ -13,8 +11,7 @@ from compare.engines.mujoco.acting import Acting, add_armature
 from compare.engines.mujoco.lock import ModelError
 from compare.robots.file import robot_of
 
-TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
-SITES = TWO.replace('name="g"', 'name="g"').replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
+SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
 
 
 def drive_of(actuators="", tendon="", content=TWO, before="", keys=""):
@@ -45,18 +42,18 @@ def test_the_law_of_an_actuator(text):
     assert (one.gain, one.bias, one.moment, one.dynamics) == LAWS[text] and one.acts
 
 
-REFUSED = {
-    '<muscle joint="k" lengthrange="0 1"/>': "a law of the kind muscle",
-    '<general joint="k" dyntype="user"/>': "a law of the user's own",
-    '<general joint="k" gaintype="user"/>': "a law of the user's own",
-    '<general joint="k" biastype="user"/>': "a law of the user's own",
-    '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "a DC motor",
-    '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "a transmission of the kind body",
-    '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "a delay",
-    '<general joint="k" damping="1 2"/>': "polynomial damping",
-    '<general tendon="t" damping="1"/>': "damping of its own at no joint",
-    '<pid joint="k" kp="3" ki="1"/>': "a law of the kind pid",
-    '<orientation site="s" refsite="s" kp="1"/>': "a law of the kind so3",
+REFUSED = {  # actuator, and a word of why it takes no part
+    '<muscle joint="k" lengthrange="0 1"/>': "muscle",
+    '<general joint="k" dyntype="user"/>': "user",
+    '<general joint="k" gaintype="user"/>': "user",
+    '<general joint="k" biastype="user"/>': "user",
+    '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
+    '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
+    '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
+    '<general joint="k" damping="1 2"/>': "polynomial",
+    '<general tendon="t" damping="1"/>': "damping",
+    '<pid joint="k" kp="3" ki="1"/>': "pid",
+    '<orientation site="s" refsite="s" kp="1"/>': "so3",
 }
 
 
@@ -74,23 +71,16 @@ def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
     more = text.replace(" ", ' name="x" ', 1)
     since(mjcf(SITES, after=TENDON.format("") + f"<actuator>{more}</actuator>"))
     drive = drive_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES)
-    assert drive.refused == {"x": REFUSED[text]}
+    assert drive.refused.keys() == {"x"} and REFUSED[text] in drive.refused["x"]
     assert [one.name for one in drive.servos] == ["p"]
 
 
-@pytest.mark.parametrize(
-    ("joint", "tendon", "reason"),
-    [
-        ('stiffness="1 2"', "", {"joint j": "polynomial stiffness"}),
-        ('damping="1 2"', "", {"joint j": "polynomial damping"}),
-        ("", 'stiffness="1 2"', {"tendon t": "polynomial stiffness"}),
-        ("", 'damping="1 2"', {"tendon t": "polynomial damping"}),
-    ],
-)
-def test_springs_and_dampers_that_are_not_linear_are_named(joint, tendon, reason):
-    content = TWO.replace('name="j"', f'name="j" {joint}')
-    since(mjcf(content, after=TENDON.format(tendon)))
-    assert drive_of('<motor joint="k"/>', tendon, content).refused == reason
+@pytest.mark.parametrize("what", ["stiffness", "damping"])
+def test_springs_and_dampers_that_are_not_linear_are_named(what):
+    joint, tendon = TWO.replace('name="j"', f'name="j" {what}="1 2"'), f'{what}="1 2"'
+    since(mjcf(joint, after=TENDON.format(tendon)))
+    drive = drive_of('<motor joint="k"/>', tendon, joint)
+    assert drive.refused.keys() == {"joint j", "tendon t"} and all(what in why for why in drive.refused.values())
 
 
 def test_what_the_file_disables_is_off():
@@ -135,30 +125,18 @@ def test_gravity_compensation_and_damping_by_actuators():
 KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
 
 
-@pytest.mark.parametrize(
-    ("key", "expected"),
-    [
-        ('ctrl="0.5 0.25"', (0.5, 0.25)),
-        ("", None),
-        ('ctrl="0 0"', (0.0, 0.0)),
-    ],
-)
-def test_a_keyframe_states_controls_or_none(key, expected):
-    drive = drive_of('<position joint="j" kp="5"/><motor joint="k"/>', keys=KEYS.format(key))
-    assert drive.controls.get("home") == expected and "plain" not in drive.controls
-
-
-def test_a_keyframe_states_the_activation_of_an_integrator_and_the_control_of_a_filter():
-    actuators = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
-    drive = drive_of(actuators, keys=KEYS.format('ctrl="0.9 0.8" act="0.3 0.2"'))
-    assert drive.controls["home"] == (0.3, 0.8)
-    assert drive_of(actuators, keys=KEYS.format('act="0.3 0.2"')).controls["home"] == (0.3, None)
-
-
-def test_of_a_compiled_model_controls_of_zero_are_none():
-    text = mjcf(TWO, after='<actuator><position joint="j" kp="5"/></actuator>' + KEYS.format('ctrl="0.4"'))
-    reading = read(mujoco.MjModel.from_xml_string(text))
-    assert reading.drive.controls == {"home": (0.4,)}
+def test_a_keyframe_states_controls_activations_or_neither():
+    plain = '<position joint="j" kp="5"/><motor joint="k"/>'
+    kept = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
+    for actuators, key, expected in (
+        (plain, 'ctrl="0.5 0.25"', (0.5, 0.25)),
+        (plain, 'ctrl="0 0"', (0.0, 0.0)),
+        (plain, "", None),
+        (kept, 'ctrl="0.9 0.8" act="0.3 0.2"', (0.3, 0.8)),  # an integrator's activation, a filter's control
+        (kept, 'act="0.3 0.2"', (0.3, None)),
+    ):
+        controls = drive_of(actuators, keys=KEYS.format(key)).controls
+        assert controls.get("home") == expected and "plain" not in controls
 
 
 def test_armature_is_added_to_bodies_whose_inertia_never_changes():
@@ -182,26 +160,6 @@ def test_a_speed_that_is_locked_does_not_move():
     assert np.abs(data.qvel[:6]).max() < 1e-6 < np.abs(data.qvel[6:]).max()
 
 
-PLUGIN = """<mujoco><extension><plugin plugin="mujoco.pid"><instance name="p"><config key="kp" value="4"/></instance></plugin>
-</extension><worldbody><body><joint name="a"/><geom size="0.1"/></body></worldbody><actuator>
-<plugin name="x" joint="a" plugin="mujoco.pid" instance="p"/><position joint="a" kp="50"/></actuator></mujoco>"""
-
-
-def test_a_plugin_is_refused_and_exerts_nothing():
-    library = next((Path(mujoco.__file__).parent / "plugin").glob("*actuator*"), None)
-    if library is None:
-        pytest.skip("no plugins beside this MuJoCo")
-    try:
-        reading = read(PLUGIN)
-    except ValueError:  # not yet loaded
-        mujoco.mj_loadPluginLibrary(str(library))
-        reading = read(PLUGIN)
-    assert reading.drive.refused == {"x": "a plugin"}
-    model, data = Acting(reading.model, reading.drive).at(np.zeros(1), np.array([1.0, 0.1]), 0.01, "Euler")
-    mujoco.mj_forward(model, data)
-    assert data.qfrc_actuator[0] == pytest.approx(5.0)
-
-
 def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     before = '<orientation site="s" refsite="s" kp="1"/>'
     motor = '<motor joint="j" gear="3" armature="0.1"/><position tendon="t" kp="2" gear="5"/>'
@@ -223,5 +181,5 @@ def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     ('<motor name="s" joint="j" gear="nan"/>', "gear of actuator 's'"),
 ])  # fmt: skip
 def test_gains_that_are_no_numbers_are_refused_by_name(actuator, what):
-    with pytest.raises(ModelError, match=f"the {what} has a number that is not finite"):
+    with pytest.raises(ModelError, match=what):
         drive_of(actuator)

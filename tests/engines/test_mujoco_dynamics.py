@@ -5,7 +5,6 @@ import pytest
 from edited import XML
 
 import tmt
-from compare.engines import GRID, Setting
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.robots.arm import ARM
@@ -25,25 +24,6 @@ def test_quantities_are_those_of_the_state_that_is_asked_for(dynamics, rng):
     dynamics.run(q, v, tau, 0.01, 10, "RK4")
     dynamics.acceleration(q + 1, v, tau)
     assert np.array_equal(dynamics.bias(q, v), before)
-
-
-def test_a_run_starts_at_the_start_and_feels_the_torque(dynamics):
-    q, tau = np.array([0.5, 0.4, 0.3]), np.array([3.0, -2.0, 1.0])
-    motion = dynamics.run(q, REST, tau, 0.001, 10, "RK4")
-    assert motion.t.shape == (11,) and np.array_equal(motion.q[0], q)
-    assert np.allclose(motion.v[1] / 0.001, tmt.acceleration(q, REST, tau), rtol=0.02)
-    unpushed = dynamics.run(q, REST, REST, 0.001, 10, "RK4")
-    assert np.abs(unpushed.q[-1] - motion.q[-1]).max() > 1e-4
-
-
-def test_a_diverged_run_is_nan_from_there_on_and_leaves_no_log(dynamics, tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    motion = dynamics.run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4")
-    finite = np.isfinite(motion.q).all(axis=1)
-    assert finite[0] and not finite[-1] and not finite[np.argmin(finite) :].any()
-    assert motion.ended.startswith(f"at t = {motion.t[np.argmin(finite) - 1]:g} s: ")
-    assert list(tmp_path.iterdir()) == []
-    assert capfd.readouterr() == ("", "")
 
 
 def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypatch):
@@ -68,12 +48,3 @@ def test_the_files_own_integrator_does_not_matter_where_states_are_evaluated(dyn
         other, same = (parse(of, tmt.ARM).of(sticky) for of in (text, XML))
         assert np.array_equal(other.acceleration(q, v, tau), same.acceleration(q, v, tau))
         assert np.array_equal(other.inverse(q, v, tau), same.inverse(q, v, tau))
-
-
-def test_a_run_is_made_anew_each_time(dynamics):
-    """What is timed is the work: nothing is kept of the run before."""
-    run, read = dynamics.prepare(np.ones(3), REST, REST, Setting(0.5, GRID), "RK4")
-    states = run()
-    first = read(states)
-    states[:] = 0.0
-    assert np.array_equal(read(run()).q, first.q)

@@ -16,46 +16,33 @@ def edited(old, new):
 
 
 def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(ModelError, match=r"cannot read .*no\.xml: No such file"):
+    with pytest.raises(ModelError, match=r"no\.xml"):
         load(tmp_path / "no.xml", ARM.tree)
 
 
+JOINTS = 'name="gamma" type="hinge"'
+
+
 @pytest.mark.parametrize(
-    "content, says",
+    "content, word",
     [
-        (b"not xml", "is not MJCF"),
-        (b"<robot/>", "has the joints none"),
-        (b"\xff\xfe\x00", "is not MJCF"),
-        (b"<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo cannot compile"),
-        (b"<mujoco/>", "has the joints none; hinges alpha, beta, gamma and no others are expected"),
+        (b"not xml", "MJCF"),
+        (b"\xff\xfe\x00", "MJCF"),
+        (b"<robot/>", "none"),
+        (b"<mujoco/>", "none.*alpha, beta, gamma"),
+        (b"<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "compile"),
+        (edited('name="gamma"', 'name="elbow"').encode(), r"elbow \(hinge\)"),
+        (edited('name="gamma"', "").encode(), r"joint 2 \(hinge\)"),
+        (edited(JOINTS, JOINTS.replace("hinge", "slide")).encode(), r"gamma \(slide\)"),
+        (edited('"upper_arm" pos="0 0 0">', '"upper_arm"><freejoint name="loose"/>').encode(), "compile|loose"),
     ],
 )
-def test_a_file_that_is_not_the_arm(tmp_path, content, says):
+def test_a_file_that_is_not_the_arm(tmp_path, content, word):
     path = tmp_path / "model.xml"
     path.write_bytes(content)
-    with pytest.raises(ModelError, match=says) as error:
+    with pytest.raises(ModelError, match=word) as error:
         load(path, ARM.tree)
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize(
-    "old, new, says",
-    [
-        ('name="gamma"', 'name="elbow"', r"elbow \(hinge\)"),
-        ('name="gamma"', "", r"joint 2 \(hinge\)"),
-        ('name="gamma" type="hinge"', 'name="gamma" type="slide"', r"gamma \(slide\)"),
-        (
-            '<body name="upper_arm" pos="0 0 0">',
-            '<body name="upper_arm"><freejoint name="loose"/>',
-            "cannot compile|loose",
-        ),
-    ],
-)
-def test_other_hinges(tmp_path, old, new, says):
-    path = tmp_path / "model.xml"
-    path.write_text(edited(old, new))
-    with pytest.raises(ModelError, match=says):
-        load(path, ARM.tree)
 
 
 def test_body_axes_are_those_of_the_world_at_zero(rng):
@@ -78,19 +65,3 @@ def test_a_comment_in_another_encoding_is_no_obstacle(tmp_path):
     path = tmp_path / "model.xml"
     path.write_bytes(XML.encode().replace(b"<!--", b"<!-- \xe9 ", 1))
     assert load(path, ARM.tree).of(ARM.case()).mass_matrix(np.zeros(3))[0, 0] == pytest.approx(0.2445)
-
-
-def test_joints_are_those_of_the_tree_in_its_order(rng):
-    """What a file calls beta is beta, though it stands before alpha."""
-    lines = [
-        f'<joint name="{name}" type="hinge" axis="{axis}"/>' for name, axis in (("alpha", "0 1 0"), ("beta", "1 0 0"))
-    ]
-    text = XML.replace(lines[0], "first").replace(lines[1], lines[0].replace("0 1 0", "1 0 0"))
-    text = text.replace("first", lines[1].replace("1 0 0", "0 1 0"))  # beta first, about y; then alpha, about x
-    q, v = rng.uniform(-3, 3, (2, 20, 3))
-    other, arm = (parse(text, ARM.tree).of(ARM.case()) for text in (text, XML))
-    swapped = [1, 0, 2]
-    assert np.allclose(other.bias(q, v), arm.bias(q[:, swapped], v[:, swapped])[:, swapped], atol=1e-12)
-    engine = parse(XML, ARM.tree)
-    assert engine.joints == ARM.joints and engine.bodies == [1, 2] and engine.source == XML
-    assert load(ARM.mjcf, ARM.tree).source == ARM.mjcf

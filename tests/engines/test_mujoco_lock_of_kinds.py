@@ -1,8 +1,8 @@
 """Slides, balls and free joints, or parts of these, locked in MuJoCo: the smaller model is the Tree without them."""
 
-import numpy as np
 import pytest
-from files import EVERYTHING, TENDON, TWO, assert_the_same, case_of, mjcf, random_mjcf, random_state
+from files import EVERYTHING, TENDON, TWO, assert_the_same, case_of, mjcf, random_mjcf
+from trees import random_state
 
 from compare.engines.mujoco import ModelError, engine, read
 
@@ -10,7 +10,7 @@ from compare.engines.mujoco import ModelError, engine, read
 def assert_locked(reading, names, rng):
     """MuJoCo with these joints locked at random positions is tmt's Tree with them locked there."""
     tree = reading.tree
-    q, _, _ = random_state(tree, rng)
+    q, _, _ = random_state(rng, tree)
     at = dict(zip(tree.hinge_names, (q[joint.q] for joint in tree.coordinates.joints)))
     positions = {name: tuple(at[name]) if len(at[name]) > 1 else float(at[name][0]) for name in names}
     smaller = tree.lock(positions)
@@ -37,19 +37,8 @@ def test_parts_of_a_free_joint(parts, rng):
     assert_locked(reading, [f"float {part}" for part in parts] + ["joint 1", "shoulder"], rng)
 
 
-def test_a_class_of_the_file_does_not_reach_the_parts_of_a_free_joint(rng):
-    classes = '<default><joint ref="20" springref="10" range="5 30" limited="true" springdamper="1 0.5" damping="0.2"/></default>'
-    body = (
-        '<body euler="30 0 0"><joint name="float" type="free" springdamper="0 0"/><geom type="box" size="0.1 0.2 0.3"/>'
-    )
-    more = '<body pos="0.3 0 0"><joint name="k"/><geom size="0.1" pos="0.2 0 0"/></body></body>'
-    reading = read(mjcf(body + more, classes))
-    for names in (["float x"], ["float turn"], ["float y", "k"]):
-        assert_locked(reading, names, rng)
-
-
 def test_random_joints_of_random_files(rng):
-    for _ in range(8):
+    for _ in range(3):
         reading = read(random_mjcf(rng))
         names = list(reading.tree.hinge_names)
         for _ in range(3):
@@ -75,13 +64,6 @@ def test_a_joint_whose_name_cannot_stand_in_a_line_is_called_by_its_number(rng):
     assert_locked(reading, ["k"], rng)
 
 
-def test_the_armature_of_an_actuator_on_a_free_joint_stays(rng):
-    body = '<body><joint name="f" type="free"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/></body>'
-    reading = read(mjcf(body, after='<actuator><general joint="f" armature="0.5" gear="2"/></actuator>'))
-    assert reading.tree.armature == (2.0,) * 6
-    assert_locked(reading, ["f y", "f turn"], rng)
-
-
 def test_a_free_body_aligned_with_its_inertia_is_compared_and_not_locked(rng):
     body = '<body euler="10 20 30"><freejoint name="f" align="true"/><geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0"/></body>'
     reading = read(mjcf(body))
@@ -89,14 +71,3 @@ def test_a_free_body_aligned_with_its_inertia_is_compared_and_not_locked(rng):
     with pytest.raises(ModelError, match="free joint 'f' is aligned with the inertia of its body") as error:
         assert_locked(reading, ["f x"], rng)
     assert "\n" not in str(error.value)
-
-
-def test_bodies_that_the_file_fuses_keep_their_numbers(rng):
-    tip = '<body pos="0.3 0 0"><joint name="k" axis="0 1 0"/><geom size="0.1"/></body>'
-    body = f'<body name="c" pos="0.1 0 0"><geom size="0.2"/>{tip}</body>'
-    content = f'<body><joint name="j"/><geom size="0.1" pos="0.2 0 0"/>{body}</body>'
-    reading = read(mjcf(content, '<compiler fusestatic="true"/>'))
-    assert reading.tree.body_names == ("body 1", "c", "body 3")
-    for names in (["j"], ["k"]):
-        assert_locked(reading, names, rng)
-    assert np.allclose(reading.tree.mass[1], 8 * reading.tree.mass[2])

@@ -6,7 +6,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from files import assert_the_same, case_of, random_state
+from files import assert_the_same, case_of
+from trees import random_state
 
 from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.stated import stated_numbers
@@ -17,12 +18,19 @@ OWN = Path(mujoco.__file__).parent / "testdata" / "model.xml"
 FILES = [*sorted(ASSETS.glob("*.xml")), *([OWN] if OWN.exists() else [])]
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+FEW = ("ant.xml", "half_cheetah.xml", "humanoid.xml", "pusher.xml", "reacher.xml", "swimmer.xml", "model.xml")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path if path.name in FEW else pytest.param(path, marks=pytest.mark.slow) for path in FILES],
+    ids=lambda path: path.name,
+)
 def test_a_published_file_is_the_same_in_both_and_with_joints_locked(path, rng):
     reading = read(path)
     tree = reading.tree
     assert_the_same(engine(reading).of(case_of(tree)), tree, rng)
-    q, _, _ = random_state(tree, rng)
+    q, _, _ = random_state(rng, tree)
     positions = {
         name: float(q[joint.q.start]) if joint.kind != "ball" else tuple(q[joint.q])
         for name, joint in zip(tree.hinge_names, tree.coordinates.joints)

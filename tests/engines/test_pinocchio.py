@@ -42,19 +42,6 @@ def test_quantities_are_those_of_tmt(rng):
             assert (np.abs(found - expected).max(axis=1) <= FACTOR * EPS * scale).all()
 
 
-@installed
-def test_a_loop_calls_as_often_as_it_is_told(rng):
-    calls = PinocchioCalls(tmt.ARM)
-    state = rng.uniform(-2.0, 2.0, (3, 3))
-    run = calls.aba_loop(*state)
-    calls.data.ddq = np.full(3, np.nan)
-    run(0)
-    assert np.isnan(calls.data.ddq).all()
-    run(2)
-    assert np.allclose(calls.data.ddq, tmt.acceleration(*state), rtol=1e-12)
-    PinocchioCalls.call_loop()(3)
-
-
 def test_it_says_of_which_trees_it_builds_none():
     assert "only trees of hinges and slides" in PinocchioCalls.unfit(read(PATHS["pendulum_ball"]).tree)
     driven = dataclasses.replace(tmt.ARM, position_gain=np.eye(3))

@@ -1,15 +1,16 @@
 """Whatever a user can get wrong gets a ValueError that says what was given and what is accepted."""
 
 import dataclasses
+import re
 import warnings
 from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import array_shapes, arrays
+from hypothesis.extra.numpy import arrays
 
 import tmt
 from tmt.compiled import evaluator, runner
@@ -31,71 +32,34 @@ CALLS = {
 }
 
 
-@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-@settings(max_examples=8)
-@given(array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=5))
-def test_wrong_shapes(call, shape):
-    assume(not shape or shape[-1] != 3)
-    with pytest.raises(ValueError, match=r"has shape .*; \(\.\.\., 3\) is expected.*alpha, beta, gamma"):
-        call(np.zeros(shape))
+SAID = [  # calls that are refused, and a word of what is said
+    *((lambda call=call: call(np.zeros((2, 4))), r"\(2, 4\).*alpha, beta, gamma") for call in CALLS.values()),
+    *((lambda call=call: call([0.0, np.inf, 0.0]), "not finite") for call in CALLS.values()),
+    *((lambda call=call: call([True, False, True]), "real numbers") for call in CALLS.values()),
+    (lambda: tmt.bias(np.zeros((2, 3)), np.zeros((4, 3))), r"q \(2, 3\), qd \(4, 3\)"),
+    *((lambda dt=dt: tmt.simulate(REST, REST, REST, dt, 1), "dt|step") for dt in (0.0, -1.0, np.nan, np.inf, "0.1", True)),
+    *((lambda n=n: tmt.simulate(REST, REST, REST, 0.1, n), "steps") for n in (0, -1, 1.5, np.nan, "1", None, True)),
+    *((lambda n=n: tmt.simulate([1.0] * 3, REST, REST, 1e-30, n, every=n), "steps|every") for n in (2**63, 10**400)),
+    (lambda: tmt.simulate(REST, REST, REST, 1e308, 100), "largest double"),
+    (lambda: tmt.simulate(REST, REST, REST, 0.1, 1, "rk5"), "'rk5'.*rk4, rk4_mean_speed, dopri8"),
+    (lambda: tmt.simulate(REST, REST, REST, 0.1, 1, ["rk4"]), "method"),
+    (lambda: tmt.simulate(REST, REST, REST, 0.1, 1, tolerance=1e-6), "tolerance"),
+    *((lambda x=x: tmt.simulate(REST, REST, REST, 0.1, 1, "dopri8_adaptive", tolerance=x), "tolerance")
+      for x in (0.0, -1.0, np.nan, np.inf, "1e-6", True)),
+    *((lambda every=every: tmt.simulate(REST, REST, REST, 0.1, 10, every=every), "^every")
+      for every in (3, 20, 0, -1, 2.5, True, None, "2")),
+    (lambda: tmt.mass_matrix(REST, model="arm"), "tmt.Tree"),
+    (lambda: tmt.mass_matrix(np.full((3, 1000), 1j)), "real numbers"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-@settings(max_examples=8)
-@given(arrays(float, 3, elements=st.floats(-10, 10)), st.integers(0, 2), st.sampled_from([np.nan, np.inf, -np.inf]))
-def test_values_that_are_not_finite(call, q, place, value):
-    q[place] = value
-    with pytest.raises(ValueError, match="not finite; finite numbers are expected"):
-        call(q)
-
-
-@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
-@pytest.mark.parametrize(
-    "q", ["abc", None, [1, 2, "x"], [[1, 2, 3], [1, 2]], [1j, 0, 0], {"q": 1}, [True, False, True]]
-)
-def test_what_is_not_numbers(call, q):
-    with pytest.raises(ValueError, match="real numbers of shape"):
-        call(q)
-
-
-def test_batches_that_do_not_fit():
-    with pytest.raises(ValueError, match=r"do not fit together: q \(2, 3\), qd \(4, 3\)"):
-        tmt.bias(np.zeros((2, 3)), np.zeros((4, 3)))
+@pytest.mark.parametrize("call, word", SAID)
+def test_what_is_wrong_is_said(call, word):
+    assert re.search(word, refused(call))
 
 
 def test_an_empty_batch_is_a_batch():
     assert tmt.mass_matrix(np.zeros((0, 3))).shape == (0, 3, 3)
-
-
-@given(st.floats(max_value=0) | st.sampled_from([np.nan, np.inf, "0.1", None, 1j, True, 10**400]))
-def test_steps_in_time(dt):
-    with pytest.raises(ValueError, match="a step in s above 0 is expected"):
-        tmt.simulate(REST, REST, REST, dt, 1)
-
-
-@given(st.integers(max_value=0) | st.floats() | st.sampled_from(["1", None, True]))
-def test_numbers_of_steps(steps):
-    with pytest.raises(ValueError, match="a whole number of at least 1 is expected"):
-        tmt.simulate(REST, REST, REST, 0.1, steps)
-
-
-@pytest.mark.parametrize("steps", [2**63, 2**64 + 5, 10**400])
-def test_more_steps_than_can_be_counted(steps):
-    refused(tmt.simulate, [1.0, 1.0, 1.0], REST, REST, 1e-30, steps, "rk4", tmt.ARM, None, steps)
-
-
-def test_unknown_method_and_model():
-    with pytest.raises(ValueError, match="unknown method 'rk5'; known are rk4, rk4_mean_speed, dopri8"):
-        tmt.simulate(REST, REST, REST, 0.1, 1, "rk5")
-    with pytest.raises(ValueError, match="unknown method"):
-        tmt.simulate(REST, REST, REST, 0.1, 1, ["rk4"])
-    with pytest.raises(ValueError, match="method 'rk4' has a fixed step and takes no tolerance"):
-        tmt.simulate(REST, REST, REST, 0.1, 1, tolerance=1e-6)
-    for wrong in (0.0, -1.0, np.nan, np.inf, "1e-6", True):
-        with pytest.raises(ValueError, match=r"tolerance is .*; a number above 0 is expected"):
-            tmt.simulate(REST, REST, REST, 0.1, 1, "dopri8_adaptive", tolerance=wrong)
-    with pytest.raises(ValueError, match=r"a tmt\.Tree is expected"):
-        tmt.mass_matrix(REST, model="arm")
 
 
 class NoArray:
@@ -136,8 +100,6 @@ def with_part(method, name):
 
 PLACES = {
     **CALLS,
-    **{f"{name}, other argument": lambda q, name=name: getattr(tmt, name)(q, REST)
-       for name in ("angular_velocities", "convective_terms", "bias", "energy")},
     "acceleration, q": lambda q: tmt.acceleration(q, REST, REST),
     "acceleration, qd": lambda qd: tmt.acceleration(REST, qd, REST),
     "simulate, qd": lambda qd: tmt.simulate(REST, qd, REST, 0.1, 1),
@@ -213,7 +175,7 @@ def test_compiled_code_takes_numbers_only():
             refused(adaptive, path, path.copy(), tau, 0.1, value)
         if value is not True:
             refused(evaluator(tmt.ARM, "acceleration").chain, REST, REST, REST, value)
-        if type(value) is not int:  # see test_more_steps_than_can_be_counted
+        if type(value) is not int:  # see SAID
             refused(lambda value=value: fixed(path, path.copy(), tau, 0.1, every=value))
 
 
@@ -236,13 +198,11 @@ def test_wrong_terms_are_refused():
 
 
 def test_paths_that_do_not_fit_into_memory():
-    for exponent in (12, 15, 18):
-        message = refused(tmt.simulate, REST, REST, REST, 1e-3, 10**exponent)
-        assert "of memory, more than there is" in message
-    assert "would take 4.8e+04 GB of memory" in refused(tmt.simulate, REST, REST, REST, 1e-3, 10**12)
+    for exponent, size in ((12, "4.8e+04 GB"), (15, "GB"), (18, "GB")):
+        assert size in refused(tmt.simulate, REST, REST, REST, 1e-3, 10**exponent)
+    assert tmt.simulate(np.zeros((3, 3)), REST, REST, 1e-3, 10**5, every=10**5).q.shape == (3, 2, 3)
     wide = np.zeros((10**5, 1, 1, 3)), np.zeros((10**5, 1, 3)), np.zeros((10**5, 3))  # 8 PB: beyond any address
-    assert "fit into memory" in refused(tmt.acceleration, *wide)
-    assert "product is beyond the largest double" in refused(tmt.simulate, REST, REST, REST, 1e308, 100)
+    assert "memory" in refused(tmt.acceleration, *wide)
 
 
 @given(arrays(float, (3, 3), elements=st.floats(allow_nan=False, allow_infinity=False)))
@@ -263,12 +223,6 @@ def test_finite_numbers_give_finite_results_or_a_reason(state):
         assert not np.isnan(tmt.energy(q, qd))
         motion = tmt.simulate(q, qd, tau, 0.01, 3)
     assert (motion.ended is None) == bool(np.isfinite(motion.q).all() and np.isfinite(motion.qd).all())
-
-
-def test_messages_are_one_line():
-    with pytest.raises(ValueError) as error:
-        tmt.mass_matrix(np.full((3, 1000), 1j))
-    assert "\n" not in str(error.value) and len(str(error.value)) < 300
 
 
 @given(st.sampled_from([int, np.int32, np.int64]), st.sampled_from([float, np.float64, np.float32, Fraction]))

@@ -11,7 +11,6 @@ from tmt.compiled.evaluator import TERMS
 from tmt.compiled.sine import LIMIT
 from tmt.equations import composite, method
 from tmt.equations.quantities import QUANTITIES
-from tmt.exact.values import FIELDS, distance, exact
 
 EPS = np.finfo(float).eps
 SMALL, LARGE = small_tree(), large_tree()
@@ -52,17 +51,13 @@ def slack(tree, quantity, q) -> float:
     return 64 * EPS * condition
 
 
-@pytest.mark.parametrize("quantity", [*QUANTITIES, TERMS])
+@pytest.mark.parametrize("quantity", ["acceleration", "jacobians", TERMS])  # of the others see test_answers
 def test_a_quantity_of_every_kind_of_joint(quantity, rng):
     states, compiled = random_states(rng, SMALL, COUNT), evaluator(SMALL, quantity)
     wanted, found = expected(SMALL, quantity, *states), rows_of(compiled, states)
     allowed = slack(SMALL, quantity, states[0]) * np.abs(wanted).max()
     assert compiled.size == wanted.shape[1] and compiled.operations > 0
     assert np.abs(found - wanted).max() <= allowed
-    if quantity != TERMS:
-        truth = exact(SMALL, *(rows[0] for rows in states))
-        truth = np.concatenate([np.ravel(getattr(truth, field)) for field in FIELDS[quantity]])
-        assert distance(found[0], truth).max() <= allowed
     for count in (*range(10), 17, COUNT):
         assert np.array_equal(in_columns(compiled, [rows[:count] for rows in states]), found[:count])
         if count:
@@ -70,6 +65,7 @@ def test_a_quantity_of_every_kind_of_joint(quantity, rng):
     assert compiled.chain(*(rows[0] for rows in states), 3) == pytest.approx(found[0].sum(), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_large_tree(rng):
     """Its code is cut into parts, and is in the articulated form."""
     states, compiled = random_states(rng, LARGE, 9), evaluator(LARGE, "acceleration")
@@ -78,14 +74,6 @@ def test_a_large_tree(rng):
     assert np.array_equal(in_columns(compiled, states), found)
     states[0][:, :3] += 1e4  # far from the world no digit is lost
     assert np.array_equal(rows_of(compiled, states), found)
-
-
-def test_a_single_hinge(rng):
-    tree = tmt.ARM.lock({"alpha": 0.1, "beta": 0.2})
-    states, compiled = list(rng.uniform(-2, 2, (3, COUNT, 1))), evaluator(tree, "acceleration")
-    found = rows_of(compiled, states)
-    assert found == pytest.approx(literal.acceleration(*states, tree), rel=1e-12)
-    assert np.array_equal(in_columns(compiled, states), found)
 
 
 def test_of_a_wrong_state_there_is_no_number(rng):
@@ -119,7 +107,3 @@ def test_another_form_of_mbar_and_h_is_traced(terms, rng):
     states[2] *= factor
     wanted = literal.acceleration(states[0], states[1], states[2] / factor)
     assert rows_of(qdd, states) == pytest.approx(wanted, rel=1e-10, abs=1e-10)
-
-
-def test_the_arm_folds_to_few_operations():
-    assert 100 < evaluator(tmt.ARM, "acceleration").operations < 140

@@ -12,11 +12,10 @@ from trees import random_states, small_tree
 
 from tmt.compiled import Library, forms, straight
 from tmt.compiled.ir import POINTER, Code, module
-from tmt.compiled.linear import WIDTH, bias_rates, solution, solve
+from tmt.compiled.linear import solution, solve
 from tmt.compiled.machine import lanes
 from tmt.compiled.sine import LIMIT
 from tmt.compiled.straight import functions, trace
-from tmt.equations import method
 from tmt.equations.dual import jacobian
 from tmt.equations.vectors import arctan, cos, sin, sqrt
 from tmt.methods import METHODS
@@ -118,7 +117,7 @@ def test_the_solution_of_a_linear_system_is_called(width, rng, monkeypatch):
     assert np.array_equal(compiled(traced, width, [solve(), solution(n)])(given), found)
 
 
-@pytest.mark.parametrize("name, few", [("rk4", 0), ("rk4", 99), ("implicit", 99)])
+@pytest.mark.parametrize("name, few", [("rk4", 0), ("implicit", 99)])
 def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_form(name, few, rng, monkeypatch):
     """In articulated bodies, where that can be, and by Mbar and h."""
     monkeypatch.setattr(forms, "FEW", few)
@@ -133,18 +132,6 @@ def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_f
     start = [*q.tolist(), *qd.tolist()]
     wanted = [*slope(start), *(row[0] for row in jacobian(slope, start, [given[-nq - n :]]))]
     assert found == pytest.approx(np.array(wanted), rel=1e-10, abs=1e-10)
-
-
-@pytest.mark.parametrize("width", [1, lanes()])
-def test_the_rates_of_the_bias_are_those_of_the_literal_form(width, rng):
-    q, qd, _ = random_states(rng, SMALL, width)
-    n = qd.shape[1]
-    traced = trace("rates", [q.shape[1], n], lambda q, qd: forms.flat(forms.Terms(SMALL).called_rates(SMALL, q, qd)))
-    more = [*functions(forms.bias_rate(SMALL), WIDTH), bias_rates(q.shape[1], n, WIDTH)]
-    found = compiled(traced, width, more)(np.hstack([q, qd]).T)
-    for l in range(width):
-        wanted = np.array(method.bias_rates(SMALL, q[l].tolist(), qd[l].tolist()))
-        assert found[:, l].reshape(n, n) == pytest.approx(wanted, rel=1e-11, abs=1e-12)
 
 
 sincos = compiled(trace("both", [1], lambda x: [sin(x[0]), cos(x[0])]))

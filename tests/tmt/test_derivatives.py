@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from trees import random_state, small_tree
 
-import tmt
 from tmt import METHODS
 from tmt.methods import SemiImplicitEuler, amplification, derivatives
 
@@ -22,19 +21,6 @@ def test_the_jacobian_of_a_step_is_that_of_dual_numbers_through_all_of_it(name, 
     found = amplification(METHODS[name], TREE, q, qd, tau, 0.01)
     monkeypatch.setattr(derivatives, "FEW_SPEEDS", len(TREE.axis))
     assert found == pytest.approx(amplification(METHODS[name], TREE, q, qd, tau, 0.01), abs=1e-11, rel=1e-11)
-
-
-@pytest.mark.parametrize("name", DESCRIBED)
-def test_a_sphere_that_floats_free_has_forces_that_no_state_changes(name, monkeypatch):
-    sphere = tmt.Tree(
-        hinge_names=list("xyzt"), parent=[-1, 0, 1, 2], offset=np.zeros((4, 3)), axis=np.eye(3)[[0, 1, 2, 0, 1, 2]],
-        damping=np.zeros(6), body_names=["s"], body_hinge=[3], mass=[2.0], com=np.zeros((1, 3)), inertia=[0.1 * np.eye(3)],
-        gravity=(0.0, 0.0, -9.81), kind=["slide"] * 3 + ["ball"],
-    )  # fmt: skip
-    q, qd = np.array([[0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0]] * 2), np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]] * 2)
-    found = amplification(METHODS[name], sphere, q, qd, np.zeros(6), 0.01)
-    monkeypatch.setattr(derivatives, "FEW_SPEEDS", 6)
-    assert found == pytest.approx(amplification(METHODS[name], sphere, q, qd, np.zeros(6), 0.01), abs=1e-12)
 
 
 @pytest.mark.parametrize("name", DESCRIBED)

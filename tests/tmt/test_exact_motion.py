@@ -2,7 +2,6 @@
 
 import dataclasses
 from fractions import Fraction
-from importlib.util import find_spec
 
 import mpmath
 import numpy as np
@@ -12,15 +11,12 @@ from models import PATHS
 from trees import random_state, small_tree, tree_of_kinds
 
 import tmt
-from compare.engines.heyoka import variables
 from compare.engines.mujoco import read
 from compare.truth.free_body import free_turning
 from compare.truth.pendulum import exact_swing
 from tmt.equations import composite
-from tmt.equations.method import acceleration
 from tmt.exact import motion as reference_run
 from tmt.exact.motion import trajectory, truth
-from tmt.exact.tree import exact_tree
 
 BENT = (0.5, 0.3, 1.0)
 ONE_HINGE = tmt.Tree(
@@ -126,42 +122,3 @@ def test_a_seeded_error_in_one_form_sets_the_two_runs_apart(monkeypatch):
 
     monkeypatch.setitem(reference_run.FORMS, "literal", wrong)
     assert truth(tmt.ARM, BENT, [1.0] * 3, [0.0] * 3, 0.25, 2)[1] > 1e-20
-
-
-@pytest.mark.skipif(find_spec("heyoka") is None, reason="heyoka is not installed")
-@pytest.mark.parametrize("name", ["arm", "pendulum_ball"])
-def test_heyoka_in_quad_precision_is_an_outside_witness(name):
-    """Another's series, of the literal form on another's numbers of 34 digits."""
-    import heyoka
-
-    if not hasattr(heyoka, "real128"):
-        pytest.skip("heyoka is built without quad precision")
-    tree = tmt.ARM if name == "arm" else read(PATHS[name]).tree
-    start = (BENT, [1.0, -2.0, 0.5]) if name == "arm" else (tree.zero, np.arange(len(tree.axis)) - 2.5)
-    q, qd = variables(tree, "q", "qd")
-    numbers = exact_tree(tree, lambda x: heyoka.expression(heyoka.real128(float(x))))
-    none = [heyoka.expression(heyoka.real128(0.0))] * len(qd)
-    qdd = acceleration(numbers, q, qd, none)
-    system = [*zip(q, numbers.coordinates.component_rates(q, qd)), *zip(qd, qdd)]
-    first = np.array([heyoka.real128(float(v)) for values in start for v in values])
-    stepper = heyoka.taylor_adaptive(system, first, fp_type=heyoka.real128, compact_mode=True)
-    stepper.propagate_until(heyoka.real128(0.5))
-    with mpmath.workdps(40):
-        expected = [mpmath.mpf(str(value)) for value in stepper.state]
-    assert off(trajectory(tree, *start, [0.0] * len(qd), 0.25, 2), expected) < 1e-29
-
-
-def test_the_last_two_terms_of_a_step_are_at_most_the_tolerance():
-    high = np.zeros((2, 6))
-    high[0, [0, 4]] = 3.0, 8.0  # 8 t^4 in units of 1 + 3
-    assert reference_run.step_size(high, 1e-20) == pytest.approx((1e-20 / 2.0) ** (1 / 4), rel=1e-12)
-    high[1, [0, 5]] = 1.0, 64.0  # 64 t^5 in units of 1 + 1
-    assert reference_run.step_size(high, 1e5) == pytest.approx((1e5 / 32.0) ** (1 / 5), rel=1e-12)
-
-
-def test_equations_that_allow_few_steps_are_given_up_after_these(monkeypatch):
-    start = np.zeros(3), np.full(3, 10.0), np.zeros(3)
-    code = reference_run.equations(tmt.ARM, start[2], "composite").code
-    monkeypatch.setattr(reference_run, "MOST_OPERATIONS", 5 * (reference_run.BESIDE + len(code)))
-    _, count, error = reference_run.followed(tmt.ARM, *start, 1.0, 100)
-    assert count == 5 and isinstance(error, reference_run.TooManySteps)

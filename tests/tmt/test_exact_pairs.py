@@ -1,16 +1,15 @@
-"""Pairs of doubles: what they compute beside numbers of many digits; and series of each operation."""
+"""Pairs of doubles: what they compute beside numbers of many digits."""
 
 import ctypes
 
 import mpmath
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tmt.compiled import Library
 from tmt.compiled.ir import DOUBLE, POINTER, Code, module
-from tmt.exact import pairs, series
+from tmt.exact import pairs
 from tmt.exact.pairs import pair
 
 NUMBERS = st.floats(-1e6, 1e6).filter(lambda x: x == 0.0 or abs(x) > 1e-100)
@@ -71,62 +70,3 @@ def test_sines_and_cosines(x, share):
 
 def test_a_root_of_nothing_is_nothing_and_one_of_less_is_no_number():
     assert root(0.0, 0.0) == (0.0, 0.0) and np.isnan(root(-1.0, 0.0)[0])
-
-
-# series
-
-RULES = {
-    "sum": (series.ADD, lambda x, y: x + y),
-    "difference": (series.SUBTRACT, lambda x, y: x - y),
-    "change of sign": (series.NEGATIVE, lambda x, y: -x),
-    "product": (series.MULTIPLY, lambda x, y: x * y),
-    "quotient": (series.DIVIDE, lambda x, y: x / y),
-    "root": (series.ROOT, lambda x, y: mpmath.sqrt(x)),
-}
-
-
-@pytest.mark.parametrize("name", RULES)
-def test_a_series_has_the_derivatives_of_its_operation(name):
-    """x' = 0.7 y, y' = 1.5 from x = 2, y = 0.9: then the result of the operation is known in closed form."""
-    operation, rule = RULES[name]
-    found = expanded([(series.SCALE, 4, 1, 2), (operation, 5, 0, 1)], rates=[4, 3])[5]
-    with mpmath.workdps(60):
-        expected = mpmath.taylor(lambda t: rule(x_at(t), y_at(t)), 0, ORDER - 1)
-    compare(found, expected)
-
-
-@pytest.mark.parametrize("place, function", [(5, mpmath.sin), (6, mpmath.cos)])
-def test_a_series_of_sine_and_cosine(place, function):
-    code = [(series.SCALE, 7, 1, 2), (series.SLOPE, 4, 0, 0), (series.SINE, 5, 0, 0), (series.COSINE, 6, 0, 0)]
-    found = expanded(code, rates=[7, 3])[place]
-    with mpmath.workdps(60):
-        expected = mpmath.taylor(lambda t: function(x_at(t)), 0, ORDER - 1)
-    compare(found, expected)
-
-
-ORDER, ROWS, FIRST = 12, 8, (2.0, 0.9, 0.7, 1.5)
-
-
-def x_at(t):
-    x, y, a, b = map(mpmath.mpf, FIRST)
-    return x + a * (y * t + b * t**2 / 2)
-
-
-def y_at(t):
-    return mpmath.mpf(FIRST[1]) + mpmath.mpf(FIRST[3]) * t
-
-
-def expanded(code, rates):
-    """The series of all rows: x, y, the two numbers, and what is computed; rates: the rows that are those of x and y."""
-    code = [*code, *((series.RATE, k, rate, 0) for k, rate in enumerate(rates))]
-    high, low = np.zeros((2, ROWS, ORDER + 1))
-    high[:4, 0] = FIRST
-    series.expand(np.array(code), high, low)
-    with mpmath.workdps(60):
-        return [[exact(*c) for c in zip(*row)] for row in zip(high.tolist(), low.tolist())]
-
-
-def compare(found, expected):
-    with mpmath.workdps(60):
-        assert max(abs(a - b) for a, b in zip(found, expected[:ORDER])) < 1e-29
-        assert abs(expected[2]) > 1e-3 or max(map(abs, expected[1:])) > 0.5

@@ -1,7 +1,6 @@
 """A Tree with a linear controller: its generalized force in every form, the implicit entries of its gains, what is refused."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from tmt.compiled import evaluator
 from tmt.equations import composite, method
 from tmt.exact.values import distance, exact
 from tmt.methods import METHODS
-from tmt.methods.derivatives import amplification, linear_system, one_step
+from tmt.methods.derivatives import linear_system
 
 FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own
     tmt.ARM,
@@ -46,32 +45,6 @@ def test_a_tree_without_a_controller_says_nothing_of_it():
     assert zeros == tmt.ARM and zeros.position_gain == () and not zeros.has_gains and "gain" not in repr(tmt.ARM)
     assert "position_gain=((40.0" in repr(DRIVEN) and eval(repr(DRIVEN), {"Tree": tmt.Tree}) == DRIVEN
     assert hash(DRIVEN) != hash(FORK)
-
-
-@pytest.mark.parametrize("name", ["position_gain", "speed_gain"])
-@pytest.mark.parametrize(
-    "value, says",
-    [
-        ((1.0, 2.0, 3.0), r"has shape \(3,\); \(3, 3\) is expected"),
-        (np.zeros((2, 3)), r"has shape \(2, 3\)"),
-        (1.0, r"has shape \(\); \(3, 3\)"),
-        (np.full((3, 3), np.nan), "finite numbers are expected"),
-        ("stiff", "numbers of shape"),
-    ],
-)
-def test_what_is_no_gain_is_refused_in_one_line(name, value, says):
-    with pytest.raises(ValueError, match=f"Tree.{name} .*{says}") as error:
-        dataclasses.replace(tmt.ARM, **{name: value})
-    assert "\n" not in str(error.value)
-
-
-def test_a_ball_has_no_gain(kinds):
-    (ball,) = {joint.qd.start for joint in kinds.coordinates.balls[:1]}
-    for place in ((ball, 0), (0, ball)):
-        gain = np.array(kinds.speed_gain)
-        gain[place] = 1.0
-        with pytest.raises(ValueError, match=r"has an entry of joint .*, a ball; of hinges and slides alone"):
-            dataclasses.replace(kinds, speed_gain=gain)
 
 
 def test_the_generalized_force_is_that_of_lagrange():
@@ -130,32 +103,9 @@ def test_which_gains_are_implicit(name, speed, position):
     assert np.allclose(slope, np.linalg.solve(wanted, force[0]), atol=1e-11)
 
 
-@pytest.mark.parametrize("name", ["implicitfast", "implicit", "discrete", "rk4"])
-def test_the_derivative_of_a_step_is_that_of_differences(name):
-    stepping, dt, nudge = METHODS[name], 0.01, 1e-6
-    J, state = amplification(stepping, DRIVEN, q, qd, tau, dt), np.concatenate([q, qd])
-    for k, unit in enumerate(np.eye(6)):
-        ends = [
-            np.concatenate(one_step(stepping, DRIVEN, *np.split(state + sign * nudge * unit, 2), tau, dt))
-            for sign in (1, -1)
-        ]
-        assert np.allclose((ends[0] - ends[1]) / (2 * nudge), J[:, k], atol=1e-7)
-
-
 def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
     left = DRIVEN.lock({"alpha": 0.3})
     assert left.position_gain == tuple(map(tuple, P[1:, 1:])) and left.speed_gain == tuple(map(tuple, S[1:, 1:]))
     assert DRIVEN.lock({"beta": 0.0}).position_gain == ((40.0, 0.0), (0.0, 20.0))
     with pytest.raises(ValueError, match=r"'beta' cannot be locked at 0\.3: its position makes a torque at 'gamma'"):
         DRIVEN.lock({"beta": 0.3})
-
-
-def test_a_tree_without_gains_has_no_operation_for_them():
-    assert evaluator(FORK, "acceleration").operations < evaluator(DRIVEN, "acceleration").operations
-
-
-def test_a_servo_settles_where_its_torque_balances_the_weight():
-    held = dataclasses.replace(DRIVEN, speed_gain=S + 30.0 * np.eye(3))
-    end = tmt.simulate(q, 0 * q, tau, 2e-3, 20_000, "implicitfast", held).q[-1]
-    left = tau - tmt.gravity_balance(end, held) - tmt.spring_torque(end, held) - P @ end
-    assert math.isclose(np.abs(left).max(), 0.0, abs_tol=1e-6)

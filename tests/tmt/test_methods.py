@@ -4,49 +4,43 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
+from trees import random_state, tree_of_kinds
 
 import tmt
 from tmt.compiled import runner
+from tmt.exact.motion import trajectory
 from tmt.methods import METHODS, RungeKutta, amplification, dop853, one_step
 from tmt.methods.implicit import ImplicitRungeKutta
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
+EPS = np.finfo(float).eps
 FIXED = [name for name, stepping in METHODS.items() if not stepping.adaptive]
-ORDERS = {name: METHODS[name].order for name in FIXED} | {"rk4_mean_speed": 4}  # of hinges; with balls see test_joints
+ORDERS = {name: METHODS[name].order for name in FIXED} | {"rk4_mean_speed": 4}  # of hinges; with balls see below
 IMPLICIT = [name for name, stepping in METHODS.items() if stepping.solves_stages]
 
 
-@pytest.mark.parametrize(
-    "changes, says",
-    [
-        ({"b": (1.0, 0.5)}, "b sums to 1.5"),
-        ({"c": (0.0, 0.4)}, "row 1 of A sums to 0.5"),
-        ({"A": ((), (0.5, 0.5))}, "row 1 of A has 2 entries"),
-        ({"A": ((),)}, "one entry for each stage"),
-    ],
-)
-def test_a_wrong_tableau_cannot_be_built(changes, says):
-    midpoint = {"order": 2, "A": ((), (0.5,)), "b": (0.0, 1.0), "c": (0.0, 0.5)}
-    RungeKutta(**midpoint)
-    with pytest.raises(ValueError, match=says):
-        RungeKutta(**midpoint | changes)
+MIDPOINT = {"order": 2, "A": ((), (0.5,)), "b": (0.0, 1.0), "c": (0.0, 0.5)}
+IMPLICIT_MIDPOINT = {"order": 2, "A": ((0.5,),), "b": (1.0,), "c": (0.5,)}
 
 
 @pytest.mark.parametrize(
-    "changes, says",
+    "kind, right, changes, word",
     [
-        ({"b": (1.0, 0.5)}, "A must be square"),
-        ({"b": (0.9,)}, "b sums to 0.9"),
-        ({"c": (0.4,)}, "row 0 of A sums to 0.5"),
-        ({"A": ((),)}, "A must be square"),
+        (RungeKutta, MIDPOINT, {"b": (1.0, 0.5)}, "1.5"),
+        (RungeKutta, MIDPOINT, {"c": (0.0, 0.4)}, "row 1 of A"),
+        (RungeKutta, MIDPOINT, {"A": ((), (0.5, 0.5))}, "row 1 of A"),
+        (RungeKutta, MIDPOINT, {"A": ((),)}, "stage"),
+        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"b": (1.0, 0.5)}, "square"),
+        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"b": (0.9,)}, "0.9"),
+        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"c": (0.4,)}, "row 0 of A"),
+        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"A": ((),)}, "square"),
     ],
 )
-def test_a_wrong_implicit_tableau_cannot_be_built(changes, says):
-    midpoint = {"order": 2, "A": ((0.5,),), "b": (1.0,), "c": (0.5,)}
-    ImplicitRungeKutta(**midpoint)
-    with pytest.raises(ValueError, match=says):
-        ImplicitRungeKutta(**midpoint | changes)
+def test_a_wrong_tableau_cannot_be_built(kind, right, changes, word):
+    kind(**right)
+    with pytest.raises(ValueError, match=word):
+        kind(**right | changes)
 
 
 def test_the_coefficients_of_dop853_are_those_of_scipy():
@@ -85,27 +79,8 @@ def test_an_adaptive_method_keeps_to_its_tolerance():
     assert errors[0] > 1e6 * errors[-1]
 
 
-@pytest.mark.parametrize("name", [name for name in FIXED if name != "gauss_legendre_4"])
-def test_amplification_is_what_a_step_does_to_a_small_deviation(name, rng):
-    q, qd, tau = rng.uniform(-1, 1, (3, 3))
-    J = amplification(METHODS[name], tmt.ARM, q, qd, tau, 0.1)
-    for column, direction in zip(J.T, 1e-5 * np.eye(6)):
-        ends = [
-            np.concatenate(
-                [
-                    path[0, 1]
-                    for path in tmt.simulate([q + s * direction[:3]], [qd + s * direction[3:]], tau, 0.1, 1, name)[1:]
-                ]
-            )
-            for s in (1, -1)
-        ]
-        assert np.abs((ends[0] - ends[1]) / 2e-5 - column).max() < 1e-7
-    assert np.array_equal(amplification(METHODS[name], tmt.ARM, np.stack([q, -q]), qd, tau, 0.1)[0], J)
-
-
 @pytest.mark.parametrize("name", IMPLICIT)
-@pytest.mark.parametrize("dt", [1.0, 10.0])
-def test_newton_finds_the_stages_of_a_held_arm_at_large_steps(name, dt):
+def test_newton_finds_the_stages_of_a_held_arm_at_large_steps(name, dt=10.0):
     q, qd = (path[-1] for path in tmt.simulate(BENT + 0.1, REST, tmt.gravity_balance(BENT), dt, 500, name)[1:])
     assert np.isfinite([q, qd]).all() and np.abs(q - BENT).max() < 2.0
 
@@ -128,3 +103,41 @@ def test_every_evaluation_of_an_implicit_method_is_counted(name):
     # over any scalar the stages are found once more, for the sake of their derivatives; compiled code counts the
     # linear equations that it starts from, which are made of dual numbers: as many in each step
     assert evaluations == counted
+
+
+# balls
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "gauss_legendre_4")) for name in METHODS]
+)
+def test_the_jacobian_of_a_step_is_that_of_small_movements(name):
+    """One ball on a slide."""
+    rng = np.random.default_rng(3)
+    tree = tree_of_kinds(rng, bodies=1, kinds=("ball", "slide"))
+    while "ball" not in tree.kind:
+        tree = tree_of_kinds(rng, bodies=1, kinds=("ball", "slide"))
+    q, qd, tau = random_state(rng, tree)
+    stepping, dt, nv = METHODS[name], 0.05, len(tree.axis)
+    J, move, h = amplification(stepping, tree, q, qd, tau, dt), tree.coordinates.move, 1e-6
+    u = h * np.concatenate([np.eye(2 * nv), -np.eye(2 * nv)]).T  # a column each, all at once
+    state = [np.full(4 * nv, x) for x in q], [x + y for x, y in zip(qd, u[nv:])]
+    ends = one_step(stepping, tree, move(state[0], list(u[:nv])), state[1], tau.tolist(), dt)
+    (q1, q0), (qd1, qd0) = (np.split(np.array(part), 2, axis=1) for part in ends)
+    change = np.concatenate([tree.coordinates.difference(q1, q0), qd1 - qd0]) / (2 * h)
+    assert np.abs(change - J).max() < 1e-6 * np.abs(J).max()
+
+
+def test_methods_keep_their_order_with_balls():
+    tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball",))
+    q, qd, tau = random_state(np.random.default_rng(6), tree)
+    truth = trajectory(tree, q, qd, tau, 0.25, 1).high[-1]
+
+    def error(name, steps):
+        motion = tmt.simulate(q, qd, tau, 0.25 / steps, steps, name, tree)
+        assert abs(np.linalg.norm(motion.q[-1][tree.coordinates.balls[0].q]) - 1.0) < 4 * EPS
+        return np.abs(np.concatenate([motion.q[-1], motion.qd[-1]]) - truth).max()
+
+    for name, order in (("rk4", 4), ("rk4_mean_speed", 2), ("implicit_midpoint", 2)):
+        assert abs(np.log2(error(name, 16) / error(name, 32)) - order) < 0.3
+    assert error("dopri8", 64) < 1e-13
