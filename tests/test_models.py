@@ -90,39 +90,6 @@ def test_every_file_moves_from_each_keyframe_and_from_qpos0_and_servos_hold_it(n
             assert np.abs(d.qpos - m.key_qpos[key]).max() < 0.1
 
 
-@pytest.mark.parametrize("name", WITH_SERVOS)
-def test_robots_with_servos_have_the_features_of_such_files(name):
-    m = model(name)
-    assert m.nu == JOINTS[name]["hinge"] and m.nkey >= 1 and m.geom_contype.any()
-    assert (m.actuator_biasprm[:, 1] < 0).all() and (m.actuator_biasprm[:, 2] < 0).all()
-    assert m.actuator_forcelimited.all() and m.jnt_limited[m.jnt_type == HINGE].all()
-    hinges = m.jnt_dofadr[m.jnt_type == HINGE]
-    assert (m.dof_armature[hinges] > 0).all() and (np.ravel(m.dof_damping)[hinges] > 0).all()
-
-
-def test_arms_have_stated_inertias_and_others_a_tilted_wrist_and_implicitfast():
-    spec = mujoco.MjSpec.from_file(str(PATHS["arm6"]))
-    assert {bool(body.explicitinertial) for body in spec.bodies[1:]} == {True, False}
-    m = model("arm7")
-    assert (np.count_nonzero(np.abs(m.jnt_axis) > 1e-3, axis=1) > 1).any() and turned(m.body_quat).sum() >= 4
-    assert (m.dof_frictionloss > 0).all() and [m.key(k).name for k in range(m.nkey)] == ["ready", ""]
-    assert m.opt.integrator == model("quadruped").opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-
-
-def test_both_humanoids_are_one_robot_and_walkers_stand_on_the_floor():
-    fixed, free = model("humanoid29"), model("humanoid29_free")
-    for field in ("body_mass", "body_inertia", "body_ipos", "actuator_gainprm"):
-        assert np.array_equal(getattr(fixed, field), getattr(free, field))
-    assert np.array_equal(fixed.jnt_axis, free.jnt_axis[1:])
-    assert np.array_equal(fixed.key_qpos[0], free.key_qpos[0, 7:])
-    for m in (free, model("quadruped")):
-        d = mujoco.MjData(m)
-        mujoco.mj_resetDataKeyframe(m, d, m.key("stand").id)
-        start = d.qpos[2]
-        after_100_steps(m, d)
-        assert d.ncon >= 4 and start - 0.02 < d.qpos[2] < start + 0.005
-
-
 def test_gripper_and_loop_are_closed_by_their_equalities():
     m = model("gripper")
     assert m.eq_type.tolist() == [mujoco.mjtEq.mjEQ_JOINT] and m.ntendon == 1 and springs_away(m).sum() == 2
