@@ -1,4 +1,4 @@
-"""A double pendulum with equations of one's own, right and wrong, for assert_agrees and differences."""
+"""A double pendulum with equations of one's own, right and wrong, for test_agreement_of_own."""
 
 import types
 
@@ -26,7 +26,6 @@ PENDULUM = """
 READING = read(PENDULUM)
 TREE = READING.tree
 NAMES = ("mass_matrix", "bias", "gravity", "acceleration")
-ORDER = [1, 0]
 
 
 def mass_matrix(q):

@@ -1,4 +1,7 @@
-"""What is wrong with a figure as it is drawn: text that is cut or lies on other text, legends on data, factors at axes' ends."""
+"""What is wrong with a figure as it is drawn: text that is cut or lies on other text, legends on data, factors at axes' ends.
+
+For test_drawn_figures, and small_runs.
+"""
 
 import numpy as np
 from matplotlib.axes import Axes

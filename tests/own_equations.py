@@ -1,4 +1,4 @@
-"""A double pendulum as MJCF and its equations as a user writes them, right and wrong: a file of one's own for tests."""
+"""A double pendulum as MJCF and its equations as a user writes them, right and wrong, for test_own_reference and test_help."""
 
 XML = """<mujoco model="double"><worldbody>
   <body name="upper"><joint name="hip" axis="0 -1 0"/><inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.1"/>

@@ -1,20 +1,23 @@
-"""What the README and the help of the experiments show: their blocks of code, commands and output."""
+"""What the README and the helps show: code, command lines and output. Used by test_readme, test_help and test_reduction."""
 
 import re
+import shlex
 from pathlib import Path
 from textwrap import dedent
 
 import tmt
-from compare.command_line import help_of
+from compare.command_line import EXAMPLES, help_of, what_can_be_asked
 from compare.experiments import EXPERIMENTS
+from compare.fleet.command import EPILOG
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(.*)\n((?:.*\n)*?)```$", README, re.MULTILINE)  # of the README: language, text
+COMPARE = re.compile(r"(?:\.venv/bin/)?python -m compare\b *([^`\n]*)")
 
 
 def language(text: str) -> str:
-    """What an indented block of a help is."""
+    """The language of an indented block of a help."""
     first = text.splitlines()[0]
     known = {"python -m ": "sh", "[[": "toml", "import ": "python"}
     return next((name for start, name in known.items() if first.startswith(start)), "text")
@@ -33,7 +36,10 @@ def blocks(of: str) -> list[str]:
     return [text for name, text in [*BLOCKS, *helps] if name == of]
 
 
-def commands() -> list[str]:
-    """All command lines; those of a help as the README would have them."""
-    lines = [line for text in blocks("sh") for line in text.splitlines() if line.strip()]
-    return [re.sub("^python ", ".venv/bin/python ", line) for line in lines]
+def command_lines() -> list[str]:
+    """All command lines of compare that are shown, without `python -m compare`; each once."""
+    of_readme = [text for name, text in BLOCKS if name == "sh"] + re.findall(r"`[^`\n]+`", README)
+    of_helps = [text for name in EXPERIMENTS for kind, text in indented(help_of(name)) if kind == "sh"]
+    beside_text = "\n".join(re.findall(r"^  python.*", f"{what_can_be_asked()}\n{EXAMPLES}\n{EPILOG}", re.MULTILINE))
+    found = COMPARE.findall("\n".join([*of_readme, *of_helps, beside_text]))
+    return list(dict.fromkeys(shlex.join(shlex.split(re.split(r" {2,}| &&", line)[0])) for line in found))

@@ -42,8 +42,14 @@ def symbols():
 
 
 def same(found, expected):
-    found = [sympy.nsimplify(sympy.simplify(f - x)) for f, x in zip(found, expected)]
-    return found == [0] * len(expected)
+    """Whether expressions are the same, at two points, but for rounding."""
+    off = [sympy.sympify(f - x) for f, x in zip(found, expected, strict=True)]
+    names = sorted(set().union(*(one.free_symbols for one in off)), key=str)
+    points = [
+        dict(zip(names, map(sympy.Rational, (f"{k}/7", "5/3", "-3/11", "8/5", "-9/4", "1/9", "4/7", "2/13"))))
+        for k in (3, 11)
+    ]
+    return all(abs(one.subs(point).evalf()) < 1e-14 for one in off for point in points)
 
 
 def test_positions_are_equation_1(symbols):
@@ -115,7 +121,7 @@ def test_lagrange_from_equation_1_and_energies_alone(rng):
     evaluate = sympy.lambdify([*q, *qd, d, e, *m, *I, grav], [M, h], "mpmath", cse=True)
 
     numbers = (0.15, 0.15, 1.9, 1.5, 0.015, 0.014, 0.002, 0.001, 0.019, 0.019, 9.81)
-    for _ in range(20):
+    for _ in range(5):
         q0, qd0 = rng.uniform(-np.pi, np.pi, 3), rng.uniform(-10, 10, 3)
         truth = exact(tmt.ARM, q0, qd0, np.zeros(3))
         with mpmath.workdps(DIGITS):

@@ -1,4 +1,4 @@
-"""python -m compare from end to end: files, exit status, error lines."""
+"""python -m compare from end to end: files, exit status, first lines; bad requests get one line and status 2."""
 
 import json
 import os
@@ -7,179 +7,270 @@ import tomllib
 
 import pandas as pd
 import pytest
+from in_process import runs_in_this_process as runs_in_this_process
+from in_process import without_workers
+from models import PATHS
 from runs import ROOT, readable_lines, words
 from small_runs import quick_run
 
-from compare import experiment
+from compare import __main__ as entry
+from compare import command_line, experiment
 from compare.__main__ import main
 from compare.experiments import EXPERIMENTS
 from compare.robots.arm import ARM
 
-RAN = [name for name in EXPERIMENTS if name != "diagnosis"]  # where nothing fails
+XML = ARM.mjcf.read_text(encoding="utf-8")
+STATIC = ("parameters", "published", "mass", "diagnosis")  # which take little time
+FIELDS = {"experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note"}
+
+
+def results_in(folder):
+    return json.loads((folder / "results.json").read_text(encoding="utf-8"))
+
+
+# one report, of which all of this is asked
 
 
 @pytest.fixture(scope="module")
-def ran(beside):
-    """One quick run of everything, and its folder."""
+def of_the_terminal(beside):
+    """A quick run of everything on a terminal, and its folder."""
     folder = beside.folder / "anywhere"
     return beside.result(quick_run, folder), folder
 
 
-def test_all_passes_and_says_so_at_a_glance(ran):
-    run, _ = ran
+@pytest.fixture(scope="module", params=["static", pytest.param("all", marks=pytest.mark.slow)])
+def report(request, tmp_path_factory):
+    """The folder of a report and its experiments: of those that take little time, in this process; of all, as a user runs it."""
+    if request.param == "all":
+        _, folder = request.getfixturevalue("of_the_terminal")
+        return folder / "reports" / "latest", list(EXPERIMENTS)
+    folder = tmp_path_factory.mktemp("static")
+    with without_workers(), pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for module in (entry, command_line, experiment):
+            patch.setattr(module, "EXPERIMENTS", {name: EXPERIMENTS[name] for name in STATIC})
+        assert main(["all", "--quick"]) == 0
+    assert [path.name for path in folder.iterdir()] == ["reports"]
+    return folder / "reports" / "latest", list(STATIC)
+
+
+@pytest.mark.slow
+def test_a_quick_run_of_all_passes_with_a_line_for_each_experiment(of_the_terminal):
+    run, _ = of_the_terminal
     assert run.status == 0, run.output
     first, *lines = readable_lines(run)
-    assert first == "reference: arm; mjcf/arm.xml compared with the stated numbers"
+    assert first.startswith("reference: arm; mjcf/arm.xml ")
     # there is nothing to diagnose
     order = sorted(EXPERIMENTS, key=experiment.TIMED_LAST.__contains__)
     expected = [[name, "skipped:" if name == "diagnosis" else "ok"] for name in order]
     assert [line.split()[:2] for line in lines[: len(EXPERIMENTS)]] == expected
-    text = words(lines[len(EXPERIMENTS) :])
-    assert re.match(r"The two models agree: all \d+ checks pass\..*Report: reports/latest/index\.html \(", text)
-
-
-def test_a_terminal_shows_how_far_and_how_long_still(ran):
-    run, _ = ran
+    assert "Report: reports/latest/index.html (" in words(lines[len(EXPERIMENTS) :])
     shown = re.findall(
         r"(\d+) of 11, (\w+), about \d+ (?:s|min) left", re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", run.output)
     )
     numbers = [int(number) for number, _ in shown]
-    assert len(set(numbers)) > 3 and numbers == sorted(numbers) and {name for _, name in shown} <= set(RAN)
-    assert len(set(shown)) == len(set(numbers))
+    assert len(set(numbers)) > 3 and numbers == sorted(numbers) and {name for _, name in shown} <= {*EXPERIMENTS}
 
 
-def test_all_writes_the_files_that_are_promised_and_nothing_else(ran):
-    _, folder = ran
-    assert [p.name for p in folder.iterdir()] == ["reports"]
-    report = folder / "reports" / "latest"
-    assert {p.name for p in report.iterdir()} == {"report.md", "index.html", "results.json", "tables", "figures"}
-    assert {p.stem for p in (report / "tables").iterdir()} >= {
-        *RAN, "evaluations", "departure", "stability_growth", "reduction_subsets", "cost_in_mujoco",
-    }  # fmt: skip
-    assert all(p.suffix in (".png", ".gif") and p.stat().st_size > 5000 for p in (report / "figures").iterdir())
+def test_a_report_has_its_files_and_no_others(report):
+    folder, names = report
+    assert {p.name for p in folder.iterdir()} == {"report.md", "index.html", "results.json", "tables", "figures"}
+    assert {p.stem for p in (folder / "tables").iterdir()} >= {*names} - {"diagnosis"}
+    assert all(p.suffix in (".png", ".gif") and p.stat().st_size > 5000 for p in (folder / "figures").iterdir())
 
 
-def test_results_have_the_promised_fields(ran):
-    _, folder = ran
-    results = json.loads((folder / "reports/latest/results.json").read_text())
+def test_results_have_their_fields(report):
+    folder, names = report
+    ran, results = {*names} - {"diagnosis"}, results_in(folder)  # where nothing fails
     assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
     assert results["reference"] == {"kind": "arm", "name": "arm"}
     assert (results["passed"], results["causes"]) == (True, [])
-    assert results["skipped"] == [{"experiment": "diagnosis", "reason": "nothing failed"}]
-    fields = {"experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note"}
-    assert all(set(check) == fields for check in results["checks"])
-    assert {check["experiment"] for check in results["checks"]} == set(RAN)
-    assert results["provenance"]["command"] == "python -m compare all --quick"
+    assert [skip["experiment"] for skip in results["skipped"]] == ["diagnosis"]
+    assert all(set(check) == FIELDS for check in results["checks"])
+    assert {check["experiment"] for check in results["checks"]} == ran
     origin = results["provenance"]
+    assert origin["command"] == "python -m compare all --quick"
     assert {"mujoco", "numpy", "python", "cpu", "seed", "commit"} <= set(origin)
     assert origin["arm-tmt-mujoco"] == tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
-    assert set(origin["seconds_of"]) == {*RAN, "figures"} and min(origin["seconds_of"].values()) > 0.0
+    assert set(origin["seconds_of"]) == {*ran, "figures"} and min(origin["seconds_of"].values()) > 0.0
     ended = origin["ended_after_s"]
-    assert set(ended) == {"start", *EXPERIMENTS, "figures"} and list(ended.values()) == sorted(ended.values())
-    assert next(iter(ended)) == "start" and max(ended, key=ended.get) == "figures"
-    assert ended["figures"] < origin["seconds"]
+    assert set(ended) == {"start", *names, "figures"} and list(ended.values()) == sorted(ended.values())
+    assert next(iter(ended)) == "start" and max(ended.values()) == ended["figures"] < origin["seconds"]
 
 
-def test_tables_are_tidy(ran):
-    _, folder = ran
-    for path in (folder / "reports/latest/tables").iterdir():
+def test_tables_are_tidy(report):
+    for path in (report[0] / "tables").iterdir():
         table = pd.read_csv(path)
-        assert len(table) > 0
+        assert len(table) > 0 and "nan" not in path.read_text().lower()
         assert all(re.fullmatch(r"[a-z0-9_]+", str(c)) or str(c).endswith("_J") for c in table.columns), path.name
-        assert "nan" not in path.read_text().lower()
-    columns = set(pd.read_csv(folder / "reports/latest/tables/trajectory.csv").columns)
-    assert {
-        "scene", "engine_integrator", "twin", "dt_s", "level", "worst_difference", "band", "judged_until_s", "diverged_at_s",
-    } <= columns  # fmt: skip
-    promised = {
-        "stability": "scene engine method damping mode_per_s predicted_dt_s observed_dt_s limit criterion",
-        "departure": "scene engine method dt_s perturbation_rad predicted_s observed_s",
-    }
-    for name, columns in promised.items():
-        assert " ".join(pd.read_csv(folder / f"reports/latest/tables/{name}.csv").columns) == columns
 
 
-def test_page_is_one_file_and_markdown_finds_its_figures(ran):
-    _, folder = ran
-    report = folder / "reports" / "latest"
-    page = (report / "index.html").read_text()
+def test_the_page_is_one_file_and_markdown_finds_its_figures(report):
+    folder, names = report
+    page, text = ((folder / name).read_text(encoding="utf-8") for name in ("index.html", "report.md"))
     linked = set(re.findall(r'(?:src|href)="(?!data:|#)([^"]+)"', page))
-    assert linked == {str(path.relative_to(report)) for path in (report / "tables").iterdir()}
-    figures = list((report / "figures").iterdir())
-    assert {path.suffix for path in figures} == {".png"} and 'id="motion"' in page
-    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == len(figures)
-    text = (report / "report.md").read_text()
+    assert linked == {str(path.relative_to(folder)) for path in (folder / "tables").iterdir()}
+    pictures = len(list((folder / "figures").iterdir()))
+    assert len(re.findall("data:image/(?:png|webp);base64,", page)) == pictures
     linked = set(re.findall(r"\((figures/[^)]+|tables/[^)]+)\)", text))
-    assert linked == {str(p.relative_to(report)) for p in report.glob("*/*")}
-    for part in "abcdefghi":
-        assert f"\n| {part} |" in text
-    assert "not run" not in text and "nan" not in text.lower().split()
+    assert linked == {str(p.relative_to(folder)) for p in folder.glob("*/*")}
+    assert "nan" not in text.lower().split() and (len(names) < len(EXPERIMENTS) or 'id="motion"' in page)
 
 
-@pytest.mark.parametrize(
-    "arguments, says",
-    [
-        (["nothing"], "'nothing' is no experiment; one of parameters, published, "),
-        (["mass", "--fast"], "'--fast' is no option; one of --out --quick "),
-        (["mass", "--mjcf", ""], "--mjcf: it is empty"),
-        (["mass", "--reference", "robot"], "argument --reference: 'robot' is no reference; one of arm, model, "),
-        (["mass", "--out", ""], "--out: it is empty"),
-        (
-            ["mass", "--scenes", "my.toml"],
-            "--scenes is for trajectory, speed, reduction and all; mass follows no scene",
-        ),
-        (
-            ["mass", "--dask", "tcp://x:1"],
-            "--dask is for diagnosis without --mjcf and --reference,",
-        ),
-        (["all", "--workers", "2"], "--workers is for diagnosis without --mjcf"),
-        (["speed", "--dask", "tcp://x:1"], "--dask is for diagnosis"),
-        (
-            ["diagnosis", "--mjcf", "a.xml", "--dask", "tcp://x:1"],
-            "--dask is for diagnosis without --mjcf",
-        ),
-        (
-            ["diagnosis", "--reference", "model", "--workers", "2"],
-            "for diagnosis without --mjcf and --reference, and for fleet",
-        ),
-        (
-            ["diagnosis", "--workers", "2", "--dask", "tcp://x:1"],
-            "--workers is for processes on this machine; a cluster",
-        ),
-        (["diagnosis", "--workers", "0"], "--workers: '0' is no number of processes; 1 or more are expected"),
-        (["diagnosis", "--dask", "nowhere"], "no scheduler answers at nowhere: "),
-        (["speed", "--scenes", ""], "--scenes: it is empty"),
-        (["speed", "--scenes", "my.toml"], "cannot read my.toml: No such file or directory"),
-        (["mass", "--mjcf", "missing.xml"], "cannot read missing.xml: No such file or directory"),
-        (["mass", "--mjcf", str(ROOT / "pyproject.toml")], "is not MJCF"),
-        (["mass", "--mjcf", str(ROOT)], "Is a directory"),
-        (["mass", "--out", str(ROOT / "pyproject.toml")], "a folder that can be written is expected"),
-    ],
-)
-def test_what_cannot_be_done_gets_one_line_and_status_2(arguments, says, capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
+# other runs
+
+
+def test_every_cause_is_in_the_results_and_on_the_terminal(inside, tmp_path, capsys):
+    model = tmp_path / "two.xml"
+    model.write_text(XML.replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
+    assert main(["gravity", "--quick", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 1
+    causes = results_in(tmp_path / "out")["causes"]
+    assert [cause["place"] for cause in causes] == ["mass of forearm", "gravity z"]
+    lines = capsys.readouterr().out.splitlines()
+    (line,) = [line for line in lines if line.startswith("  CAUSE gravity z")]
+    assert 0 < line.index("-9.81 ") < line.index("-9.8 ")  # stated, compiled
+
+
+def test_a_heavier_arm_differs_from_the_stated_numbers_and_not_from_its_own(inside, tmp_path, capsys):
+    path = tmp_path / "heavy.xml"
+    path.write_text(XML.replace('mass="1.5"', 'mass="1.6"'))
+    for asked, status, kind, name in (([], 1, "arm", "arm"), (["--reference", "model"], 0, "model", str(path))):
+        assert main(["parameters", "--quick", "--mjcf", str(path), *asked, "--out", str(tmp_path / "out")]) == status
+        first, *_ = capsys.readouterr().out.splitlines()
+        assert first.startswith(f"reference: {kind}; {path} ")
+        assert results_in(tmp_path / "out")["reference"] == {"kind": kind, "name": name}
+        assert (tmp_path / "out" / "report.md").read_text(encoding="utf-8").startswith(f"{first}\n")
+        assert (tmp_path / "out" / "tables" / "inventory.csv").exists() == bool(asked)
+
+
+def test_a_robot_is_compared_and_its_inventory_has_all_that_is_off(inside, tmp_path, capsys):
+    assert main(["parameters", "--quick", "--mjcf", str(PATHS["gripper"]), "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[1].endswith("1 equalities off: mimic")
+    rows = pd.read_csv(tmp_path / "tables" / "inventory.csv").set_index("feature")
+    assert rows.loc["equality", ["count", "names", "treatment"]].tolist() == [1, "mimic", "open_tree"]
+    found = rows.loc["actuator", ["count", "names", "treatment"]].tolist()
+    assert found == [3, "shoulder;wrist;fingers", "switched_off"]
+
+
+def test_joints_are_matched_by_place_but_not_where_their_type_differs(inside, tmp_path, capsys):
+    named = XML.replace('name="gamma"', 'name="wrist"')
+    for k, (text, status) in enumerate(((named.replace('type="hinge"', 'type="slide"'), 2), (named, 0))):
+        model, out = tmp_path / f"{k}.xml", tmp_path / f"out{k}"
+        model.write_text(text)
+        assert main(["kinematics", "--quick", "--reference", "arm", "--mjcf", str(model), "--out", str(out)]) == status
+        printed = capsys.readouterr()
+        assert "wrist" in (printed.err if status else printed.out) and out.exists() == (status == 0)
+
+
+def test_the_command_whose_report_is_replaced_is_named(inside, tmp_path, capsys):
+    for more, replaced in ((["--quick"], False), ([], True)):
+        assert main(["published", *more, "--out", str(tmp_path)]) == 0
+        assert ("`python -m compare published --quick" in " ".join(capsys.readouterr().out.split())) == replaced
+
+
+@pytest.mark.slow
+def test_a_full_run_takes_more_states(inside, tmp_path):
+    for quick, states in (["--quick"], 1000), ([], 10_000):
+        assert main(["gravity", *quick, "--out", str(tmp_path)]) == 0
+        assert pd.read_csv(tmp_path / "tables" / "gravity.csv")["states"].max() == states
+
+
+SERVO = """<mujoco model="tail"><option timestep="0.002"/><worldbody><body><joint name="swing" axis="0 1 0" damping="0.01"/>
+  <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody>
+  <actuator><position joint="swing" kp="50" kv="800"/></actuator></mujoco>"""
+
+
+def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(inside, tmp_path, capsys):
+    path, out = tmp_path / "tail.xml", tmp_path / "out"
+    path.write_text(SERVO)
+    asked = ["--dt", "0.001", "--integrator", "Euler"]
+    assert main(["stability", "--quick", "--mjcf", str(path), *asked, "--out", str(out)]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("TMT and MuJoCo agree in stability"))
+    assert "2 ms at qpos0" in lines[at] and "limit is 1." in lines[at]
+    assert "2 ms under Euler" in lines[at + 1] and "limit 1." in lines[at + 1]
+    assert lines[at + 2].startswith("Asked: 1 ms under Euler: stable (limit 1.")
+    results = results_in(out)
+    assert not results["passed"] and results["causes"] == []
+    failed = [check for check in results["checks"] if not check["passed"]]
+    assert [(check["quantity"], check["scene"]) for check in failed] == [("stable at its own step", "qpos0")]
+    text = (out / "report.md").read_text(encoding="utf-8")
+    assert text.index(lines[at + 1]) < text.index("## Stability")
+    assert lines[at + 1] in (out / "index.html").read_text(encoding="utf-8").replace("&#x27;", "'")
+
+
+# bad requests
+
+BODY = '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}</body></worldbody></mujoco>'
+MESH = '<mujoco><asset><mesh name="m" file="none.stl"/></asset><worldbody><body><joint/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>'  # noqa: E501
+ARM7, MIXED, FREE = (str(PATHS[name]) for name in ("arm7", "mixed", "free_body"))
+WRONG = {  # arguments, each with what is in its line
+    # words
+    "mas": "did you mean mass?", "Trajectories": "did you mean trajectory?", "al --quick": "did you mean all?",
+    "help": "did you mean --help?", "mas --help": "did you mean mass?", "mas --version": "did you mean mass?",
+    "xyz": f"{', '.join(EXPERIMENTS)} or all", "mass --quik": "did you mean --quick?", "mass -quick": "did you mean --quick?",
+    "--mjfc robot.xml mass": "did you mean --mjcf?", "mass --mjfc=robot.xml": "did you mean --mjcf?",
+    "mass --xyz": " ".join(command_line.OPTIONS_OF_ALL), "mass gravity": "'gravity'", "--quick": "all --quick",
+    "--mjcf robot.xml": "all --mjcf robot.xml", "mass --reference modle": "did you mean model?",
+    "mass --reference x": "'x'", "mass --reference my.py": "my.py:OBJECT", "mass --out": "--out: expected one argument",
+    # values, and options that do not go together
+    "mass --mjcf=": "--mjcf: it is empty", "mass --out=": "--out: it is empty", "speed --scenes=": "--scenes: it is empty",
+    "stability --integrator=": "--integrator: it is empty", "diagnosis --workers 0": "'0'", "diagnosis --workers x": "'x'",
+    "mass --scenes my.toml": "mass", "mass --dask tcp://x:1": "--dask", "all --workers 2": "--workers",
+    "diagnosis --mjcf a.xml --dask tcp://x:1": "--mjcf", "diagnosis --reference model --workers 2": "--reference",
+    "diagnosis --workers 2 --dask tcp://x:1": "--dask", "mass --dt 0.1": "--dt", "all --integrator Euler": "--integrator",
+    "stability --dt 0": "'0'", "stability --dt nan": "'nan'", "stability --dt 5.1": "'5.1'", "stability --dt 2ms": "'2ms'",
+    "mass --joints hip,knee": "--joints", "mass --joints hip,knee --reference model": "--joints",
+    # what is found only when it is looked for
+    "diagnosis --dask nowhere": "nowhere", "speed --scenes my.toml": "my.toml", "mass --mjcf missing.xml": "missing.xml",
+    f"mass --mjcf {ROOT / 'pyproject.toml'}": "pyproject.toml", f"mass --mjcf {ROOT}": "directory",
+    f"mass --out {ROOT / 'pyproject.toml'}": "pyproject.toml", f"mass --reference arm --mjcf {ARM7}": "joint3 (hinge)",
+    f"published --mjcf {ARM7}": "arm7", "stability --dt 0.1": "arm", f"stability --integrator Euler --mjcf {FREE}": "free_body",
+    f"stability --integrator euler --mjcf {ARM7}": "did you mean Euler?", f"stability --integrator heun --mjcf {ARM7}": "'heun'",
+}  # fmt: skip
+
+
+def refused(capsys, arguments, word):
+    """Status 2, one line with this word, and nothing else."""
     try:
         status = main(arguments)
     except SystemExit as stop:
         status = stop.code
     out, err = capsys.readouterr()
-    assert status == 2
-    assert out == "" and len(err.splitlines()) == 1 and says in err
+    assert (status, out, len(err.splitlines())) == (2, "", 1) and word in err, err
+    assert err.startswith("python -m compare: ")
+
+
+@pytest.mark.parametrize("arguments", WRONG)
+def test_a_bad_request_gets_one_line_and_status_2(arguments, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    refused(capsys, arguments.split(), WRONG[arguments])
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_hinge_of_another_name_is_matched_and_one_of_another_axis_gets_status_2_where_the_arm_is_asked_for(
-    tmp_path, capsys
-):
-    model, out = tmp_path / "other.xml", tmp_path / "out"
-    named = ARM.mjcf.read_text().replace('name="gamma"', 'name="wrist"')
-    missing = named.replace('type="hinge"', 'type="slide"')
-    for text, status in ((missing, 2), (named, 0)):
-        model.write_text(text)
-        assert not out.exists()
-        assert main(["mass", "--quick", "--reference", "arm", "--mjcf", str(model), "--out", str(out)]) == status
-        printed = capsys.readouterr()
-        assert "wrist" in (printed.err if status else printed.out)
+def test_a_line_break_stays_in_the_line(capsys):
+    refused(capsys, ["two\nlines"], r"two\nlines")
+
+
+@pytest.mark.parametrize("text, word", [
+    ("<mujoco><worldbody>", "bad.xml"), ("", "empty"), ("no XML", "MJCF"), (MESH, "none.stl"),
+    ('<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>', "joint"), (BODY.format(""), "mass"),
+    (BODY.format('<inertial pos="0 0 0" mass="inf" diaginertia="1 1 1"/>'), "finite"),
+])  # fmt: skip
+def test_a_file_that_cannot_be_compared_gets_one_line_and_status_2(tmp_path, capsys, monkeypatch, text, word):
+    (tmp_path / "bad.xml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    for name in ("all", "gravity"):
+        refused(capsys, [name, "--quick", "--mjcf", "bad.xml"], word)
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.xml"]
+
+
+@pytest.mark.parametrize(
+    "line, word", [('posture = "raised"', "'raised'"), ("q = [1.0]", "17"), ("speed = [1.0]", "15")]
+)
+def test_a_wrong_scene_of_a_robot_gets_status_2(tmp_path, capsys, line, word):
+    (tmp_path / "my.toml").write_text(f'[[scene]]\nname = "mine"\n{line}\n')
+    refused(capsys, ["trajectory", "--mjcf", MIXED, "--scenes", str(tmp_path / "my.toml")], word)
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="permissions bind only who is not root")
@@ -187,22 +278,3 @@ def test_a_read_only_folder_gets_status_2(tmp_path, capsys):
     tmp_path.chmod(0o500)
     assert main(["mass", "--out", str(tmp_path / "out")]) == 2
     assert "Permission denied" in capsys.readouterr().err
-
-
-def test_every_cause_is_in_the_results(tmp_path, capsys):
-    model = tmp_path / "two.xml"
-    model.write_text(ARM.mjcf.read_text().replace('mass="1.5"', 'mass="1.6"').replace("-9.81", "-9.8"))
-    assert main(["gravity", "--quick", "--mjcf", str(model), "--out", str(tmp_path / "out")]) == 1
-    results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
-    assert [cause["place"] for cause in results["causes"]] == ["mass of forearm", "gravity z"]
-    assert "  CAUSE gravity z: stated -9.81 m/s2, compiled -9.8 m/s2" in capsys.readouterr().out
-
-
-def test_a_full_run_takes_more_states_and_a_report_says_whose_place_it_takes(tmp_path, capsys):
-    for quick, states, said in (
-        (["--quick"], 1000, ""),
-        ([], 10_000, " in place of that of `python -m compare gravity"),
-    ):
-        assert main(["gravity", *quick, "--out", str(tmp_path)]) == 0
-        assert pd.read_csv(tmp_path / "tables" / "gravity.csv")["states"].max() == states
-        assert f"index.html{said}" in " ".join(capsys.readouterr().out.split())

@@ -8,6 +8,7 @@ from small_runs import flaws_of_arm
 from compare.report import style
 
 
+@pytest.mark.slow
 def test_no_figure_of_a_run_is_cut_or_covered(beside):
     found = beside.result(flaws_of_arm)
     assert len(found) > 30 and {name: of for name, of in found.items() if of} == {}

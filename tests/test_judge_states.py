@@ -28,50 +28,40 @@ def test_sizes_of_a_run(engines):
     assert full.is_quick is small.is_quick is False and quick.is_quick is True
 
 
-def test_a_robot_without_postures_is_looked_at_where_all_its_joints_are_at_zero(engines):
-    bare = dataclasses.replace(ARM, postures={}, scenes=())
-    named = Setup(bare, engines).named
-    assert (named.name, named.states, named.q.tolist()) == ("a posture", ("all joints at zero",), [[0.0, 0.0, 0.0]])
+def test_a_robot_without_postures_is_compared_where_all_its_joints_are_at_zero(engines):
+    named = Setup(dataclasses.replace(ARM, postures={}, scenes=()), engines).named
+    assert len(named.states) == 1 and named.q.tolist() == [[0.0, 0.0, 0.0]]
 
 
 def larger(joints):
-    """The arm with so many times its joints and bodies, one chain."""
+    """The arm with this many times its joints and bodies, one chain."""
     tree, n = ARM.tree, 3 * joints
     many = {name: getattr(tree, name) * joints for name in ("offset", "axis", "damping", "mass", "com", "inertia")}
     names = {"hinge_names": [f"h{i}" for i in range(n)], "body_names": [f"b{i}" for i in range(2 * joints)]}
     hinges = {"parent": range(-1, n - 1), "body_hinge": [3 * k + i for k in range(joints) for i in (1, 2)]}
     rest = dict.fromkeys(("kind", "armature", "stiffness", "rest", "reference"), ())
     postures = {f"p{i}": (float(i),) * n for i in range(4)}
-    return dataclasses.replace(
-        ARM,
-        tree=dataclasses.replace(tree, **many, **names, **{k: tuple(v) for k, v in hinges.items()}, **rest),
-        postures=postures,
-    )
+    tree = dataclasses.replace(tree, **many, **names, **{k: tuple(v) for k, v in hinges.items()}, **rest)
+    return dataclasses.replace(ARM, tree=tree, postures=postures)
 
 
-def test_exact_states_take_five_seconds_at_most():
+def test_a_large_robot_gets_fewer_exact_states_with_a_note():
     assert states.of_named(ARM) == 5 and states.affordable(ARM) > 205 and states.random(ARM, 10, 7).notes == ()
     robot = larger(9)  # 27 joints, 18 bodies
     affordable = states.affordable(robot)
     assert affordable * states.seconds(robot) <= states.SECONDS_OF_EXACT and 4 < affordable < 20
     named, some = states.named(robot), states.random(robot, 100, 50)
     assert named.exact_states + some.exact_states <= affordable and named.exact_states == min(4, affordable // 2)
-    assert some.notes == (
-        f"Exact values are known of {some.exact_states} random states in place of 50: "
-        f"one takes about {states.seconds(robot):.1g} s.",
-    )
+    assert len(some.notes) == 1 and f" {some.exact_states} " in some.notes[0] and " 50" in some.notes[0]
     giant = larger(30)
     assert states.of_named(giant) == states.random(giant, 5, 5).exact_states == 0
-    assert states.named(giant).notes == (
-        f"Exact values are known of 0 of the 4 named postures: one of them takes about {states.seconds(giant):.1g} s.",
-    )
+    assert len(states.named(giant).notes) == 1
 
 
-def test_fewer_states_of_a_large_robot_and_its_note():
-    robot = larger(20)
-    some = states.random(robot, 10_000, 1)
+def test_a_large_robot_gets_fewer_random_states_with_a_note():
+    some = states.random(larger(20), 10_000, 1)
     assert len(some.q) * 3 * 60 * 40 <= states.MOST_NUMBERS < (len(some.q) + 1) * 3 * 60 * 40
-    assert some.notes[0] == f"{len(some.q):,} random states in place of 10,000: so many bodies and joints take long."
+    assert f"{len(some.q):,}" in some.notes[0] and "10,000" in some.notes[0]
 
 
 def test_a_state_of_many_numbers_is_named_by_its_number():

@@ -1,24 +1,21 @@
-"""Every code block of the README and of the experiments' help: Python runs in a fresh folder, commands are parsed, what is shown
-is what is printed."""
+"""The README: its figures are those of reports/example, its Python runs, its output is what is printed."""
 
 import csv
 import json
 import os
 import re
 import shlex
-import shutil
-import sys
 import tomllib
 import traceback
 from pathlib import Path
 
 import numpy as np
 import pytest
+from in_process import runs_in_this_process as runs_in_this_process
 from models import PATHS
-from shown import BLOCKS, README, ROOT, blocks, commands, indented
+from shown import BLOCKS, README, ROOT, blocks, command_lines
 
 from compare.__main__ import main
-from compare.command_line import help_of
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.flags import INTEGRATORS
 from compare.experiments.stability.servos import full_at
@@ -30,6 +27,7 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.scene_file import read_scenes
 
+EXAMPLE = ROOT / "reports" / "example"
 PENDULUM = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/>
 <body><joint name="knee" axis="1 0 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/></body></body></worldbody></mujoco>"""
 NUMBER = re.compile(r"(?<![\w])[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
@@ -43,19 +41,12 @@ def run(text, folder, monkeypatch):
     return names
 
 
-def test_every_block_says_what_it_is():
+def test_it_is_short_and_has_all_that_it_links():
     assert BLOCKS and {language for language, _ in BLOCKS} <= {"python", "sh", "text", "toml"}
-    assert len(BLOCKS) == README.count("\n```") / 2
-
-
-def test_it_is_short_and_what_it_shows_is_there():
-    assert len(README.splitlines()) <= 150
+    assert len(BLOCKS) == README.count("\n```") / 2 and len(README.splitlines()) <= 150
     linked = re.findall(r"\]\(([^)]+)\)", README)
     assert len([name for name in linked if name.endswith((".png", ".gif"))]) == 5
     assert all((ROOT / name).exists() for name in linked)
-
-
-EXAMPLE = ROOT / "reports" / "example"
 
 
 def table(name):
@@ -68,40 +59,27 @@ def largest(rows, **where):
     return max(float(row["largest_difference"]) for row in rows if where.items() <= row.items())
 
 
-def test_its_results_are_those_of_the_example():
-    """Of the command that stands beside them."""
+def test_its_figures_are_those_of_the_example():
     results = json.loads((EXAMPLE / "results.json").read_text(encoding="utf-8"))
     assert results["provenance"]["command"].endswith("-m compare all --out reports/example") and results["passed"]
-    at_random = {"scene": "random states"}
-    limits = [
-        float(row["observed_dt_s"]) / float(row["predicted_dt_s"]) - 1.0
-        for row in table("stability")
-        if row["predicted_dt_s"] and row["observed_dt_s"]
-    ]
+    rows = [row for row in table("stability") if row["predicted_dt_s"] and row["observed_dt_s"]]
+    off = [float(row["observed_dt_s"]) / float(row["predicted_dt_s"]) - 1.0 for row in rows]
     worst = re.search(r"(\d+ %) of it", (EXAMPLE / "report.md").read_text(encoding="utf-8"))[1]
-    runs = [row for row in table("trajectory") if row["scene"].endswith(", free") and row["level"] == "open loop"]
-    runs = [
-        row for row in runs if row["engine_integrator"] == "RK4" and row["dt_s"] == "0.078125" and row["unit"] == "rad"
-    ]
-    followed = [
-        row for row in table("speed") if (row["engine"], row["method"], row["dt_s"]) == ("mujoco", "RK4", "0.078125")
-    ]
-    (error,) = [float(row["worst_error_rad"]) for row in followed if row["scene"] == "ball catch, free"]
-    for text in (
-        f"All {len(results['checks'])} checks pass:",
-        f"at most {largest(table('mass'), quantity='Mbar', **at_random):.1e} kg m2 apart",
-        f"accelerations {largest(table('acceleration'), quantity='qdd', **at_random):.1e} rad/s2",
-        f"no difference exceeds {worst} of its rounding tolerance",
-        f"agree within {largest(runs):.1e} rad in the scenes that are let go",
-        f"both are {error:.2g} rad from the true motion after ball catch",
-        f"All {len(limits)} step limits,",
-    ):
-        assert text in " ".join(README.split()), text
-    assert max(map(abs, limits)) <= 1e-4 and "agree with runs within 0.01 %" in README
-    for row in table("what_should_i_use"):
-        said = f"| {row['scene']}: {float(row['target_rad']):.0e} rad |"
-        if said in README:
-            assert f"{said} {cheapest(row)} |" in README
+    of_free = {"engine_integrator": "RK4", "dt_s": "0.078125", "unit": "rad", "level": "open loop"}
+    free = [row for row in table("trajectory") if row["scene"].endswith(", free")]
+    followed = {"engine": "mujoco", "method": "RK4", "dt_s": "0.078125", "scene": "ball catch, free"}
+    (error,) = [float(row["worst_error_rad"]) for row in table("speed") if followed.items() <= row.items()]
+    text = " ".join(README.partition("## The result")[2].split())
+    for figure in (
+        f"{len(results['checks'])} checks", f"{largest(table('mass'), quantity='Mbar', scene='random states'):.1e} kg m2",
+        f"{largest(table('acceleration'), quantity='qdd', scene='random states'):.1e} rad/s2", worst,
+        f"{largest(free, **of_free):.1e} rad", f"{error:.2g} rad", f"{len(off)} step limits", "0.01 %",
+    ):  # fmt: skip
+        assert figure in text, figure
+    assert max(map(abs, off)) <= 1e-4
+    shown = [(row, f"| {row['scene']}: {float(row['target_rad']):.0e} rad |") for row in table("what_should_i_use")]
+    shown = [f"{said} {cheapest(row)} |" for row, said in shown if said in README]
+    assert len(shown) == 4 and all(line in README for line in shown)
 
 
 def cheapest(row):
@@ -114,8 +92,9 @@ def cheapest(row):
     return f"{mujoco} (dt {float(row['mujoco_dt_s']):.2g} s) | {slow} | {by_tmt} | {fast} | {ratio}"
 
 
+@pytest.mark.slow
 def test_a_class_is_judged_as_it_says(tmp_path, monkeypatch, capsys):
-    (line,) = [shlex.split(line)[3:] for line in commands() if "reports/class" in line]
+    (line,) = [shlex.split(line) for line in command_lines() if "reports/class" in line]
     monkeypatch.chdir(tmp_path)
     text = ARM.mjcf.read_text(encoding="utf-8")
     Path("submissions").mkdir()
@@ -125,25 +104,15 @@ def test_a_class_is_judged_as_it_says(tmp_path, monkeypatch, capsys):
     with open("reports/class/fleet.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     cause = "com x of forearm: stated 0.15 m, compiled 0.151 m"
-    assert [(row["file"], row["verdict"], row["reason"]) for row in rows] == [
-        ("submissions/wrong.xml", "differ", cause),
-        ("submissions/right.xml", "agree", ""),
-    ]
+    wrong, right = ("submissions/wrong.xml", "differ", cause), ("submissions/right.xml", "agree", "")
+    assert [(row["file"], row["verdict"], row["reason"]) for row in rows] == [wrong, right]
     assert cause in capsys.readouterr().out and cause in " ".join(README.split())
     assert all(Path(f"reports/class/files/{row['file']}/index.html").exists() for row in rows)
 
 
-def test_a_help_has_blocks_of_every_kind():
-    found = {
-        name: [language for language, _ in indented(help_of(name))]
-        for name in ("parameters", "trajectory", "diagnosis")
-    }
-    assert found == {"parameters": ["text", "sh"], "trajectory": ["toml", "sh"], "diagnosis": ["python", "sh"]}
-
-
 @pytest.mark.parametrize("text", blocks("python"), ids=lambda text: text.splitlines()[0])
 def test_python_runs_as_it_is_printed(text, tmp_path, monkeypatch):
-    """A block of the README that fails does so with the message that the next block shows."""
+    """A block that fails does so with the message that the next block shows."""
     following = ([block for at, block in enumerate(BLOCKS) if at and BLOCKS[at - 1][1] == text] or [("", "")])[0]
     try:
         names = run(text, tmp_path, monkeypatch)
@@ -175,46 +144,6 @@ def same(printed, shown):
     return words[0] == words[1] and len(numbers[0]) == len(numbers[1]) and np.allclose(*numbers, rtol=1e-9)
 
 
-def test_what_is_shown_is_compared_by_words_and_by_numbers():
-    assert same("a: 1.5 \n b 2e+3", "a: 1.5000000000001\n b 2000")
-    assert not same("a: 1.5", "a: 1.501") and not same("a: 1.5", "b: 1.5") and not same("a 1", "a 1 1")
-
-
-def test_the_example_is_ten_lines():
-    assert sum(bool(line.strip()) for line in blocks("python")[0].splitlines()) == 10
-
-
-@pytest.mark.parametrize("line", commands())
-def test_commands_can_be_given(line, capsys, tmp_path, monkeypatch):
-    """They are parsed; what sets up an environment is left out."""
-    if line.startswith("python3 -m venv"):
-        assert re.search(r"-m (compare all|pytest)$", line)
-        return
-    program, *arguments = shlex.split(line)
-    if program == ".venv/bin/dask":
-        assert shutil.which(Path(sys.executable).with_name("dask"))
-        return
-    assert program == ".venv/bin/python" and arguments[0] == "-m"
-    assert arguments[1] == "compare"
-    with pytest.raises(SystemExit) as ended:
-        main([*arguments[2:], "--help"])
-    assert (
-        ended.value.code == 0
-        and f"usage: python -m compare {'EXPERIMENT|all' if 'all' in arguments else arguments[2]} "
-        in capsys.readouterr().out
-    )
-
-
-def test_inline_commands_can_be_given(capsys):
-    inline = re.findall(r"`(?:\.venv/bin/)?python -m compare ([^`\n]+)`", README)
-    assert len(inline) >= 3
-    for text in inline:
-        with pytest.raises(SystemExit) as ended:
-            main([*shlex.split(text), "--help"])
-        assert ended.value.code == 0, text
-    capsys.readouterr()
-
-
 def test_the_first_line_of_the_output_is_the_one_that_is_shown(tmp_path, monkeypatch):
     (shown,) = (text.strip() for text in blocks("text") if text.startswith("reference:"))
     monkeypatch.chdir(tmp_path)
@@ -223,7 +152,6 @@ def test_the_first_line_of_the_output_is_the_one_that_is_shown(tmp_path, monkeyp
 
 
 def test_the_answer_for_a_step_is_the_one_that_is_shown():
-    """Its sentence about a file of the tests, from the same rows."""
     (shown,) = (text.strip() for text in blocks("text") if text.startswith("Stable at its own"))
     found = reading.read(PATHS["arm7"])
     robot = robot_of(found, "arm7.xml")
@@ -240,16 +168,14 @@ def test_scenes_are_read(text, tmp_path):
     assert tomllib.loads(text)["scene"][0]["name"] == read_scenes(path, ARM)[0].name
 
 
-def test_own_equations_on_the_command_line_run_as_the_readme_has_them(tmp_path, monkeypatch, capsys):
-    """Its line and that of the help of diagnosis, with the two pendulums of its example and quick."""
+def test_own_equations_on_the_command_line_run_as_the_readme_has_them(inside, tmp_path, monkeypatch, capsys):
     text = blocks("python")[0].rsplit("\n\n", 1)[0]
     assert "assert_agrees" not in text
     (tmp_path / "my_equations.py").write_text(text + "\n")
     names = run(text, tmp_path, monkeypatch)
     (tmp_path / "robot.xml").write_text(names["mjcf"])
-    lines = [shlex.split(line)[3:] for line in commands() if "--reference my_equations.py:" in line]
-    assert [line[0] for line in lines] == ["all", "mass", "diagnosis"]
-    assert main([*lines[2], "--quick", "--out", "out"]) == 1
+    (line,) = [line for line in command_lines() if line.startswith("diagnosis ") and "my_equations.py:" in line]
+    assert main([*shlex.split(line), "--quick", "--out", "out"]) == 1
     assert "coefficient of knee'^2" in Path("out/report.md").read_text(encoding="utf-8")
     assert Path("out/figures/diagnosis_nearest.png").stat().st_size > 5000  # the picture beside it
     assert sorted(os.listdir()) == ["my_equations.py", "out", "robot.xml"]

@@ -1,0 +1,42 @@
+"""A run of the command line without its two further processes, which take 2.5 s to start: for test_command_line, test_examine,
+test_help, test_own_reference, test_readme and test_random_mjcf."""
+
+from contextlib import contextmanager
+
+import pytest
+
+from compare.fleet.file_pieces import Here
+from compare.process import workers
+from compare.process.clock import Clock
+
+
+class Inside(Here):
+    """Workers that compute and draw in this process, at once."""
+
+    def __init__(self):
+        self.clock = Clock()
+
+    def map(self, function, *arguments):
+        return iter([function(*each) for each in zip(*arguments)])
+
+    def quiet(self):
+        """Nothing is under way."""
+
+
+@contextmanager
+def start_inside():
+    yield Inside()
+
+
+@contextmanager
+def without_workers():
+    """In this block runs start no further processes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(workers, "start_workers", start_inside)
+        yield
+
+
+@pytest.fixture(name="inside")
+def runs_in_this_process():
+    with without_workers():
+        yield
