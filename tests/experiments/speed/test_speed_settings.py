@@ -21,11 +21,8 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
     assert settings.regular_of(MINE).name == "bent, free"
     alone = dataclasses.replace(ARM, scenes=(OWN,))
     assert settings.regular_of(alone).name == "my swing"
-    for size, expected in (
-        ("full", names),
-        ("quick", ["bent, free", "my swing"]),
-        ("small", ["zero, free", "bent, free"]),
-    ):
+    sizes = {"full": names, "quick": ["bent, free", "my swing"], "small": ["zero, free", "bent, free"]}
+    for size, expected in sizes.items():
         assert [case.name for case in settings.followed(MINE, size)] == expected
         assert [case.name for case in settings.followed(alone, size)] == ["my swing"]
 
