@@ -93,18 +93,6 @@ def test_the_true_error_is_that_of_rk4_with_the_coarsest_steps():
     assert accuracy.true_error([], BENT) == {}
 
 
-def test_numbers_of_first_order_and_of_smaller_models():
-    rows = known_rows()
-    (first,) = accuracy.first_order_in_words(rows, ["bent, free"])
-    assert "3.1e-02 rad" in first and "64 ms" in first and "Euler, 1024" in first
-    assert accuracy.first_order_in_words([], ["bent, free"]) == []
-    smaller = row("tmt", "rk4", 1e-3, 64, 0.5e-3, scene="bent, free, beta locked", whole="bent, free")
-    (gain,) = accuracy.smaller_models_in_words([*rows, smaller])
-    assert " 2.00 " in gain and "1.00e-03" in gain and "2.00e-02" in gain
-    another = smaller | {"scene": "bent, free, my own", "whole": None}  # a scene that is only called so
-    assert accuracy.smaller_models_in_words([*rows, another]) == []
-
-
 def test_a_reference_of_few_digits_is_named(known_reference):
     for apart, count in ((0.99e-14, 1), (1e-14, 2)):
         known = {"bent, free": known_reference._replace(apart=apart)}

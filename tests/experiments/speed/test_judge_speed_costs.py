@@ -11,7 +11,7 @@ from compare.engines import Method, Setting
 from compare.experiment import Setup
 from compare.experiments import speed
 from compare.experiments.speed import evaluations, peers, times
-from compare.experiments.speed.evaluations import CALLED, EACH, FORWARD, MJ_STEP, RK4_STEP, WHOLE, WHOLE_CALLED
+from compare.experiments.speed.evaluations import EACH, FORWARD, MJ_STEP, RK4_STEP, WHOLE
 from compare.experiments.speed.peers import ABA, ABA_OF_MANY, ABA_OF_NOTHING, BATCH, CALL, COMPILED, COMPILED_FAST
 from compare.experiments.speed.ways import IN_LANES
 from compare.judge.check import Result
@@ -76,13 +76,6 @@ def test_the_ratios_of_what_an_evaluation_costs():
     assert "(2.0 times more)" in " ".join(evaluations.costs_in_words(slower, (1, 1, 64), None, "arm"))
     without = {key: value for key, value in NS.items() if not key[1].startswith("MuJoCo")}
     assert "a reason" in " ".join(evaluations.costs_in_words(without, (1, 1, 64), None, "arm", "a reason"))
-
-
-def test_what_calls_from_python_take_is_said_as_it_was_timed():
-    one, many, whole = ((FORWARD, CALLED, 1, 1), (FORWARD, CALLED, 1000, 2), (FORWARD, WHOLE_CALLED, 1, 1))
-    assert evaluations.called_in_words({}) == evaluations.called_in_words({whole: 1.0}) == []
-    (words,) = evaluations.called_in_words({one: 3000.0, whole: 1740.0, many: 21.04})
-    assert words.index(" 3.0 us") < words.index("mj_forward 1.7 us") < words.index("1,000 states") < words.index("21.0")
 
 
 def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):

@@ -9,7 +9,6 @@ from compare.experiments.speed import advice, evaluations, figures_evaluations
 from compare.experiments.speed import figures_panels as beside
 from compare.experiments.speed import figures_times as draw
 from compare.judge.check import Result
-from compare.report import style
 from compare.robots.arm import ARM
 
 MUJOCOS, OURS = "#e69f00", "#0072b2"  # colours
@@ -67,31 +66,6 @@ def test_what_has_diverged_has_its_methods_own_mark_in_a_column_of_its_own():
     places = {line.get_xdata()[0] for line in columns}
     assert len(places) == len(columns) > 1
     assert min(places) >= draw.OF_DIVERGED and max(places) < fig.axes[0].get_xlim()[0]
-
-
-def test_names_of_methods_cover_no_curve_and_no_other_name():
-    fig = draw.draw_times(drawn_result(), "bent, free")[1]
-    fig.draw_without_rendering()
-    (ax,) = fig.axes
-    boxes = [text.get_window_extent() for text in ax.texts]
-    points = style.on_paper(ax)
-    assert len(boxes) == len({text.get_text() for text in ax.texts}) > 4
-    for k, box in enumerate(boxes):
-        assert not any(box.overlaps(other) for other in boxes[:k]) and ax.bbox.fully_containsx(box.x1)
-        inner = box.padded(-2.0)  # but for the line to its point
-        assert style.points_in(np.array([inner.extents]), points)[0] <= 3
-
-
-def test_the_legend_of_all_scenes_names_the_engines_and_one_panel_the_methods():
-    result = drawn_result()
-    result.curves["floors"]["other"] = 1e-15
-    result.rows += [row | {"scene": "other"} for row in result.rows]
-    for figure in (call(result)[1] for call in (beside.draw_evaluations, beside.draw_energy)):
-        texts = [text.get_text() for text in figure.legends[0].get_texts()]
-        assert texts == list(dict.fromkeys(map(draw.written, (row["engine"] for row in draw.rows_of_runs(result)))))
-        first, other = figure.axes
-        drawn = {line.get_label().split(": ", 1)[1] for line in first.get_lines() if line.get_label()[0] != "_"}
-        assert {text.get_text() for text in first.texts} == drawn and not other.texts
 
 
 def test_an_engine_that_is_not_there_is_not_drawn():

@@ -52,13 +52,6 @@ def test_a_reference_in_doubles_says_its_digits(gripper):
     assert known.error(known.high[:, 2:3] + 1e-3, [2]) == pytest.approx(1e-3)
 
 
-def test_any_scene_of_a_file_has_a_reference_in_pairs(gripper):
-    for case in gripper[0].cases[-2:]:
-        known, doubles = reference.reference(case), reference.in_doubles(case)
-        assert known.why is None and known.apart < 1e-29 and np.abs(known.low).max() > 0.0
-        assert known.error(doubles.high[:, : case.coordinates.nq], range(4)).max() < 10 * max(doubles.apart, 1e-15)
-
-
 def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
     case = settings.regular_of(robot_in("free_body"))
     known = reference.in_doubles(case)
@@ -66,12 +59,6 @@ def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
     turned = case.coordinates.move(known.high[:, :7], [0.0, 0.0, 0.0, 0.0, 1e-3, 0.0])
     assert known.error(turned[:, 3:], [3]) == pytest.approx(1e-3)
     assert known.error(turned, range(4)) == pytest.approx(1e-3)
-
-
-def test_a_run_that_does_not_end_has_no_reference(gripper):
-    fast = gripper[2].changed(speed=(1e12, 1e12, 0.0, 0.0))
-    with pytest.raises(ValueError, match="do not reach its end"), np.errstate(all="ignore"):
-        reference.in_doubles(fast)
 
 
 def test_errors_below_what_is_known_have_its_size(gripper):

@@ -6,15 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from edited import XML, setup_of
-from models import PATHS
 
 from compare import experiment
 from compare.engines import Method, Setting
-from compare.engines.mujoco import load, read
+from compare.engines.mujoco import load
 from compare.experiments import speed
 from compare.experiments.speed import accuracy, runs, settings
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from tmt.methods import METHODS
 
 
@@ -158,9 +156,3 @@ def test_who_is_not_there_has_a_row_with_the_reason_but_in_a_quick_run(engines):
 
 def test_a_robot_without_such_scenes_is_left_out_with_the_reason():
     assert speed.skipped(ARM) is None and "bare" in speed.skipped(dataclasses.replace(ARM, scenes=(), name="bare"))
-
-
-def test_a_run_in_doubles_is_spoken_of_where_one_may_serve():
-    of_file = robot_of(read(PATHS["gripper"]), "gripper.xml")
-    assert "1e-30" in speed.tolerance(ARM) and "dopri8" not in speed.tolerance(ARM)
-    assert "dopri8" in speed.tolerance(of_file)

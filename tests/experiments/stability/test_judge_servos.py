@@ -8,7 +8,7 @@ import pytest
 from compare.experiments.stability import servos
 from compare.experiments.stability.servos import figures_step
 from compare.experiments.stability.servos.predicted import Steps
-from compare.experiments.stability.servos.sentences import at_the_top, in_seconds, refused_in_words, shaking
+from compare.experiments.stability.servos.sentences import at_the_top, in_seconds, shaking
 
 
 def row(**more):
@@ -103,12 +103,6 @@ def test_the_first_words_say_whether_the_step_is_stable_and_its_limits(rows, beg
     assert text.startswith(begins) and all(number in text for number in numbers)
 
 
-def test_what_has_no_limit_a_small_error_or_a_locked_base_is_not_spoken_of():
-    top = at_the_top(limits(), [])
-    assert at_the_top(limits() + limits(own=1e-5, euler=1e-5, base="locked"), []) == top
-    assert at_the_top(limits(step_response_error=0.0999), []) == at_the_top(limits(step_response_error=None), []) == top
-
-
 @pytest.mark.parametrize("full, kind, numbers", [
     ([], "", []), ([run("Euler", 0.4, False)], "shakes", []), ([run("Euler", 1e-5, False)], "calm", []),
     ([run("Euler", 0.4, False, 1, 2)], "shakes", ["1 ", "2 "]), ([run("Euler", None, False, 3)], "shakes", ["3 "]),
@@ -124,10 +118,6 @@ def test_what_the_full_model_does_where_a_step_is_not_stable(full, kind, numbers
     found, warned = shaking(full, rows)
     assert found == kind and all(number in warned for number in numbers)
     assert (at_the_top(limits(), full) != at_the_top(limits(), [])) is bool(full)
-
-
-def test_what_is_left_out_is_named_with_its_reason():
-    assert refused_in_words({}) == [] and "biceps: a muscle" in refused_in_words({"biceps": "a muscle"})[0]
 
 
 @pytest.mark.parametrize("dt, beside, text", [

@@ -9,7 +9,7 @@ from servo_models import FILTERED, FLOATING, FORK, INERTIA, acting_of, hinge, po
 
 from compare.engines.mujoco.flags import INTEGRATORS
 from compare.experiments.stability.servos import observed, response
-from compare.experiments.stability.servos.observed import alternating, grows_in_runs, hardly_grows
+from compare.experiments.stability.servos.observed import grows_in_runs, hardly_grows
 
 
 def limit_of(source, integrator, base=None):
@@ -74,13 +74,6 @@ def test_a_base_that_drifts_is_no_growth():
     start = next(observed.run_parts(acting, at, "implicitfast", 1e-3, 400))
     assert 0.1 < np.linalg.norm(start, axis=1).max() < 3.0
     assert not grows_in_runs(acting, at, "implicitfast", 1e-3)
-
-
-def test_what_changes_its_sign_is_told_from_swings():
-    n = np.arange(500)
-    assert alternating(((-1.0) ** n)[:, None]) == pytest.approx(1.0, rel=1e-6)
-    assert alternating(np.cos(0.1 * n)[:, None]) < 1e-5
-    assert alternating(np.array([(-1.0) ** n, 0.0 * n]).T * 3.0) == pytest.approx(3.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("turning, growing", [

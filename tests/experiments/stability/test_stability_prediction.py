@@ -14,7 +14,7 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import Setup, engines
 from compare.truth.linear import held
-from compare.truth.postures import all_of_kind, kinds, of_kind, posture_names
+from compare.truth.postures import all_of_kind, of_kind, posture_names
 from compare.truth.steps import region
 
 BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
@@ -44,11 +44,6 @@ def test_the_posture_that_stands_for_a_kind_is_the_robots_choice_or_the_first():
     other = dataclasses.replace(ARM, kinds={}, postures=postures)
     assert all_of_kind(other, "saddle") == ("upright", "ball catch")
     assert of_kind(other, "centre") is None and all_of_kind(other, "centre") == ()
-
-
-def test_without_gravity_every_posture_is_marginal():
-    floating = dataclasses.replace(ARM, tree=dataclasses.replace(ARM.tree, gravity=(0.0, 0.0, 0.0)))
-    assert set(kinds(floating).values()) == {"marginal"}
 
 
 @pytest.mark.parametrize("name, imaginary, real", [
