@@ -12,8 +12,7 @@ from compare.experiment import Setup
 from compare.experiments import speed
 from compare.experiments.speed import evaluations, peers, times
 from compare.experiments.speed.evaluations import EACH, FORWARD, MJ_STEP, RK4_STEP, WHOLE
-from compare.experiments.speed.peers import ABA, ABA_OF_MANY, ABA_OF_NOTHING, BATCH, CALL, COMPILED, COMPILED_FAST
-from compare.experiments.speed.ways import IN_LANES
+from compare.experiments.speed.peers import ABA, BATCH, COMPILED
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 
@@ -130,33 +129,3 @@ def test_who_is_not_here_has_a_reason_and_no_time(engines, states, monkeypatch):
     rows = evaluations.evaluation_rows({}, absent=nobody.absent)
     assert [row["why_not"] for row in rows] == list(nobody.absent.values())
     assert all(row["ns_per_state"] is row["states"] is None for row in rows)
-
-
-def test_who_is_here_evaluates_these_states(engines, states):
-    here = peers.Peers(Setup.small(ARM, engines), states)
-    one = {(quantity, name) for quantity, name, loop in here.of_one_state([part[0] for part in states]) if not loop(1)}
-    many = here.of_many_states(states)
-    for run in many.values():
-        run()
-    expected = set()
-    if here.heyoka:
-        expected |= {(FORWARD, name, 40, 1) for name in (COMPILED, COMPILED_FAST, IN_LANES)}
-    if here.batch:
-        expected |= {(quantity, BATCH, 40, threads) for quantity in (FORWARD, RK4_STEP) for threads in (1, 2)}
-    if here.pinocchio:
-        expected |= {(FORWARD, ABA_OF_MANY, 40, 1)}
-        assert here.of_tolerance <= 1.0 and one == {(FORWARD, ABA), (CALL, ABA_OF_NOTHING)}
-    assert set(many) == expected and len(here.absent) == 3 - bool(here.heyoka) - bool(here.batch) - bool(here.pinocchio)
-
-
-def test_what_others_take_is_said_beside_tmt():
-    class Known:
-        of_tolerance, absent = 0.031, {(FORWARD, BATCH): "a reason"}
-
-    ns = NS | {
-        (FORWARD, ABA, 1, 1): 1290.0, (CALL, ABA_OF_NOTHING, 1, 1): 410.0, (FORWARD, ABA_OF_MANY, 1000, 1): 820.0,
-        (FORWARD, COMPILED, 1000, 1): 20.0, (FORWARD, COMPILED_FAST, 1000, 1): 5.0, (FORWARD, BATCH, 1000, 2): 800.0,
-    }  # fmt: skip
-    aba, many, absent = peers.peers_in_words(ns, {1000: 10.0}, Known)
-    assert all(number in aba for number in ("1290 ns", "410 ns", "820 ns", "3.1 %")) and "a reason" in absent
-    assert all(part in many for part in ("tmt 10.0 ns", "20.0 ns (2 ", "5.0 ns (0.5 ", "800.0 ns (80 "))

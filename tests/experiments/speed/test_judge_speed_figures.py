@@ -89,11 +89,3 @@ def test_an_empty_section_has_no_figures_and_none_raises():
     assert list(speed.figures(empty, ARM)) == []
     assert [len(call(empty)) for call in (beside.draw_evaluations, beside.draw_energy)] == [3, 3]
     assert len(figures_evaluations.draw_cost(empty, "arm")) == 3
-
-
-def test_each_engine_is_said_to_take_longer_where_it_does():
-    lines = [{"scene": "a", "target_rad": target, "ratio": ratio}
-             for target, ratio in ((1e-2, 0.5), (1e-3, 4.0), (1e-6, None))]  # fmt: skip
-    theirs, ours = draw.spoken(Result("speed", tables={"what_should_i_use": lines}), "a").split(";")
-    assert theirs.startswith("MuJoCo") and "4 times as long for 1e-03 rad" in theirs
-    assert ours.strip().startswith("tmt") and "2.0 times as long for 1e-02 rad" in ours

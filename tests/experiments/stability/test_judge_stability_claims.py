@@ -113,10 +113,8 @@ def kept_runs(observed=None, largest=0.06, leaves=(), acceleration=50.0, rest=0.
         for method in RK4 for torque in beyond.NEAR_TORQUES for dt, away in ((0.3, 1e-9), (0.35, largest))
     ]  # fmt: skip
     engines = [method.engine for method in RK4]
-    paths = {(engine, torque, 0.3): np.full(3, size)
-             for engine, size in zip(engines, (1e-3, 1e-6)) for torque in beyond.NEAR_TORQUES}  # fmt: skip
     return {
-        "rows": rows, "limit": 0.3108, "fastest": 9.1, "counts": [1, 2, 3], "paths": paths,
+        "rows": rows, "limit": 0.3108, "fastest": 9.1, "counts": [1, 2, 3], "paths": {},
         "leaves": {(engine, torque): list(leaves) for engine in engines for torque in beyond.NEAR_TORQUES},
         "acceleration_at_end": {engine: np.array([0.0, -acceleration, 0.0]) for engine in engines},
         "free_from_end": dict.fromkeys(engines, rest),
@@ -133,10 +131,3 @@ def test_claim_3(result, changed, word, failing):
     beyond.check_kept(result, ARM, kept_runs(**changed))
     assert verdict(result.notes[0]) == word
     assert sum(not check.passed for check in result.checks) == failing and len(result.checks) == 10
-
-
-def test_figure_of_what_is_kept_dots_mujoco(result):
-    result.curves["kept"] = kept_runs()
-    lines = figures_claims.draw_kept(result, ARM)[1].axes[0].lines
-    drawn = {(line.get_linestyle(), line.get_ydata()[0]) for line in lines if len(line.get_ydata())}
-    assert {("-", 1e-3), (":", 1e-6)} == {(dash, size) for dash, size in drawn if size in (1e-3, 1e-6)}

@@ -113,16 +113,6 @@ def test_energy_does_as_by_the_same_scheme(result, theirs, passes):
     assert only(result) is passes and "rk4" in result.notes[0] and "+0.2 J" in result.notes[0]
 
 
-def test_what_ends_newtons_method(result):
-    """Where it finds every stage, where it fails with rates that do not overflow, and with one that does."""
-    for found, rate in ((200, 1e200), (100, 0.99e100), (100, 1.01e100), (100, None)):
-        rows = [{"method": "implicit_midpoint", "motion": "free", "dt_s": dt, "steps_found": steps,
-                 "last_rad_per_s": last, "steps": 200} for dt, steps, last in ((1.0, 200, 5.0), (2.0, found, rate))]  # fmt: skip
-        long_runs.check_newton(result, "bent", [rows])
-    never, slow, fast, unknown = result.notes
-    assert "1e+100" in fast and not any("1e+100" in text for text in (never, slow, unknown)) and "1 of 2" in slow
-
-
 def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
     runs = [minute("tmt", "rk4", "drifts", 0.1), minute("mujoco", "RK4", "drifts", 0.2)]
     result.curves |= {"minutes": runs, "silent": {"gain": {"range": 18.8}}}

@@ -1,14 +1,11 @@
 """The checks of amplification, limits and growth on rows just inside and just outside of each tolerance; no runs."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from judged import BOTH, only
 from models import PATHS
 
 from compare.engines.mujoco import reading
-from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
 from compare.experiments.stability import equilibria, figures_limits, limits, limits_judged
 from compare.experiments.stability.subjects import subjects_of
@@ -135,18 +132,6 @@ def test_limits_that_no_run_decides():
     assert away > 100.0 * near
 
 
-@pytest.mark.parametrize("rates, swings, name", [
-    ((1.0, 2.0), 0.0, "node"), ((1.0, 2.0), 3.0, "focus"), ((0.0, 2.0), 3.0, "centre"),
-])  # fmt: skip
-def test_what_decays_is_a_node_or_a_focus(rates, swings, name):
-    values = np.array([complex(-rate, sign * swings) for rate in rates for sign in (1, -1)])
-    at = SimpleNamespace(
-        kind="centre", modes=(values, None), small=1e-6, without_stiffness=np.zeros(4, bool), name="low",
-        tree=SimpleNamespace(damping=(1.0,)), case=SimpleNamespace(robot=SimpleNamespace(is_read=True, positions=())),
-    )  # fmt: skip
-    assert name in equilibria.kind_in_words(at).split(":")[0]
-
-
 # figures: the right engine with the right number
 
 
@@ -165,13 +150,3 @@ def test_limits_figure_marks_mujoco_where_mujoco_is(result):
     marks = [line.get_xdata() for line in ax.lines if line.get_marker() == "|" and len(line.get_xdata())]
     ends = sorted(bar.get_x() + bar.get_width() for bar in ax.patches if bar.get_y() >= -1)
     assert [float(*x) for x in marks] == [0.0999] and ends == pytest.approx([0.1, 0.1001, 0.2])
-
-
-def test_map_names_who_grows():
-    dts = np.array([0.1, 0.2, 0.4, 0.8])
-    by_method = {
-        RK4: np.array([1.0, 1.0, 1e3, 1e3]), INTEGRATORS["RK4"]: np.array([1.0, 99.0, 99.0, 99.0]),
-        INTEGRATORS["Euler"]: np.full(4, np.inf), INTEGRATORS["implicit"]: np.array([1.0, 101.0, 1.0, 1.0]),
-    }  # fmt: skip
-    text = figures_limits.map_in_words(by_method, dts, 100.0, {("tmt", "rk4"): 0.3, ("mujoco", "implicit"): 0.3})
-    assert "0.20 to 0.40 s" in text and "1 of 2" in text and text.index("MuJoCo Euler") < text.index("MuJoCo RK4")

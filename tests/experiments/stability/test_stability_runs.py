@@ -94,17 +94,6 @@ def test_a_tiny_step_that_rounding_holds_back_is_in_the_prediction(engines, meth
     assert abs(observed - rounded) < departure.DEPARTURE_TOLERANCE < 0.1 < observed - exact
 
 
-def test_departure_is_predicted_beside_a_mode_without_stiffness(engines, method):
-    """About an upright first axis every posture has one: a torque along it has no equilibrium."""
-    tree = dataclasses.replace(tmt.ARM, axis=((0.0, 0.0, 1.0), *tmt.ARM.axis[1:]))
-    at = held(dataclasses.replace(ARM, tree=tree, postures={"inverted": (0, 180, 90)}), "inverted")
-    assert at.kind == "saddle" and np.abs(at.modes[0]).min() < 1e-6
-    rows = departure.departures(0.01, at, engines, (method("tmt", "rk4"),))
-    result = Result("stability")
-    departure.check_departures(result, rows)
-    assert all(row["observed_s"] for row in rows) and all(check.passed for check in result.checks)
-
-
 def test_own_bias_holds_for_ever(engines, method):
     theirs, ours = method("mujoco", "RK4"), method("tmt", "rk4")
     tau = torques.own_torque(theirs, engines, BALL)
