@@ -1,17 +1,19 @@
-"""What is concluded from errors: every rule with a row just inside and one just outside."""
+"""What is concluded from errors, orders and times: every rule with a row just inside and one just outside."""
 
 from functools import partial
 
 import numpy as np
 import pytest
 from judged import BOTH
-from speed_rows import SCHEMES, known_rows, row
+from speed_rows import RK4, SCHEMES, known_rows, row
 
-from compare.experiments.speed import accuracy
+from compare.engines import Method
+from compare.experiments.speed import accuracy, advice
 from compare.judge.check import Result
-from compare.robots.arm import ARM
 
 BENT = {"bent, free": 64}
+BESIDE = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
+STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 
 
 def judged(check, rows, *arguments):
@@ -21,54 +23,29 @@ def judged(check, rows, *arguments):
     return {check.quantity: check.passed for check in result.checks}
 
 
+def runs(engine, method, errors):
+    """A row for each error, from coarse to fine."""
+    return [row(engine, method, error, 64 << k) for k, error in enumerate(errors)]
+
+
 same_schemes = partial(judged, accuracy.check_same_schemes)
 smallest_errors = partial(judged, accuracy.check_smallest_errors)
 
 
-@pytest.mark.parametrize(
-    "ours, theirs, verdict",
-    [
-        (1e-3, 1e-3 + 63e-10, True),
-        (1e-3, 1e-3 + 65e-10, False),
-        (1e-3, 1e-3 - 65e-10, False),
-        (1e-3, None, False),
-        (None, 1e-3, False),
-        (0.0999, 0.2, False),
-        (0.2, 0.0999, False),
-        (0.1001, 0.2, None),
-        (None, 0.2, None),
-        (None, None, None),
-    ],
-)
+@pytest.mark.parametrize("ours, theirs, verdict", [
+    (1e-3, 1e-3 + 63e-10, True), (1e-3, 1e-3 + 65e-10, False), (1e-3, 1e-3 - 65e-10, False), (1e-3, None, False),
+    (None, 1e-3, False), (0.0999, 0.2, False), (0.2, 0.0999, False), (0.1001, 0.2, None), (None, None, None),
+])  # fmt: skip
 def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
     rows = [row("tmt", "rk4", ours), row("mujoco", "RK4", theirs), row("tmt", "rk4", 1.0, 128)]
     found = same_schemes(rows, {"bent, free": 1e-10}, {"bent, free": SCHEMES})
     assert found == ({} if verdict is None else {"the same error as tmt's rk4": verdict})
 
 
-def test_where_tmt_took_no_step_as_coarse_nothing_is_compared():
-    quantity = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
-    theirs = [row("mujoco", "RK4", 1e-3, 64), row("mujoco", "RK4", 1e-5, 128)]
-    assert smallest_errors(theirs, {"bent, free": 1e-16}) == {}
-    assert smallest_errors([*theirs, row("tmt", "rk4", 1e-9, 1024)], {"bent, free": 1e-16}) == {}
-    assert smallest_errors([*theirs, row("tmt", "rk4", None, 128)], {"bent, free": 1e-16}) == {quantity: False}
-
-
-@pytest.mark.parametrize("left, passes", [(1e-14, True), (0.9e-14, True), (0.99e-14 / 64 / 2, False)])
+@pytest.mark.parametrize("left, passes", [(1e-14 / 63, True), (1e-14 / 65, False)])
 def test_errors_that_have_stopped_are_of_the_size_of_rounding(left, passes):
-    stops = [1e-6, 1e-14, 2e-14]  # 64 of the rounding, at least, where the last is not the least
-    rows = [row("mujoco", "RK4", e, 64 << k) for k, e in enumerate(stops)]
-    rows += [row("tmt", "rk4", e, 64 << k) for k, e in enumerate([1e-6, 1e-14])]
-    found = smallest_errors(rows, {"bent, free": left})
-    assert found.pop("smallest error of mujoco's RK4, where smaller steps gain nothing") is passes
-    assert list(found) == ["smallest error of MuJoCo's RK4, beside that of tmt's rk4"]
-
-
-def test_the_factor_of_rounding_is_64():
-    for error, passes in ((63e-14, True), (65e-14, False)):
-        rows = [row("mujoco", "RK4", e, 64 << k) for k, e in enumerate([error, 1.0])]
-        found = smallest_errors([*rows, row("tmt", "rk4", error)], {"bent, free": 1e-14})
-        assert found["smallest error of mujoco's RK4, where smaller steps gain nothing"] is passes
+    rows = runs("mujoco", "RK4", [1e-6, 1e-14, 2e-14]) + runs("tmt", "rk4", [1e-6, 1e-14])
+    assert smallest_errors(rows, {"bent, free": left}) == {STOPPED: passes, BESIDE: True}
 
 
 @pytest.mark.parametrize(
@@ -77,43 +54,32 @@ def test_the_factor_of_rounding_is_64():
 )  # fmt: skip
 def test_mujoco_comes_as_near_as_tmt(ours, theirs, passes):
     rows = [row("tmt", "rk4", ours), row("mujoco", "RK4", theirs)]
-    found = smallest_errors(rows, {"bent, free": 1e-14})
-    assert found == {"smallest error of MuJoCo's RK4, beside that of tmt's rk4": passes}
+    assert smallest_errors(rows, {"bent, free": 1e-14}) == {BESIDE: passes}
 
 
-@pytest.mark.parametrize(
-    "nearest, found", [(256, {}), (64, {"smallest error of MuJoCo's RK4, beside that of tmt's rk4": False})]
-)
-def test_where_both_diverge_with_all_of_mujocos_steps_nothing_is_compared(nearest, found):
-    rows = [row("mujoco", "RK4", None, steps) for steps in (64, 128)]
-    rows += [row("tmt", "rk4", 1e-9 / steps if steps >= nearest else None, steps) for steps in (64, 128, 256)]
-    assert smallest_errors(rows, {"bent, free": 1e-14}) == found
+@pytest.mark.parametrize("theirs, ours, found", [
+    ([1e-3, 1e-5], [], {}),
+    ([1e-3, 1e-5], [None, None], {BESIDE: False}),
+    ([None, None], [None, None, 1e-9], {}),  # tmt's steps that are finer than MuJoCo's do not count
+    ([None, None], [1e-9, 1e-10, 1e-11], {BESIDE: False}),
+])  # fmt: skip
+def test_mujoco_is_compared_where_tmt_has_a_step_as_coarse_and_one_ends(theirs, ours, found):
+    rows = runs("mujoco", "RK4", theirs) + runs("tmt", "rk4", ours)
+    assert smallest_errors(rows, {"bent, free": 1e-16}) == found
 
 
 @BOTH
 def test_where_mujocos_steps_end_before_its_errors_stop_tmts_are_no_finer(share, passes):
-    errors = [1e-6, 1e-7, 1e-8]
-    rows = [row("tmt", "rk4", e, 64 << k) for k, e in enumerate(errors)]
-    ends = [row("mujoco", "RK4", e, 64 << k) for k, e in enumerate([1e-6, share * 2e-7])]
-    quantity = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
-    assert smallest_errors([*ends, *rows], {"bent, free": 1e-20})[quantity] is passes
+    ours, theirs = runs("tmt", "rk4", [1e-6, 1e-7, 1e-8]), [1e-6, share * 2e-7]
+    assert smallest_errors(runs("mujoco", "RK4", theirs) + ours, {"bent, free": 1e-20})[BESIDE] is passes
     # where finer steps have gained nothing, more of them would not have either
-    stops = [*ends, row("mujoco", "RK4", 1e-6, 256)]
-    assert not smallest_errors([*stops, *rows], {"bent, free": 1e-20})[quantity]
+    assert not smallest_errors(runs("mujoco", "RK4", [*theirs, 1e-6]) + ours, {"bent, free": 1e-20})[BESIDE]
 
 
-@pytest.mark.parametrize(
-    "found, work, best, last, ends",
-    [
-        (0.71e-14, 121, 1e-14, 100, True),
-        (0.69e-14, 121, 1e-14, 100, False),
-        (0.71e-14, 119, 1e-14, 100, False),
-        (29e-15, 200, 29e-15, 100, True),
-        (31e-15, 200, 31e-15, 100, False),
-        (np.inf, 200, 1e-15, 100, True),
-        (np.nan, 200, 1e-15, 100, True),
-    ],
-)
+@pytest.mark.parametrize("found, work, best, last, ends", [
+    (0.71e-14, 121, 1e-14, 100, True), (0.69e-14, 121, 1e-14, 100, False), (0.71e-14, 119, 1e-14, 100, False),
+    (29e-15, 200, 29e-15, 100, True), (31e-15, 200, 31e-15, 100, False), (np.nan, 200, 1e-15, 100, True),
+])  # fmt: skip
 def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
     assert accuracy.gained_nothing(found, work, best, last, 1e-15) is ends
 
@@ -124,64 +90,93 @@ def test_the_true_error_is_that_of_rk4_with_the_coarsest_steps():
     steps = BENT | {"bent, damped": 64}
     assert accuracy.true_error(rows, steps) == {"bent, free": (1.5, 1.6), "bent, damped": (0.02, None)}
     assert accuracy.true_error(rows, {"bent, free": 128}) == {"bent, free": (1e-3, None)}
-    assert accuracy.true_error([], BENT) == {} and accuracy.true_errors_in_words([], BENT, ARM) == []
-
-
-@pytest.mark.parametrize(
-    "ours, theirs, says",
-    [
-        (1.5, 1.501, "bent, free: TMT 1.5 rad, MuJoCo 1.5 rad. bent, free: both engines make this error"),
-        (1.5, 1.6, "bent, free: TMT 1.5 rad, MuJoCo 1.6 rad. bent, free: the errors are not the same"),
-        (0.099, 0.099, "MuJoCo 0.099 rad."),
-        (0.099, None, "MuJoCo no number. bent, free: the errors are not the same"),
-    ],
-)
-def test_the_true_error_in_words(ours, theirs, says):
-    (words,) = accuracy.true_errors_in_words([row("tmt", "rk4", ours), row("mujoco", "RK4", theirs)], BENT, ARM)
-    assert says in words and ("rad. bent" in words or "number. bent" in words) == ("not" in says or "both" in says)
-    assert words.startswith("At the assignment's step, 64 steps of RK4, ")
-
-
-def test_only_the_arms_own_step_is_the_assignments():
-    rows = [row("tmt", "rk4", 1e-3), row("mujoco", "RK4", 1e-3)]
-    rows += [row("tmt", "rk4", 1e-6, 128, scene="mine"), row("mujoco", "RK4", 1e-6, 128, scene="mine")]
-    rows += [row("heyoka", "Taylor", 1e-6, 64, dt_s=None)]  # it chose as many steps by itself
-    rows += [row(*of, 1e-6, dt_s=1 / 64, scene="short") for of in (("tmt", "rk4"), ("mujoco", "RK4"))]
-    own, mine, short = accuracy.true_errors_in_words(rows, BENT | {"mine": 128, "short": 64}, ARM)
-    assert own.startswith("At the assignment's step, 64 steps of RK4, ") and "mine" not in own
-    assert mine.startswith("At the coarsest step, 128 steps of RK4, ") and "bent" not in mine
-    assert short.startswith("At the coarsest step, 64 steps of RK4, ") and "bent" not in short
-
-
-def test_sentences_of_first_order_and_smaller_models():
-    rows = known_rows()
-    assert (
-        "bent, free: 3.1e-02 rad in 64 ms (Euler, 1024 steps)" in accuracy.first_order_in_words(rows, ["bent, free"])[0]
-    )
-    assert accuracy.first_order_in_words([], ["bent, free"]) == []
-    smaller = row("tmt", "rk4", 1e-3, 64, 0.5e-3, scene="bent, free, beta locked", whole="bent, free")
-    (words,) = accuracy.smaller_models_in_words([*rows, smaller])
-    assert (
-        "(tmt rk4, 64 steps): the whole model takes 2.00 times as long; 1.00e-03 rad off where that is 2.00e-02"
-        in words
-    )
-    another = row("tmt", "rk4", 1e-3, 64, 0.5e-3, scene="bent, free, my own")  # a scene that is only called so
-    assert accuracy.smaller_models_in_words([*rows, another]) == []
-    floors = {"bent, free": 1e-14}
-    assert "Of the curves of all methods 1 comes to within 30 times of it; in 0 of these" in accuracy.floors_in_words(
-        rows, floors)[0]  # fmt: skip
+    assert accuracy.true_error([], BENT) == {}
 
 
 def test_a_reference_of_few_digits_is_named(known_reference):
-    for apart, named in ((0.99e-14, False), (1e-14, True), (1e-9, True)):
+    for apart, count in ((0.99e-14, 1), (1e-14, 2)):
         known = {"bent, free": known_reference._replace(apart=apart)}
-        _, *words = accuracy.references_in_words(known, {"bent, free": max(1e-14, apart)})
-        assert bool(words) is named and all("known to no more than" in text for text in words)
+        assert len(accuracy.references_in_words(known, {"bent, free": max(1e-14, apart)})) == count
+    (in_doubles,) = accuracy.references_in_words(
+        {"s": known_reference._replace(apart=3e-13, steps=1024, why="long")}, {"s": 1e-12}
+    )
+    assert "3e-13 (1024" in in_doubles
 
 
-def test_digits_of_the_reference_are_growth_times_1e_30(known_reference):
-    floors = {"bent, free": 2.0**-52 * 1e4}
-    for apart, said in ((0.99e-26, "They differ by no more."), (1.01e-26, "by more than that in bent, free.")):
-        known = {"bent, free": known_reference._replace(apart=apart, steps=77)}
-        (words,) = accuracy.references_in_words(known, floors)
-        assert f"bent, free: 1e-26 ({apart:.0e}, 77 steps)" in words and words.endswith(said)
+# orders
+
+
+@pytest.mark.parametrize(
+    "order, measured, passes",
+    [(4, 4.149, True), (4, 4.151, False), (4, 3.851, True), (4, 3.849, False), (1, 1.151, False), (8, 7.01, True),
+     (8, 6.99, False), (8, 12.0, True), (4, np.nan, False)],
+)  # fmt: skip
+def test_the_order_is_measured_within_its_margin(order, measured, passes):
+    result = Result("speed")
+    advice.check_order(result, "bent, free, tmt rk4", order, measured)
+    assert [check.passed for check in result.checks] == [passes]
+
+
+@pytest.mark.parametrize("errors, complete, measured, passed", [
+    ([0.29, 2.9e-2, 2.9e-2 / 16], True, [4.0], [True, True]),
+    ([3.1e-2, 2.9e-2 / 16], True, [], [False]),  # one error only is below 3e-2 rad
+    ([3.1e-2, 2.9e-2 / 16], False, [], []),
+    ([0.29, 16 * 2.1e-12, 2.1e-12], True, [4.0], [True, True]),
+    ([0.29, 16 * 1.9e-12, 1.9e-12], True, [], [False]),
+    ([2.9e-2, 2.8e-2, 2.8e-2 / 16], True, [4.0], [True, True]),  # the finest two count
+    ([2.9e-2, 2.9e-2 / 16, 2.8e-2 / 16], True, [pytest.approx(0.05, abs=0.01)], [False, True]),
+    # with half of the coarsest steps the error would be below 2e-12 rad, where rounding shows
+    ([16 * 1.99e-12, 1e-13], True, [], []),
+    ([16 * 2.01e-12, 1e-13], True, [], [False]),
+    ([np.nan, 16 * 1.99e-12, 1e-13], True, [], [False]),  # the coarsest has diverged
+    ([], True, [], [False]),  # it did not run
+])  # fmt: skip
+def test_an_order_is_measured_where_errors_fall_regularly(errors, complete, measured, passed):
+    result = Result("speed", rows=runs("tmt", "rk4", errors))
+    table = advice.orders(result, ["bent, free"], [RK4], complete)
+    assert [line["measured_order"] for line in table] == pytest.approx(measured) if measured != [] else not table
+    assert [check.passed for check in result.checks] == passed
+
+
+def orders_of_file(errors, floor):
+    """The orders that are measured with the robot of a file, whose rounding is known, and the result."""
+    result = Result("speed", rows=runs("tmt", "rk4", errors), curves={"floors": {"bent, free": floor}, "of_file": True})
+    return advice.orders(result, ["bent, free"], [Method("tmt", "rk4", 4, "rk4")], complete=False), result
+
+
+def test_no_order_of_a_file_is_measured_near_what_is_known():
+    errors = [2.56e-8, 1.6e-9, 1e-10]
+    assert orders_of_file(errors, 1e-12)[0] and not orders_of_file(errors, 1e-9)[0]
+
+
+@pytest.mark.parametrize("change, asked", [(0.149, True), (0.151, False), (None, False)])
+def test_an_order_of_a_file_is_asked_where_it_has_settled(change, asked):
+    orders = [4.0 + 2.0 * (change or 0.0), 4.0 + (change or 0.0)][change is None :]
+    _, result = orders_of_file(1e-4 / 2.0 ** np.cumsum([0.0, *orders]), 1e-16)
+    assert bool(result.checks) is asked and any("free, tmt rk4" in note for note in result.notes) is not asked
+
+
+# advice
+
+
+def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
+    table = {line["target_rad"]: line for line in advice.advice(known_rows(), ["bent, free"], {"bent, free": 1e-16})}
+    line = table[1e-3]
+    assert (line["mujoco"], line["tmt"], line["of_all"]) == (
+        "mujoco RK4, 256 steps", "tmt dopri8, 64 steps", "scipy DOP853, 500 steps")  # fmt: skip
+    times = [line[f"{engine}_ms"] for engine in ("mujoco", "tmt", "of_all")]
+    assert times == pytest.approx([80.0, 2.0, 0.1]) and line["mujoco_evaluations"] == 1024
+    assert (line["ratio"], line["kernel_part"], line["method_part"]) == pytest.approx((40.0, 20.0, 2.0))
+    assert line["integrator_part"] == pytest.approx(1.0) and line["why_not"] is None
+    assert table[1e-12]["mujoco"] is None and "3.1e-07" in table[1e-12]["why_not"]
+
+
+def test_what_to_use_for_a_step_response_is_of_the_error_asked_for():
+    line = {"target_rad": 1e-3, "mujoco": "mujoco implicitfast, 128 steps", "mujoco_dt_s": 1 / 512, "mujoco_ms": 0.4,
+            "tmt": "tmt dopri8_adaptive, tolerance 1e-03", "tmt_dt_s": None, "tmt_ms": 0.05, "scene": "let go"}  # fmt: skip
+    other = line | {"target_rad": 1e-6, "mujoco": "mujoco RK4, 9 steps"}
+    table = [line, other, line | {"scene": "step"}, dict.fromkeys(line) | {"target_rad": 1e-3, "scene": "far"}]
+    (said,) = advice.step_response_in_words(table, ["step"])
+    assert said.index("step: mujoco") < said.index("let go: mujoco") < said.index("far: ")
+    assert said.count("mujoco implicitfast, 128 steps (dt = 0.00195 s), 0.4 ms") == 2 and "9 steps" not in said
+    assert advice.step_response_in_words(table, []) == advice.step_response_in_words(table[:2], ["step"]) == []

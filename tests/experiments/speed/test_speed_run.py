@@ -6,25 +6,23 @@ import numpy as np
 import pandas as pd
 import pytest
 from edited import XML, setup_of
-from models import PATHS
 
 from compare import experiment
 from compare.engines import Method, Setting
-from compare.engines.mujoco import load, read
+from compare.engines.mujoco import load
 from compare.experiments import speed
 from compare.experiments.speed import accuracy, runs, settings
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from tmt.methods import METHODS
 
 
 def test_every_method_follows_the_scene(engines, bent, known_reference):
     """Each method's finest useful setting is near the reference, and costs evaluations."""
     for method in settings.methods(engines, "full"):
-        steps = None if method.adaptive else 2**14 if method.order == 1 else 1024
+        steps = None if method.adaptive else 2**13 if method.order == 1 else 1024
         setting = Setting(5.0, steps, 1e-7 if method.adaptive else None)
         row = runs.row_of_run(bent, bent, engines, method, setting, known_reference)
-        tolerance = {1: 0.3, 2: 0.03}.get(method.order, 1e-4)
+        tolerance = {1: 0.6, 2: 0.03}.get(method.order, 1e-4)
         assert 0.0 < row["worst_error_rad"] < tolerance, method
         assert row["error_rad"] <= row["worst_error_rad"] and not row["diverged"]
         assert row["energy_error_J"] > 0.0 and row["dt_s"] == (5.0 / steps if steps else None)
@@ -35,9 +33,8 @@ def test_every_method_follows_the_scene(engines, bent, known_reference):
 
 
 def test_a_run_that_diverges_has_no_error(engines, bent, known_reference):
-    row = runs.row_of_run(
-        bent, bent, engines, engines["tmt"].methods["explicit_euler"], Setting(5.0, 64), known_reference
-    )
+    method = engines["tmt"].methods["explicit_euler"]
+    row = runs.row_of_run(bent, bent, engines, method, Setting(5.0, 64), known_reference)
     assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
 
 
@@ -71,34 +68,29 @@ def test_where_the_reference_is_not_known_nothing_is_judged(engines, bent, known
         assert runs.rows_of_scene(bent, engines, known, "small", "same schemes")[1] == left
 
 
+@pytest.mark.slow
 def test_a_small_run_takes_every_path(engines, small):
     result = small("speed")
     table = pd.DataFrame(result.rows)
-    assert list(table.columns) == speed.COLUMNS and speed.COLUMNS[-1] == "why_not"
+    assert list(table.columns) == speed.COLUMNS
     everyone = {(m.engine, m.name) for m in settings.methods(engines, "full")}
-    runs = table[table.why_not.isna()]
-    assert {(row.engine, row.method) for row in runs.itertuples()} == everyone and runs.diverged.any()
-    diverged = runs[runs.diverged.astype(bool)]
-    assert diverged[["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(axis=None)
-    assert (runs.seconds > 0.0).all() and set(runs.scene) == {"zero, free", "zero, free, beta locked", "bent, free"}
-    assert any("zero, free, beta locked (tmt rk4, 1024 steps): the whole model takes" in note for note in result.notes)
-    evaluations = pd.DataFrame(result.tables["evaluations"])
-    assert list(evaluations.columns) == [
-        "quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
-        "why_not",
-    ]  # fmt: skip
-    timed = evaluations[evaluations.why_not.isna()]
+    ran = table[table.why_not.isna()]
+    assert {(row.engine, row.method) for row in ran.itertuples()} == everyone
+    diverged = ran[ran.diverged.astype(bool)]
+    assert len(diverged) and diverged[["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(axis=None)
+    assert (ran.seconds > 0.0).all() and set(ran.scene) == {"zero, free", "zero, free, beta locked", "bent, free"}
+    costs = pd.DataFrame(result.tables["evaluations"])
+    timed = costs[costs.why_not.isna()]
     assert {"mass_matrix_and_bias", "forward_dynamics", "rk4_step"} <= set(timed.quantity)
-    assert (timed.ns_per_state > 0.0).all() and evaluations[evaluations.why_not.notna()].ns_per_state.isna().all()
+    assert (timed.ns_per_state > 0.0).all() and costs[costs.why_not.notna()].ns_per_state.isna().all()
     counted = timed[timed.operations.notna()].set_index("implementation")
     assert {"compiled", "compiled, side by side"} < set(counted.index)
     assert np.allclose(counted.operations_per_ns, counted.operations / counted.ns_per_state)
-    everybody = {name.split(",")[0] for name in evaluations.implementation} & {"MuJoCo", "heyoka", "Pinocchio"}
-    assert everybody == {"MuJoCo", "heyoka", "Pinocchio"}  # by a time or by a reason
+    # by a time or by a reason
+    assert {"MuJoCo", "heyoka", "Pinocchio"} <= {name.split(",")[0] for name in costs.implementation}
     errors = accuracy.true_error(result.rows, dict.fromkeys(("zero, free", "bent, free"), 64))
-    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1) and errors["bent, free"][0] == pytest.approx(
-        0.27, abs=0.01
-    )
+    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1)
+    assert errors["bent, free"] == pytest.approx((0.27, 0.27), abs=0.01)
 
 
 def test_a_run_without_timings_has_the_checks_only(engines):
@@ -142,37 +134,25 @@ def with_and_without():
     return results, counts
 
 
+@pytest.mark.slow
 def test_an_engine_that_cannot_take_part_says_why_in_its_cells_and_is_nowhere_else(beside):
     (with_it, without), figures = beside.result(with_and_without)
-    rows = [row for row in with_it.rows if row["why_not"] is not None]
-    assert rows == [
-        dict.fromkeys(speed.COLUMNS)
-        | {"scene": "bent, free", "engine": "own", "method": "RK4, Heun", "why_not": "own.py is not there"}
-    ]
-    assert with_it.rows[-1] is rows[0] and len(with_it.rows) == len(without.rows) + 1
-    assert [(c.scene, c.quantity, c.value) for c in with_it.checks] == [
-        (c.scene, c.quantity, c.value) for c in without.checks
-    ]
+    absent = {"scene": "bent, free", "engine": "own", "method": "RK4, Heun", "why_not": "own.py is not there"}
+    assert with_it.rows[-1] == dict.fromkeys(speed.COLUMNS) | absent and len(with_it.rows) == len(without.rows) + 1
+    values = [[(c.scene, c.quantity, c.value) for c in result.checks] for result in (with_it, without)]
+    assert values[0] == values[1]
     for name, table in with_it.tables.items():
         assert "own" not in {row.get("engine") for row in table} and len(table) == len(without.tables[name])
-    assert with_it.notes[-1] == "yours takes no part: own.py is not there."
-    assert not any("own" in note.split() or "own.py" in note for note in with_it.notes[:-1])
+    assert ["own.py" in note for note in with_it.notes] == [False] * (len(with_it.notes) - 1) + [True]
     assert figures[0] == figures[1] > 0
 
 
-def test_a_quick_run_takes_mujoco_and_tmt_alone(engines):
-    setup = experiment.Setup.quick(ARM, engines | {"own": Elsewhere()})
-    assert speed.unavailable(setup, ["bent, free"]) == []
+def test_who_is_not_there_has_a_row_with_the_reason_but_in_a_quick_run(engines):
+    rows = settings.unavailable(experiment.Setup.small(ARM, engines | {"own": Elsewhere()}), ["bent, free"])
+    assert {"scene": "bent, free", "engine": "own", "method": "RK4, Heun", "why_not": "own.py is not there"} in rows
+    quick = experiment.Setup.quick(ARM, engines | {"own": Elsewhere()})
+    assert settings.unavailable(quick, ["bent, free"]) == []
 
 
 def test_a_robot_without_such_scenes_is_left_out_with_the_reason():
-    assert speed.skipped(ARM) is None
-    bare = dataclasses.replace(ARM, scenes=(), name="bare")
-    assert speed.skipped(bare) == "the bare has no scene that every method follows"
-
-
-def test_a_run_in_doubles_is_spoken_of_where_one_may_serve():
-    assert "Taylor's method in pairs of doubles, good to 1e-30 times" in speed.tolerance(ARM)
-    assert "dopri8" not in speed.tolerance(ARM)
-    of_file = robot_of(read(PATHS["gripper"]), "gripper.xml")
-    assert "where that would take too long, a run in doubles by tmt's dopri8" in speed.tolerance(of_file)
+    assert speed.skipped(ARM) is None and "bare" in speed.skipped(dataclasses.replace(ARM, scenes=(), name="bare"))

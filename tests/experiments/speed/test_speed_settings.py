@@ -21,28 +21,21 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
     assert settings.regular_of(MINE).name == "bent, free"
     alone = dataclasses.replace(ARM, scenes=(OWN,))
     assert settings.regular_of(alone).name == "my swing"
-    for size, expected in (
-        ("full", names),
-        ("quick", ["bent, free", "my swing"]),
-        ("small", ["zero, free", "bent, free"]),
-    ):
+    sizes = {"full": names, "quick": ["bent, free", "my swing"], "small": ["zero, free", "bent, free"]}
+    for size, expected in sizes.items():
         assert [case.name for case in settings.followed(MINE, size)] == expected
         assert [case.name for case in settings.followed(alone, size)] == ["my swing"]
 
 
-def test_methods_are_those_of_the_engines_that_are_there(engines):
+def test_methods_are_those_of_the_engines_that_are_there_or_the_same_schemes_of_both(engines):
     full, quick = (settings.methods(engines, size) for size in ("full", "quick"))
     there = [engine for engine in engines.values() if engine.unavailable() is None]
     assert full == settings.methods(engines, "small") == [m for engine in there for m in engine.methods.values()]
-    assert [m.engine for m in full] == sorted((m.engine for m in full), key=list(engines).index)
     assert quick == [m for m in full if m.engine in ("mujoco", "tmt")] and len(quick) < len(full)
-
-
-def test_the_same_schemes_are_one_of_mujoco_for_each_and_the_same_in_tmt(engines):
     same = settings.methods(engines, "full", "same schemes")
-    assert [(m.engine, m.name) for m in same if m.engine == "mujoco"] == [
-        ("mujoco", "Euler"), ("mujoco", "implicit"), ("mujoco", "RK4")]  # fmt: skip
-    assert {m.name for m in same if m.engine == "tmt"} == {m.scheme for m in same if m.engine == "mujoco"}
+    theirs = {m.name: m.scheme for m in same if m.engine == "mujoco"}
+    assert set(theirs) == {"Euler", "implicit", "RK4"}
+    assert {m.name for m in same if m.engine == "tmt"} == set(theirs.values())
 
 
 @pytest.mark.parametrize(

@@ -8,35 +8,22 @@ from judged import BOTH, INSIDE, only
 
 import tmt
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
-from compare.engines.tmt import Tmt
 from compare.experiments.stability import choice, failure, figures_failure, long_runs
-from compare.experiments.stability.subjects import subjects_of
 from compare.judge.scale import gravity_scale
 from compare.robots.arm import ARM
 
-IMPLICIT = Tmt().methods["implicit"]
 FREE = choice.free_motion(ARM)
 
 
-@pytest.mark.parametrize(
-    "small, large, passes",
-    [
-        (99.0, 101.0, (True, True)),
-        (101.0, 99.0, (False, False)),
-        (2.0, np.inf, (True, True)),
-        (np.inf, 1e7, (False, True)),
-    ],
-)
-def test_growth_at_the_resonance(result, small, large, passes):
-    grown = np.array([[1.0, small], [1.0, large]])
-    failure.check_near(result, ARM, "bent", {"steps": 2000, "grown": {INTEGRATORS["implicit"]: grown}})
-    assert tuple(check.passed for check in result.checks) == passes
-
-
-def test_where_a_robot_is_not_known_to_resonate_only_small_deviations_are_judged(result):
-    grown = np.array([[1.0, 101.0], [1.0, 1.0]])
-    failure.check_near(result, ARM, "hanging", {"steps": 2000, "grown": {INTEGRATORS["implicit"]: grown}})
-    assert not only(result)
+@pytest.mark.parametrize("small, large, posture, passes", [
+    (99.0, 101.0, "bent", [True, True]), (101.0, 99.0, "bent", [False, False]), (2.0, np.inf, "bent", [True, True]),
+    (np.inf, 1e7, "bent", [False, True]),
+    (101.0, 1.0, "hanging", [False]),  # not known to resonate: large deviations are not judged
+])  # fmt: skip
+def test_growth_at_the_resonance(result, small, large, posture, passes):
+    grown = {INTEGRATORS["implicit"]: np.array([[1.0, small], [1.0, large]])}
+    failure.check_near(result, ARM, posture, {"steps": 2000, "grown": grown})
+    assert [check.passed for check in result.checks] == passes
 
 
 def silent_run(since=1.0, caught=1.0, warnings=0, resets=0, definite=-0.5):
@@ -54,21 +41,16 @@ def test_a_silent_failure_is_caught_within_a_step(result, share, passes):
     assert only(result) is passes
 
 
-def test_a_silent_failure_that_is_not_caught_fails(result):
-    failure.check_silent(result, silent_run(1.0, None, resets=1), silent_run(None, None))
-    assert not only(result) and "It starts again once, first at 1.50 s" in result.notes[0]
-
-
-def test_where_nothing_fails_nothing_has_to_be_caught(result):
+def test_a_silent_failure_that_is_not_caught_fails_and_nothing_else_has_to_be(result):
     failure.check_silent(result, silent_run(None, None), silent_run(None, None, definite=0.0123))
-    assert not result.checks
-    assert "it never starts again, and no failure is silent" in result.notes[0]
-    assert "No failure" in result.notes[1] and "stays definite" in result.notes[1] and "0.0123" in result.notes[1]
+    assert not result.checks and "0.0123" in result.notes[1]
+    failure.check_silent(result, silent_run(1.0, None, resets=1), silent_run(None, None))
+    assert not only(result) and "1.50 s" in result.notes[2]
 
 
-@pytest.mark.parametrize("definite, word", [(-1e-9, "loses definiteness"), (1e-9, "stays definite")])
-def test_definiteness_is_the_sign_of_an_eigenvalue(definite, word):
-    assert word in failure.gain_in_words(silent_run(definite=definite))
+def test_definiteness_is_the_sign_of_an_eigenvalue():
+    lost, kept = (failure.gain_in_words(silent_run(definite=least)) for least in (-1e-9, 1e-9))
+    assert "loses" in lost and "loses" not in kept
 
 
 def run_with_gain(share):
@@ -94,22 +76,18 @@ def test_the_range_of_the_potential_is_found_from_any_postures():
     assert failure.potential_range(one) == pytest.approx(failure.potential_range(FREE), rel=1e-9)
 
 
-def test_a_clock_that_goes_back_gives_a_failure_away():
-    run = run_with_gain(0.5) | {"time": np.array([0.0, 1.0, 0.0])}
-    assert failure.caught(FREE, np.arange(3.0), run) == 2.0
-    assert failure.observed(FREE, np.arange(3.0), run)["since_s"] == 2.0
-
-
-def test_a_failure_is_caught_at_the_first_of_its_signs():
+@pytest.mark.parametrize(
+    "back, fast, first", [(3, 2, 2.0), (2, 3, 2.0), (None, 3, 3.0), (4, None, 4.0), (None, None, None)]
+)
+def test_a_failure_is_caught_at_the_first_of_its_signs(back, fast, first):
     """A clock that goes back, and more energy than the arm can have: whichever comes first."""
-    t, still = np.arange(5.0), np.tile(FREE.q, (5, 1))
-    for back, fast, first in ((3, 2, 2.0), (2, 3, 2.0), (None, 3, 3.0), (4, None, 4.0), (None, None, None)):
-        time, qd = np.arange(5.0), np.zeros((5, 3))
-        if back is not None:
-            time[back:] -= 2.0
-        if fast is not None:
-            qd[fast:] = 1e3
-        assert failure.caught(FREE, t, {"time": time, "q": still, "qd": qd}) == first
+    t, time, qd = np.arange(5.0), np.arange(5.0), np.zeros((5, 3))
+    if back is not None:
+        time[back:] -= 2.0
+    if fast is not None:
+        qd[fast:] = 1e3
+    run = {"time": time, "q": np.tile(FREE.q, (5, 1)), "qd": qd, "warnings": 0}
+    assert failure.caught(FREE, t, run) == first == failure.observed(FREE, t, run)["since_s"]
 
 
 # long runs
@@ -122,63 +100,21 @@ def test_energy_drifts_by_three_standard_deviations(deviations, kind):
     assert long_runs.behaviour(off) == (kind, pytest.approx(deviations))
 
 
-def minute(engine, method, kind, scheme="rk4"):
+def minute(engine, method, kind, size=0.0):
     ended = 1.0 if kind == "diverges" else None
     row = {"scene": "bent, free", "engine": engine, "method": method, "dt_s": 0.01, "energy": kind,
            "largest_j": None if ended else 0.1, "change_j": None if ended else 0.2, "diverged_at_s": ended}  # fmt: skip
-    return {"row": row, "scheme": scheme, "t": np.arange(3.0), "off": np.zeros(3), "seconds": 60.0}
+    return {"row": row, "scheme": "rk4", "t": np.arange(60.0), "off": np.full(60, size), "seconds": 60.0}
 
 
 @pytest.mark.parametrize("theirs, passes", [("drifts", True), ("bounded", False), ("diverges", False)])
 def test_energy_does_as_by_the_same_scheme(result, theirs, passes):
     long_runs.check_minutes(result, [minute("tmt", "rk4", "drifts"), minute("mujoco", "RK4", theirs)])
-    assert only(result) is passes and "drifts: rk4 (by +0.2 J)" in result.notes[0]
-
-
-@pytest.mark.parametrize(
-    "found, rate, words",
-    [
-        (200, 1e200, ("never up to 2 s", "It finds every stage")),
-        (100, 0.99e100, ("fails from 2 s", "before none of them do rates overflow")),
-        (100, 1.01e100, ("fails from 2 s", "the rates are beyond 1e+100 rad/s in 1")),
-        (100, None, ("fails from 2 s",)),
-    ],
-)
-def test_what_ends_newtons_method(result, found, rate, words):
-    rows = [
-        {"method": "implicit_midpoint", "motion": "free", "dt_s": dt, "steps_found": steps, "last_rad_per_s": last,
-         "steps": 200} for dt, steps, last in ((1.0, 200, 5.0), (2.0, found, rate))
-    ]  # fmt: skip
-    long_runs.check_newton(result, "bent", [rows])
-    assert all(text in result.notes[0] for text in words)
-
-
-# figures: the right engine with the right number
-
-
-def test_edge_names_each_engine_with_its_growth(result):
-    near = {
-        IMPLICIT: np.array([[1.5], [200.0]]),
-        INTEGRATORS["implicit"]: np.array([[2.5], [np.inf]]),
-    }
-    result.curves["near"] = {
-        "x": np.array([1.7, 1.75]),
-        "steps": 2000,
-        "grown": {k: v.repeat(2, 1) for k, v in near.items()},
-    }
-    result.curves["edge"] = {"x": np.array([1.0, 2.0]), "y": np.array([1e-3, 1e-2]), "steps": 2000,
-                             "grown": {IMPLICIT: np.ones((2, 2))}}  # fmt: skip
-    result.curves["looked at"] = subjects_of(ARM).names
-    caption = figures_failure.draw_edge(result, ARM)[2]
-    assert "TMT implicit 1.50-fold and 200.00-fold; MuJoCo implicit 2.50-fold and diverges" in caption
+    assert only(result) is passes and "rk4" in result.notes[0] and "+0.2 J" in result.notes[0]
 
 
 def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
-    runs = [minute("tmt", "rk4", "drifts"), minute("mujoco", "RK4", "drifts")]
-    for run, size in zip(runs, (0.1, 0.2)):
-        run["t"], run["off"] = np.arange(60.0), np.full(60, size)
+    runs = [minute("tmt", "rk4", "drifts", 0.1), minute("mujoco", "RK4", "drifts", 0.2)]
     result.curves |= {"minutes": runs, "silent": {"gain": {"range": 18.8}}}
-    _, fig, caption = figures_failure.draw_minutes(result, ARM)
-    drawn = {line.get_label(): (line.get_marker(), line.get_ydata()[0]) for line in fig.axes[0].lines}
-    assert drawn == {"RK4": ("None", 0.1), "MuJoCo, same scheme": ("o", 0.2)}
-    assert "drifts: RK4" in caption
+    lines = figures_failure.draw_minutes(result, ARM)[1].axes[0].lines
+    assert [(line.get_marker(), line.get_ydata()[0]) for line in lines] == [("None", 0.1), ("o", 0.2)]

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import pytest
 from small_runs import on_the_moon
 
 from compare.engines.mujoco import load
@@ -9,43 +10,33 @@ from compare.experiment import Setup, engines
 from compare.experiments import stability
 from compare.robots.arm import ARM
 
+SPARE = {"up": {"up": ARM.postures["upright"]}, "down": {"down": ARM.postures["hanging"]}}  # one posture each
 
+
+def verdicts(notes):
+    """What is said of each claim: {"1": "reproduced"}."""
+    heads = [note.split(":")[0] for note in notes if note.startswith("Claim ")]
+    return dict(head.removeprefix("Claim ").split(", ") for head in heads)
+
+
+@pytest.mark.slow
 def test_a_small_run_fills_every_table(small):
     small = small("stability")
     assert set(small.tables) == {
         "departure", "stability_modes", "stability_growth", "stability_torques", "stability_finer_steps",
         "stability_bent", "stability_energy", "stability_newton",
     }  # fmt: skip
-    text = " ".join(small.notes)
-    for words in ("Claim 1, reproduced", "Claim 2, reproduced", "Claim 3, bounded", "loses definiteness"):
-        assert words in text
-    assert "left out" not in text
+    assert verdicts(small.notes) == {"1": "reproduced", "2": "reproduced", "3": "bounded"}
+    assert any("silent" in check.quantity for check in small.checks)
 
 
-def test_on_the_moon_no_sentence_speaks_of_the_stated_arm(beside):
-    """Gravity 1.62: many checks fail, nothing raises, and the sentences say what happened there."""
-    result, captions = beside.result(on_the_moon, "stability")
+@pytest.mark.slow
+def test_on_the_moon_many_checks_fail_and_nothing_raises(beside):
+    """Gravity 1.62: the engines hold other models, and the arm that is stated is not the one that runs."""
+    result, _ = beside.result(on_the_moon, "stability")
     assert sum(not check.passed for check in result.checks) > 100
-    text = " ".join(result.notes + captions)
-    for words in (
-        "it never starts again",
-        "stays definite",
-        "Claim 1, not reproduced",
-        "MuJoCo: 27 leave, after 0.08 s",
-    ):
-        assert words in text
-    for words in (
-        "loses definiteness",
-        "the cause is rounding",
-        "There is no limit",
-        "silent failure",
-        "edge is sharp",
-    ):
-        assert words.lower() not in text.lower().replace("no failure is silent", "")
+    assert verdicts(result.notes)["1"] == "not reproduced" and any("0.08 s" in note for note in result.notes)
     assert not any("silent" in check.quantity for check in result.checks)  # nothing failed, so nothing has to be caught
-
-
-SPARE = {"up": {"up": ARM.postures["upright"]}, "down": {"down": ARM.postures["hanging"]}}  # one posture each
 
 
 def lacking(name) -> tuple[list, list]:
@@ -59,12 +50,8 @@ def lacking(name) -> tuple[list, list]:
 
 def test_what_a_robot_lacks_is_left_out_with_a_reason(beside):
     notes, figures = beside.result(lacking, "up")
-    assert [note.split(":")[0] for note in notes] == [
-        "None of the arm's named postures is a centre",
-        "None of the arm's named postures is marginal",
-        "Nothing is claimed of the arm",
-    ]
-    assert figures == ["stability_regions", "stability_departure"]
+    assert [sum(kind in note for note in notes) for kind in ("a centre", "marginal", "a saddle")] == [1, 1, 0]
+    assert len(notes) == 3 and figures == ["stability_regions", "stability_departure"]
     notes, figures = beside.result(lacking, "down")
-    assert "None of the arm's named postures is a saddle: departures from one are left out." in notes
+    assert [sum(kind in note for note in notes) for kind in ("a centre", "marginal", "a saddle")] == [0, 1, 1]
     assert figures == ["stability_limits", "stability_regions", "stability_silent"]
