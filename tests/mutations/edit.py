@@ -1,7 +1,6 @@
 """One edit of a source file, found by module, function and expression; formatting does not matter."""
 
 import ast
-import copy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -65,7 +64,7 @@ def applied(project: Path, edit: Edit) -> Place:
     path, node = hits[(edit.nth or 1) - 1]
     body = parsed(path.read_text(encoding="utf-8")).body
     texts = [written(statement) for statement in body]
-    (k,) = (k for k, statement in enumerate(body) if any(one is node for one in ast.walk(statement)))
+    k = next(k for k, statement in enumerate(body) if any(one is node for one in ast.walk(statement)))
     after = "\n".join([*texts[:k], edited(body[k], node, edit), *texts[k + 1 :]])
     return Place(path, "\n".join(texts) + "\n", after + "\n")
 
@@ -125,32 +124,29 @@ def matches(node, pattern):
         yield from matches(child, pattern)
 
 
-class Replaced(ast.NodeTransformer):
-    """A tree with other nodes in the place of one."""
-
-    def __init__(self, old, new):
-        self.old, self.new = old, new
-
-    def visit(self, node):
-        return self.new if node is self.old else self.generic_visit(node)
-
-
 def edited(statement: ast.stmt, node: ast.AST, edit: Edit) -> str:
     """A statement with the new expression or statements in the place of a node."""
     new = [Filled(found(read(edit.old)[0], node)).visit(one) for one in read(edit.new)]
     if isinstance(node, ast.keyword):
-        new = ast.keyword(arg=new[0].targets[0].id, value=new[0].value)
+        new = [ast.keyword(arg=new[0].targets[0].id, value=new[0].value)]
     elif isinstance(node, ast.stmt):
         new = [ast.Expr(one) if isinstance(one, ast.expr) else one for one in new]
-    elif len(new) == 1:
-        new = new[0]
-    else:
+    elif len(new) != 1:
         raise DoesNotApply(f"{edit.name}: new is one expression, as old is")
-    copies = {}
-    whole = copy.deepcopy(statement, copies)
-    text = ast.unparse(Replaced(copies[id(node)], new).visit(whole))
+    root = ast.Module([statement], [])
+    fields = ((parent, name, value) for parent in ast.walk(root) for name, value in ast.iter_fields(parent))
+    parent, name, value = next((*at, value) for *at, value in fields if any(one is node for one in listed(value)))
+    changed = [other for one in listed(value) for other in (new if one is node else [one])]
+    setattr(parent, name, changed if isinstance(value, list) else changed[0])
     try:
+        text = ast.unparse(root)
         ast.parse(text)
     except SyntaxError:
-        raise DoesNotApply(f"{edit.name}: {edit.old} cannot be replaced in the text") from None
+        raise DoesNotApply(f"{edit.name}: {edit.old} cannot be replaced") from None
+    finally:
+        setattr(parent, name, value)
     return text
+
+
+def listed(value) -> list:
+    return value if isinstance(value, list) else [value]
