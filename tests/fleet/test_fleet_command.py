@@ -11,10 +11,9 @@ from inside import PENDULUM
 from runs import ROOT, compare, on_terminal, readable_lines, words
 
 from compare.__main__ import main
-from compare.fleet.command import FLEET_OPTIONS, MOST_SAID, say_some
+from compare.fleet.command import FLEET_OPTIONS
 from compare.fleet.piece import FleetError
 from compare.fleet.row import FLEET_COLUMNS
-from compare.report.terminal import Terminal
 
 NAME = "a b#ü.xml"  # of a file that agrees
 
@@ -169,19 +168,3 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off(verdict, status, fold
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     assert main(["fleet", "m/x", "--only", "mass", "--out", "status", "--workers", "1"]) == status
     assert "late.xml, why\n" in capsys.readouterr().out
-
-
-def test_of_many_lines_of_a_kind_the_first_are_said(capsys):
-    for count in (MOST_SAID, MOST_SAID + 300):
-        say_some(Terminal(), [f"line {k}" for k in range(count)])
-        *lines, last = capsys.readouterr().out.splitlines()
-        assert lines == [f"line {k}" for k in range(len(lines))] and len(lines) in (MOST_SAID - 1, MOST_SAID)
-        assert ("300 more" in last) == (count > MOST_SAID)
-
-
-def test_the_help_names_every_option(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["fleet", "--help"])
-    text = capsys.readouterr().out
-    assert stop.value.code == 0 and all(f"  {name} " in text for name in FLEET_OPTIONS)
-    assert max(map(len, text.splitlines())) <= 80

@@ -13,8 +13,8 @@ from compare.fleet.figures_fleet import MOST_NAMED_FILES, draw_steps
 from compare.fleet.models import place_of_report
 from compare.fleet.page import fleet_page
 from compare.fleet.row import FLEET_COLUMNS
-from compare.fleet.table import picture_of_steps, sentences_of, with_why_itself, write_table
-from compare.fleet.times import Spent, in_percent, seconds_left, time_of_workers
+from compare.fleet.table import picture_of_steps, sentences_of, write_table
+from compare.fleet.times import time_of_workers
 
 ROW = {
     "file": "a.xml", "sha256": "1", "verdict": "agree", "reason": "", "joints": 3, "worst_ratio": 0.123456,
@@ -124,13 +124,6 @@ def test_the_sentences_count_verdicts_and_name_whose_own_step_is_not_stable():
     assert len(said) == 4 and "3 files" in said[1] and "nobody may" in said[2] and "7 files and 5 pieces" in said[3]
 
 
-def test_what_is_compared_with_itself_has_the_reason_beside_files_with_stated_numbers():
-    itself = ROW | {"verdict": "self-consistent", "reference": "model", "why_itself": "joint x", "reason": "slow"}
-    first, second = (row["reason"] for row in with_why_itself([itself, ROW]))
-    assert first.startswith("joint x") and first.endswith("slow") and second == ""
-    assert with_why_itself([itself]) == [itself]
-
-
 @pytest.mark.parametrize("took, workers, whole, alone, shares", [
     ({"mass": [(2, 10.0), (3, 20.0)], "speed": [(2, 6.0)], "reduction": [(2, 4.0)]}, 2, 32.0, True, (40 / 64, 10 / 64)),
     ({"mass": [(2, 10.0), (3, 20.0)], "speed": [(2, 6.0)], "reduction": [(2, 4.0)]}, 2, 32.0, False, (40 / 64, 0.0)),
@@ -140,21 +133,3 @@ def test_what_is_compared_with_itself_has_the_reason_beside_files_with_stated_nu
 ])  # fmt: skip
 def test_the_time_of_the_workers_is_computing_waiting_for_timings_or_neither(took, workers, whole, alone, shares):
     assert time_of_workers(took, workers, whole, alone) == pytest.approx((*shares, 1.0 - sum(shares)))
-
-
-@pytest.mark.parametrize("parts", [(0.333, 0.333, 0.334), (0.005, 0.005, 0.99), (0.7451, 0.2151, 0.0398)])
-def test_percents_add_up_to_100(parts):
-    found = in_percent(Spent(*parts))
-    assert sum(found) == 100 and all(abs(a - 100.0 * b) < 1.0 for a, b in zip(found, parts, strict=True))
-
-
-def test_what_is_left_is_what_the_same_kind_took_by_the_joints_of_the_robot():
-    took = {"mass": [(7, 100.0), (7, 100.0)]}
-    small, large = (seconds_left(took, [("mass", joints)], 1, True) for joints in (7, 27))
-    assert small == pytest.approx(200.4 / 3) and large == pytest.approx(3.0 * small)
-    assert seconds_left(took, [("mass", 7)] * 4, 4, True) == pytest.approx(small)
-    assert seconds_left({}, [("mass", 2)], 2, True) is None and seconds_left(took, [], 2, True) == 0.0
-    took, still = {"speed": [(7, 8.0)], "mass": [(7, 4.0)]}, [("speed", 7)] * 3 + [("mass", 7)] * 10
-    timed, others = 24.0, 10 * 2.2 / 2  # timed pieces one after the other, or beside the others
-    assert seconds_left(took, still, 2, times_alone=True) == pytest.approx(timed + others)
-    assert seconds_left(took, still, 2, times_alone=False) == pytest.approx(max(timed, others))

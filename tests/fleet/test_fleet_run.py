@@ -7,7 +7,7 @@ import zlib
 import pytest
 from inside import PENDULUM, Inside, report, step_of
 
-from compare.fleet.file_pieces import UNPACKED, Asked, Known, findings, unpacked_at, untimed_part
+from compare.fleet.file_pieces import Asked, Known, findings, untimed_part
 from compare.fleet.models import bundle, found_models
 from compare.fleet.piece import Outcome
 from compare.fleet.row import AGREE, BROKE, DIFFER, ITSELF, REFUSED
@@ -161,14 +161,6 @@ def test_a_file_of_which_nothing_comes_back_breaks_off_with_the_reason(step, fle
     assert not row["has_report"]  # the one in the folder is an earlier one
 
 
-def test_a_file_that_differs_is_named_before_it_is_done(fleet):
-    early = []
-    differs = Outcome(pickle.dumps((b"", "the first check")))
-    door = Inside(before=lambda piece: differs if step_of(piece.name) == "mass" else answered(piece))
-    fleet(ONE, ["mass"], door, take=lambda run: early.extend(run.take_early()))
-    assert [task.differs for task in early] == ["the first check"]
-
-
 def test_few_pieces_and_their_models_are_in_memory_at_a_time_and_reports_do_not_wait_for_other_files(fleet):
     door = Inside(before=lambda piece: None if step_of(piece.name) == "read" else NONE)
     files = {f"{k:02}.xml": PENDULUM.format(0.1 + k) for k in range(2 * AHEAD_FOR_ALL)}
@@ -177,16 +169,6 @@ def test_few_pieces_and_their_models_are_in_memory_at_a_time_and_reports_do_not_
     assert not any(task.packed for task in found.of.tasks)
     done = [step_of(name) for name in door.done]
     assert done.index("report") < len(done) - 1 - done[::-1].index("mass")  # of the last file
-
-
-def test_a_process_keeps_the_files_of_few_models(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    bundles = [pickle.dumps({"up0/m.xml": str(k).encode(), "mesh.obj": b""}) for k in range(UNPACKED + 2)]
-    assert [unpacked_at(bundle).read_text() for bundle in [*bundles, bundles[0]]] == [
-        *map(str, range(len(bundles))),
-        "0",
-    ]
-    assert len(list(tmp_path.iterdir())) == UNPACKED
 
 
 SOLUTION = PENDULUM.format(0.1)

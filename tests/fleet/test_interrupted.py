@@ -63,15 +63,12 @@ def test_the_key_ctrl_c(folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_a_signal_and_another_fleet_in_its_folder(folder, number):
+def test_a_signal(folder, number):
     run = runs.started(*runs.command(*HERE), cwd=folder)
-    assert soon(lambda: (folder / "out" / "kept").exists())
-    second = runs.compare(*HERE, cwd=folder)
-    assert second.returncode == 2 and len(second.stderr.splitlines()) == 1 and " out;" in second.stderr
-    assert soon(lambda: len(kept(folder)) >= 2) and run.poll() is None
+    assert soon(lambda: kept(folder))
     end = runs.ended(run, number)
     if number == signal.SIGTERM:
-        assert end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0] and end.seconds < runs.SECOND
+        assert end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0]
     assert nothing_left(folder)
     Kept(folder / "out").close()  # nobody has its lock
 

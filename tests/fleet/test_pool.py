@@ -16,11 +16,10 @@ import toy_pieces as toy
 from processes import gone_soon, notes
 from runs import ENVIRONMENT, ROOT
 
-from compare.fleet.calls import Calls, door_opened
-from compare.fleet.piece import FleetError, Piece, outcomes
+from compare.fleet.calls import door_opened
+from compare.fleet.piece import Piece, outcomes
 from compare.fleet.pool import Pool
 from compare.process import interrupt
-from compare.process.workers import WorkerEnded
 
 SOME = ("for ever", "raises", "SIGKILL", "SIGKILL once", "eats", "prints", "asked with a lock", "shares", "last")
 
@@ -73,23 +72,6 @@ def test_calls_have_their_outcomes_in_order_and_none_is_lost_with_another():
     assert found[1].broke.startswith("ValueError") and found[0].machine == platform.node()
     with door_opened(None, None) as door:
         assert door is None
-
-
-class Gone:
-    """A door behind which nothing is any more."""
-
-    under_way = 0
-
-    def submit(self, piece):
-        self.under_way += 1
-
-    def next(self):
-        raise FleetError("the scheduler tcp://x:1 is gone; what is done is kept")
-
-
-def test_where_the_door_is_gone_the_run_ends_with_a_line():
-    with pytest.raises(WorkerEnded, match="tcp://x:1"):
-        Calls(Gone()).outcomes(math.sqrt, [4.0])
 
 
 def test_a_process_that_is_killed_between_two_pieces_costs_no_try(tmp_path):

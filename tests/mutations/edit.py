@@ -74,9 +74,7 @@ def sources(project: Path) -> list[Path]:
     return [path for package in PACKAGES for path in sorted((project / package).rglob("*.py"))]
 
 
-@cache
-def written(statement: ast.stmt) -> str:
-    return ast.unparse(statement)
+written = cache(ast.unparse)
 
 
 def is_named(path: Path, module: str) -> bool:
@@ -85,9 +83,7 @@ def is_named(path: Path, module: str) -> bool:
     return any(parts[:end][-len(wanted) :] == wanted for end in range(1, len(parts) + 1))
 
 
-@cache
-def parsed(text: str) -> ast.Module:
-    return ast.parse(text)
+parsed = cache(ast.parse)
 
 
 def scopes(path: Path, where: str) -> list[ast.AST]:
@@ -134,8 +130,8 @@ def edited(statement: ast.stmt, node: ast.AST, edit: Edit) -> str:
     elif len(new) != 1:
         raise DoesNotApply(f"{edit.name}: new is one expression, as old is")
     root = ast.Module([statement], [])
-    fields = ((parent, name, value) for parent in ast.walk(root) for name, value in ast.iter_fields(parent))
-    parent, name, value = next((*at, value) for *at, value in fields if any(one is node for one in listed(value)))
+    fields = ((parent, *field) for parent in ast.walk(root) for field in ast.iter_fields(parent))
+    parent, name, value = next(field for field in fields if any(one is node for one in listed(field[-1])))
     changed = [other for one in listed(value) for other in (new if one is node else [one])]
     setattr(parent, name, changed if isinstance(value, list) else changed[0])
     try:

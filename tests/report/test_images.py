@@ -40,15 +40,6 @@ def test_a_figure_is_small_and_its_colours_are_not_visibly_changed(chart, tmp_pa
     assert sizes == sorted(sizes)
 
 
-def test_a_map_of_many_colours_keeps_them(tmp_path):
-    figure = Figure(figsize=(4, 3), dpi=100)
-    figure.subplots().pcolormesh(np.add.outer(np.arange(60.0), np.arange(60.0)), cmap="viridis")
-    figure.savefig(tmp_path / "whole.png")
-    images.save_figure(figure, tmp_path / "few.png")
-    whole, few = pixels(tmp_path / "whole.png"), pixels(tmp_path / "few.png")
-    assert np.abs(whole - few).max(axis=2)[(whole != 255).any(axis=2)].mean() < 1
-
-
 def test_the_page_has_the_smaller_file_without_loss(chart, tmp_path):
     images.save_figure(chart, tmp_path / "a.png")
     address, width, height = images.embedded(tmp_path / "a.png")
@@ -69,13 +60,6 @@ def test_spread_labels_keep_their_order_their_distance_and_their_ends(values):
     assert np.array_equal(np.argsort(places, kind="stable"), np.argsort(values, kind="stable"))
 
 
-@pytest.mark.parametrize("values, places", [
-    ([0.0, 5.0], [0.0, 5.0]), ([2.0, 2.0], [1.5, 2.5]), ([2.0, 2.0, 3.0, 3.0], [1.0, 2.0, 3.0, 4.0]), ([9.0, 9.0], [4.0, 5.0]),
-])  # fmt: skip
-def test_spread_labels_stay_near_what_they_name(values, places):
-    assert style.spread(values, 1.0, 0.0, 5.0) == pytest.approx(places)
-
-
 def test_a_name_stands_beside_its_point_and_on_no_line():
     ax = Figure(figsize=(style.WIDTH, 3.0)).subplots()
     wall = ax.plot(np.linspace(0.5, 0.6, 400), np.tile([0.3, 0.9], 200))  # right of the second point
@@ -87,9 +71,3 @@ def test_a_name_stands_beside_its_point_and_on_no_line():
     assert not style.points_in(
         np.array([boxes["hindered"].extents]), ax.transData.transform(wall[0].get_xydata())
     ).any()
-
-
-def test_letters_are_dark_enough_to_be_read_on_white():
-    for colour in (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.GREY, style.PINK, style.SKY, "black"):
-        dark = np.array(style.in_letters(colour))
-        assert dark @ style.BRIGHTNESS <= style.BRIGHTEST_LETTERS + 1e-12 and (dark >= 0.0).all()

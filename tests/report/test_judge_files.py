@@ -62,12 +62,6 @@ def test_the_page_is_red_if_a_check_fails_and_tables_are_whole(folder):
     assert lines == ["a,b", *(f"{row['a']!r},{row['b']}" for row in rows)]
 
 
-def test_a_report_of_sections_without_rows_is_written(folder):
-    names = ("published", "kinematics", "mass", "acceleration", "trajectory", "speed")
-    assert not write(folder, report([section(name) for name in names])).broken
-    assert list((folder / "tables").iterdir()) == [] and (folder / "report.md").exists()
-
-
 def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     """A report of which the questions, a table, a check and a section cannot be made."""
     asks = replace(ARM, questions=(Question("a", "what", "mass", ("largest", "mass", "Mbar", None)),))

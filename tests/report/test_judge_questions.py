@@ -1,13 +1,10 @@
 """The answers to the assignment's questions: which number is whose, what broke off, what is far from the truth."""
 
-from dataclasses import replace
-
 import pytest
 from sections import section
 
 from compare.judge.units import renamed
 from compare.report.questions import answers
-from compare.report.tables import questions
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
 
@@ -71,10 +68,3 @@ def test_what_to_use_gives_each_engine_its_own_time(unit, regular, numbers):
     ran.result.curves["regular"] = regular
     found = answers([ran], ARM)[-1][-1]
     assert all(number in found for number in (f"1e-06 {unit}", *numbers))
-
-
-def test_where_no_question_is_of_an_assignment_there_is_no_column_for_its_parts():
-    ran = [section("speed", rows=[{"scene": "bent", "dt_s": 0.5, "steps": 9}], what_should_i_use=[LINE])]
-    columns = ["part", "asked", "answered in", "answer"]
-    assert list(questions(ran, ARM).columns) == columns
-    assert list(questions(ran, replace(ARM, questions=())).columns) == columns[1:]

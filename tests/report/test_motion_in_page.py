@@ -49,12 +49,6 @@ def pictures_of(scene) -> list:
     return found
 
 
-def test_there_is_no_figure_where_nothing_moves():
-    broken = section("trajectory")  # one that broke off has no curves
-    found = [motion.motion_in_html(sections, ARM) for sections in ([], [section("mass")], [broken])]
-    assert [*found, page_of()] == [""] * 4
-
-
 def test_it_opens_on_the_scene_that_differs():
     of = section(
         "trajectory", ("open loop", 2.0, 1.0, "at most", True), ("drift", 2.0, 1.0, "at most", False, About.PREDICTION)
@@ -134,12 +128,6 @@ def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng, points, pic
     assert left == len(found[0]["apart"]) and pictures in (None, left)
     assert found[0]["dt"] == pytest.approx(5.0 / (left - 1), rel=0.2)
     assert all((f"scene {k}" in text) for k in range(count))  # also those that are not shown
-
-
-@pytest.mark.parametrize("seconds, pause", [(5.0, 39), (1.0, 39), (10.0, 78)])
-def test_a_short_scene_is_shown_slower_and_says_so(seconds, pause):
-    scene = data_of(page_of(drawn()._replace(t=np.linspace(0.0, seconds, 129))))["scenes"][0]
-    assert scene["pause"] == pause and (" 5 times" in scene["seen"]) == (seconds < 5.0)
 
 
 @pytest.mark.slow

@@ -75,13 +75,6 @@ def test_every_picture_is_drawn_once_with_the_last_of_its_experiments_that_run(n
     assert found == expected
 
 
-@pytest.mark.parametrize("experiment, result", [
-    ("speed", Result("speed", curves={"regular": "s"})), ("mass", Result("mass")), ("stability", Result("stability")),
-])  # fmt: skip
-def test_there_is_no_picture_without_data(experiment, result):
-    assert drawn(experiment, result) == []
-
-
 @pytest.mark.parametrize("experiment, name", [
     ("mass", "agreement"), pytest.param("trajectory", "scenes", marks=pytest.mark.slow),
     pytest.param("stability", "limits", marks=pytest.mark.slow),
@@ -154,16 +147,6 @@ def test_the_picture_of_scenes_shows_shares_times_and_who_leaves_when():
     assert {("o", "#ffffff", 1.0), ("s", orange, 2.0)} <= set(marks(of_times))
     bars = [bar.get_width() for bar in of_times.patches]
     assert bars[:3] == [5.0, 3.0, 0.5]  # the scene, judged at some step, judged at every step
-
-
-def test_a_scene_that_fails_is_in_the_picture_however_many_there_are():
-    rows = [RUN | {"scene": f"s{k}", "difference_over_band": 0.1 if k < 11 else 1e4} for k in range(12)]
-    result = Result("trajectory", rows=rows)
-    result.check("s11, RK4", "one step", 2.0, 1.0, "rad")
-    _, figure, _ = figures_overview.picture_of_scenes({"trajectory": result}, SimpleNamespace(cases=[]))
-    left = figure.axes[0]
-    assert [label.get_text() for label in left.get_yticklabels()] == [f"s{k}" for k in range(8)] + ["✗ s11"]
-    assert marks(left)[-1] == ("X", *hexes(RED), figures_overview.MOST_SHARE)
 
 
 def test_a_curve_has_what_nothing_of_the_same_engine_beats():

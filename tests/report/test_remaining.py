@@ -76,17 +76,6 @@ def test_a_report_that_cannot_be_read_plans_nothing(tmp_path, ended):
     assert plan([*EXPERIMENTS], False, command, out) == AFTER_FULL
 
 
-@pytest.mark.parametrize("whole, quick", [(AFTER_FULL, False), (AFTER_QUICK, True)])
-def test_of_some_experiments_their_share_is_planned(tmp_path, whole, quick):
-    order = sorted(whole, key=whole.get)
-    assert set(whole) == {START, *EXPERIMENTS, END} and order[0] == START and order[-1] == END
-    before = {name: whole[order[order.index(name) - 1]] for name in ("speed", END)}
-    alone = plan(["speed"], quick, "python -m compare speed", tmp_path)
-    assert list(alone) == [START, "speed", END]
-    assert alone["speed"] - alone[START] == pytest.approx(whole["speed"] - before["speed"])
-    assert alone[END] - alone["speed"] == pytest.approx(whole[END] - before[END])
-
-
 def test_the_version_is_that_of_the_checkout_that_runs(tmp_path):
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     assert provenance("c", ARM.mjcf, "arm.xml", 1)[OURS] == stated == of_checkout(ROOT)

@@ -5,12 +5,10 @@ import os
 import re
 
 import pytest
-from runs import ROOT, SECOND, compare, in_shell, on_terminal, readable_lines, screen, words
+from runs import ROOT, compare, in_shell, readable_lines, words
 from small_runs import runs_on_terminals, terminal_folders
 
-from compare.engines.mujoco import load
 from compare.report.terminal import Terminal
-from compare.robots.arm import ARM
 
 
 @pytest.fixture(scope="module")
@@ -73,20 +71,6 @@ def test_a_check_that_failed_is_status_1_though_nobody_hears_of_it(runs):
     assert runs["closed"].returncode == 1 and results_in(runs["plain"] / "closed")["passed"] is False
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("columns, term, at", [(40, "xterm", b"1 of 1, mass"), (80, "dumb", b"parameters ")])
-def test_ctrl_c(tmp_path, columns, term, at):
-    arguments = ["all", "--quick"] if term == "dumb" else ["mass"]
-    for _ in range(2):  # the machine may be busy
-        run = on_terminal(arguments, columns, term, tmp_path, interrupt_at=at)
-        lines, visible = screen(run.output, columns)
-        assert run.status == 2 and visible and "interrupted" in words(lines[-3:]) and "1 of 1" not in words(lines)
-        assert list(tmp_path.iterdir()) == []
-        if run.seconds < SECOND:
-            return
-    raise AssertionError(f"answered after {run.seconds:.2f} s")
-
-
 PARTS = ["4 of 11", "acceleration", "about 35 s left"]
 
 
@@ -115,13 +99,6 @@ def test_a_run_whose_progress_cannot_be_shown_says_a_line_now_and_then(capfd, mo
         said = ""
         while "4 of 11, mass: states" not in said:  # the test ends by its time limit otherwise
             said += capfd.readouterr().out
-
-
-def test_a_model_of_any_name_can_be_locked(tmp_path):
-    path = tmp_path / os.fsdecode(b"\xff\xc3\xa4.xml")
-    path.write_bytes(ARM.mjcf.read_bytes())
-    locked = ARM.case("locked", locked=("beta",), posture="bent")
-    assert load(path, ARM.tree).of(locked).coordinates.names == ("alpha", "gamma")
 
 
 @pytest.mark.parametrize("line, status", [
