@@ -75,7 +75,7 @@ def test_what_is_timed_goes_to_the_worker_for_it(cluster, place, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_shared_is_sent_in_silence_and_not_kept(cluster, capfd, recwarn):
+def test_what_is_shared_is_sent_in_silence_and_not_kept(recwarn, cluster, capfd):
     asked = [Piece("", toy.length, shared=b"z" * 3 * 10**7) for _ in range(6)]
     assert [found.returned for found in outcomes(cluster, asked)] == [3 * 10**7] * 6
     assert soon(lambda: not cluster.client.who_has())

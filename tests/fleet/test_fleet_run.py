@@ -113,6 +113,7 @@ def test_timed_pieces_of_a_pool_come_after_all_others_and_those_of_a_cluster_at_
         assert [done[k + 1] for k, step in enumerate(done) if step == "speed, untimed"] == ["speed"] * 2
 
 
+@pytest.mark.slow
 def test_a_timed_experiment_in_two_pieces_finds_what_it_finds_in_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.xml").write_text(ONE["a.xml"])
