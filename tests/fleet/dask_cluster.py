@@ -1,4 +1,4 @@
-"""A Dask cluster of this machine, started as a user starts one: with Dask's own commands."""
+"""A Dask cluster of this machine, started with Dask's own commands; for test_cluster.py and test_interrupted.py."""
 
 import json
 import os
@@ -17,56 +17,43 @@ HERE = Path(__file__).resolve().parent
 class Machines:
     """A scheduler and workers. folder: for what they write."""
 
-    def __init__(self, folder, root=ROOT):
-        self.folder, self.root, self.processes = folder, root, []
-        self.file = folder / "scheduler.json"
+    def __init__(self, folder):
+        self.folder, self.processes, self.file = folder, [], folder / "scheduler.json"
         self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-        while not (written := about_scheduler(self.file)):
+        while not (address := address_in(self.file)):
             assert self.scheduler.poll() is None
             time.sleep(0.02)
-        self.address = written["address"]
+        self.address = address
 
-    def start(self, what, *options, root=None):
+    def start(self, what, *options, root=ROOT):
         """One of Dask's commands, in a session of its own."""
-        environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join(map(str, (root or self.root, HERE))),
-        }
-        log = (self.folder / f"{what}-{len(self.processes)}.log").open("wb")
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (root, HERE)))}
         words = [sys.executable, "-m", "dask", what, *options, "--scheduler-file", str(self.file)]
-        with log:
+        with (self.folder / f"{what}-{len(self.processes)}.log").open("wb") as log:
+            streams = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log}
             self.processes.append(
-                subprocess.Popen(
-                    words, cwd=self.folder, env=environment, stdout=log, stderr=log, stdin=subprocess.DEVNULL,
-                    start_new_session=True,
-                )
-            )  # fmt: skip
+                subprocess.Popen(words, cwd=self.folder, env=environment, start_new_session=True, **streams)
+            )
         return self.processes[-1]
 
-    def worker(self, *options, threads=1, root=None):
+    def worker(self, *options, threads=1, root=ROOT):
         """One more worker, without a nanny where that is not asked for."""
-        options = options or ("--no-nanny",)
         local = self.folder / f"local-{len(self.processes)}"
         local.mkdir()
-        return self.start(
-            "worker", *options, "--nthreads", str(threads), "--local-directory", str(local), "--no-dashboard",
-            "--memory-limit", "1111111112", root=root,
-        )  # fmt: skip
+        options = [*(options or ["--no-nanny"]), "--nthreads", str(threads), "--local-directory", str(local)]
+        return self.start("worker", *options, "--no-dashboard", "--memory-limit", "1111111112", root=root)
 
-    def kill(self, process, number=signal.SIGKILL):
+    def kill(self, process):
         """End one of them, with what it has started."""
         with suppress(ProcessLookupError):
-            os.killpg(process.pid, number)
+            os.killpg(process.pid, signal.SIGKILL)
         process.wait()
 
-    def end(self):
-        for process in self.processes:
-            self.kill(process)
 
-
-def about_scheduler(file):
-    """What a scheduler says of itself, as soon as it has said all."""
+def address_in(file):
+    """What a scheduler has written, as soon as that is whole."""
     with suppress(OSError, ValueError):
-        return json.loads(file.read_text())
+        return json.loads(file.read_text())["address"]
 
 
 @contextmanager
@@ -75,4 +62,5 @@ def machines(folder):
     try:
         yield made
     finally:
-        made.end()
+        for process in made.processes:
+            made.kill(process)

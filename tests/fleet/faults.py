@@ -1,92 +1,66 @@
-"""What can happen to a piece, and what is to become of it: the same for the pool and for a cluster."""
+"""What can happen to a piece, and what is to become of it: for test_pool.py and test_cluster.py alike."""
 
-import re
 import signal
 import sys
 from types import ModuleType
+from typing import NamedTuple
 
 import toy_pieces as toy
 
 from compare.fleet.piece import Piece, outcomes
 
-LIMIT = 5.0  # s that a piece may take here
+LIMIT = 3.0  # s that a piece may take here
 MEMORY = 10**9  # bytes that it may have
-TIMES = {"SIGKILL": 4, "SIGSEGV": 4, "SIGKILL once": 2, "exits": 4, "for ever": 1}  # how many times each begins
+LARGE = b"x" * 3 * 10**7
+GONE = ModuleType("gone")  # a module that no other process has
+exec("def nowhere():\n    return 0\n", GONE.__dict__)
 
 
-def pieces(folder):
-    """Pieces by name; each has a folder in which it notes that it began."""
+class Fault(NamedTuple):
+    """A piece, and what becomes of it."""
 
-    def made(name, function, *arguments, **more):
-        return name, Piece(name, function, arguments, **more)
-
-    def place(name):
-        path = folder / name.replace(" ", "_")
-        path.mkdir(exist_ok=True)
-        return str(path)
-
-    gone = ModuleType("gone")  # a module that no other process has
-    exec("def nowhere():\n    return 0\n", gone.__dict__)
-    sys.modules["gone"] = gone
-    return dict(
-        [
-            made("for ever", toy.for_ever, place("for ever")),
-            made("returns", toy.twice, 21),
-            made("raises", toy.raises, "it\nbroke"),
-            made("SIGKILL", toy.killed, signal.SIGKILL, place("SIGKILL")),
-            made("SIGSEGV", toy.killed, signal.SIGSEGV, place("SIGSEGV")),
-            made("SIGKILL once", toy.killed, signal.SIGKILL, place("SIGKILL once"), 1),
-            made("exits", toy.exits, 3),
-            made("leaves", toy.leaves),
-            made("eats", toy.eats, 4 * MEMORY),
-            made("eats little", toy.eats, 10**7),
-            made("prints", toy.prints),
-            made("unsendable", toy.unsendable),
-            made("asked with a lock", toy.twice, toy.unsendable()),
-            made("asked of nobody", gone.nowhere),
-            made("shares", toy.length, group="big", shared=b"x" * 3 * 10**7),
-            made("shares too", toy.length, "first", group="big", shared=b"x" * 3 * 10**7),
-            made("last", toy.twice, 4),
-        ]
-    )
+    function: object
+    arguments: tuple = ()
+    value: object = None  # what it returns; None: it breaks
+    words: tuple = ()  # of the reason why it breaks
+    tries: int = 0  # how many times it begins, where it takes notes of that: its last argument is a folder
+    more: dict = {}  # noqa: RUF012
 
 
-def tried(door, folder):
-    """What becomes of all of them, by name."""
-    asked = pieces(folder)
-    return dict(zip(asked, outcomes(door, list(asked.values()))))
-
-
-PLACE = r"\(compare/fleet/(piece|child)\.py:\d+\)"
-VALUES = {
-    "returns": 42,
-    "SIGKILL once": "at last",
-    "eats little": 10**7,
-    "prints": "",
-    "shares": 3 * 10**7,
-    "shares too": 3 * 10**7,
-    "last": 8,
-}
-ENDS = {
-    "raises": rf"RuntimeError: it broke {PLACE}",
-    "SIGKILL": "ended by SIGKILL, 4 times",
-    "SIGSEGV": "ended by SIGSEGV, 4 times",
-    "exits": "ended with status 3, no hope, 4 times",
-    "leaves": rf"SystemExit: 3 {PLACE}",
-    "for ever": "took longer than 5 s",
-    "eats": "out of memory: more than the 1 GB that a piece may have",
-    "unsendable": rf"TypeError: cannot pickle '_thread.lock' object {PLACE}",
-    "asked with a lock": rf"TypeError: cannot pickle '_thread.lock' object {PLACE}",
-    "asked of nobody": rf"ModuleNotFoundError: No module named 'gone' {PLACE}",
+FAULTS = {
+    "for ever": Fault(toy.for_ever, words=("3 s",), tries=1),
+    "returns": Fault(toy.twice, (21,), 42),
+    "raises": Fault(toy.raises, ("it\nbroke",), words=("RuntimeError: it broke",)),
+    "SIGKILL": Fault(toy.killed, (signal.SIGKILL, 9), words=("SIGKILL", "4 times"), tries=4),
+    "SIGSEGV": Fault(toy.killed, (signal.SIGSEGV, 9), words=("SIGSEGV", "4 times"), tries=4),
+    "SIGKILL once": Fault(toy.killed, (signal.SIGKILL, 1), "at last", tries=2),
+    "exits": Fault(toy.exits, (3,), words=("status 3", "no hope", "4 times")),
+    "leaves": Fault(toy.leaves, words=("SystemExit: 3",)),
+    "eats": Fault(toy.eats, (4 * MEMORY,), words=("memory", "1 GB")),
+    "prints": Fault(toy.prints, value=""),
+    "unsendable": Fault(toy.unsendable, words=("TypeError", "lock")),
+    "asked with a lock": Fault(toy.twice, (toy.unsendable(),), words=("TypeError", "lock")),
+    "asked of nobody": Fault(GONE.nowhere, words=("ModuleNotFoundError", "gone")),
+    "shares": Fault(toy.length, value=len(LARGE), more={"group": "big", "shared": LARGE}),
+    "shares too": Fault(toy.length, ("first",), len(LARGE), more={"group": "big", "shared": LARGE}),
+    "last": Fault(toy.twice, (4,), 8),
 }
 
 
-def check(outcome, name, folder):
-    """Whether what has become of a piece is what is to become of it."""
-    if name in VALUES:
-        assert (outcome.broke, outcome.returned) == ("", VALUES[name])
-    else:
-        assert re.fullmatch(ENDS[name], outcome.broke), outcome.broke
-    if name in TIMES and (folder / name.replace(" ", "_")).exists():
-        assert len(list((folder / name.replace(" ", "_")).iterdir())) == TIMES[name]
-    assert outcome.is_late == (name == "for ever")
+def check_all(door, folder, names=tuple(FAULTS)):
+    """Whether through a door what is to become of each piece does. folder: where they take notes of when they begin."""
+    sys.modules["gone"] = GONE
+    asked = []
+    for name in names:
+        fault, place = FAULTS[name], folder / name
+        place.mkdir()
+        arguments = (*fault.arguments, str(place)) if fault.tries else fault.arguments
+        asked.append(Piece(name, fault.function, arguments, **fault.more))
+    for name, found in zip(names, outcomes(door, asked), strict=True):
+        fault = FAULTS[name]
+        if fault.value is None:
+            assert all(word in found.broke for word in fault.words), f"{name}: {found.broke}"
+        else:
+            assert (found.broke, found.returned) == ("", fault.value), name
+        assert len(list((folder / name).iterdir())) == fault.tries, name
+        assert found.is_late == (name == "for ever")

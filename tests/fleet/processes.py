@@ -1,4 +1,4 @@
-"""Which processes live, and what pieces have noted of themselves."""
+"""Which processes live, and what pieces have noted of themselves; for the tests of pool, cluster and interrupts."""
 
 import time
 from pathlib import Path
@@ -29,6 +29,6 @@ def gone_soon(*pids):
 
 
 def notes(folder, count=1):
-    """What so many pieces have noted, as soon as they have."""
+    """What pieces have noted, as soon as this number of them have."""
     assert soon(lambda: sum(bool(note.read_text()) for note in Path(folder).iterdir()) >= count)
     return [note.read_text().split() for note in sorted(Path(folder).iterdir())]

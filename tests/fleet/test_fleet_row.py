@@ -1,95 +1,71 @@
-"""The row of a file: its verdict and reason, the largest share of a tolerance, its own step; and which row comes first."""
+"""The row of a file: its verdict, its share of a tolerance, its own step; which comes first, and what changed since before."""
 
-import itertools
+import random
 
 import pytest
 
+from compare.fleet.piece import FleetError
 from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, order, row_of_file
+from compare.fleet.since import changes, earlier
+from compare.fleet.table import csv_of_fleet
 from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
 from compare.reference import Reference
 from compare.report.verdict import Section
 
 CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
-
-
-def sections(*checks, limits=()):
-    """One section with checks: (quantity, value, tolerance, note, rule, about); all of rounding but those of other rules."""
-    result = Result("stability", tables={"step_limits": list(limits)})
-    for quantity, value, tolerance, note, rule, about in checks:
-        result.check(
-            "home", quantity, value, tolerance, "s", note, about == About.MODELS and rule == "at most", rule, about
-        )
-    return [Section("stability", "", "", "", result)]
+STATED = Reference("arm", "a.xml")
+BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
+OFF = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
 
 
 def good(share=0.5):
     return "M", share, 1.0, "", "at most", About.MODELS
 
 
-def broke(quantity=ENDS):
-    return quantity, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
-
-
-def unstable(dt=0.002, limit=0.001):
+def own(dt=0.002, limit=0.001):
     return AT_OWN_STEP, dt, limit, "with Euler", "at most", About.STEP
+
+
+def row_of(*checks, limits=(), causes=(), lost=(), reference=STATED):
+    """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
+    result = Result("stability", tables={"step_limits": list(limits)})
+    for quantity, value, tolerance, note, rule, about in checks:
+        result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
+    return row_of_file([Section("stability", "", "", "", result)], causes, lost, reference)
+
+
+@pytest.mark.parametrize("verdict, checks, more, named", [
+    (AGREE, [good(1.0)], {}, ""),
+    (AGREE, [good(1.0), own(0.001)], {}, ""),
+    (AGREE, [good(), own()], {}, "2 ms"),  # its own step is not stable: the reason says so
+    (AGREE, [good()], {"reference": Reference("solution", "a.xml")}, ""),
+    (AGREE, [good()], {"reference": Reference("arm", "a.xml", renamed=("wrist as hand",))}, "wrist as hand"),
+    (ITSELF, [good()], {"reference": Reference("model", "a.xml")}, ""),
+    (DIFFER, [good(2.0)], {"reference": Reference("model", "a.xml")}, "2 s"),
+    (DIFFER, [good(1.0 + 1e-9)], {"causes": CAUSES}, "mass of upper"),
+    (DIFFER, [good(2.0), BROKEN, own(), OFF], {"causes": CAUSES}, "mass of upper"),
+    (BROKE, [good(), BROKEN, own(), OFF], {}, "SIGKILL, 4 times"),
+    (BROKE, [good(), ("figure a is drawn", *BROKEN[1:])], {}, "figure a is drawn"),
+    (BROKE, [good()], {"lost": ["the table"]}, "the table"),
+    (UNCONFIRMED, [good(), OFF, own()], {}, "0.01"),
+    (REFUSED, [], {}, ""),
+])  # fmt: skip
+def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
+    row = row_of(*checks, **more)
+    assert row["verdict"] == verdict and named in row["reason"]
+    assert bool(named) == bool(row["reason"]) or verdict == REFUSED
+
+
+def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
+    assert row_of(good(0.2), good(3.0), own(9.0))["worst_ratio"] == 3.0
+    diverged = row_of(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
+    assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
+    assert row_of(BROKEN)["worst_ratio"] is None
 
 
 def limit(dt, stable, integrator="Euler", base="fixed", kind="finite"):
     return {"integrator": integrator, "file_integrator": "Euler", "base": base, "limit": kind, "predicted_dt_s": dt,
             "stable_at_file_dt": stable}  # fmt: skip
-
-
-STATED = Reference("arm", "a.xml")
-
-
-def verdict(*arguments, causes=(), lost=(), reference=STATED, **more):
-    row = row_of_file(sections(*arguments, **more), causes, lost, reference)
-    return row["verdict"], row["reason"]
-
-
-def test_a_file_agrees_differs_breaks_off_or_is_refused():
-    assert verdict(good(1.0)) == (AGREE, "")
-    assert verdict(good(1.0 + 1e-9), causes=CAUSES) == (DIFFER, f"{CAUSES[0]['text']}, and 1 more")
-    assert verdict(good(2.0)) == (DIFFER, "stability: M, home: 2 s, must be at most 1 s")
-    assert verdict(good(), broke()) == (BROKE, "stability ended by SIGKILL, 4 times")
-    assert verdict(good(), broke("figure a is drawn")) == (
-        BROKE,
-        "stability: figure a is drawn: ended by SIGKILL, 4 times",
-    )
-    assert verdict(good(), lost=["the table could not be made"]) == (BROKE, "the table could not be made")
-    off = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
-    assert verdict(good(), off)[0] == UNCONFIRMED and "one prediction is not confirmed" in verdict(good(), off)[1]
-    assert verdict(good(), off, unstable())[1].endswith("the limit is 1 ms with Euler")
-    assert [verdict(good(), off, one)[0] for one in (good(2.0), broke())] == [DIFFER, BROKE]
-    assert verdict() == (REFUSED, "nothing could be compared")
-
-
-def test_what_differs_weighs_more_than_what_breaks_and_that_more_than_a_step():
-    assert verdict(good(2.0), broke(), unstable(), causes=CAUSES)[0] == DIFFER
-    assert verdict(good(), broke(), unstable())[0] == BROKE
-
-
-def test_a_file_whose_own_step_is_not_stable_agrees_and_says_where_the_limit_is():
-    said = "not stable at its own step of 2 ms at home: the limit is 1 ms with Euler"
-    assert verdict(good(), unstable()) == (AGREE, said)
-    assert verdict(good(), unstable(0.001)) == (AGREE, "")
-
-
-def test_only_what_is_compared_with_stated_numbers_agrees():
-    verdicts = [verdict(good(), reference=Reference(kind, "a.xml"))[0] for kind in ("arm", "solution", "model")]
-    assert verdicts == [AGREE, AGREE, ITSELF]
-    assert verdict(good(2.0), reference=Reference("model", "a.xml"))[0] == DIFFER
-    renamed = Reference("arm", "a.xml", renamed=("wrist as hand",))
-    assert verdict(good(), reference=renamed) == (AGREE, "joints matched: wrist as hand")
-    assert verdict(good(2.0), causes=CAUSES[:1], reference=renamed)[1].endswith("2 kg; joints matched: wrist as hand")
-
-
-def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
-    row = row_of_file(sections(good(0.2), good(3.0), unstable(9.0)), CAUSES, [], STATED)
-    assert row["worst_ratio"] == 3.0
-    diverged = row_of_file(sections(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS)), [], [], STATED)
-    assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
-    assert row_of_file(sections(broke()), [], [], STATED)["worst_ratio"] is None
 
 
 @pytest.mark.parametrize("limits, stable, least", [
@@ -103,25 +79,59 @@ def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
     ([limit(None, True, kind="always stable"), limit(None, None, kind="saddle")], True, None),
 ])  # fmt: skip
 def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stable, least):
-    row = row_of_file(sections(good(), limits=limits), [], [], STATED)
+    row = row_of(good(), limits=limits)
     assert (row["stable_at_file_dt"], row["limit_s"]) == (stable, least)
 
 
 def test_what_needs_a_look_comes_first():
-    def row(verdict, stable, ratio, file="a"):
-        return {"verdict": verdict, "stable_at_file_dt": stable, "worst_ratio": ratio, "file": file}
-
     right = [
-        row(DIFFER, None, 1e9), row(DIFFER, True, 2.0), row(BROKE, None, None), row(UNCONFIRMED, None, 0.5),
-        row(REFUSED, None, None), row(ITSELF, False, 0.1), row(ITSELF, True, 0.9),
-        row(AGREE, False, 0.1), row(AGREE, None, 0.9), row(AGREE, True, 0.9, "b"), row(AGREE, True, 0.0, "c"),
-        row(AGREE, None, None, "d"),
+        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (UNCONFIRMED, None, 0.5, "a"),
+        (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
+        (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
     ]  # fmt: skip
-    for mixed in itertools.islice(itertools.permutations(right), 0, None, 9973):
-        assert sorted(mixed, key=order) == right
+    rows = [dict(zip(("verdict", "stable_at_file_dt", "worst_ratio", "file"), row)) for row in right]
+    for seed in range(20):
+        assert sorted(random.Random(seed).sample(rows, len(rows)), key=order) == rows
 
 
-def test_the_columns_are_those_that_are_promised():
-    assert ",".join(FLEET_COLUMNS) == (
-        "file,sha256,verdict,reason,joints,worst_ratio,file_integrator,file_dt_s,stable_at_file_dt,limit_s,seconds"
-    )
+# what has changed since an earlier fleet
+
+ROW = {
+    "file": "a b.xml", "sha256": "1", "verdict": AGREE, "reason": "", "joints": 3, "worst_ratio": 0.1,
+    "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("before, now, named", [
+    ({}, {"seconds": 99.0, "worst_ratio": 0.9, "sha256": "2", "reason": "other"}, None),
+    ({}, {"verdict": DIFFER, "reason": "mass of x"}, ["agree", "differ", "mass of x"]),
+    ({"verdict": DIFFER}, {}, ["differ", "agree"]),
+    ({}, {"stable_at_file_dt": False}, [""]),
+    ({"stable_at_file_dt": None}, {"stable_at_file_dt": False}, [""]),
+    ({}, {"limit_s": 0.010099}, None),
+    ({}, {"limit_s": 0.009901}, None),
+    ({}, {"limit_s": 0.010101}, ["10 ms", "10.1 ms"]),
+    ({}, {"limit_s": 0.009899}, ["10 ms", "9.899 ms"]),
+    ({"limit_s": None}, {}, ["none", "10 ms"]),
+    ({"limit_s": None}, {"limit_s": None}, None),
+    ({"limit_s": 0.0}, {"limit_s": 0.0}, None),
+    ({"limit_s": 0.0}, {}, [" 0 ms", "10 ms"]),
+    ({}, {"verdict": BROKE, "limit_s": 1.0, "sha256": "2"}, ["agree", "broke", "10 ms", "1000 ms"]),
+    ({}, {"file": "new.xml", "verdict": REFUSED}, ["new.xml", "refused", "a b.xml", "agree"]),  # and one is gone
+])  # fmt: skip
+def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named, tmp_path):
+    (tmp_path / "fleet.csv").write_text(csv_of_fleet([ROW | before]), encoding="utf-8")
+    found = changes(earlier(tmp_path), [ROW | now])
+    places = [" ".join(found).index(name) for name in named or ()]
+    assert bool(found) == bool(named) and places == sorted(places)
+
+
+@pytest.mark.parametrize("content", [
+    None, b"a,b\n1,2\n", b"", b"\xff\xfe\x00", (",".join(FLEET_COLUMNS) + "\na,1,agree,,1,1,Euler,1,true,soon,1\n").encode(),
+])  # fmt: skip
+def test_what_is_no_earlier_fleet_is_refused_in_one_line(content, tmp_path):
+    if content is not None:
+        (tmp_path / "fleet.csv").write_bytes(content)
+    with pytest.raises(FleetError, match=r"fleet\.csv") as refused:
+        earlier(tmp_path)
+    assert len(str(refused.value).splitlines()) == 1

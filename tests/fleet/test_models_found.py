@@ -1,10 +1,16 @@
-"""Which files a fleet has: folders, patterns, files and lists, and what is left out with its reason."""
+"""Which files a fleet has: folders, patterns, files and lists, what is left out, and what a file needs beside itself."""
 
 import os
+import struct
+import zlib
+from pathlib import Path
 
+import numpy as np
 import pytest
+from mujoco import MjModel
 
-from compare.fleet.models import bundle, files_in, found_models, place_of_report
+from compare.engines.mujoco import ModelError, read
+from compare.fleet.models import bundle, found_models, place_of_report, unpacked
 from compare.fleet.piece import FleetError
 
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
@@ -15,10 +21,10 @@ def here(tmp_path, monkeypatch):
     """An empty folder, and a function that writes files there by their names."""
     monkeypatch.chdir(tmp_path)
 
-    def write(names, text=MODEL):
-        for name in [names] if isinstance(names, str) else names:
-            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-            (tmp_path / name).write_text(text, encoding="utf-8")
+    def write(names, content=MODEL):
+        for path in map(Path, [names] if isinstance(names, str) else names):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content if isinstance(content, bytes) else content.encode())
 
     return write
 
@@ -27,58 +33,49 @@ def names(*asked):
     return [model.shown for model in found_models(asked).models]
 
 
+def left_out(*asked):
+    return dict(found_models(asked).left_out)
+
+
 def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
     here(["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/.git/f.xml", "m/b/.g.xml", "m/mesh.obj", "m/folder.xml/h.xml"])
-    here("m/robot.urdf.xml", "<robot name='x'/>")
-    here("m/package.xml", "<?xml version='1.0'?><package/>")
-    here("m/no.xml", "<!-- nothing -->")
-    here("m/none.xml", "")
-    here("m/words.xml", "alpha turns about y")
-    (os.mkfifo if hasattr(os, "mkfifo") else os.mkdir)("m/pipe.xml")
-    # what has no element at all is refused, and not passed over
-    assert names("m") == ["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml", "m/none.xml", "m/words.xml"]
-    assert found_models(["m"]).left_out == [
-        ("m/no.xml", "it is no MJCF, it is no XML"),
-        ("m/package.xml", "it is no MJCF, its outermost element is <package>"),
-        ("m/robot.urdf.xml", "it is no MJCF, its outermost element is <robot>"),
-    ]
+    other = {"m/robot.urdf.xml": "<robot name='x'/>", "m/package.xml": "<?xml version='1.0'?><package/>",
+             "m/no.xml": "<!-- nothing -->"}  # fmt: skip
+    broken = {
+        "m/none.xml": "",
+        "m/words.xml": "alpha turns",
+        "m/broken.xml": "<mujoco><worldbody>",
+    }  # these are refused
+    for name, text in (other | broken | {"m/part.xml": "<mujocoinclude><body>", "m/link.xml": "<robot><link>"}).items():
+        here(name, text)
+    os.mkfifo("m/pipe.xml")
+    assert names("m") == sorted(["m/a.xml", "m/b/c/d.XML", "m/e.mjcf", "m/folder.xml/h.xml", *broken])
+    assert other.keys() <= left_out("m").keys() and "<robot>" in left_out("m")["m/robot.urdf.xml"]
+    assert names("m/link.xml") == ["m/link.xml"]  # what is named is a model
 
 
-def test_a_pattern_that_no_shell_expanded(here):
-    here(["m/a.xml", "m/b/c.xml", "m/b/d/e.xml", "n/a[1].xml"])
+def test_patterns_and_lists(here):
+    here(["m/a.xml", "m/b/c.xml", "m/b/d/e.xml", "n/a[1].xml", "m/b c.xml"])
     here("m/package.xml", "<package/>")
-    assert names("m/*.xml") == ["m/a.xml"]
-    assert names("m/**/*.xml") == ["m/a.xml", "m/b/c.xml", "m/b/d/e.xml"] == names("m/**")
-    assert names("m/b*") == ["m/b/c.xml", "m/b/d/e.xml"]
+    assert names("m/*.xml") == ["m/a.xml", "m/b c.xml"]
+    assert names("m/**/*.xml") == ["m/a.xml", "m/b c.xml", "m/b/c.xml", "m/b/d/e.xml"] == names("m/**")
     assert names("n/a[1].xml") == ["n/a[1].xml"]  # a file of that name comes before the pattern
-
-
-def test_a_list_has_a_path_in_each_line(here):
-    here(["m/a.xml", "m/b c.xml", "d.xml"])
     here("list.txt", "\ufeff# what is released\r\n\r\n  m/b c.xml  \r\n@list.txt\r\n@more/list.txt\r\n")
-    here("more/list.txt", "d.xml\n@list.txt\n@more/list.txt\n")
-    assert names("@list.txt") == ["d.xml", "m/b c.xml"] == names("@more/list.txt")
-    assert names("@list.txt", "m", "./m/../m/a.xml") == ["d.xml", "m/a.xml", "m/b c.xml"]
+    here("more/list.txt", "n/a[1].xml\n@list.txt\n@more/list.txt\n")
+    assert names("@list.txt") == ["m/b c.xml", "n/a[1].xml"] == names("@more/list.txt")
 
 
 @pytest.mark.parametrize("asked, says", [
-    (["nowhere"], "there is no nowhere; a file, a folder, a pattern or @LIST is expected"),
-    (["m/a.xml", "m/*.mjcf"], r"there is no m/\*.mjcf; "),
-    (["m\n\0"], r"there is no m\\n\\x00; "),
-    (["*\0"], r"there is no \*\\x00; "),
-    (["@none.txt"], "cannot read the list none.txt: No such file"),
-    (["@m"], "cannot read the list m: Is a directory"),
-    (["@"], "cannot read the list "),
-    (["empty", "@nothing.txt"], "no MJCF file is in empty, @nothing.txt"),
-    (["@bad.txt"], "there is no m/c.xml; "),
-    (["/dev/null"], "/dev/null is neither a file nor a folder"),
+    (["nowhere"], "nowhere"), (["m/a.xml", "m/*.mjcf"], r"m/\*.mjcf"), (["m\n\0"], r"m\\n\\x00"), (["@none.txt"], "none.txt"),
+    (["@m"], "list m"), (["empty", "@nothing.txt"], "empty, @nothing.txt"), (["@bad.txt"], "m/c.xml"),
+    (["/dev/null"], "/dev/null"),
 ])  # fmt: skip
 def test_a_word_that_names_nothing_is_refused_in_one_line(asked, says, here):
     here("m/a.xml")
     here("empty/package.xml", "<package/>")
     here("nothing.txt", "# nothing\n")
     here("bad.txt", "m/c.xml\n")
-    with pytest.raises(FleetError, match=f"^{says}") as refused:
+    with pytest.raises(FleetError, match=says) as refused:
         found_models(asked)
     assert len(str(refused.value).splitlines()) == 1
 
@@ -86,67 +83,27 @@ def test_a_word_that_names_nothing_is_refused_in_one_line(asked, says, here):
 def test_the_same_file_is_there_once_however_it_is_named(here, tmp_path):
     here(["m/a.xml", "m/b.xml"])
     assert names("m", "m/a.xml", "./m/../m/a.xml", str(tmp_path / "m" / "a.xml"), "m/*.xml") == ["m/a.xml", "m/b.xml"]
-    (tmp_path / "m" / "0.xml").symlink_to("a.xml")
-    (tmp_path / "m" / "dangling.xml").symlink_to("nowhere.xml")
-    (tmp_path / "m" / "self").symlink_to(".")
-    (tmp_path / "n").symlink_to("m")
-    found = found_models(["m", "n"])
-    assert [model.shown for model in found.models] == ["m/a.xml", "m/b.xml"]
-    assert ("m/0.xml", "it is the same file as m/a.xml") in found.left_out
-    assert all(why.startswith("it is the same file as m/") for _, why in found.left_out)
+    for name, target in (("m/0.xml", "a.xml"), ("m/dangling.xml", "nowhere.xml"), ("m/self", "."), ("n", "m")):
+        Path(name).symlink_to(target)
+    assert names("m", "n") == ["m/a.xml", "m/b.xml"] and "m/a.xml" in left_out("m", "n")["m/0.xml"]
 
 
-def test_parts_are_left_out_with_the_reason(here):
-    here("scene.xml", "<mujoco><include file='robot.xml'/><include file='settings.xml'/></mujoco>")
-    here("robot.xml")
-    here(["settings.xml", "lonely.xml"], "<mujocoinclude><option timestep='0.001'/></mujocoinclude>")
-    found = found_models(["."])
-    assert {model.shown: model.included_by for model in found.models} == {"robot.xml": "scene.xml", "scene.xml": ""}
-    assert found.left_out == [
-        ("lonely.xml", "it is a part, to be included by a model"),
-        ("settings.xml", "it is a part, included by scene.xml"),
-    ]
-    asked_for = found_models(["settings.xml", "scene.xml"])  # as a shell expands *.xml
-    assert {model.shown: model.included_by for model in asked_for.models}["settings.xml"] == "scene.xml"
-
-
-def test_a_part_that_is_named_is_a_model_also_where_its_folder_is_named_too(here):
-    here("m/part.xml", "<mujocoinclude/>")
-    for asked in (["m", "m/part.xml"], ["m/part.xml", "m"], ["./m/part.xml", "m/*", "m"]):
-        (model,) = found_models(asked).models
-        assert model.path.name == "part.xml" and found_models(asked).left_out == []
-
-
-def test_a_file_that_may_not_be_read_is_a_model_so_that_it_is_refused_and_not_passed_over(here, monkeypatch):
-    def refuses(*_, **__):
-        raise PermissionError(13, "Permission denied")
-
-    here("m/a.xml")
-    monkeypatch.setattr("compare.fleet.models.ElementTree.iterparse", refuses)
-    monkeypatch.setattr("compare.fleet.models.needed_by", lambda path: (path,))
-    assert names("m") == ["m/a.xml"]
-
-
-def test_of_files_that_include_each_other_none_is_a_part(here):
-    here("a.xml", "<mujoco><include file='b.xml'/></mujoco>")
-    here("b.xml", "<mujoco><include file='a.xml'/><include file='b.xml'/></mujoco>")
-    assert [model.included_by for model in found_models(["."]).models] == ["", ""]
-
-
-def test_broken_xml_is_a_model_if_it_seems_to_be_one_or_is_named(here):
-    here("m/broken.xml", "<mujoco><worldbody>")
-    here("m/other.xml", "<robot><link>")
-    here("m/encoding.xml", "<?xml version='1.0' encoding='nonsense'?><mujoco/>")
-    here("m/part.xml", "<mujocoinclude><body>")
-    here("m/mesh.xml", "\0<mujoco>")
-    assert names("m") == ["m/broken.xml", "m/encoding.xml"]
-    assert names("m/other.xml", "m/mesh.xml") == ["m/mesh.xml", "m/other.xml"]
-
-
-def test_a_folder_that_cannot_be_read_is_said(tmp_path):
-    left_out = []
-    assert list(files_in(tmp_path / "gone", left_out)) == []
-    assert left_out == [(str(tmp_path / "gone"), "it cannot be read: No such file or directory")]
+def test_parts_are_left_out_unless_they_are_named(here):
+    here("m/scene.xml", "<mujoco><include file='robot.xml'/><include file='settings.xml'/></mujoco>")
+    here("m/robot.xml")
+    here(["m/settings.xml", "m/lonely.xml"], "<mujocoinclude><option timestep='0.001'/></mujocoinclude>")
+    found = found_models(["m"])
+    assert {model.shown: model.included_by for model in found.models} == {
+        "m/robot.xml": "m/scene.xml",
+        "m/scene.xml": "",
+    }
+    assert [name for name, _ in found.left_out] == ["m/lonely.xml", "m/settings.xml"]
+    assert "m/scene.xml" in left_out("m")["m/settings.xml"]
+    for asked in (["m", "m/lonely.xml"], ["./m/lonely.xml", "m/*"]):
+        assert any(name.endswith("lonely.xml") for name in names(*asked))
+    here("m/scene.xml", "<mujoco><include file='robot.xml'/></mujoco>")
+    here("m/robot.xml", "<mujoco><include file='scene.xml'/><include file='robot.xml'/></mujoco>")
+    assert [model.included_by for model in found_models(["m/robot.xml", "m/scene.xml"]).models] == ["", ""]  # a circle
 
 
 def test_a_file_that_is_gone_or_has_changed_is_not_sent(here):
@@ -154,24 +111,120 @@ def test_a_file_that_is_gone_or_has_changed_is_not_sent(here):
     first, second = found_models(["."]).models
     assert first.hash != second.hash  # of the same content: a name belongs to it
     here("a.xml", MODEL + "<!-- -->")
-    with pytest.raises(OSError, match="has changed since the fleet began"):
-        bundle(first)
     os.unlink("b.xml")
-    assert second.hash
-    with pytest.raises(FileNotFoundError):
-        bundle(second)
+    for model, error in ((first, OSError), (second, FileNotFoundError)):
+        with pytest.raises(error):
+            bundle(model)
 
 
 def test_reports_of_two_files_are_never_in_one_folder(tmp_path):
     asked = ["a/b.xml", "/a/b.xml", "../a/b.xml", "../../a/b.xml", "a/../b.xml", "b.xml", "up/a/b.xml", "x" * 300 + ".xml",
-             "x" * 301 + ".xml", "a/b.xml/c.xml", "ü/b.xml", "a/b.XML"]  # fmt: skip
+             "x" * 301 + ".xml", "ü/b.xml", "a/B.xml/c.xml"]  # fmt: skip
     places = [place_of_report(shown) for shown in asked]
-    assert (
-        len({place.casefold() for place in places}) == len(asked) - 1
-    )  # a/b.xml and a/b.XML are one file or two, as places
-    assert places[0] == "files/a/b.xml" and places[5] == "files/b.xml"
+    assert len({place.casefold() for place in places}) == len(asked) and places[0] == "files/a/b.xml"
+    assert not any(other.startswith(f"{place}/") for place in places for other in places)
     for place in places:
         whole = (tmp_path / place).resolve()
         assert whole.is_relative_to(tmp_path / "files") and all(len(part.encode()) < 250 for part in whole.parts)
-    nested = [a for a in places for b in places if a != b and b.startswith(a + "/")]
-    assert nested == [places[0]]  # of which the system has one only
+
+
+# what a file needs beside itself: it is sent along, and its change changes the hash
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+def png(level):
+    """Four by four pixels."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    rows = zlib.compress((b"\0" + bytes([level, 9, 200, 30])) * 4)
+    header = struct.pack(">IIBBBBB", 4, 4, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
+
+
+def robot(assets, geoms, more=""):
+    return (f"<mujoco>{more}<asset>{assets}</asset><worldbody><body name='b'><joint name='j' axis='0 1 0'/>{geoms}</body>"
+            "</worldbody></mujoco>")  # fmt: skip
+
+
+@pytest.fixture
+def collection(here):
+    """A model with everything, below and above its folder."""
+    sides = ("right", "left", "up", "down", "front", "back")
+    files = {
+        "shared/meshes/above.obj": TETRAHEDRON.format(1), "robots/r/assets/inside.obj": TETRAHEDRON.format(2),
+        "robots/r/assets/ground.png": png(100), "robots/r/pictures/wood.png": png(20),
+        "robots/r/parts/defaults.xml": "<mujocoinclude><default><geom density='500'/></default>"
+                                       "<include file='deeper/settings.xml'/></mujocoinclude>",
+        "robots/r/deeper/settings.xml": "<mujocoinclude><option timestep='0.003'/></mujocoinclude>",
+        "robots/r/hand/hand.xml": robot("<mesh name='m' file='finger.obj'/>", "<geom type='mesh' mesh='m'/>",
+                                        "<compiler meshdir='shapes'/>"),
+        "robots/r/hand/shapes/finger.obj": TETRAHEDRON.format(4),
+    } | {f"robots/r/pictures/{side}.png": png(len(side)) for side in sides}  # fmt: skip
+    cube = " ".join(f"file{side}='{side}.png'" for side in sides)
+    assets = (
+        "<mesh name='a' file='../../../shared/meshes/above.obj'/><mesh name='i' file='inside.obj'/>"
+        "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/><texture name='t' type='2d' file='wood.png'/>"
+        f"<texture name='c' type='cube' {cube}/>"
+        "<model name='hand' file='hand/hand.xml'/>"
+    )
+    geoms = "<geom type='mesh' mesh='a'/><geom type='mesh' mesh='i'/><attach model='hand' body='b' prefix='h_'/>"
+    more = "<compiler meshdir='assets' texturedir='pictures'/><include file='parts/defaults.xml'/>"
+    for name, content in (files | {"robots/r/r.xml": robot(assets, geoms, more)}).items():
+        here(name, content)
+    here("robots/r/assets/unused.obj", TETRAHEDRON.format(9))
+    return files
+
+
+def test_everything_is_sent_and_compiles_to_the_same_elsewhere(collection, tmp_path):
+    (model,) = found_models(["robots/r/r.xml"]).models
+    needed = {os.path.basename(part) for part in model.parts}
+    assert {os.path.basename(name) for name in collection} <= needed and "unused.obj" not in needed
+    before = MjModel.from_xml_path("robots/r/r.xml")
+    files = bundle(model)
+    os.rename("robots", "gone")
+    os.rename("shared", "gone_too")
+    after = MjModel.from_xml_path(str(unpacked(files, tmp_path / "elsewhere")))
+    assert (after.opt.timestep, after.nmesh, after.nhfield) == (0.003, 3, 1)
+    for name in ("body_mass", "body_inertia", "mesh_vert", "hfield_data"):
+        assert np.array_equal(getattr(before, name), getattr(after, name)), name
+
+
+def test_a_change_of_a_part_changes_the_hash(collection, here):
+    def hash_now():
+        (model,) = found_models(["robots/r/r.xml"]).models
+        return model.hash, model.sha256
+
+    known = hash_now()
+    here(["robots/r/assets/unused.obj", "robots/other.xml"], "<mujoco/>")
+    assert hash_now() == known
+    for name in (*collection, "robots/r/r.xml"):
+        here(name, Path(name).read_bytes() + b"\n")
+        before, known = known, hash_now()
+        assert known[0] != before[0] and (known[1] != before[1]) == name.endswith("r/r.xml"), name
+
+
+def test_paths_that_are_absolute_stripped_missing_or_in_a_circle(here, tmp_path):
+    geom = "<geom type='mesh' mesh='s'/>"
+    here(["assets/s.obj", "far/s.obj"], TETRAHEDRON.format(1))
+    strip = "<compiler assetdir='assets' strippath='true'/>"
+    here("stripped.xml", robot("<mesh name='s' file='C:\\far\\away/s.obj'/>", geom, strip))
+    (model,) = found_models(["stripped.xml"]).models
+    assert MjModel.from_xml_path(str(unpacked(bundle(model), tmp_path / "elsewhere"))).nmesh == 1
+    here("absolute.xml", robot(f"<mesh name='s' file='{tmp_path}/far/s.obj'/>", geom))
+    before = found_models(["absolute.xml"]).models[0].hash
+    here("far/s.obj", TETRAHEDRON.format(2))
+    assert found_models(["absolute.xml"]).models[0].hash != before
+    here(
+        "missing.xml",
+        robot(f"<mesh name='s' file='{'x' * 5000}'/><mesh file='none.obj'/><mesh file='/dev/zero'/>", geom),
+    )
+    (model,) = found_models(["missing.xml"]).models
+    assert list(model.parts) == [Path("missing.xml")]
+    with pytest.raises(ModelError):
+        read(unpacked(bundle(model), tmp_path / "nowhere"))
+    here("a.xml", "<mujoco><compiler meshdir='far'/><include file='b.xml'/><include file='a.xml'/></mujoco>")
+    here("b.xml", "<mujoco><include file='a.xml'/><mesh file='s.obj'/></mujoco>")
+    assert sorted(map(str, found_models(["a.xml"]).models[0].parts)) == ["a.xml", "b.xml", "far/s.obj"]

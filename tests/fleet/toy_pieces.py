@@ -1,4 +1,4 @@
-"""Pieces that do what a piece can do, in a module that a process on any worker can import."""
+"""Pieces that do what a piece can do, in a module that any process can import; for test_pool.py and test_cluster.py."""
 
 import os
 import signal
@@ -24,14 +24,14 @@ def raises(text):
 
 
 def noted(folder, what=""):
-    """A mark that it began, in a folder; how many there are."""
+    """A mark in a folder that a piece began; how many there are."""
     place = Path(folder)
     (place / f"{time.time_ns()}-{os.getpid()}").write_text(what)
     return len(list(place.iterdir()))
 
 
-def killed(number, folder, times=1000):
-    """Ends by a signal, so many times."""
+def killed(number, times, folder):
+    """Ends by a signal, the first times."""
     if noted(folder) <= times:
         os.kill(os.getpid(), number)
         time.sleep(60)
@@ -49,7 +49,7 @@ def leaves():
 
 def for_ever(folder):
     """Starts a process that would live long, says which they are, and never returns."""
-    started = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+    started = subprocess.Popen(["sleep", "600"])
     noted(folder, f"{os.getpid()} {started.pid}")
     time.sleep(600)
 
@@ -61,7 +61,7 @@ def eats(size):
 def prints():
     print("this is no answer")
     os.write(1, b"nor this\n")
-    subprocess.run([sys.executable, "-c", "print('nor this')"], check=True)
+    subprocess.run(["echo", "nor this"], check=True)
     return sys.stdin.read()
 
 
@@ -87,14 +87,9 @@ def takes_worker_down(folder):
     time.sleep(60)
 
 
-def waits(folder, opened):
+def waits(folder, opened, shared=b""):
     """Waits until a file is there; who waits is noted."""
     noted(folder, f"{os.getpid()} {os.getppid()}")
     while not Path(opened).exists():
         time.sleep(0.02)
-    return "opened"
-
-
-def waits_with(folder, opened, shared):
-    waits(folder, opened)
     return len(shared)

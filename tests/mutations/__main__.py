@@ -1,7 +1,6 @@
 """python -m tests.mutations: make the judge wrong in a hundred ways, and list those that no test notices.
 
-Each edit is made in a copy of the project; the tests of the judge run first, and all others only if they pass. The copies are in
-processes on this machine or, with --dask, on the workers of a cluster, to which the project is sent.
+Each edit is made in a copy of the project; the tests of the judge run first, and all others only if they pass.
 """
 
 import argparse
@@ -12,20 +11,15 @@ from contextlib import closing
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from compare.fleet.cluster import Cluster
-from compare.fleet.piece import FleetError
-from compare.fleet.pool import Pool
-
-from .campaign import CannotStart, longest, tried_edits
+from .campaign import CannotStart, tried_edits
 from .edit import DoesNotApply, applied
 from .edits import EDITS
 from .stages import stages
 
 PROJECT = Path(__file__).resolve().parents[2]
 STATUS = """exit status: 0 no edit survives but those declared harmless; 1 some do; 2 an edit does not apply to the sources, or
-could not be tried, or the tests do not pass without any"""
+the tests do not pass without any"""
 
 
 def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
@@ -35,14 +29,8 @@ def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
     parser.add_argument("--list", action="store_true", help="list the edits, run nothing")
     parser.add_argument("--judge-only", action="store_true", help="only the fast tests of the judge")
     some = min(2, os.cpu_count() or 1)
-    parser.add_argument("--jobs", type=int, metavar="N", help=f"runs side by side on this machine ({some})")
-    parser.add_argument(
-        "--dask", metavar="ADDRESS", help="the scheduler of a Dask cluster, whose workers run the tests"
-    )
+    parser.add_argument("--jobs", type=int, default=some, metavar="N", help="runs side by side (%(default)s)")
     options = parser.parse_args(arguments)
-    if options.dask and options.jobs is not None:
-        parser.error("--jobs is for runs on this machine; a cluster has its own workers (--dask)")
-    jobs = some if options.jobs is None else options.jobs
     console = Console(soft_wrap=True, highlight=False, markup=False, emoji=False)
     chosen = [edit for edit in edits if not options.words or any(word in edit.name for word in options.words)]
     places, lost = {}, []
@@ -53,7 +41,7 @@ def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
             lost.append(str(error))
     for text in lost:
         console.print(f"does not apply: {text}")
-    if lost or not chosen or jobs < 1:
+    if lost or not chosen or options.jobs < 1:
         console.print(f"{len(lost)} of {len(chosen)} edits do not apply" if lost else "nothing to do")
         return 2
     if options.list:
@@ -64,11 +52,10 @@ def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
     before = [signal.signal(number, signal.default_int_handler) for number in signals]
     try:
         chosen = stages(project)[: 1 if options.judge_only else None]
-        door = Cluster(options.dask, longest(chosen)) if options.dask else Pool(jobs, longest(chosen))
-        with closing(door):
-            return campaign(console, project, places, chosen, door)
-    except FleetError as error:
-        console.print(str(error))
+        with closing(tried_edits(project, chosen, places, options.jobs)) as tried:
+            return campaign(console, tried)
+    except CannotStart as error:
+        console.print(f"the tests do not pass without an edit: {error}")
         return 2
     except KeyboardInterrupt:
         console.print("interrupted")
@@ -78,37 +65,21 @@ def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
             signal.signal(number, handler)
 
 
-def campaign(console, project, places, stages, door) -> int:
-    """Try the edits, a line for each, then the survivors; the exit status."""
-    columns = BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
-    survivors, lost = [], 0
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
-        task = progress.add_task("the unedited copy", total=len(places))
-        try:
-            for tried in tried_edits(door, project, stages, places):
-                progress.update(task, advance=1, description="")
-                console.print(line(tried))
-                survivors += [] if tried.caught or tried.lost else [tried]
-                lost += bool(tried.lost)
-        except CannotStart as error:
-            console.print(f"the tests do not pass without an edit: {error}")
-            return 2
-    harmful = [tried for tried in survivors if not tried.edit.harmless]
-    for tried in sorted(survivors, key=lambda tried: bool(tried.edit.harmless)):
-        harmless = f" (harmless: {tried.edit.harmless})" if tried.edit.harmless else ""
-        console.print(f"\nsurvived: {tried.edit.name}{harmless}\n{tried.diff}")
-    declared = len(survivors) - len(harmful)
-    caught = len(places) - len(survivors) - lost
-    console.print(f"\n{len(places)} edits: {caught} caught, {declared} declared harmless, {len(harmful)} survived"
-                  + f", {lost} could not be tried" * bool(lost))  # fmt: skip
-    return 1 if harmful else 2 if lost else 0
-
-
-def line(tried) -> str:
-    """One line for an edit."""
-    outcome = f"caught by {tried.caught}" if tried.caught else "SURVIVED" if not tried.edit.harmless else "harmless"
-    outcome = f"could not be tried: {tried.lost}" if tried.lost else outcome
-    return f"{tried.seconds:5.1f} s  {tried.edit.name}: {outcome}"
+def campaign(console, tried) -> int:
+    """A line for each edit that was tried, then the survivors; the exit status."""
+    survivors, count = [], 0
+    for one in tried:
+        count += 1
+        survivors += [] if one.caught else [one]
+        outcome = f"caught by {one.caught}" if one.caught else "harmless" if one.edit.harmless else "SURVIVED"
+        console.print(f"{one.seconds:5.1f} s  {one.edit.name}: {outcome}")
+    for one in sorted(survivors, key=lambda one: bool(one.edit.harmless)):
+        harmless = f" (harmless: {one.edit.harmless})" if one.edit.harmless else ""
+        console.print(f"\nsurvived: {one.edit.name}{harmless}\n{one.diff}")
+    harmful = sum(not one.edit.harmless for one in survivors)
+    console.print(f"\n{count} edits: {count - len(survivors)} caught, {len(survivors) - harmful} declared harmless, "
+                  f"{harmful} survived")  # fmt: skip
+    return 1 if harmful else 0
 
 
 if __name__ == "__main__":

@@ -1,29 +1,26 @@
-"""The edits as pieces of work, for processes of this machine or for a cluster: each the tests on a copy of the project."""
+"""The edits, one after another in copies of the project, each with the tests that may notice it."""
 
 import difflib
 import os
-import pickle
 import shutil
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
+from importlib.util import cache_from_source
 from pathlib import Path
+from queue import SimpleQueue
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from compare.fleet.piece import Door, Piece, outcomes
-from compare.fleet.sent import sent_call
+from tmt.compiled.store import cache_folder
 
-from . import trial
 from .edit import Edit, Place
+from .trial import Runs, Stage
 
 ASIDE = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "venv", "build", "latest")  # not part of a copy
 PATIENCE = 60.0, 3.0  # seconds and times the time of the unedited copy: then a run counts as endless
-UNEDITED = 20  # times these seconds may the unedited copy take in a stage
-
-
-class Stage(NamedTuple):
-    """Tests that run together."""
-
-    files: list[str]
-    options: tuple = ()
+UNEDITED = 1200.0  # s that the unedited copy may take in a stage
 
 
 class Tried(NamedTuple):
@@ -33,64 +30,71 @@ class Tried(NamedTuple):
     caught: str  # by which test, or how; empty: it survived
     seconds: float
     diff: str
-    lost: str = ""  # why it could not be tried
 
 
 class CannotStart(Exception):
     """The unedited copy does not pass."""
 
 
-def longest(stages: list[Stage]) -> float:
-    """Seconds that the longest piece may take: it ends its runs itself, before that."""
-    return PATIENCE[0] + len(stages) * patience(PATIENCE[0] * UNEDITED)
-
-
-def patience(seconds: float) -> float:
-    """Seconds after which a run counts as endless, where the unedited copy took so many."""
-    return PATIENCE[0] + PATIENCE[1] * seconds
-
-
-def tried_edits(door: Door, project: Path, stages: list[Stage], places: dict[Edit, Place]) -> Iterator[Tried]:
+def tried_edits(project: Path, stages: list[Stage], places: dict[Edit, Place], jobs: int) -> Iterator[Tried]:
     """Each edit with its outcome, as they end; an edit that survives one stage meets the next.
 
-    CannotStart: the unedited copy does not pass, which comes first. FleetError: the cluster is gone.
+    CannotStart: the unedited copy does not pass, which comes first.
     """
-    copy = trial.packed(files_of(project))
-    allowed = [PATIENCE[0] * UNEDITED] * len(stages)
-    (outcome,) = outcomes(door, [piece("the unedited copy", "unedited", stages, allowed, (), (copy, b""))])
-    if outcome.broke:
-        raise CannotStart(outcome.broke)
-    seconds, failed, compiled = outcome.returned
-    if failed:
-        raise CannotStart(failed)
-    allowed, edits = [patience(one) for one in seconds], list(places.items())
-    for k, (edit, place) in enumerate(edits):
-        name = place.path.relative_to(project).as_posix()
-        ordered = [stage._replace(files=nearest(project, stage, edit)) for stage in stages]
-        door.submit(piece(str(k), "edited", ordered, allowed, (name, place.after), (copy, compiled)))
-    while door.under_way:
-        if done := door.next():
-            edit, place = edits[int(done[0].name)]
-            caught, seconds = ("", done[1].wall) if done[1].broke else done[1].returned
-            yield Tried(edit, caught, seconds, difference(place.path.relative_to(project), place), done[1].broke)
+    runs, copies = Runs(), SimpleQueue()
+    with TemporaryDirectory(prefix="edits-") as place:
+        first, cache = Path(place, "0", "project"), Path(place, "cache")
+        shutil.copytree(project, first, ignore=ASIDE)
+        cache.mkdir(mode=0o700)
+        with suppress(OSError):  # without what is compiled the first run takes a minute longer
+            shutil.copytree(cache_folder(), cache, dirs_exist_ok=True)
+        pool = ThreadPoolExecutor(jobs)
+        try:
+            limits = []
+            for stage in stages:
+                started = time.perf_counter()
+                failed, output = pool.submit(runs.failed, first, cache, stage, UNEDITED).result()
+                if failed:
+                    raise CannotStart(f"{failed}\n{output}")
+                limits.append(PATIENCE[0] + PATIENCE[1] * (time.perf_counter() - started))
+            for k in range(jobs):
+                copies.put(shutil.copytree(first, Path(place, str(k + 1), "project"), ignore=ASIDE))
+
+            def tried(edit, changed):
+                name, started, copy = changed.path.relative_to(project), time.perf_counter(), copies.get()
+                ordered = [stage._replace(files=nearest(project, stage, edit)) for stage in stages]
+                caught = caught_by(runs, copy, cache, name, changed.after, list(zip(ordered, limits)))
+                copies.put(copy)
+                return Tried(edit, caught, time.perf_counter() - started, difference(name, changed))
+
+            for done in as_completed([pool.submit(tried, *item) for item in places.items()]):
+                yield done.result()
+        finally:
+            runs.end()
+            pool.shutdown(cancel_futures=True)
 
 
-def piece(name: str, function: str, stages: list[Stage], allowed: list[float], more: tuple, bundle: tuple) -> Piece:
-    """One call of a function of trial, whose text and copy of the project it brings with it."""
-    code = Path(trial.__file__).read_text(encoding="utf-8")
-    arguments = code, function, trial.versions(), [tuple(stage) for stage in stages], allowed, *more
-    return Piece(name, sent_call, arguments, group="edits", shared=pickle.dumps(bundle))
+def caught_by(runs, copy, cache, name, text, stages) -> str:
+    """What notices a changed text of a file of a copy. stages: with the time that each may take."""
+    file, own_cache = copy / name, copy.parent / "cache"
+    before = file.read_text(encoding="utf-8")
+    shutil.copytree(
+        cache, own_cache, copy_function=os.link
+    )  # machine code of an edited source must not reach the next edit
+    try:
+        write(file, text)
+        return next(
+            (caught for stage, limit in stages if (caught := runs.failed(copy, own_cache, stage, limit)[0])), ""
+        )
+    finally:
+        write(file, before)
+        shutil.rmtree(own_cache, ignore_errors=True)
 
 
-def files_of(project: Path) -> dict[str, Path]:
-    """What a copy has: the files by their names in it."""
-    found = {}
-    for folder, folders, names in os.walk(project):
-        aside = ASIDE(folder, [*folders, *names])
-        folders[:] = [name for name in folders if name not in aside]
-        paths = [Path(folder, name) for name in names if name not in aside]
-        found |= {f"project/{path.relative_to(project).as_posix()}": path for path in paths}
-    return found
+def write(file, text) -> None:
+    """Write a source, and forget its byte code: of the same size within a second it would pass for the new one."""
+    file.write_text(text, encoding="utf-8")
+    Path(cache_from_source(file)).unlink(missing_ok=True)
 
 
 def nearest(project: Path, stage: Stage, edit: Edit) -> list[str]:
@@ -104,7 +108,7 @@ def nearest(project: Path, stage: Stage, edit: Edit) -> list[str]:
     return sorted(stage.files, key=named, reverse=True)
 
 
-def difference(name, place) -> str:
+def difference(name: Path, place: Place) -> str:
     """An edit as a diff."""
     texts = (text.splitlines() for text in (place.before, place.after))
     return "\n".join(difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm=""))

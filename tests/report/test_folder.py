@@ -28,25 +28,17 @@ def test_a_new_report_replaces_the_old_one_and_keeps_other_files(tmp_path):
     assert sorted(p.name for p in out.iterdir()) == ["my notes.txt", "results.json", "tables"]
 
 
-@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_an_interrupted_report_leaves_the_old_one_whole(tmp_path, error):
-    with new_report(tmp_path) as work:
-        fill(work, "old")
-    with pytest.raises(error), new_report(tmp_path) as work:
-        fill(work, "half")
-        raise error
-    assert files(tmp_path) == {"tables/mass.csv": "old", "results.json": "old"}
-
-
-def test_an_interrupted_first_report_leaves_no_folder(tmp_path):
-    with pytest.raises(RuntimeError), new_report(tmp_path / "new"):
-        raise RuntimeError
-    assert list(tmp_path.iterdir()) == []
+def test_an_interrupted_report_leaves_the_old_one_whole_and_a_first_one_nothing(tmp_path):
+    old_report(tmp_path / "report")
+    for name in ("report", "new"):
+        with pytest.raises(KeyboardInterrupt), new_report(tmp_path / name) as work:
+            fill(work, "half")
+            raise KeyboardInterrupt
+    assert files(tmp_path / "report") == OLD and [path.name for path in tmp_path.iterdir()] == ["report"]
 
 
 def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
-    with new_report(tmp_path) as work:
-        fill(work, "old")
+    old_report(tmp_path)
     rename = type(tmp_path).rename
 
     def stubborn(source, target):
@@ -54,12 +46,11 @@ def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
             raise PermissionError(13, "Permission denied")
         return rename(source, target)
 
-    with pytest.raises(FolderError, match="the old one is unchanged"), new_report(tmp_path) as work:
+    with pytest.raises(FolderError), new_report(tmp_path) as work:
         fill(work, "new")
         monkeypatch.setattr(type(tmp_path), "rename", stubborn)
     monkeypatch.undo()
-    assert files(tmp_path) == {"tables/mass.csv": "old", "results.json": "old"}
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["results.json", "tables"]
+    assert files(tmp_path) == OLD and sorted(p.name for p in tmp_path.iterdir()) == ["results.json", "tables"]
 
 
 # a run that is killed, or asked to end, at each moment of the exchange
@@ -118,15 +109,13 @@ def test_after_kill_9_in_the_exchange_the_next_run_finds_the_old_report_whole(tm
     assert at == 5 + len(before)  # three moved in, two names of a folder changed, and what was moved away
 
 
-def test_an_exchange_that_has_begun_is_finished_and_the_run_ends_well(tmp_path):
-    numbers = [signal.SIGTERM] * 7 + [signal.SIGINT, signal.SIGHUP]
-    for at, number in enumerate(numbers):
-        out = tmp_path / str(at)
-        old_report(out)
-        asked = run(out, number, at % 7)
-        assert (asked.returncode, asked.stdout, asked.stderr) == (0, "7\n", "")
-        assert files(out) == NEW
-        assert sorted(p.name for p in out.iterdir()) == ["report.md", "results.json", "tables"]
+@pytest.mark.parametrize("number, at", [(signal.SIGTERM, 0), (signal.SIGINT, 3), (signal.SIGHUP, 6)])
+def test_an_exchange_that_has_begun_is_finished_and_the_run_ends_well(tmp_path, number, at):
+    old_report(tmp_path)
+    asked = run(tmp_path, number, at)
+    assert (asked.returncode, asked.stdout, asked.stderr) == (0, "7\n", "")
+    assert files(tmp_path) == NEW
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["report.md", "results.json", "tables"]
 
 
 def test_two_runs_at_once_both_end_well(tmp_path):
@@ -156,15 +145,11 @@ def test_only_what_a_run_has_left_is_cleared(tmp_path):
 @pytest.mark.parametrize("report", [False, True])
 def test_files_of_somebody_elses_are_not_replaced(tmp_path, report):
     if report:
-        with new_report(tmp_path) as work:
-            fill(work, "old")
+        old_report(tmp_path)
     (tmp_path / "tables").mkdir(exist_ok=True)
     (tmp_path / "tables" / "precious.csv").write_text("1")
     before = files(tmp_path)
-    with (
-        pytest.raises(FolderError, match=r"has tables/precious\.csv, which is not of an earlier report"),
-        new_report(tmp_path),
-    ):
+    with pytest.raises(FolderError, match=r"tables/precious\.csv"), new_report(tmp_path):
         pass
     assert files(tmp_path) == before
 
@@ -172,25 +157,21 @@ def test_files_of_somebody_elses_are_not_replaced(tmp_path, report):
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"provenance": {"files": null}}'])
 def test_some_other_results_json_is_not_replaced(tmp_path, text):
     (tmp_path / "results.json").write_text(text)
-    with pytest.raises(FolderError, match=r"has results\.json, which is not"), new_report(tmp_path):
+    with pytest.raises(FolderError, match=r"results\.json"), new_report(tmp_path):
         pass
     assert (tmp_path / "results.json").read_text() == text
 
 
-def test_what_stands_in_a_folders_place_is_said(tmp_path):
+@pytest.mark.parametrize("name, word", [
+    ("file", "it is a file"), ("file/below", "is a file"), ("link", "nowhere"), ("link/below", "nowhere"),
+    ("long" * 100, "too long"),
+])  # fmt: skip
+def test_what_stands_in_a_folders_place_is_named_and_stays(tmp_path, name, word):
     (tmp_path / "file").write_text("")
     (tmp_path / "link").symlink_to("nowhere")
-    expected = "; a folder that can be written is expected"
-    for path, says in (
-        (tmp_path / "file", "it is a file"),
-        (tmp_path / "file" / "below", f"{tmp_path / 'file'} is a file"),
-        (tmp_path / "link", "it is a symbolic link to nowhere, which does not exist"),
-        (tmp_path / "link" / "below", f"{tmp_path / 'link'} is a symbolic link to nowhere, which does not exist"),
-        (tmp_path / ("long" * 100), "File name too long"),
-    ):
-        with pytest.raises(FolderError) as error, new_report(path):
-            pass
-        assert str(error.value) == f"cannot write to {path}: {says}{expected}"
+    with pytest.raises(FolderError) as error, new_report(tmp_path / name):
+        pass
+    assert str(tmp_path / name) in str(error.value) and word in str(error.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "link"]
 
 
@@ -205,17 +186,14 @@ def little_space():
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path):
-    with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
-        save(work / "results.json", "x" * 5000)
-    expected = f"cannot write {tmp_path / 'out' / 'results.json'}: File too large; a report that was there is unchanged"
-    assert str(error.value) == expected
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_full_disk_while_a_figure_is_drawn_is_no_failed_check(tmp_path, monkeypatch):
+def test_a_full_disk_is_said_with_the_name_of_the_file_also_while_a_figure_is_drawn(tmp_path, monkeypatch):
     module = SimpleNamespace(figures=lambda result, robot: iter([lambda: ("plot", Figure(), "")]))
     monkeypatch.setitem(sys.modules, "compare.experiments.plain", module)
-    with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
-        draw("plain", None, None, work)
-    assert f"cannot write {tmp_path / 'out' / 'plot.png'}: File too large" in str(error.value)
+    for name, write in (
+        ("results.json", lambda work: save(work / "results.json", "x" * 5000)),
+        ("plot.png", lambda work: draw("plain", None, None, work)),
+    ):
+        with little_space(), pytest.raises(FolderError) as error, new_report(tmp_path / "out") as work:
+            write(work)
+        assert f"{tmp_path / 'out' / name}: File too large" in str(error.value)
+        assert list(tmp_path.iterdir()) == []

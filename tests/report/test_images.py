@@ -1,15 +1,16 @@
-"""Figures on disk and in the page: small, and as they were drawn."""
+"""Figures on disk and in the page: small, and as they were drawn; where names stand in them."""
 
 import base64
 import io
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from PIL import Image
 
-from compare.report import images
-from compare.report.style import BLUE, RED
+from compare.report import images, style
 
 
 @pytest.fixture
@@ -18,7 +19,7 @@ def chart():
     axes = figure.subplots()
     axes.set_facecolor("#f9f9f9")  # nearly as white as the paper
     for k in range(9):
-        axes.plot(np.sin(np.linspace(0, 9, 400) + k), color=(BLUE, RED)[k % 2], linewidth=3)
+        axes.plot(np.sin(np.linspace(0, 9, 400) + k), color=(style.BLUE, style.RED)[k % 2], linewidth=3)
     return figure
 
 
@@ -39,27 +40,34 @@ def test_a_figure_is_small_and_its_colours_are_not_visibly_changed(chart, tmp_pa
     assert sizes == sorted(sizes)
 
 
-def test_the_page_has_the_smaller_file_whole(chart, tmp_path):
+def test_the_page_has_the_smaller_file_without_loss(chart, tmp_path):
     images.save_figure(chart, tmp_path / "a.png")
     address, width, height = images.embedded(tmp_path / "a.png")
     kind, data = address.split(",", 1)
     assert kind == "data:image/webp;base64" and base64.b64decode(data) == (tmp_path / "a.webp").read_bytes()
-    assert pixels(io.BytesIO(base64.b64decode(data))).shape == (height, width, 3)
-    assert (pixels(io.BytesIO(base64.b64decode(data))) == pixels(tmp_path / "a.png")).all()  # without loss
+    found = pixels(io.BytesIO(base64.b64decode(data)))
+    assert found.shape == (height, width, 3) and (found == pixels(tmp_path / "a.png")).all()
     (tmp_path / "a.webp").write_bytes((tmp_path / "a.webp").read_bytes() + bytes(100_000))
     assert images.embedded(tmp_path / "a.png")[0].startswith("data:image/png;base64,")
     images.clear_webp(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
-    assert images.embedded(tmp_path / "a.png")[0].startswith("data:image/png;base64,")
-    with pytest.raises(OSError):
-        images.embedded(tmp_path / "b.png")
 
 
-def test_a_map_of_many_colours_keeps_them(tmp_path):
-    figure = Figure(figsize=(4, 3), dpi=100)
-    figure.subplots().pcolormesh(np.add.outer(np.arange(60.0), np.arange(60.0)), cmap="viridis")
-    figure.savefig(tmp_path / "whole.png")
-    images.save_figure(figure, tmp_path / "few.png")
-    whole, few = pixels(tmp_path / "whole.png"), pixels(tmp_path / "few.png")
-    drawn = (whole != 255).any(axis=2)
-    assert np.abs(whole - few).max(axis=2)[drawn].mean() < 1
+@given(st.lists(st.floats(-2.0, 12.0), max_size=11))
+def test_spread_labels_keep_their_order_their_distance_and_their_ends(values):
+    places = style.spread(values, 1.0, 0.0, 10.0)
+    assert (np.diff(np.sort(places)) > 1.0 - 1e-9).all() and ((places > -1e-9) & (places < 10.0 + 1e-9)).all()
+    assert np.array_equal(np.argsort(places, kind="stable"), np.argsort(values, kind="stable"))
+
+
+def test_a_name_stands_beside_its_point_and_on_no_line():
+    ax = Figure(figsize=(style.WIDTH, 3.0)).subplots()
+    wall = ax.plot(np.linspace(0.5, 0.6, 400), np.tile([0.3, 0.9], 200))  # right of the second point
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    style.name_ends(ax, [(0.2, 0.2, "free", "black"), (0.48, 0.6, "hindered", "black")])
+    boxes = {text.get_text(): text.get_window_extent() for text in ax.texts}
+    x, y = ax.transData.transform((0.2, 0.2))
+    assert 0.0 < boxes["free"].x0 - x < 15.0 and boxes["free"].y0 < y < boxes["free"].y1
+    assert not style.points_in(
+        np.array([boxes["hindered"].extents]), ax.transData.transform(wall[0].get_xydata())
+    ).any()

@@ -5,8 +5,6 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +14,6 @@ from compare.experiments.trajectory.motion_frames import Drawn
 from compare.judge.check import About
 from compare.report import motion
 from compare.robots.arm import ARM
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def drawn(scene="held", pictures=129, points=3, apart=0.0, rng=None, ended=None) -> Drawn:
@@ -53,12 +49,6 @@ def pictures_of(scene) -> list:
     return found
 
 
-def test_there_is_no_figure_where_nothing_moves():
-    assert motion.motion_in_html([], ARM) == motion.motion_in_html([section("mass")], ARM) == page_of() == ""
-    broken = section("trajectory")  # one that broke off has no curves
-    assert motion.motion_in_html([broken], ARM) == ""
-
-
 def test_it_opens_on_the_scene_that_differs():
     of = section(
         "trajectory", ("open loop", 2.0, 1.0, "at most", True), ("drift", 2.0, 1.0, "at most", False, About.PREDICTION)
@@ -76,17 +66,7 @@ def test_the_figure_is_whole_and_fetches_nothing():
     assert text.startswith('<figure id="motion">') and text.rstrip().endswith("</figure>")
     assert not re.search(r"https?:|src=|href=|@import|fetch\(|import\(|url\((?!#motion-ring\))", text)
     assert text.count("<option>") == 2 and text.index("<option>held") < text.index("<option>let go")
-    for needed in (
-        'type="range"',
-        'type="button"',
-        "<select",
-        "prefers-color-scheme: dark",
-        "prefers-reduced-motion",
-        "print",
-    ):
-        assert needed in text, needed
-    assert "What is seen." in text and "Held, RK4, dt = 5/128 s." in text
-    assert "$" not in re.sub(r"<script>.*</script>", "", text, flags=re.DOTALL)
+    assert all(needed in text for needed in ('type="range"', 'type="button"', "<select", "prefers-reduced-motion"))
 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-9, 0.3])
@@ -118,19 +98,14 @@ def test_what_does_not_move_takes_no_place():
     assert scene["paths"][0][1:] == [0] * 128 and scene["paths"][1] == [1] + [0] * 128
 
 
-def test_a_picture_is_there_without_script_and_in_print():
+def test_a_picture_is_there_without_script_and_a_frame_where_the_robot_is_fixed():
     text = page_of(drawn(apart=0.3))
-    found = pictures_of(data_of(text)["scenes"][0])
-    for name, pictures in zip(("ours", "theirs"), found):
+    scene = data_of(text)["scenes"][0]
+    for name, pictures in zip(("ours", "theirs"), pictures_of(scene)):
         x, y, *_ = pictures[-1]
         assert f'<path class="{name}" d="M{x} {y}L' in text
-    assert '<div class="controls" hidden>' in text
-
-
-def test_where_a_robot_is_fixed_there_is_a_frame():
-    scene = data_of(page_of(drawn()))["scenes"][0]
     x, y = pictures_of(scene)[0][0][:2]
-    assert scene["base"] == f"M{x} {y}m-18-18h36v36h-36z" and scene["base"] in page_of(drawn())
+    assert '<div class="controls" hidden>' in text and scene["base"].startswith(f"M{x} {y}m") and scene["base"] in text
     assert data_of(page_of(drawn()._replace(fixed=False)))["scenes"][0]["base"] == ""
 
 
@@ -138,49 +113,24 @@ def test_names_cannot_break_the_page():
     text = page_of(drawn("</script><b>&amp;\u2028"), label="yours")
     assert "<b>" not in text and text.count("</script>") == 2 and "&lt;/script&gt;&lt;b&gt;" in text
     assert data_of(text)["scenes"][0]["name"] == "</script><b>&amp;\u2028"
-    assert data_of(text)["engines"] == ["Yours", "MuJoCo"] and "</svg> Yours" in text
+    assert data_of(text)["engines"] == ["Yours", "MuJoCo"]
 
 
-def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes_and_both_are_said(rng):
-    small = page_of(*(drawn(f"scene {k}", rng=rng) for k in range(6)))
-    assert "pictures of each scene" not in small and "Not in this page" not in small
-    larger = page_of(*(drawn(f"scene {k}", points=40, rng=rng) for k in range(6)))
-    assert "One of 2 pictures of each scene is in this page." in larger and "Not in this page" not in larger
-    largest = page_of(*(drawn(f"scene {k}", points=400, rng=rng) for k in range(6)))
-    assert "One of 8 pictures of each scene is in this page. Not in this page: scene " in largest
-    assert len(data_of(largest)["scenes"]) < 6
-    beyond = page_of(drawn(points=3000, rng=rng))
-    assert re.search(r"One of \d\d+ pictures of each scene", beyond)
-    for text in (small, larger, largest, beyond):
-        assert len(text.encode()) <= 300_000
-    scene = data_of(larger)["scenes"][0]
-    assert len(scene["paths"][0]) == len(scene["apart"]) == 65 and scene["dt"] == 5.0 / 64
+@pytest.mark.parametrize("points, pictures, scenes", [
+    (3, 129, 6), (40, 65, 6), (400, 17, None), pytest.param(3000, None, 1, marks=pytest.mark.slow),
+])  # fmt: skip
+def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng, points, pictures, scenes):
+    count = 1 if points == 3000 else 6
+    text = page_of(*(drawn(f"scene {k}", points=points, rng=rng) for k in range(count)))
+    found = data_of(text)["scenes"]
+    assert len(text.encode()) <= 300_000 and 1 <= len(found) <= count and scenes in (None, len(found))
+    left = len(found[0]["paths"][0])
+    assert left == len(found[0]["apart"]) and pictures in (None, left)
+    assert found[0]["dt"] == pytest.approx(5.0 / (left - 1), rel=0.2)
+    assert all((f"scene {k}" in text) for k in range(count))  # also those that are not shown
 
 
-@pytest.mark.parametrize(
-    "seconds, words, pause", [(5.0, "", 39), (1.0, "It is shown 5 times slower.", 39), (10.0, "", 78)]
-)
-def test_a_short_scene_is_shown_slower_and_says_so(seconds, words, pause):
-    scene = data_of(page_of(drawn()._replace(t=np.linspace(0.0, seconds, 129))))["scenes"][0]
-    assert scene["seen"].endswith(words or "What is seen.") and scene["pause"] == pause
-
-
-def test_the_script_is_short_and_packed():
-    assert len((ROOT / "compare" / "report" / "motion.js").read_text(encoding="utf-8").splitlines()) <= 80
-    assert '"compare.report" = ["*.html", "*.js"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-
-
-def test_any_robot_is_named():
-    assert "The robot is seen" in motion.motion_in_html(
-        [
-            SimpleNamespace(
-                name="trajectory", result=SimpleNamespace(curves={"drawn": [drawn()]}, checks=[], label="TMT")
-            )
-        ],
-        SimpleNamespace(noun="robot"),
-    )
-
-
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium to run the script")
 def test_the_script_draws_each_engine_where_it_is(tmp_path):
     one = drawn(apart=0.3)
@@ -199,5 +149,5 @@ def test_the_script_draws_each_engine_where_it_is(tmp_path):
     run = subprocess.run(["chromium", *asked], capture_output=True, text=True, timeout=120)
     for name, pictures in zip(("ours", "theirs"), found):
         assert f'class="{name}" d="{motion.outline(pictures[-1], [(0, 1), (1, 2)])}"' in run.stdout, name
-    assert "t = 5.00 s: apart in any joint by at most 0.3 rad" in run.stdout
+    assert "5.00 s" in run.stdout and "0.3 rad" in run.stdout
     assert '<div class="controls">' in run.stdout

@@ -1,10 +1,9 @@
-"""What the first screen draws and says of results: just inside and just outside of each tolerance, and when it is drawn."""
+"""What the first screen draws and says of results: which is whose, what is judged, what is marked, and when it is drawn."""
 
-from functools import partial
 from types import SimpleNamespace
 
 import pytest
-from made_overviews import RUN, drawn, limits, timed
+from matplotlib.colors import to_hex
 
 from compare.experiments import EXPERIMENTS
 from compare.judge.check import Result
@@ -12,58 +11,108 @@ from compare.report import engines_apart, figures_overview, methods_compared, ov
 from compare.report.engines_apart import Agreement, SceneRun
 from compare.report.methods_compared import Cheapest, Curve, Limit
 from compare.report.one_number import one_number
+from compare.report.style import BLUE, GREY, ORANGE, RED
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
 
+OF_BIAS = {"quantity": "Mbar", "difference_eps": 2.0, "tmt_from_exact_eps": 1.0, "mujoco_from_exact_eps": 4.0,
+           "passed": True}  # fmt: skip
+RUN = {"scene": "a", "level": "open loop", "difference_over_band": 0.2, "judged_until_s": 3.0, "diverged_at_s": None}
+AS_PREDICTED = "limit, observed / predicted - 1"
 
-def test_every_picture_is_drawn_once_with_the_last_of_its_experiments_that_run():
-    results = {name: Result(name, rows=[{"a": 1}], checks=[1], label="yours") for name in EXPERIMENTS}
-    for names, expected in (
-        (list(EXPERIMENTS), {"acceleration": ["mass", "acceleration"], "trajectory": ["trajectory"], "speed": ["speed"],
-                             "stability": ["stability"]}),
-        (["mass"], {"mass": ["mass"]}),
-        (["parameters", "reduction"], {}),
-    ):  # fmt: skip
-        found = {}
-        for k, name in enumerate(names):
-            done = [Section(one, "", "", "", results[one]) for one in names[: k + 1]]
-            needs = overview.results_needed(name, names, done)
-            assert all(one.rows == [{"a": 1}] and one.label == "yours" and not one.checks for one in needs.values())
-            if needs:
-                found[name] = list(needs)
-                assert len(overview.drawn_with(name, needs)) == 1
-        assert found == expected
+
+def timed(engine, method, seconds, error, **more):
+    return {"scene": "s", "engine": engine, "method": method, "seconds": seconds, "worst_error_rad": error, "why_not": None,
+            "diverged": False} | more  # fmt: skip
+
+
+def limits(*observed):
+    row = {"scene": "s", "engine": "tmt", "method": "rk4", "damping": 0.5, "limit": "finite", "predicted_dt_s": 0.1}
+    rows = [row | {"observed_dt_s": value} for value in observed] + [row | {"scene": "saddle", "observed_dt_s": 0.1}]
+    return Result("stability", rows=rows, curves={"looked at": {"centres": ("s",)}, "schemes": {("tmt", "rk4"): "rk4"}})
+
+
+def drawn(experiment, result):
+    return [call() for call in figures_overview.pictures(experiment, {experiment: result}, ARM)]
+
+
+def marks(ax):
+    """What is marked in a panel: (mark, colour, x) of every point."""
+    found = []
+    for line in ax.get_lines():
+        if line.get_marker() not in (None, "None", ""):
+            colour = to_hex(line.get_markerfacecolor()) if line.get_markerfacecolor() != "none" else "none"
+            found += [(line.get_marker(), colour, float(x)) for x in line.get_xdata()]
+    return found
+
+
+def upright(ax):
+    """Where upright lines stand, with their colours."""
+    lines = [
+        line for line in ax.get_lines() if line.get_linestyle() != "None" and line.get_marker() in (None, "None", "")
+    ]
+    lines = [line for line in lines if len(set(line.get_xdata())) == 1]
+    return [(to_hex(line.get_color()), float(line.get_xdata()[0])) for line in lines]
+
+
+def hexes(*colours):
+    return [to_hex(colour) for colour in colours]
+
+
+@pytest.mark.parametrize("names, expected", [
+    (list(EXPERIMENTS), {"acceleration": ["mass", "acceleration"], "trajectory": ["trajectory"], "speed": ["speed"],
+                         "stability": ["stability"]}),
+    (["mass"], {"mass": ["mass"]}),
+    (["parameters", "reduction"], {}),
+])  # fmt: skip
+def test_every_picture_is_drawn_once_with_the_last_of_its_experiments_that_run(names, expected):
+    done, found = [], {}
+    for name in names:
+        done.append(Section(name, "", "", "", Result(name, rows=[{"a": 1}], label="yours")))
+        if needs := overview.results_needed(name, names, done):
+            found[name] = list(needs)
+            assert len(overview.drawn_with(name, needs)) == 1
+    assert found == expected
+
+
+@pytest.mark.parametrize("experiment, name", [
+    ("mass", "agreement"), pytest.param("trajectory", "scenes", marks=pytest.mark.slow),
+    pytest.param("stability", "limits", marks=pytest.mark.slow),
+])  # fmt: skip
+def test_pictures_are_drawn_of_a_small_run(small, experiment, name):
+    ((file, figure, caption),) = drawn(experiment, small(experiment))
+    assert file == f"{overview.BEGINNING}{name}" and caption and "nan" not in caption
+    assert figure.get_size_inches()[0] == figures_overview.SIZE[0]
 
 
 def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity():
-    row = {
-        "quantity": "Mbar",
-        "difference_eps": 2.0,
-        "tmt_from_exact_eps": 1.0,
-        "mujoco_from_exact_eps": None,
-        "passed": True,
-    }
     rows = [
-        row,
-        row | {"difference_eps": 7.0, "tmt_from_exact_eps": None},
-        row | {"quantity": "other", "difference_eps": 9.0},
+        OF_BIAS | {"mujoco_from_exact_eps": None},
+        OF_BIAS | {"difference_eps": 7.0, "tmt_from_exact_eps": None, "mujoco_from_exact_eps": None},
+        OF_BIAS | {"quantity": "other", "difference_eps": 9.0},
     ]
-    results = {"mass": Result("mass", rows=rows)}
-    assert engines_apart.agreements(results) == [Agreement("mass matrix M", 7.0, 1.0, None, True)]
-    rows.append(row | {"difference_eps": float("nan"), "passed": False})
-    (found,) = engines_apart.agreements(results)
+    (found,) = engines_apart.agreements({"mass": Result("mass", rows=rows)})
+    assert found[1:] == (7.0, 1.0, None, True)
+    rows.append(OF_BIAS | {"difference_eps": float("nan"), "passed": False})
+    (found,) = engines_apart.agreements({"mass": Result("mass", rows=rows)})
     assert found.apart == float("inf") and not found.passed
-    assert "differ in mass matrix M: up to no number of eps" in engines_apart.agreement_in_words([found], "TMT")
-
-
-def test_the_sentence_on_agreement_comes_out_either_way():
     good, bad = Agreement("bias h", 4.8, 1.0, 5.0, True), Agreement("accelerations", 64.1, 1.0, 5.0, False)
-    assert engines_apart.agreement_in_words([good], "TMT") == (
-        "TMT and MuJoCo have the same bias h: at most 4.8 eps apart (bias h), and 5 eps from exact."
-    )
-    assert engines_apart.agreement_in_words([good, bad], "yours") == (
-        "Yours and MuJoCo differ in accelerations: up to 64 eps apart (accelerations)."
-    )
+    said = engines_apart.agreement_in_words([good], "TMT")
+    assert "bias h" in said and "4.8 eps" in said and " 5 eps" in said
+    said = engines_apart.agreement_in_words([good, bad], "yours")
+    assert "accelerations" in said and "64 eps" in said and "bias h" not in said
+
+
+def test_the_picture_of_agreement_shows_whose_distance_is_whose_beside_the_tolerance():
+    blue, orange, red, black = hexes(BLUE, ORANGE, RED, "black")
+    for apart, passed in ((2.0, True), (5e4, False)):
+        ((_, figure, _),) = drawn("mass", Result("mass", rows=[OF_BIAS | {"difference_eps": apart, "passed": passed}]))
+        ax = figure.axes[0]
+        assert sorted(marks(ax)) == sorted([("D", black, apart), ("o", blue, 1.0), ("s", orange, 4.0)])
+        labels = {line.get_marker(): line.get_label() for line in ax.get_lines()}
+        assert "TMT" in labels["o"] and "MuJoCo" in labels["s"]
+        assert upright(ax) == [(red, 64.0)] and ax.get_xlim()[1] > max(apart, 64.0)
+        assert [label.get_text().startswith("✗ ") for label in ax.get_yticklabels()] == [not passed]
 
 
 def test_a_scene_at_a_glance():
@@ -78,15 +127,26 @@ def test_a_scene_at_a_glance():
         SceneRun("a", 0.7, (0.5, 3.0), 5.0, 0.6, None, True),
         SceneRun("a, more", None, (3.0, 3.0), 3.0, None, None, False),
     ]
-    assert engines_apart.scenes_in_words(found, "yours").startswith("Yours and MuJoCo do not move alike in a, more: ")
-    assert engines_apart.scenes_in_words(found[:1], "TMT") == (
-        "TMT and MuJoCo move alike in all 1 scenes: at most 70 % of the rounding band apart, judged for 0.5 to 3 s."
-    )
-    left = found[0]._replace(left=(None, 4.7))
-    assert engines_apart.scenes_in_words([left], "TMT").endswith(
-        "In a the posture is left by MuJoCo alone within its 5 s, at 4.7 s."
-    )
-    assert "is left" not in engines_apart.scenes_in_words([left._replace(left=(4.6, 4.7))], "TMT")
+    assert "a, more" in engines_apart.scenes_in_words(found, "yours")
+    good = engines_apart.scenes_in_words(found[:1], "TMT")
+    left = engines_apart.scenes_in_words([found[0]._replace(left=(None, 4.7))], "TMT")
+    assert "70 %" in good and "0.5 to 3 s" in good and "4.7" in left and "4.7" not in good
+
+
+def test_the_picture_of_scenes_shows_shares_times_and_who_leaves_when():
+    orange, red, black = hexes(ORANGE, RED, "black")
+    rows = [RUN | {"scene": "held", "judged_until_s": until} for until in (0.5, 3.0)]
+    robot = SimpleNamespace(cases=[SimpleNamespace(name="held", duration=5.0, is_held=True, steps=64)])
+    left = {"tmt": 1.0, "mujoco": 2.0}
+    runs = {("held", "rk4", steps): {"t": [0.0, 5.0], "left": left if steps == 64 else {}} for steps in (64, 128)}
+    result = Result("trajectory", rows=rows, curves={"runs": runs})
+    assert [one.left for one in engines_apart.scene_runs(result, robot)] == [(1.0, 2.0)]
+    _, figure, _ = figures_overview.picture_of_scenes({"trajectory": result}, robot)
+    of_shares, of_times = figure.axes
+    assert marks(of_shares) == [("D", black, 0.2)] and upright(of_shares) == [(red, 1.0)]
+    assert {("o", "#ffffff", 1.0), ("s", orange, 2.0)} <= set(marks(of_times))
+    bars = [bar.get_width() for bar in of_times.patches]
+    assert bars[:3] == [5.0, 3.0, 0.5]  # the scene, judged at some step, judged at every step
 
 
 def test_a_curve_has_what_nothing_of_the_same_engine_beats():
@@ -96,73 +156,58 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats():
         timed("tmt", "rk4", 1e-9, 2.0), timed("heyoka", "Taylor", None, None, why_not="absent"),
     ]  # fmt: skip
     result = Result("speed", rows=rows, curves={"regular": "s", "unit": "rad"})
-    found = methods_compared.best_curves(result)
-    assert found == [
+    assert methods_compared.best_curves(result) == [
         Curve("tmt", [1e-3, 1e-6, 1e-9], [1.0, 4.0, 5.0], Cheapest("dopri8", 4.0)),
         Curve("mujoco", [1.1e-6], [10.0], None),
     ]
-    assert methods_compared.times_in_words(result).endswith("To 1e-06 rad (s): tmt dopri8, 4 ms.")
-    rows.append(timed("mujoco", "RK4", 3e-3, 1e-6))
-    assert methods_compared.times_in_words(result).endswith("(s): MuJoCo RK4, 3 ms; tmt dopri8, 4 ms.")
-    assert methods_compared.times_in_words(Result("speed", rows=rows[:2], curves={"regular": "s"})).endswith(
-        "None reaches 1e-06 rad."
-    )
+    assert "dopri8, 4 ms" in methods_compared.times_in_words(result)
+    assert "RK4" not in methods_compared.times_in_words(result)  # which is just outside of the error asked for
+    rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt_s=0.00244140625, steps=2048.0))
+    rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
+    for said in (methods_compared.times_in_words(result), one_number(Section("speed", "", "", "", result))):
+        assert (
+            "MuJoCo RK4, 2048 steps (dt 0.0024 s), 3 ms" in said and "tmt dopri8, 4 ms" in said and "1e-06 rad" in said
+        )
 
 
-def test_the_cheapest_settings_have_their_scene_and_their_steps():
-    rows = [
-        timed("scipy", "DOP853", 5e-4, 1e-7), timed("mujoco", "RK4", 0.039, 1e-6, dt_s=0.00244140625, steps=2048.0),
-        timed("tmt", "dopri8_adaptive", 9.3e-5, 1e-6, dt_s=None, steps=80, tolerance=1e-9),
-    ]  # fmt: skip
-    result = Result("speed", rows=rows, curves={"regular": "s", "unit": "m"})
-    said = "o 1e-06 m (s): tmt dopri8_adaptive, tolerance 1e-09, 0.093 ms; MuJoCo RK4, 2048 steps (dt 0.0024 s), 39 ms"
-    assert methods_compared.times_in_words(result) == f"The cheapest settings of each engine. T{said}."
-    assert one_number(Section("speed", "", "", "", result)) == f"t{said}"
+def test_the_picture_of_times_rings_the_cheapest_within_the_error_asked_for():
+    rows = [timed("tmt", "rk4", 1e-3, 1e-3), timed("tmt", "dopri8", 4e-3, 1e-7), timed("mujoco", "RK4", 1e-2, 1e-8)]
+    ((_, figure, _),) = drawn("speed", Result("speed", rows=rows, curves={"regular": "s", "unit": "rad"}))
+    (ax,) = figure.axes
+    assert upright(ax) == [(to_hex(GREY), 1e-6)]
+    rings = [line for line in ax.get_lines() if line.get_markerfacecolor() == "none"]
+    assert [(line.get_xdata()[0], line.get_ydata()[0]) for line in rings] == [(1e-7, 4.0), (1e-8, 10.0)]
+    assert {text.get_text() for text in ax.texts} == {"dopri8 4 ms", "RK4 10 ms"}
+    curves = {line.get_label(): to_hex(line.get_color()) for line in ax.get_lines() if line not in rings}
+    assert (curves["tmt"], curves["MuJoCo"]) == (to_hex(BLUE), to_hex(ORANGE))
 
 
 def test_limits_are_counted_where_they_are_predicted_and_observed():
     result = limits(0.1001, None)
     found = methods_compared.limits_found(result)
     assert found[0] == Limit("rk4", "tmt", "s", 0.5, "finite", 0.1, 0.1001, True) and len(found) == 2
-    assert methods_compared.limits_at_a_glance(found) == (
-        "1 step limits, predicted from one step of a method, are observed in runs within 0.1 %."
-    )
-    of_two = methods_compared.limits_found(limits(0.1001, 0.0995))
-    assert methods_compared.limits_at_a_glance(of_two).startswith("2 step limits") and "within 0.5 %" in (
-        methods_compared.limits_at_a_glance(of_two)
-    )
+    said = [
+        methods_compared.limits_at_a_glance(methods_compared.limits_found(of))
+        for of in (result, limits(0.1001, 0.0995))
+    ]
+    assert said[0].startswith("1 ") and " 0.1 %" in said[0] and said[1].startswith("2 ") and " 0.5 %" in said[1]
     result.check("s, TMT rk4, damping 0.5", "growth in 8 steps", 2.0, 1.0, "")  # of something else
     assert all(one.passed for one in methods_compared.limits_found(result))
-    result.check("s, TMT rk4, damping 0.5", "limit, observed / predicted - 1", 2.0, 1.0, "")
-    assert not any(one.passed for one in methods_compared.limits_found(result))
-    assert methods_compared.limits_at_a_glance(methods_compared.limits_found(result)).startswith(
-        "2 of 2 step limits are not"
-    )
+    result.check("s, TMT rk4, damping 0.5", AS_PREDICTED, 2.0, 1.0, "")
+    found = methods_compared.limits_found(result)
+    assert not any(one.passed for one in found) and "2 of 2" in methods_compared.limits_at_a_glance(found)
 
 
-@pytest.mark.parametrize("ratio, text", [(1.34, "1.3"), (134.4, "130"), (9.8e11, "9.8e+11")])
-def test_ratios_in_print(ratio, text):
-    assert overview.times_in_print(ratio) == text
-
-
-@pytest.mark.parametrize("experiment, name", [("mass", "agreement"), ("trajectory", "scenes"), ("stability", "limits")])
-def test_pictures_are_drawn_of_a_small_run(small, experiment, name):
-    ((file, figure, caption),) = drawn(experiment, small(experiment))
-    assert file == f"{overview.BEGINNING}{name}" and caption.endswith(".") and "nan" not in caption
-    assert figure.get_size_inches()[0] == figures_overview.SIZE[0]
-
-
-def test_what_fails_is_named_with_a_cross_in_its_picture(small):
-    result = small("mass")
-    rows = [row | {"passed": False, "difference_eps": 65.0} for row in result.rows]
-    for given, crossed in ((result, False), (Result("mass", rows=rows), True)):
-        ((_, figure, caption),) = drawn("mass", given)
-        labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-        assert [label.startswith("✗ ") for label in labels] == [crossed] and ("differ" in caption) == crossed
-
-
-def test_there_is_no_picture_without_data():
-    for experiment, needs in (("speed", {}), ("speed", {"speed": Result("speed", curves={"regular": "s"})}),
-                              ("mass", {"mass": Result("mass")}), ("stability", {"stability": Result("stability")})):  # fmt: skip
-        assert not list(figures_overview.pictures(experiment, needs, ARM))
-    assert isinstance(next(figures_overview.pictures("stability", {"stability": limits(0.1)}, ARM)), partial)
+def test_the_picture_of_limits_shows_what_is_predicted_and_what_is_observed():
+    result = limits(0.125)
+    result.rows.append(result.rows[0] | {"engine": "mujoco", "method": "RK4", "observed_dt_s": 0.5})
+    result.curves["schemes"]["mujoco", "RK4"] = "rk4"
+    blue, orange, red = hexes(BLUE, ORANGE, RED)
+    for failing, of_mujoco in ((False, ("s", orange, 0.5)), (True, ("X", red, 0.5))):
+        if failing:
+            result.check("s, MuJoCo RK4, damping 0.5", AS_PREDICTED, 4.0, 1.0, "")
+        ((_, figure, _),) = drawn("stability", result)
+        (ax,) = figure.axes
+        assert marks(ax) == [("o", blue, 0.125), of_mujoco]
+        assert [float(lines.get_segments()[0][0][0]) for lines in ax.collections] == [0.1, 0.1]
+        assert [label.get_text() for label in ax.get_yticklabels()] == ["✗ RK4" if failing else "RK4"]
