@@ -11,7 +11,7 @@ import tmt
 from compare import diagnosis
 from compare.diagnosis import fit
 from compare.diagnosis.words import Cause
-from compare.engines.mujoco import parse, reading
+from compare.engines.mujoco import reading
 from compare.experiments import diagnosis as experiment
 from compare.experiments.diagnosis import derivation, fault_table, faults, generator, wrong_motion
 from compare.fleet.calls import door_opened
@@ -37,22 +37,36 @@ def test_half_of_the_faults_are_of_the_generator():
     assert {fault.kind for fault in MADE} >= set(kinds.split())
 
 
-@pytest.mark.parametrize("robot, step", [("arm", 46), ("six hinges", 122)])
-def test_a_sample_of_the_list(robot, step):
-    table = rows_of([fault for fault in MADE if fault.robot == robot][::step])
-    assert {row["outcome"] for row in table if row["visible"]} <= {"right", "tied"}
+def small(faults):
+    """Those of trees of few joints, which take little time."""
+    return [fault for fault in faults if len(fault.tree.axis) <= 3]
+
+
+SAMPLES = {
+    "arm": [fault for fault in MADE if fault.robot == "arm" and fault.source == "list"][::47],
+    "generator": small([fault for fault in MADE if fault.source == "generator"][::37])[:5],
+}
+LONG_SAMPLES = {
+    "six hinges": [fault for fault in MADE if fault.robot == "six hinges"][::61],
+    "more of the arm": [fault for fault in MADE if fault.robot == "arm"][::23],
+    "more of the generator": [fault for fault in MADE if fault.source == "generator"][::101],
+}
+
+
+@pytest.mark.parametrize(
+    "sample", [*SAMPLES.values(), *(pytest.param(one, marks=pytest.mark.slow) for one in LONG_SAMPLES.values())],
+    ids=[*SAMPLES, *LONG_SAMPLES],
+)  # fmt: skip
+def test_of_a_sample_no_fault_is_explained_by_something_else(sample):
+    table = rows_of(sample)
+    assert "wrong" not in {row["outcome"] for row in table} and len(table) >= 5
+    found = [row["outcome"] in ("right", "tied") for row in table if row["visible"]]
+    assert sum(found) >= 0.9 * len(found) > 0
     assert all(row["reason"] for row in table if row["outcome"] in ("tied", "none"))
 
 
-def test_a_sample_of_the_generator():
-    table = rows_of([fault for fault in MADE if fault.source == "generator"][::101])
-    assert "wrong" not in {row["outcome"] for row in table}
-    visible = [row["outcome"] in ("right", "tied") for row in table if row["visible"]]
-    assert sum(visible) >= 0.9 * len(visible) > 0
-
-
 def test_faults_of_motion_are_all_found():
-    table = rows_of(wrong_motion.wrong_motions("arm", ARM.tree))
+    table = rows_of(list(wrong_motion.wrong_motions("arm", ARM.tree))[::3])
     assert {row["outcome"] for row in table} == {"right"}
     assert {row["seen_by"] for row in table} == {"acceleration", "trajectory"}
 
@@ -72,20 +86,6 @@ def test_the_six_hinges_are_those_of_the_model_rounded():
     for name in ("offset", "axis", "mass", "com", "armature", "damping"):
         assert np.allclose(getattr(SIX_HINGES, name), getattr(model, name), rtol=1e-4, atol=1e-6)
     assert np.allclose(SIX_HINGES.inertia, model.inertia, rtol=1e-3, atol=1e-7) and SIX_HINGES.parent == model.parent
-
-
-def test_mujoco_with_an_edited_number_is_named_too():
-    q, qd = states_of(ARM.tree, diagnosis.STATES_ASKED)
-    tolerance, text = fault_table.tolerance_of_values(ARM.tree, q, qd), ARM.mjcf.read_text(encoding="utf-8")
-    for place, old, new in (
-        ("CoM x of forearm", 'pos="0.15 0 0"', 'pos="0.157 0 0"'),
-        ("inertia yy of forearm", "0.001 0.019 0.019", "0.001 0.0185 0.019"),
-    ):
-        assert text.count(old) == 1
-        dynamics = parse(text.replace(old, new), ARM.tree).of(ARM.case())
-        given = diagnosis.packed(dynamics.mass_matrix(q), dynamics.bias(q, qd), 3, len(q))
-        found = diagnosis.diagnose(ARM.tree, ARM.joints, q, qd, given, tolerance)
-        assert place in {cause.place for cause in found.causes}
 
 
 # the judge
@@ -136,13 +136,13 @@ def test_an_error_in_the_search_is_noticed(monkeypatch):
 
     monkeypatch.setattr(fit.Search, "kept", fit.Search.outcome, raising=False)
     monkeypatch.setattr(fit.Search, "outcome", careless)
-    chosen = [fault for fault in MADE if fault.robot == "arm" and fault.kind == "pair"][:6]
+    chosen = [fault for fault in MADE if fault.robot == "arm" and fault.kind == "pair"][:3]
     assert "wrong" in {row["outcome"] for row in rows_of(chosen)}
 
 
 # the table
 
-FEW = [fault for fault in MADE if fault.kind in ("sign", "force")][:4]
+FEW = [fault for fault in MADE if fault.kind in ("sign", "force") and fault.robot == "arm"][:3]
 
 
 def without_seconds(table):
@@ -152,11 +152,11 @@ def without_seconds(table):
 def test_through_a_door_the_rows_are_the_same_and_a_fault_that_cannot_be_tried_is_a_failed_check():
     broken = FEW[1]._replace(name="a fault of no kind", make=("unknown",))
     result, done = Result("diagnosis"), []
-    with door_opened(None, 2) as door:
+    with door_opened(None, 1) as door:
         table = fault_table.rows_by_pieces(result, [FEW[0], broken, *FEW[1:]], door, done.append)
     right = fault_table.rows_in_parts(FEW, map, done.append)
-    assert without_seconds(table) == without_seconds(right) and len(table) == 4
-    assert done == [1, 2, 3, 4, 5, 4]
+    assert without_seconds(table) == without_seconds(right) and len(table) == 3
+    assert done == [1, 2, 3, 4, 3]
     (check,) = result.checks
     assert (check.scene, check.quantity, check.passed) == (f"{broken.robot}, a fault of no kind", ENDS, False)
 

@@ -6,7 +6,6 @@ from matplotlib.colors import to_hex
 
 from compare.engines.mujoco import additions
 from compare.experiment import Setup
-from compare.experiments import reduction
 from compare.experiments.reduction import cost, figures_motion, figures_needs, times
 from compare.judge.check import Result
 from compare.robots.arm import ARM
@@ -102,24 +101,3 @@ def test_the_figures_of_known_motions_have_each_engine_in_its_place():
     _, fig, caption = figures_motion.draw_small_oscillations(result, ARM)
     lines = {line.get_label(): line.get_ydata()[-1] for line in fig.axes[0].get_lines()}
     assert lines["TMT"] == 1e-4 and lines["MuJoCo"] == 3e-4 and "2.000 (TMT)" in caption and "0.000 (MuJoCo)" in caption
-
-
-def test_any_name_of_a_scene_gives_a_plain_file_name(tmp_path):
-    scene = "to / $5 and $6_x^"
-    needs = {scene: {"locked": (), "stays": JOINTS[:1]}}
-    figures_needs.draw_needs(Result("reduction", curves={"needs": needs}), ARM)[1].savefig(tmp_path / "needs.png")
-    errors = {(engine, i): [1e-3] * 6 for engine in ("tmt", "mujoco") for i in EULER_AND_RK4}
-    swing = {"dt": 0.02 / 2.0 ** np.arange(6), "errors": errors, "orders": {}, "stated": {"RK4": 4, "Euler": 1}}
-    for name, drawn in ((scene, "reduction_to_5_and_6_x_"), (300 * "x", "reduction_" + 50 * "x")):
-        result = Result("reduction", curves={"swings": {name: swing}})
-        found, fig, _ = figures_motion.draw_swing(result, name)
-        assert found == drawn and not fig.axes[0].texts  # no order is measured
-
-
-def test_there_are_figures_only_of_what_was_found_and_none_raises():
-    for stays, count in ((), 0), (("gamma",), 1):
-        needs = {"bent, free": {"stays": list(stays), "locked": []}}
-        result = Result("reduction", rows=[{"scene": "bent, free"}], curves={"swings": {}, "needs": needs})
-        assert len(list(reduction.figures(result, ARM))) == count
-    empty = Result("reduction", curves={"needs": {}, "apart": {}, "swings": {}}, tables={"cost_in_mujoco": []})
-    assert len(figures_needs.draw_needs(empty, ARM)) == len(figures_needs.draw_costs(empty)) == 3

@@ -171,7 +171,6 @@ def test_a_robot_of_few_hinges_without_postures_and_scenes_goes_through(tree):
 
 
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
-    """What is no timing is computed once: beside other work where that was begun, else here."""
     log = []
 
     def untimed(setup, *more):

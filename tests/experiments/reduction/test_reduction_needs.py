@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
 from models import PATHS, chain, random_tree
 
@@ -15,7 +14,7 @@ from compare.judge.check import Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import Setup, engines
-from compare.truth.smallest import Needed, needed, reduced
+from compare.truth.smallest import needed, reduced
 
 SUBSETS = [("alpha",), ("beta",), ("gamma",), ("alpha", "beta"), ("alpha", "gamma"), ("beta", "gamma")]
 
@@ -150,15 +149,6 @@ def test_a_users_own_scene_needs_what_it_needs(engines, scene, smallest):
     assert [" ".join(model.joints) if model else "none" for _, model in smaller] == smallest
 
 
-def test_a_run_is_of_the_scheme_in_both_engines(engines):
-    case, setup = ARM.case("short", posture="bent", duration=0.25, dt=1 / 64), Setup.small(ARM, engines)
-    for integrator, scheme in (("Euler", "semi_implicit_euler"), ("RK4", "rk4")):
-        paths = needs.states_of_run(case, setup, integrator)
-        path = tmt.simulate(*case.start, case.tau, 1 / 1024, 256, scheme)
-        assert np.array_equal(paths["tmt"], np.concatenate([path.q, path.qd], axis=1))
-        assert np.abs(paths["mujoco"] - paths["tmt"]).max() < 1e-12
-
-
 def test_a_held_posture_with_springs_needs_nothing():
     robot = setup_of(PATHS["gripper"]).robot
     held = next(case for case in robot.cases if case.is_held)
@@ -167,49 +157,9 @@ def test_a_held_posture_with_springs_needs_nothing():
     assert needed(rigid).stays == ()
 
 
-def test_the_held_posture_of_a_file_is_judged_in_movements(free_body):
-    case, result = next(case for case in free_body.robot.cases if case.is_held), empty()
-    needs.of_case(result, case, free_body, ("RK4",))
-    assert [check.quantity for check in result.checks] == ["smallest model to whole", "time judged"] * 2
-    assert failed(result) == []
-
-
-@pytest.mark.parametrize("off, passes", [(0.99e-9, True), (1.01e-9, False)])
-def test_a_movement_off_a_ball_is_named_by_its_axis(free_body, off, passes):
-    result, apart = Result("reduction"), np.zeros((3, 12))
-    apart[1, 4] = off
-    times, width = np.arange(3.0), np.full((3, 12), 1e-9)
-    needs.check_smaller(result, "s", free_body.robot.coordinates, times, apart, width, 2.0)
-    assert result.checks[0].passed is passes and result.checks[0].unit == "rad"
-    assert "stone turn y" in result.checks[0].note and "1.000" in result.checks[0].note
-
-
-def test_a_smaller_case_keeps_the_places_of_its_joints(free_body):
-    case = next(case for case in free_body.robot.cases if case.name.endswith("let go"))
-    assert needs.free_places(case, case.changed(locked=("stone x", "stone turn"))) == [1, 2, 8, 9]
-
-
-@pytest.mark.parametrize("joints, speeds", [((), 0), (("lower",), 3), (("upper", "lower"), 6)])
-def test_a_ball_has_three_speeds_in_the_table_of_times(joints, speeds):
-    setup = setup_of(PATHS["pendulum_ball"])
-    case = next(case for case in setup.robot.cases if not case.is_held)
-    locked = tuple(name for name in setup.robot.joints if name not in joints)
-    rows = times.time_rows([(case.name, case.changed(locked=locked) if joints else None)], setup, {}, {})
-    assert {(row["hinges"], row["nv"]) for row in rows} == {(" ".join(joints) or "none", speeds)}
-
-
 def test_a_robot_that_falls_does_not_bend():
     """Its accelerations are 0 with 50 digits of the very numbers of the file: a sum of masses in doubles would bend it."""
     case = next(case for case in setup_of(PATHS["quadruped"]).robot.cases if case.name == "stand, let go")
     need = needed(case)
     assert set(need.moves) == {"root z"} and len(need.undecided) == 15
     assert [row["found"] for row in needs.joint_rows(case, need)].count("not decided") == 15
-    words = needs.need_in_words(case, need)
-    assert " 9 " in words and "front" in words and "rear" not in words  # the first six are named
-
-
-def test_what_takes_too_long_with_50_digits_is_not_decided():
-    robot = setup_of(random_tree(3)).robot
-    free = next(case for case in robot.cases if not case.is_held and not case.v.any())
-    assert needs.not_decided(free) == Needed((), {}, robot.joints)
-    assert needs.not_decided(free.changed(speed=(1.0,) * robot.coordinates.nv)).undecided == ()

@@ -74,15 +74,6 @@ def test_a_run_ends_in_the_table_at_the_very_state_at_which_it_has_diverged():
     assert np.isnan(values[4]).all() and np.isfinite(values[5]).all()
 
 
-@pytest.mark.parametrize("steps, known", [(64, True), (63, False), (65, False), (192, True), (10, False)])
-def test_only_runs_whose_records_fall_on_the_times_have_rows(steps, known):
-    case, states = FREE.changed(dt=5.0 / steps), np.ones((steps + 1, 3))
-    record = motion.at_equal_times(case, np.linspace(0.0, 5.0, steps + 1), states, states, None)
-    assert (record is not None) == known
-    if known:
-        np.testing.assert_allclose(record[0], np.linspace(0.0, 5.0, 65), rtol=1e-15)
-
-
 def test_a_scene_whose_steps_do_not_fall_on_the_times_says_which_run_it_shows_or_that_there_is_none(engines):
     odd = FREE.changed(name="odd", dt=5.0 / 12)
     robot, runs = dataclasses.replace(ARM, scenes=(odd.scene,)), follow(odd, engines, (1, 16)).curves
