@@ -1,4 +1,4 @@
-"""Diagnoses of the arm, for tests."""
+"""Diagnoses of the arm, for the tests of this folder: states, tolerances and values of its Mbar and h."""
 
 import numpy as np
 
@@ -22,7 +22,9 @@ def tolerance(tree, q, qd):
     return FACTOR * EPS * packed(M, np.broadcast_to(scale.bias, (len(q), nv)), nv, len(q))
 
 
-def values(tree, q, qd):
+def values(tree=tmt.ARM, q=None, qd=None):
+    """Mbar and h of a tree, (states, entries), at the arm's states where none are given."""
+    q, qd = states() if q is None else (q, qd)
     return packed(tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree), len(tree.axis), len(q))
 
 

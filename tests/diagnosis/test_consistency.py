@@ -13,31 +13,25 @@ from compare.engines.mujoco import reading
 
 ARM = tmt.ARM
 HEAVY = replace(ARM, mass=(2.0, 1.5))
-NAMES = (
-    "M is symmetric",
-    "M is positive definite",
-    "h at rest is a gradient",
-    "h is even in the rates",
-    "h is quadratic in the rates",
-    "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2",
-)
+SYMMETRIC, DEFINITE, GRADIENT, EVEN, QUADRATIC, POWER = range(6)  # in the order in which they are asked
 
 
-def asked(mass_matrix=tmt.mass_matrix, bias=tmt.bias, tree=ARM, seed=0):
-    coordinates, rng = Coordinates(tree.hinge_names, tree.kind), np.random.default_rng(seed)
+def asked(mass_matrix=tmt.mass_matrix, bias=tmt.bias, tree=ARM):
+    coordinates, rng = Coordinates(tree.hinge_names, tree.kind), np.random.default_rng(0)
     q = coordinates.move(np.tile(tree.zero, (12, 1)), rng.uniform(-2.0, 2.0, (12, coordinates.nv)))
     return conditions(mass_matrix, bias, coordinates, q, rng.uniform(-3.0, 3.0, (12, coordinates.nv)))
 
 
-def broken(*given, **more):
-    return [NAMES.index(condition.name) for condition in asked(*given, **more) if not condition.is_met]
+def broken(*given):
+    found = asked(*given)
+    return [k for k, condition in enumerate(found) if not condition.is_met]
 
 
 @pytest.mark.parametrize("name", ["arm", "mixed", "free_body", "gripper", "pendulum_ball"])
 def test_right_equations_meet_all(name):
     tree = ARM if name == "arm" else reading.read(PATHS[name]).tree
     found = asked(lambda q: tmt.mass_matrix(q, tree), lambda q, qd: tmt.bias(q, qd, tree), tree)
-    assert all(condition.is_met for condition in found)
+    assert all(condition.is_met for condition in found) and len(found) >= 5
     assert all(condition.value < 0.5 * condition.tolerance for condition in found if condition.rule == "at most")
 
 
@@ -47,14 +41,14 @@ def with_skew(q):
     return M
 
 
-FAULTS = {
-    "not symmetric": (with_skew, tmt.bias, [0]),
-    "not definite": (lambda q: tmt.mass_matrix(q) - 0.1 * np.eye(3), tmt.bias, [1]),
-    "no gradient": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-5 * q[:, [1, 1, 1]] * [1, 0, 0], [2]),
-    "damping": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-9 * qd, [3]),
-    "cubic": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-6 * qd**4, [4, 5]),
-    "another mass": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd, HEAVY), [5]),
-}  # fmt: skip
+FAULTS = {  # of an M that is not symmetric the power is not asked
+    "not symmetric": (with_skew, tmt.bias, [SYMMETRIC]),
+    "not definite": (lambda q: tmt.mass_matrix(q) - 0.1 * np.eye(3), tmt.bias, [DEFINITE]),
+    "no gradient": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-5 * q[:, [1, 1, 1]] * [1, 0, 0], [GRADIENT]),
+    "damping": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-9 * qd, [EVEN]),
+    "cubic": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-6 * qd**4, [QUADRATIC, POWER]),
+    "another mass": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd, HEAVY), [POWER]),
+}
 
 
 @pytest.mark.parametrize("mass_matrix, bias, expected", FAULTS.values(), ids=FAULTS)
@@ -62,44 +56,31 @@ def test_each_condition_is_broken_by_its_fault(mass_matrix, bias, expected):
     assert broken(mass_matrix, bias) == expected
 
 
-def test_sentences_have_their_figures():
-    texts = {condition.name: condition.text for condition in asked(bias=FAULTS["another mass"][1])}
-    assert texts[NAMES[5]].startswith("Your h does not belong to your M: qd'(h - h at rest) is ")
-    texts = {condition.name: condition.text for condition in asked(bias=FAULTS["damping"][1])}
-    assert texts[NAMES[3]].startswith("Your bias is linear in qd: is damping in it?")
-
-
 @pytest.mark.parametrize("share, met", [(0.95, True), (1.05, False)])  # h itself is rounded by some 0.5 %
 def test_the_odd_part_just_inside_and_outside(share, met):
-    (even,) = (condition for condition in asked() if condition.name == NAMES[3])
-    moved = share * even.tolerance
+    even = asked()[EVEN]
 
     def bias(q, qd):
         h = tmt.bias(q, qd)
-        h[even.state, 0] += moved * np.sign(qd[even.state, 0])
+        h[even.state, 0] += share * even.tolerance * np.sign(qd[even.state, 0])
         return h
 
-    (found,) = (condition for condition in asked(bias=bias) if condition.name == NAMES[3])
-    if found.state == even.state:
-        assert found.is_met is met
+    found = asked(bias=bias)[EVEN]
+    assert found.state == even.state and found.is_met is met
 
 
-@pytest.mark.parametrize("size", [1e-12, 1e-9, 1e-6, 1e-3])
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_noise_is_not_blamed(size, seed):
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("size", [1e-12, 1e-6, 1e-3])
+def test_noise_and_single_precision_are_not_blamed(size):
+    rng = np.random.default_rng(1)
 
     def mass_matrix(q):
         noise = rng.normal(size=(len(q), 3, 3))
         return tmt.mass_matrix(q) * (1.0 + size * (noise + np.swapaxes(noise, 1, 2)))
 
-    assert broken(mass_matrix, lambda q, qd: tmt.bias(q, qd) * (1.0 + size * rng.normal(size=q.shape))) == []
-
-
-def test_single_precision_is_not_blamed():
     def single(values):
         return values.astype(np.float32).astype(float)
 
+    assert broken(mass_matrix, lambda q, qd: tmt.bias(q, qd) * (1.0 + size * rng.normal(size=q.shape))) == []
     assert broken(lambda q: single(tmt.mass_matrix(q)), lambda q, qd: single(tmt.bias(q, qd))) == []
 
 

@@ -52,7 +52,7 @@ def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco, damped
         assert {quantity for quantity, check in tight.items() if not check.passed} == (set() if passes else {name})
 
 
-@pytest.mark.parametrize("rate", [100.0, 202.0, 5e4])
+@pytest.mark.parametrize("rate", [100.0, 202.0])
 def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
@@ -61,7 +61,7 @@ def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     one = [check for check in result.checks if check.quantity == "one step, TMT to MuJoCo"]
     count, fast = len(mine.states[0]), int((np.abs(mine.states[1]).max(axis=1) / 64 > np.pi).sum())
     assert all(check.passed for check in one) and len(one) == (fast < count) and bool(fast) == (rate > 201.1)
-    assert result.notes == [f"bent, damped, RK4, dt = 1/64 s: {fast} of {count}"] * bool(fast)
+    assert [f"{fast} of {count}" in note for note in result.notes] == [True] * bool(fast)
 
 
 @pytest.mark.parametrize("judged, passes", [(3.12, True), (3.13, False)])
@@ -92,13 +92,6 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
     assert kept["left"] == {"tmt": None, "mujoco": 5 / 64} and kept["ended"]["tmt"] is None
     assert kept["ended"]["mujoco"] == diverged_at(HELD, t, *theirs)
     assert {row["diverged_at_s"] for row in result.rows} == {kept["ended"]["mujoco"]}
-
-
-def test_an_engine_that_rests_is_named():
-    """Without gravity MuJoCo's arm stays where it is let go, and TMT's falls."""
-    rests = parse(XML.replace("0 0 -9.81", "0 0 0"), tmt.ARM)
-    checks = judged_with(rests, side(DAMPED))
-    assert (checks["movement"].value, checks["movement"].passed) == (0.0, False)
 
 
 def test_every_rule_of_a_run_is_applied(engines):
@@ -147,6 +140,12 @@ def test_an_integrator_of_other_bits_is_seen(engines):
     checks = runs.follow(FREE, engines | {"mujoco": different}, (1,)).checks
     failed = [check.scene for check in checks if "same bits" in check.quantity and not check.passed]
     assert failed == ["bent, free, implicitfast, dt = 5/64 s"]
+
+
+def test_a_run_of_which_nothing_is_judged_is_said(engines):
+    case = FREE.changed(duration=1 / 64, dt=1 / 512)
+    notes = [runs.follow(case, engines, (1,), entries=entries).notes for entries in (0, 100_000)]
+    assert [any("RK4, 8 steps" in note for note in of_run) for of_run in notes] == [True, False]
 
 
 def test_an_arm_that_flies_apart_is_reported_as_diverged(engines):

@@ -35,18 +35,17 @@ def curves(engines):
     return found
 
 
-def test_each_engine_and_integrator_of_a_scene_has_65_equal_times_and_no_column_is_more(curves, engines):
+def test_every_run_of_a_scene_has_65_equal_times_its_own_values_and_none_after_it_has_diverged(
+    curves, engines, tmp_path
+):
     result, table = table_of(curves)
     assert list(table.columns) == ABOUT + OF_ARM and result.filed == ("motion",) and result.notes == []
-    count = len(engines["mujoco"].methods) + len({method.scheme for method in engines["mujoco"].methods.values()})
-    assert len(table) == 2 * count * (GRID + 1)
+    methods = engines["mujoco"].methods
+    schemes = {method.scheme for method in methods.values()}
+    assert len(table) == 2 * (len(methods) + len(schemes)) * (GRID + 1)
     for _, run in table.groupby(["scene", "engine", "integrator"]):
         assert run["dt_s"].unique().tolist() == [5.0 / 64]  # of the two steps that were run the scene's own
         np.testing.assert_array_equal(run["t_s"], np.arange(GRID + 1) * (5.0 / 64))
-
-
-def test_values_are_those_of_the_runs_and_empty_after_divergence(curves):
-    _, table = table_of(curves)
     for scheme, integrator in (("rk4", "RK4"), ("semi_implicit_euler", "Euler")):
         curve = curves["ball catch, free", scheme, 64]
         for engine, name in (("tmt", scheme), ("mujoco", integrator)):
@@ -55,22 +54,13 @@ def test_values_are_those_of_the_runs_and_empty_after_divergence(curves):
             assert alive.all() == (scheme == "rk4") and alive[0]
             expected = np.where(alive[:, None], np.concatenate(curve[engine], axis=1), np.nan)
             np.testing.assert_array_equal(run[OF_ARM].to_numpy(float), expected)
-
-
-def test_the_file_has_all_digits_and_empty_cells(curves, tmp_path):
-    result, table = table_of(curves)
+    swing = table[table.scene == "elbow swing"]
+    assert (swing[OF_ARM[:2]].to_numpy(float) == CASES["elbow swing"].posture[:2]).all()
+    assert (swing[OF_ARM[3:5]] == 0.0).all(axis=None) and np.ptp(swing[OF_ARM[2]].to_numpy(float)) > 1.0
     (tmp_path / "motion.csv").write_text(csv(result.tables["motion"]), encoding="utf-8")
-    read = pd.read_csv(tmp_path / "motion.csv")
+    read = pd.read_csv(tmp_path / "motion.csv")  # which has all digits, and empty cells
     np.testing.assert_array_equal(read[OF_ARM].to_numpy(float), table[OF_ARM].to_numpy(float))
     assert read[OF_ARM].isna().any(axis=None) and "nan" not in (tmp_path / "motion.csv").read_text().lower()
-
-
-def test_locked_joints_stay_where_they_are_locked(curves):
-    _, table = table_of(curves)
-    swing = table[table.scene == "elbow swing"]
-    start = CASES["elbow swing"].posture
-    assert (swing[OF_ARM[:2]].to_numpy(float) == start[:2]).all() and (swing[OF_ARM[3:5]] == 0.0).all(axis=None)
-    assert np.ptp(swing[OF_ARM[2]].to_numpy(float)) > 1.0
 
 
 def test_a_run_ends_in_the_table_at_the_very_state_at_which_it_has_diverged():
@@ -84,29 +74,16 @@ def test_a_run_ends_in_the_table_at_the_very_state_at_which_it_has_diverged():
     assert np.isnan(values[4]).all() and np.isfinite(values[5]).all()
 
 
-@pytest.mark.parametrize("steps, known", [(64, True), (63, False), (65, False), (128, True), (192, True), (10, False)])
-def test_only_runs_whose_records_fall_on_the_times_have_rows(steps, known):
-    case = FREE.changed(dt=5.0 / steps)
-    states = np.ones((steps + 1, 3))
-    record = motion.at_equal_times(case, np.linspace(0.0, 5.0, steps + 1), states, states, None)
-    assert (record is not None) == known
-    if known:
-        np.testing.assert_allclose(record[0], np.linspace(0.0, 5.0, 65), rtol=1e-15)
-
-
 def test_a_scene_whose_steps_do_not_fall_on_the_times_says_which_run_it_shows_or_that_there_is_none(engines):
     odd = FREE.changed(name="odd", dt=5.0 / 12)
-    robot = dataclasses.replace(ARM, scenes=(odd.scene,))
-    runs = follow(odd, engines, (1, 16)).curves
+    robot, runs = dataclasses.replace(ARM, scenes=(odd.scene,)), follow(odd, engines, (1, 16)).curves
     result, table = table_of(runs, robot)
-    assert table["dt_s"].unique().tolist() == [5.0 / 192] and "odd: 192 steps" in result.notes[0]
+    assert table["dt_s"].unique().tolist() == [5.0 / 192] and "odd" in result.notes[0] and "192" in result.notes[0]
     result, table = table_of({key: run for key, run in runs.items() if key[2] == 12}, robot)
-    assert len(table) == 0 and result.notes == [
-        "tables/motion.csv has no rows of scenes whose runs have no multiple of 64 steps: odd."
-    ]
+    assert len(table) == 0 and "odd" in result.notes[0]
 
 
-def test_columns_of_every_kind_of_joint():
+def test_columns_of_every_kind_of_joint_and_of_names_that_differ_in_signs_alone():
     names = ("root x", "root y", "root z", "root turn", "hip", "lift", "my knee")
     of = Coordinates(names, ("slide", "slide", "slide", "ball", "ball", "slide", "hinge"))
     assert motion.motion_columns(of) == [
@@ -116,8 +93,5 @@ def test_columns_of_every_kind_of_joint():
         "qd_root_x_rad_per_s", "qd_root_y_rad_per_s", "qd_root_z_rad_per_s",
         "qd_hip_x_rad_per_s", "qd_hip_y_rad_per_s", "qd_hip_z_rad_per_s", "qd_lift_m_per_s", "qd_my_knee_rad_per_s",
     ]  # fmt: skip
-
-
-def test_joints_whose_names_differ_in_signs_alone_have_columns_of_their_own():
     columns = motion.motion_columns(Coordinates(("a-b", "a b", "a_b", "x turn")))
     assert len(set(columns)) == 8 and columns[0] == "q_a_b_rad" and columns[3] == "q_x_turn_rad"

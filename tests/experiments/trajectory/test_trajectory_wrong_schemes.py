@@ -1,18 +1,38 @@
-"""A method of tmt that is not MuJoCo's scheme leaves the band of rounding: small errors of a scheme are seeded."""
+"""A method of tmt that is not MuJoCo's scheme leaves the band of rounding, also where servos act."""
 
+import copy
 import dataclasses
+from types import SimpleNamespace
 
 import pytest
 from models import PATHS
 
 from compare.case import Case, Scene
 from compare.engines.mujoco import reading
+from compare.engines.own import Own
+from compare.experiments.trajectory import own_runs
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
-from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler
+from tmt.compiled import Library, store
+from tmt.compiled.runner import known as compiled_runs
+from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, semi_implicit
+
+LEVELS = {"derivative", "one step", "open loop"}
+STEPS = {"one step", "open loop"}
+
+
+def failing(case, engines, *integrators) -> set:
+    """(integrator, level) of the checks that fail; of these integrators, or of all."""
+    mujoco, known = copy.copy(engines["mujoco"]), engines["mujoco"].methods_in(case)
+    mujoco.methods_in = lambda _: {name: known[name] for name in integrators or known}
+    checks = [
+        check for check in follow(case, engines | {"mujoco": mujoco}, (1,)).checks if "to MuJoCo" in check.quantity
+    ]
+    assert {check.quantity.split(",")[0] for check in checks} == LEVELS
+    return {(check.scene.split(", ")[-2], check.quantity.split(",")[0]) for check in checks if not check.passed}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,28 +58,19 @@ class Hasty(RungeKutta):
 
 RK4 = {"order": 4, "A": METHODS["rk4"].A, "b": METHODS["rk4"].b, "c": METHODS["rk4"].c}
 WRONG_SCHEMES = {
-    "damping explicit": ("semi_implicit_euler", Altered(False, drop="damping"), "bent, damped, Euler"),
-    "derivative of the bias dropped": ("implicit", Altered(True, drop="bias"), "bent, free, implicit"),
-    "stages swapped": ("rk4", RungeKutta(**RK4 | {"b": (1 / 3, 1 / 6, 1 / 6, 1 / 3)}), "bent, free, RK4"),
-    "another method of order 4, Kutta's 3/8 rule": (
-        "rk4",
-        RungeKutta(
-            4, ((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8), (0.0, 1 / 3, 2 / 3, 1.0)
-        ),
-        "bent, free, RK4",
-    ),
-    "dt off by one ulp times 1e6": ("rk4", Hasty(**RK4), "bent, free, RK4"),
+    "damping explicit": ("semi_implicit_euler", Altered(False, drop="damping"), "bent, damped", "Euler"),
+    "derivative of the bias dropped": ("implicit", Altered(True, drop="bias"), "bent, free", "implicit"),
+    "stages swapped": ("rk4", RungeKutta(**RK4 | {"b": (1 / 3, 1 / 6, 1 / 6, 1 / 3)}), "bent, free", "RK4"),
+    "dt off by one ulp times 1e6": ("rk4", Hasty(**RK4), "bent, free", "RK4"),
 }
 
 
-@pytest.mark.parametrize("scheme, wrong, where", WRONG_SCHEMES.values(), ids=WRONG_SCHEMES)
-def test_a_wrong_scheme_leaves_the_band(scheme, wrong, where, engines, monkeypatch):
-    case = next(case for case in ARM.cases if where.startswith(case.name))
-    assert [str(check) for check in follow(case, engines, (1,)).checks if not check.passed] == []
+@pytest.mark.parametrize("scheme, wrong, scene, integrator", WRONG_SCHEMES.values(), ids=WRONG_SCHEMES)
+def test_a_wrong_scheme_leaves_the_band(scheme, wrong, scene, integrator, engines, monkeypatch):
+    case = next(case for case in ARM.cases if case.name == scene)
+    assert failing(case, engines, integrator) == set()
     monkeypatch.setitem(METHODS, scheme, wrong)
-    checks = follow(case, engines, (1,)).checks
-    failed = {check.quantity for check in checks if not check.passed and check.scene.startswith(where)}
-    assert {"one step, TMT to MuJoCo", "open loop, TMT to MuJoCo"} <= failed
+    assert failing(case, engines, integrator) >= {(integrator, level) for level in STEPS}
 
 
 def test_a_body_that_tumbles_tells_how_a_quaternion_is_moved(monkeypatch):
@@ -67,9 +78,83 @@ def test_a_body_that_tumbles_tells_how_a_quaternion_is_moved(monkeypatch):
     read = reading.read(PATHS["free_body"])
     engines, robot = engines_of(reading.engine(read)), robot_of(read, "free_body.xml")
     scene = Scene("tumbling", speed=(0.0, 0.0, 0.0, 200.0, 300.0, -100.0), duration=0.25, dt=1 / 64, judged=0.0)
-    case, (scheme,) = Case(robot, scene), {engines["mujoco"].methods["RK4"].scheme}
-    assert [str(check) for check in follow(case, engines, (1,)).checks if not check.passed] == []
+    case, scheme = Case(robot, scene), engines["mujoco"].methods["RK4"].scheme
+    assert failing(case, engines, "RK4") == set()
     monkeypatch.setitem(METHODS, scheme, METHODS["rk4_mean_speed" if scheme == "rk4" else "rk4"])
-    checks = follow(case, engines, (1,)).checks
-    failed = {(check.scene.split(", ")[1], check.quantity) for check in checks if not check.passed}
-    assert failed == {("RK4", "one step, TMT to MuJoCo"), ("RK4", "open loop, TMT to MuJoCo")}
+    assert failing(case, engines, "RK4") == {("RK4", level) for level in STEPS}
+
+
+# servos
+
+GEARED = PATHS["gripper"].read_text(encoding="utf-8").replace('kp="60" kv="6"', 'kp="6" kv="0.6" gear="3"')
+SHORT = Scene("step", "open", "servos", targets=(6.0, 6.0, 0.02, 0.02), duration=1 / 16, dt=1 / 256, judged=1 / 16)
+
+
+@pytest.fixture(scope="module")
+def gripper():
+    """Its robot and the engines; its tendon pulls two fingers, its first servo has a gear."""
+    found = reading.read(GEARED)
+    return robot_of(found, "gripper.xml"), engines_of(reading.engine(found))
+
+
+def case_of(robot, **changed):
+    return dataclasses.replace(robot, scenes=(dataclasses.replace(SHORT, **changed),)).cases[0]
+
+
+@pytest.fixture
+def altered(monkeypatch):
+    """Replace a part of tmt, and let nothing that was compiled before stand for it."""
+
+    def replace(of, name, value):
+        (monkeypatch.setitem if isinstance(of, dict) else monkeypatch.setattr)(of, name, value)
+        monkeypatch.setattr(store, "library", lambda source, *what: Library(source()))
+        compiled_runs.clear()
+
+    yield replace
+    compiled_runs.clear()
+
+
+@pytest.mark.parametrize("changed", [{}, {"name": "held", "targets": 0.0}, {"gravity": False}], ids=str)
+def test_every_integrator_is_its_scheme_held_and_in_a_step(gripper, changed):
+    robot, known = gripper
+    assert failing(case_of(robot, **changed), known) == set()
+
+
+def test_velocity_gains_implicit_under_euler_leave_the_band(gripper, altered):
+    altered(METHODS, "semi_implicit_euler", SemiImplicitEuler(implicit_bias=False, implicit_gains=True))
+    assert failing(case_of(gripper[0]), gripper[1], "Euler") == {("Euler", level) for level in STEPS}
+
+
+def test_cross_terms_of_a_tendon_counted_implicit_leave_the_band(gripper, altered):
+    altered(semi_implicit, "on_one_path", lambda tree: [[True] * len(tree.axis)] * len(tree.axis))
+    found = failing(case_of(gripper[0]), gripper[1], "implicitfast")
+    assert found == {("implicitfast", level) for level in STEPS}
+
+
+def test_position_gains_explicit_under_discrete_leave_the_band(gripper, altered):
+    if "discrete" not in gripper[1]["mujoco"].methods:
+        pytest.skip("this MuJoCo has no integrator discrete")
+    altered(METHODS, "discrete", METHODS["implicitfast"])
+    assert {name for name, _ in failing(case_of(gripper[0]), gripper[1], "discrete")} == {"discrete"}
+
+
+def test_a_gear_that_is_not_squared_and_an_armature_that_is_forgotten_leave_the_band(gripper):
+    robot, known = gripper
+    servo = robot.drive.actuators[0]
+    once = dataclasses.replace(servo, bias=(0.0, servo.bias[1] / 3.0, servo.bias[2] / 3.0))
+    drive = dataclasses.replace(robot.drive, actuators=(once, *robot.drive.actuators[1:]))
+    bare = dataclasses.replace(robot.tree, armature=(0.0, *robot.tree.armature[1:]))
+    for wrong in ({"drive": drive}, {"tree": bare}):
+        found = failing(case_of(dataclasses.replace(robot, **wrong)), known, "Euler")
+        assert found == {("Euler", level) for level in LEVELS}
+
+
+def test_equations_of_ones_own_have_no_servos(gripper):
+    robot, known = gripper
+    equations = SimpleNamespace(has=lambda name: True, times={"acceleration": (1e-6,)})
+    setup = SimpleNamespace(engines={"own": SimpleNamespace(equations=equations)}, size="full", finer=(1,))
+    able, _, said = own_runs.within_time(setup, robot.cases, 1_000_000)
+    assert [case.name for case in able] == ["open, held", "open, let go", "open, let go, damped"] and len(said) == 1
+    assert Own(equations).methods_in(robot.cases[-1]) == {} and Own(equations).methods_in(able[0])
+    with_own = case_of(dataclasses.replace(robot, own=("acceleration",)))
+    assert follow(with_own, known | {"own": Own(equations)}, (1,), {with_own: None}).rows == []
