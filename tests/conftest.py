@@ -1,16 +1,22 @@
+"""Fixtures of all tests, and the budget: processor time of each folder, printed at the end of a run."""
+
+import os
+import pickle
 import signal
+from collections import defaultdict
+from pathlib import Path
 
 import numpy as np
 import pytest
-from aside import Aside, is_waiting
+from filelock import FileLock
 from hypothesis import settings
-from small_runs import Beside, jobs, of_arm
+from small_runs import of_arm
 
 from compare import experiment
 from compare.engines.mujoco import load
 from compare.robots.arm import ARM
 
-# what is started in the background or by nohup ignores these, and its children do too: tests that send them would wait
+# a process in the background, or under nohup, is started with these ignored, and so would be those that it starts
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -19,43 +25,65 @@ if hasattr(signal, "SIGHUP"):
 settings.register_profile("project", database=None, derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("project")
 
-
-ALL_RUN = {"test_agreement.py", "test_second_robot.py", "test_judge_check.py"}  # where these run, all do
-
-
-def are_all(items) -> bool:
-    return {item.path.name for item in items} >= ALL_RUN
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items):
-    if are_all(items):
-        items.sort(key=is_waiting)
+HERE = Path(__file__).resolve().parent
+BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
+    "tests": 60, "diagnosis": 8, "engines": 35, "experiments": 105, "fleet": 25, "judge": 3, "process": 6, "report": 20,
+    "tmt": 40, "truth": 15,
+}  # fmt: skip
+LONGEST = 10  # tests that are listed
 
 
-def pytest_collection_finish(session):
-    if are_all(session.items) and not session.config.option.collectonly:
-        session.config.aside = Aside(session.config, session.items, session.config._tmp_path_factory.mktemp("aside"))
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item):
+    item.begins = sum(os.times()[:4])
+    return (yield)
 
 
-def pytest_runtest_protocol(item, nextitem):
-    """Of a test that runs in the further pytest: what that reports; of any other: what pytest does."""
-    aside = getattr(item.config, "aside", None)
-    if aside is None:
-        return None
-    if not is_waiting(item):
-        aside.one_begins()
-        return None
-    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-    for report in aside.reports(item):
-        item.ihook.pytest_runtest_logreport(report=report)
-    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
-    return True
+@pytest.hookimpl(wrapper=True, trylast=True)
+def pytest_runtest_teardown(item):
+    result = yield
+    item.user_properties.append(("processor_s", sum(os.times()[:4]) - item.begins))
+    return result
 
 
-def pytest_sessionfinish(session):
-    if aside := getattr(session.config, "aside", None):
-        aside.end()
+def pytest_terminal_summary(terminalreporter):
+    seconds = {
+        report.nodeid: dict(report.user_properties).get("processor_s", 0.0)
+        for reports in terminalreporter.stats.values()
+        for report in reports
+        if getattr(report, "when", "") == "teardown"
+    }
+    folders = defaultdict(float)
+    for name, of_test in seconds.items():
+        parts = Path(name.split("::")[0]).parts
+        folders[parts[1] if len(parts) > 2 else "tests"] += of_test
+    if len(seconds) > LONGEST:
+        terminalreporter.section(f"processor time: {sum(seconds.values()):.0f} s")
+        for name, of_folder in sorted(folders.items()):
+            terminalreporter.line(f"{of_folder:7.1f} s of {BUDGET.get(name, 0):3} s  {name}")
+        for name in sorted(seconds, key=seconds.get, reverse=True)[:LONGEST]:
+            terminalreporter.line(f"{seconds[name]:7.1f} s  {name}")
+
+
+@pytest.fixture(scope="session")
+def common(tmp_path_factory, worker_id) -> Path:
+    """A folder of all processes that run the tests."""
+    own = tmp_path_factory.getbasetemp()
+    return own if worker_id == "master" else own.parent
+
+
+@pytest.fixture(scope="session")
+def shared(common):
+    """shared(function, *args): what a function of a module returns, computed once for all processes that run the tests."""
+
+    def result(function, *args):
+        path = common / "-".join([function.__module__, function.__name__, *map(str, args)]).replace(os.sep, "_")[-200:]
+        with FileLock(f"{path}.lock"):
+            if not path.exists():
+                path.write_bytes(pickle.dumps(function(*args)))
+        return pickle.loads(path.read_bytes())
+
+    return result
 
 
 @pytest.fixture(scope="session")
@@ -69,19 +97,17 @@ def engines(mujoco):
     return experiment.engines(mujoco)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def beside(request, tmp_path_factory):
-    """Where all tests are run, what takes long is computed beside them from the start."""
-    folder = tmp_path_factory.mktemp("beside")
-    beside = Beside(folder, jobs(folder) if are_all(request.session.items) else ())
-    yield beside
-    beside.end()
-
-
 @pytest.fixture(scope="session")
-def small(beside):
-    """small(name): the result of an experiment in a small run, every path with few states and steps; made once."""
-    return lambda name: beside.result(of_arm, name)
+def small(shared):
+    """small(name): the result of an experiment in a small run, every path with few states and steps."""
+    results = {}
+
+    def result(name):
+        if name not in results:
+            results[name] = shared(of_arm, name)
+        return results[name]
+
+    return result
 
 
 @pytest.fixture

@@ -1,19 +1,18 @@
-"""Small runs that take long: functions that return what they find, so that they can be computed in a further process.
+"""Small runs that several tests look at, which the fixture `shared` computes once.
 
-The tests run one after the other. Where all of them are run, `Beside` computes these at the same time, on the other core.
+Used by conftest.py (`small`), test_agreement, test_checks, test_command_line, test_drawn_figures, test_second_robot,
+report/test_terminal and experiments/stability/test_stability_small.
 """
 
 import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 from crane import crane
 from drawn_flaws import flaws
-from model_edits import EDITS, failing
 from runs import in_shell, on_terminal
 
 from compare import drawing, experiment
@@ -122,50 +121,6 @@ def runs_on_terminals(plain, umlauts):
     return {name: run.result() for name, run in under_way.items()}
 
 
-def jobs(folder) -> list[tuple]:
-    """All of these and some of test modules, which are collected by now, in the order in which the tests ask for them."""
-    from test_reduction import leg
-    from test_seeded_errors import IN_THE_MJCF, failing_in
-    from test_speed_run import with_and_without
-    from test_stability_small import SPARE, lacking
-    from test_trajectory_other_models import MODELS, said_of
-
-    return [
-        (of_arm, "reduction"),
-        (leg,),
-        (with_and_without,),
-        (of_arm, "stability"),
-        (on_the_moon, "stability"),
-        *((lacking, name) for name in SPARE),
-        *((failing_in, name) for name in IN_THE_MJCF),
-        *((said_of, name) for name in MODELS),
-        *((of_arm, name) for name in EXPERIMENTS if name not in ("reduction", "stability")),
-        (runs_on_terminals, *terminal_folders(folder)),
-        (report_of_arm,),
-        (flaws_of_arm,),
-        (quick_run, folder / "anywhere"),
-        (of_crane,),
-        *((failing, old, new) for old, new, _ in EDITS.values()),
-    ]
-
-
 def terminal_folders(folder) -> tuple[Path, Path]:
     """Where `runs_on_terminals` runs."""
     return folder / "plain", folder / "Zoë" / "Über"
-
-
-class Beside:
-    """A further process, or none: then what is asked for is computed at once. folder: where it may write."""
-
-    def __init__(self, folder, jobs):
-        self.folder, self.pool = folder, get_context("spawn").Pool(1) if jobs else None
-        self.under_way = {job: self.pool.apply_async(job[0], job[1:]) for job in jobs}
-
-    def result(self, *job):
-        """What a function returns for its arguments."""
-        return self.under_way[job].get() if job in self.under_way else job[0](*job[1:])
-
-    def end(self):
-        if self.pool:
-            self.pool.terminate()
-            self.pool.join()

@@ -37,8 +37,8 @@ def test_a_run_that_diverges_is_no_movement(small):
 
 
 @pytest.mark.slow
-def test_a_report_of_all_experiments_has_every_figure(small, beside):
-    made = beside.result(report_of_arm)
+def test_a_report_of_all_experiments_has_every_figure(small, shared):
+    made = shared(report_of_arm)
     assert made.lost == []
     assert f" {sum(len(small(name).checks) for name in EXPERIMENTS)} " in made.words
     of_more_scenes = {"speed_ball_catch_free", "speed_bent_damped"}

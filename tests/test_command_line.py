@@ -32,10 +32,10 @@ def results_in(folder):
 
 
 @pytest.fixture(scope="module")
-def of_the_terminal(beside):
+def of_the_terminal(shared, common):
     """A quick run of everything on a terminal, and its folder."""
-    folder = beside.folder / "anywhere"
-    return beside.result(quick_run, folder), folder
+    folder = common / "anywhere"
+    return shared(quick_run, folder), folder
 
 
 @pytest.fixture(scope="module", params=["static", pytest.param("all", marks=pytest.mark.slow)])

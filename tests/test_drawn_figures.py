@@ -9,8 +9,8 @@ from compare.report import style
 
 
 @pytest.mark.slow
-def test_no_figure_of_a_run_is_cut_or_covered(beside):
-    found = beside.result(flaws_of_arm)
+def test_no_figure_of_a_run_is_cut_or_covered(shared):
+    found = shared(flaws_of_arm)
     assert len(found) > 30 and {name: of for name, of in found.items() if of} == {}
 
 

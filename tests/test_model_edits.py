@@ -29,6 +29,6 @@ def test_a_wrong_model_fails_in_single_states(name):
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in IN_ALL else pytest.mark.slow) for name in EDITS]
 )
-def test_a_wrong_model_fails_wherever_it_matters(name, beside):
+def test_a_wrong_model_fails_wherever_it_matters(name, shared):
     old, new, reasons = EDITS[name]
-    judge(beside.result(failing, old, new), EXPERIMENTS, reasons)
+    judge(shared(failing, old, new), EXPERIMENTS, reasons)

@@ -31,8 +31,8 @@ def test_only_printed_numbers_are_of_the_arm_alone(robot):
 
 
 @pytest.mark.slow
-def test_all_experiments_pass_and_draw_and_the_report_is_of_this_robot(beside):
-    made = beside.result(of_crane)
+def test_all_experiments_pass_and_draw_and_the_report_is_of_this_robot(shared):
+    made = shared(of_crane)
     for section in made.sections:
         assert section.name == "diagnosis" or section.result.checks
         assert [str(check) for check in section.result.checks if not check.passed] == []

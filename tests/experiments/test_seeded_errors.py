@@ -121,8 +121,8 @@ def test_without_an_error_all_checks_pass(text):
 
 
 @pytest.mark.parametrize("name", IN_THE_MJCF)
-def test_error_in_the_mjcf(name, beside):
-    assert_named(beside.result(failing_in, name), IN_THE_MJCF[name][-1])
+def test_error_in_the_mjcf(name, shared):
+    assert_named(shared(failing_in, name), IN_THE_MJCF[name][-1])
 
 
 @pytest.mark.parametrize("name", [*IN_THE_METHOD, *IN_THE_METHOD_OF_KINDS])

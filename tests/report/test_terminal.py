@@ -12,10 +12,10 @@ from compare.report.terminal import Terminal
 
 
 @pytest.fixture(scope="module")
-def runs(beside):
+def runs(shared, common):
     """Runs of the arm and of a heavy one, on terminals and in a shell, and their two folders."""
-    plain, umlauts = terminal_folders(beside.folder)
-    return beside.result(runs_on_terminals, plain, umlauts) | {"plain": plain, "umlauts": umlauts}
+    plain, umlauts = terminal_folders(common)
+    return shared(runs_on_terminals, plain, umlauts) | {"plain": plain, "umlauts": umlauts}
 
 
 def results_in(folder):

@@ -135,8 +135,8 @@ def leg():
     return result, drawn, [reduction.claim(robot), reduction.tolerance(robot)]
 
 
-def test_a_robot_of_four_hinges_goes_through_with_figures(beside):
-    result, drawn, general = beside.result(leg)
+def test_a_robot_of_four_hinges_goes_through_with_figures(shared):
+    result, drawn, general = shared(leg)
     assert [str(check) for check in failed(result)] == []
     assert len(result.tables["reduction_subsets"]) == (2**4 - 2) * 6
     smallest = {row["scene"]: row["hinges"] for row in result.rows}

@@ -135,8 +135,8 @@ def with_and_without():
 
 
 @pytest.mark.slow
-def test_an_engine_that_cannot_take_part_says_why_in_its_cells_and_is_nowhere_else(beside):
-    (with_it, without), figures = beside.result(with_and_without)
+def test_an_engine_that_cannot_take_part_says_why_in_its_cells_and_is_nowhere_else(shared):
+    (with_it, without), figures = shared(with_and_without)
     absent = {"scene": "bent, free", "engine": "own", "method": "RK4, Heun", "why_not": "own.py is not there"}
     assert with_it.rows[-1] == dict.fromkeys(speed.COLUMNS) | absent and len(with_it.rows) == len(without.rows) + 1
     values = [[(c.scene, c.quantity, c.value) for c in result.checks] for result in (with_it, without)]

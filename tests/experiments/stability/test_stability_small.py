@@ -31,9 +31,9 @@ def test_a_small_run_fills_every_table(small):
 
 
 @pytest.mark.slow
-def test_on_the_moon_many_checks_fail_and_nothing_raises(beside):
+def test_on_the_moon_many_checks_fail_and_nothing_raises(shared):
     """Gravity 1.62: the engines hold other models, and the arm that is stated is not the one that runs."""
-    result, _ = beside.result(on_the_moon, "stability")
+    result, _ = shared(on_the_moon, "stability")
     assert sum(not check.passed for check in result.checks) > 100
     assert verdicts(result.notes)["1"] == "not reproduced" and any("0.08 s" in note for note in result.notes)
     assert not any("silent" in check.quantity for check in result.checks)  # nothing failed, so nothing has to be caught
@@ -48,10 +48,10 @@ def lacking(name) -> tuple[list, list]:
     return [note for note in result.notes if "left out" in note or "no claims" in note], names
 
 
-def test_what_a_robot_lacks_is_left_out_with_a_reason(beside):
-    notes, figures = beside.result(lacking, "up")
+def test_what_a_robot_lacks_is_left_out_with_a_reason(shared):
+    notes, figures = shared(lacking, "up")
     assert [sum(kind in note for note in notes) for kind in ("a centre", "marginal", "a saddle")] == [1, 1, 0]
     assert len(notes) == 3 and figures == ["stability_regions", "stability_departure"]
-    notes, figures = beside.result(lacking, "down")
+    notes, figures = shared(lacking, "down")
     assert [sum(kind in note for note in notes) for kind in ("a centre", "marginal", "a saddle")] == [0, 1, 1]
     assert figures == ["stability_limits", "stability_regions", "stability_silent"]

@@ -42,8 +42,8 @@ def said_of(name) -> tuple[Result, list]:
 @pytest.mark.parametrize("name", [*MODELS, *(
     pytest.param(name, marks=pytest.mark.slow) for name in edited.MODELS if name not in MODELS
 )])  # fmt: skip
-def test_a_model_that_is_another_arm_goes_through(name, beside):
-    result, captions = beside.result(said_of, name)
+def test_a_model_that_is_another_arm_goes_through(name, shared):
+    result, captions = shared(said_of, name)
     assert len(captions) > 3 and not any("nan" in caption for name, caption in captions if name != "trajectory_drift")
     errors = np.array(list(result.curves["errors"].values()), dtype=float)
     assert errors.shape == (4, 2)
