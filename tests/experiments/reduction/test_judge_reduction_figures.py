@@ -59,7 +59,8 @@ def test_the_table_and_the_figure_of_needs_have_the_times_of_each_engine(engines
     assert rows[free.name, 3, "tmt", "RK4"]["max_difference_rad"] is None
 
     needs = {free.name: {"locked": (), "stays": ("beta",)}, held.name: {"locked": (), "stays": JOINTS}}
-    _, fig, _ = figures_needs.draw_needs(Result("reduction", rows=table, curves={"needs": needs}), ARM)
+    _, fig, caption = figures_needs.draw_needs(Result("reduction", rows=table, curves={"needs": needs}), ARM)
+    assert "TMT in zero, free" in caption and "1 of 3" in caption and "0.33" in caption  # the largest gain
     lines = [line for line in fig.axes[1].get_lines() if len(line.get_xdata()) == 1]
     for colour, drawn_times in ((GREEN, (100.0, 300.0)), (ORANGE, (4000.0, 6000.0))):
         of_engine = [line for line in lines if to_hex(line.get_color()) == colour]
