@@ -31,7 +31,7 @@ def test_a_terminal_shows_how_far_it_is_and_then_what_was_found(runs, columns, t
     run = runs["arm", columns, term]
     assert run.status == 0, run.output
     text = words(readable_lines(run))
-    assert re.search(r" mass ok \d+ checks .* 1 of 11 ", text) and f"arm({columns}, '{term}')/index.html (" in text
+    assert re.search(r" mass ok \d+ checks .*\b1 of 11 ", text) and f"arm({columns}, '{term}')/index.html (" in text
     plain = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", run.output)
     assert bool(SHOWN.search(plain)) == ("\x1b" in run.output) == (term == "xterm"), plain
     assert all(len(part.rstrip()) <= columns for part in re.split(r"[\r\n]+", plain))
