@@ -64,9 +64,6 @@ def part(name, of):
     return re.search(rf"^{of}:(.*?)(?=\n\n[A-Z]\w+[:,]|\Z)", help_of(name), re.MULTILINE | re.DOTALL)[1]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="reports/example still has growth.csv and speed_targets.csv, which no run writes"
-)
 def test_every_table_and_figure_of_the_example_is_named_in_one_help():
     tables = [table for name in EXPERIMENTS for table in re.findall(r"(\w+)\.csv", part(name, "Tables"))]
     assert len(set(tables)) == len(tables)
