@@ -7,7 +7,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.compiled import runner
+from tmt.compiled import prepared
 from tmt.methods import method_named
 from tmt.simulation import reasons
 
@@ -97,12 +97,11 @@ class TmtDynamics:
         every, dt = setting.every, setting.duration / setting.steps
         paths = [np.full((1, setting.steps + 1, len(start)), np.nan) for start in (q, v)]
         paths[0][0, 0], paths[1][0, 0] = q, v
-        codes = np.zeros((1, 2), int)
-        tolerance = () if setting.tolerance is None else (setting.tolerance,)
-        run = partial(runner(self.tree, method), *paths, np.array(tau, float)[None], dt, *tolerance, codes)
+        run, outcome = prepared(self.tree, method, *paths, np.array(tau, float)[None], dt, setting.tolerance or 0.0)
         t = np.linspace(0.0, setting.duration, GRID + 1)
 
-        def read(evaluations):
+        def read(_):
+            codes, evaluations = outcome()
             (ended,) = reasons(self.tree, *paths, codes, dt, setting.tolerance or 0.0)
             taken = evaluations // stepping.stages if stepping.adaptive else setting.steps
             return Motion(t, *(path[0, ::every].copy() for path in paths), evaluations, ended, taken)

@@ -8,7 +8,7 @@ import pytest
 from trees import random_states, small_tree
 
 import tmt
-from tmt.compiled import forms, runner, runs
+from tmt.compiled import forms, prepared, runner, runs
 from tmt.compiled.runner import Runner, known
 from tmt.methods import METHODS, one_step
 from tmt.simulation import Motion
@@ -128,3 +128,18 @@ def test_a_runner_fills_paths():
     assert ended[0].tolist() == [0, 0] and ended[1, 0] > 0
     again = [np.ascontiguousarray(np.concatenate([x[:, :1], 0.0 * x[:, :1]], axis=1)) for x in (q, qd)]
     assert run(*again, tau, 0.1, tolerance=1e-6) > 0 and np.isfinite(again[0][0]).all()
+
+
+def test_a_prepared_run_fills_its_paths_each_time():
+    q, qd, tau = starts(3)
+    wanted = tmt.simulate(q, qd, tau, 0.01, 20, "dopri8_adaptive", SMALL, 1e-8)
+    paths = [np.full((3, 21, part.shape[1]), np.nan) for part in (q, qd)]
+    paths[0][:, 0], paths[1][:, 0] = q, qd
+    run, outcome = prepared(SMALL, "dopri8_adaptive", *paths, tau, 0.01, 1e-8)
+    for _ in range(2):
+        run()
+        assert np.array_equal(paths[0], wanted.q) and np.array_equal(paths[1], wanted.qd)
+        assert outcome()[1] == wanted.evaluations and not outcome()[0].any()
+        paths[0][:, 1:] = np.nan
+    with pytest.raises(ValueError, match="share memory"):
+        prepared(SMALL, "rk4", paths[0], paths[0], tau, 0.01)

@@ -1,9 +1,12 @@
-"""Machine code for a tree: `evaluator` of its quantities, `runner` of its motions, `Library` of any LLVM text."""
+"""Machine code for a tree: `evaluator` of its quantities, `runner` of its motions, `prepared` for one that is timed.
+
+`Library`: of any LLVM text.
+"""
 
 from .evaluator import Evaluator, evaluator
-from .runner import runner
+from .runner import prepared, runner
 
-__all__ = ["Evaluator", "Library", "evaluator", "runner"]
+__all__ = ["Evaluator", "Library", "evaluator", "prepared", "runner"]
 
 
 def __getattr__(name: str):

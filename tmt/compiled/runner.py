@@ -68,7 +68,12 @@ class Runner:
             in_threads(follow_some, [(slice(*pair),) for pair in pairwise(bounds)], cores())
         else:
             follow_some(slice(None))
-        taken, codes = steps * count, info[:, :2]
+        return self.outcome(q, qd, info, every)
+
+    def outcome(self, q, qd, info, every: int) -> tuple[np.ndarray, int]:
+        """What `follow` returns, once compiled code has filled the paths and info."""
+        steps, codes = (q.shape[1] - 1) * every, info[:, :2]
+        taken = steps * len(q)
         if codes[:, 0].any():
             taken = int(np.where(codes[:, 0], codes[:, 1] + 1, steps).sum())
             for i in np.flatnonzero(codes[:, 0]):
@@ -106,18 +111,11 @@ def runner(tree: Tree, method: str) -> Callable:
     else.
     """
     own = runner_of(tree, method)
-    nq, nv = tree.coordinates.nq, tree.coordinates.nv
 
     def adaptive(q, qd, tau, dt, tolerance, ended=None, every=1):
-        records = q.shape[1] if isinstance(q, ndarray) and q.ndim == 3 else "records"
-        count = len(tau) if isinstance(tau, ndarray) and tau.ndim else "runs"
-        check("tau", tau, (count, nv))
-        check("q", q, (count, records, nq))
-        check("qd", qd, (count, records, nv))
-        if np.may_share_memory(q, qd) or np.may_share_memory(q, tau) or np.may_share_memory(qd, tau):
-            raise ValueError("q, qd and tau share memory; arrays of their own are expected")
+        check_paths(tree, q, qd, tau)
         if ended is not None:
-            check("ended", ended, (count, 2), np.int64)
+            check("ended", ended, (len(tau), 2), np.int64)
         dt, tolerance, every = real("dt", dt), real("tolerance", tolerance), whole("every", every)
         codes, evaluations = own.follow(q, qd, tau, dt, tolerance, every)
         if ended is not None:
@@ -129,6 +127,39 @@ def runner(tree: Tree, method: str) -> Callable:
 
     own.compiled(1)
     return adaptive if own.stepping.adaptive else fixed
+
+
+def prepared(tree: Tree, method: str, q, qd, tau, dt, tolerance=0.0) -> tuple[Callable, Callable]:
+    """A `run()` that is nothing but compiled code, which fills these paths each time; and `outcome()` of the last time.
+
+    Arguments as of `runner`, one run after the other; outcome: why each ended and after how many steps, and the evaluations.
+    """
+    own = runner_of(tree, method)
+    check_paths(tree, q, qd, tau)
+    info = np.zeros((len(tau), 3), np.int64)
+    given = (
+        *map(address, (q, qd, tau)),
+        real("dt", dt),
+        real("tolerance", tolerance),
+        address(info),
+        1,
+        q.shape[1],
+        len(tau),
+    )
+    run = partial(own.compiled(1), *given)
+    run.arrays = q, qd, tau, info  # they live as long as it
+    return run, partial(own.outcome, q, qd, info, 1)
+
+
+def check_paths(tree, q, qd, tau) -> None:
+    """Raise ValueError unless compiled code can fill these paths."""
+    records = q.shape[1] if isinstance(q, ndarray) and q.ndim == 3 else "records"
+    count = len(tau) if isinstance(tau, ndarray) and tau.ndim else "runs"
+    check("tau", tau, (count, tree.coordinates.nv))
+    check("q", q, (count, records, tree.coordinates.nq))
+    check("qd", qd, (count, records, tree.coordinates.nv))
+    if np.may_share_memory(q, qd) or np.may_share_memory(q, tau) or np.may_share_memory(qd, tau):
+        raise ValueError("q, qd and tau share memory; arrays of their own are expected")
 
 
 def check(name: str, array, shape: tuple, dtype=np.float64) -> None:
