@@ -27,7 +27,7 @@ class Runs:
     def failed(self, copy: Path, cache: Path, stage: Stage, limit: float) -> tuple[str, str]:
         """What failed first, empty if nothing did, and the end of the output. copy: of the project, in a folder of its own."""
         tests = [f"--basetemp={copy.parent / 'tests'}", *stage.options, *stage.files]
-        command = [sys.executable, "-m", "pytest", "-n0", "-x", "-q", "-rfE", *tests]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-rfE", *tests]
         scratch = copy.parent / "scratch"
         scratch.mkdir(exist_ok=True)
         others = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
