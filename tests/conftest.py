@@ -27,8 +27,8 @@ settings.load_profile("project")
 
 HERE = Path(__file__).resolve().parent
 BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
-    "tests": 60, "diagnosis": 8, "engines": 35, "experiments": 105, "fleet": 25, "judge": 3, "process": 6, "report": 20,
-    "tmt": 40, "truth": 15,
+    "tests": 70, "diagnosis": 20, "engines": 30, "experiments": 85, "fleet": 25, "judge": 3, "process": 6, "report": 12,
+    "tmt": 35, "truth": 14,
 }  # fmt: skip
 LONGEST = 10  # tests that are listed
 

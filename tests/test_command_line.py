@@ -95,7 +95,9 @@ def test_results_have_their_fields(report):
     assert set(origin["seconds_of"]) == {*ran, "figures"} and min(origin["seconds_of"].values()) > 0.0
     ended = origin["ended_after_s"]
     assert set(ended) == {"start", *names, "figures"} and list(ended.values()) == sorted(ended.values())
-    assert next(iter(ended)) == "start" and max(ended.values()) == ended["figures"] <= origin["seconds"] + 0.05  # of one digit
+    assert (
+        next(iter(ended)) == "start" and max(ended.values()) == ended["figures"] <= origin["seconds"] + 0.05
+    )  # of one digit
 
 
 def test_tables_are_tidy(report):

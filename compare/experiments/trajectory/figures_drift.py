@@ -53,7 +53,10 @@ def drift_caption(drifts: dict, steps: dict) -> str:
         orders.append(f"{method.name}: {', '.join(spans)}")
         energy = {name: max(of[method][name][-1] for (_, what, _), of in drifts.items() if what == "energy")
                   for name in of_engine}  # fmt: skip
-        of_energy = ", ".join(f"{LABELS[name]} {value:.1e} J" for name, value in energy.items())
+        of_energy = ", ".join(
+            f"{LABELS[name]} {f'{value:.1e} J' if np.isfinite(value) else 'no number'}"
+            for name, value in energy.items()
+        )
         largest.append(f"{method.name} at dt = 1/{steps[method][-1] / DRIFT_DURATION:g} s: {of_energy}")
     pairs = [
         pair for of in drifts.values() for engines in of.values() for pair in zip(engines["tmt"], engines["mujoco"])
