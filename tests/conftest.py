@@ -60,7 +60,8 @@ def pytest_terminal_summary(terminalreporter):
     if len(seconds) > LONGEST:
         terminalreporter.section(f"processor time: {sum(seconds.values()):.0f} s")
         for name, of_folder in sorted(folders.items()):
-            terminalreporter.line(f"{of_folder:7.1f} s of {BUDGET.get(name, 0):3} s  {name}")
+            allowed = f" of {BUDGET.get(name, 0):3} s" * (terminalreporter.config.option.markexpr == "not slow")
+            terminalreporter.line(f"{of_folder:7.1f} s{allowed}  {name}")
         for name in sorted(seconds, key=seconds.get, reverse=True)[:LONGEST]:
             terminalreporter.line(f"{seconds[name]:7.1f} s  {name}")
 

@@ -41,7 +41,8 @@ def test_without_words_it_prints_ten_lines_with_all_experiments(tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["all", "--help"]])
-def test_help_has_every_experiment_and_option(arguments, capsys):
+def test_help_has_every_experiment_and_option(arguments, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     status, text, err = answered(arguments, capsys)
     assert (status, err) == (0, "") and max(map(len, text.splitlines())) <= LINE_WIDTH
     assert all(f"  {name} " in text for name in (*EXPERIMENTS, *OPTIONS_OF_ALL, "--version"))
