@@ -7,9 +7,10 @@ SOON = 60.0  # s, far more than anything here takes
 
 
 def is_there(pid):
-    """Whether a process lives."""
+    """Whether a process lives, or a thread of it: only without any can its parent know that it ended."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        ended = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        return not ended or len(list(Path(f"/proc/{pid}/task").iterdir())) > 1
     except OSError:
         return False
 
