@@ -77,6 +77,12 @@ def test_its_figures_are_those_of_the_example():
     ):  # fmt: skip
         assert figure in text, figure
     assert max(map(abs, off)) <= 1e-4
+    rows = [row for row in table("evaluations") if row["quantity"] == "forward_dynamics"]
+    mujoco, compiled = (
+        min(float(row["ns_per_state"]) for row in rows if row["implementation"] == name)
+        for name in ("MuJoCo, mj_forward", "compiled")
+    )
+    assert f"is {mujoco / compiled:.0f} times as fast as mj_forward per evaluation" in README
     shown = [(row, f"| {row['scene']}: {float(row['target_rad']):.0e} rad |") for row in table("what_should_i_use")]
     shown = [f"{said} {cheapest(row)} |" for row, said in shown if said in README]
     assert len(shown) == 4 and all(line in README for line in shown)

@@ -52,7 +52,7 @@ def simulate(
     """Motion under constant torque: t (records,) s, q (..., records, nq) and qd (..., records, nv), rad and rad/s.
 
     q (..., nq), qd (..., nv): state at t = 0; tau (..., nv): torque. dt: step in s, above 0; steps: how many, at least 1; every:
-    only the states after each so many steps are kept, a divisor of steps: records = steps / every + 1. method: a key of METHODS,
+    every n-th state alone is kept, n a divisor of steps: records = steps / every + 1. method: a key of METHODS,
     or "taylor". An adaptive method takes its own steps between those; tolerance (default 1e-9): the error of each, in units of
     1 + |value|. "taylor" is the true motion, rounded once (default tolerance 1e-33): a Taylor series in pairs of doubles, whose
     evaluations are its steps.

@@ -15,7 +15,7 @@ def cores() -> int:
 
 
 def side_by_side(work: Callable, count: int, speeds: int) -> list:
-    """work(slice) of parts of so many states, in threads where each has enough to do."""
+    """work(slice) of parts of many states, in threads where each has enough to do."""
     threads = max(1, min(cores(), count * speeds // SHARED))
     ends = [count * k // threads // TOGETHER * TOGETHER for k in range(threads)] + [count]
     slices = [slice(*pair) for pair in pairwise(ends)]
@@ -23,7 +23,7 @@ def side_by_side(work: Callable, count: int, speeds: int) -> list:
 
 
 def in_threads(work: Callable, parts: list[tuple], threads: int) -> list:
-    """work(*part) of all parts, in so many threads; one after the other where none can be started any more."""
+    """work(*part) of all parts, in this number of threads; one after the other where none can be started any more."""
     with ThreadPoolExecutor(threads) as pool:
         try:
             found = [pool.submit(work, *part) for part in parts]

@@ -16,7 +16,7 @@ from tmt.model.values import shown
 from .straight import Traced, trace
 from .trace import Expression
 
-FEW, MANY = 5, 20  # speeds: up to so many the composite form alone is traced, from so many on the articulated one alone
+FEW, MANY = 5, 20  # speeds: up to FEW the composite form alone is traced, from MANY on the articulated one alone
 DENSE = 10  # speeds from which solving linear systems and the derivatives of the bias are loops and no longer straight lines
 DYNAMICS = ("mass_matrix", "bias", "gravity_balance", "acceleration")
 

@@ -100,7 +100,7 @@ class Value:
         return self.code.put(self.kind, f"{operation} {self.kind} {self.name}, {self.like(other).name}")
 
     def compare(self, how: str, other) -> "Value":
-        """A flag: lt, le, gt, ge, eq, ne; of doubles false where one is not a number, but for ne."""
+        """A flag: lt, le, gt, ge, eq, ne; false where a double is not a number, except ne."""
         if element(self.kind) == DOUBLE:
             how = f"fcmp {'une' if how == 'ne' else 'o' + how}"
         else:
@@ -127,7 +127,7 @@ class Value:
         return self.code.put(self.kind, f"insertelement {self.kind} {self.name}, {x.kind} {x.name}, i32 {l}")
 
     def everywhere(self, width: int) -> "Value":
-        """The value in each of so many lanes."""
+        """The value in each of `width` lanes."""
         if width == 1:
             return self
         kind = wide(self.kind, width)
@@ -217,7 +217,7 @@ class Code:
         return None
 
     def reserve(self, kind: str, count: int = 1) -> Value:
-        """A place of the function's own for so many values."""
+        """A place of the function's own for `count` values."""
         self.count += 1
         name = f"%v{self.count}"
         self.first.append(f"  {name} = alloca {kind}, i64 {count}, align 64")

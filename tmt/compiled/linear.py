@@ -9,7 +9,7 @@ WIDTH = lanes()  # directions, states or runs that are taken side by side
 def solve() -> Code:
     """solve(matrix, stride, right, n): the solution of matrix x = right in place of right, by L U without pivots.
 
-    matrix: n rows, of so many numbers each, of which n belong to it; it is written over.
+    matrix: n rows of `stride` numbers, of which the first n belong to it; it is written over.
     """
     code = Code(
         "solve", {"matrix": POINTER, "stride": INDEX, "right": POINTER, "n": INDEX}, attributes="noinline", own=True
@@ -53,7 +53,7 @@ def solution(n: int) -> Code:
 
 
 def bias_rates(nq: int, n: int, width: int) -> Code:
-    """bias_rates(in, out): dh/dqd (n, n) from (q, qd), by `bias_rate` in so many directions at a time."""
+    """bias_rates(in, out): dh/dqd (n, n) from (q, qd), by `bias_rate`, several directions at a time."""
     code = Code("bias_rates", {"in": POINTER, "out": POINTER}, attributes="noinline", own=True)
     state = code.reserve(wide(DOUBLE, width), nq + 2 * n)
     found = code.reserve(wide(DOUBLE, width), n)

@@ -30,7 +30,7 @@ class Runner:
         self.tree, self.stepping, self.given, self.runs = tree, stepping, given, {}
 
     def compiled(self, width: int) -> Callable:
-        """The compiled function for so many runs side by side."""
+        """The compiled function for `width` runs side by side."""
         if width not in self.runs:
             from . import runs, store  # here, so that `import tmt` need not wait for llvmlite
 

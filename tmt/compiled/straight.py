@@ -49,7 +49,7 @@ class Traced:
 
 
 def trace(name: str, sizes: Iterable[int], function: Callable) -> Traced:
-    """function(*lists) of so many scalars each, which returns a list."""
+    """function(*lists), each list of one of these sizes, which returns a list."""
     tape, count = Tape(), 0
     lists = []
     for size in sizes:

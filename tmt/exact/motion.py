@@ -169,7 +169,7 @@ def step_size(high: np.ndarray, tolerance: float) -> float:
 
 
 def after(time: Fraction, high: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """The state (2, nq + nv), so many s after that of the series."""
+    """The state (2, nq + nv) a time in s after that of the series."""
     state, rounded = np.empty((2, len(high))), float(time)
     series.values_at(high, low, rounded, float(time - Fraction(rounded)), state)
     return state

@@ -27,7 +27,7 @@ def quantity(function: Callable) -> Callable:
             with np.errstate(all="ignore"):
                 return function(*arguments, **named)
         except MemoryError as error:
-            raise ValueError(f"{function.__name__} of so many states does not fit into memory: {error}") from None
+            raise ValueError(f"{function.__name__} of these states does not fit into memory: {error}") from None
 
     return evaluated
 
@@ -102,7 +102,7 @@ def whole(name, value) -> int:
 
 
 def paths(runs, steps, every, nq, nv) -> tuple[np.ndarray, np.ndarray]:
-    """Arrays for the q and qd of so many runs, (runs, steps / every + 1, nq or nv); ValueError if there is no memory for them."""
+    """Arrays for the q and qd of all runs, (runs, steps / every + 1, nq or nv); ValueError if there is no memory for them."""
     records = steps // every + 1
     size = runs * records * (nq + nv) * 8
     try:
