@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from mutations.__main__ import main
-from mutations.campaign import Stage
 from mutations.edit import DoesNotApply, Edit, applied
 from mutations.edits import EDITS
 
@@ -48,7 +47,6 @@ def test_it():
 def toy(tmp_path, monkeypatch):
     """A project of one judge and its test."""
     monkeypatch.setenv("TMT_CACHE", str(tmp_path / "compiled"))
-    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # as fast as may be
     for name, text in (("compare/rules.py", JUDGE), ("tests/test_toy.py", TEST)):
         path = tmp_path / "toy" / name
         path.parent.mkdir(parents=True)
@@ -61,7 +59,7 @@ def test_one_edit_is_caught_and_one_survives(toy, capfd):
         Edit("rules", "Check.passed", "abs(_1) <= tolerance", "True or _1", "always passes"),
         Edit("moved", "WIDTH", "0.5", "5", "wide"),
     ]
-    assert main(["--jobs", "1"], toy, edits, lambda project: [Stage(["tests/test_toy.py"])]) == 1
+    assert main(["--jobs", "1"], toy, edits) == 1
     out = capfd.readouterr().out
     assert "always passes: caught by tests/test_toy.py::test_it" in out and "wide: SURVIVED" in out
     assert "-WIDTH = 0.5\n+WIDTH = 5" in out
@@ -75,10 +73,9 @@ import sys
 sys.path.insert(0, {tests!r})
 from pathlib import Path
 from mutations.__main__ import main
-from mutations.campaign import Stage
 from mutations.edit import Edit
 edits = [Edit("rules", "WIDTH", "0.5", "5", "wide")]
-sys.exit(main([], Path({toy!r}), edits, lambda project: [Stage(["tests/test_long.py"])]))
+sys.exit(main([], Path({toy!r}), edits))
 """
 LONG = """import os, subprocess, time
 

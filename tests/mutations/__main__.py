@@ -1,6 +1,6 @@
-"""python -m tests.mutations: make the judge wrong in a hundred ways, and list those that no test notices.
+"""python -m tests.mutations: make the judge wrong in some 430 ways, and list those that no test notices.
 
-Each edit is made in a copy of the project; the tests of the judge run first, and all others only if they pass.
+Each edit is made in a copy of the project, and meets the tests of the default stage, those first that name what is edited.
 """
 
 import argparse
@@ -12,22 +12,20 @@ from pathlib import Path
 
 from rich.console import Console
 
-from .campaign import CannotStart, tried_edits
+from .campaign import fail_without_an_edit, tried_edits
 from .edit import DoesNotApply, applied
 from .edits import EDITS
-from .stages import stages
 
 PROJECT = Path(__file__).resolve().parents[2]
 STATUS = """exit status: 0 no edit survives but those declared harmless; 1 some do; 2 an edit does not apply to the sources, or
-the tests do not pass without any"""
+a test that caught one fails without it too"""
 
 
-def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
+def main(arguments=None, project=PROJECT, edits=EDITS) -> int:
     """Run the command line; the exit status."""
     parser = argparse.ArgumentParser("python -m tests.mutations", description=__doc__, epilog=STATUS)
     parser.add_argument("words", nargs="*", metavar="WORD", help="only edits that have one of these in their name")
     parser.add_argument("--list", action="store_true", help="list the edits, run nothing")
-    parser.add_argument("--judge-only", action="store_true", help="only the fast tests of the judge")
     some = min(2, os.cpu_count() or 1)
     parser.add_argument("--jobs", type=int, default=some, metavar="N", help="runs side by side (%(default)s)")
     options = parser.parse_args(arguments)
@@ -51,12 +49,12 @@ def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
     signals = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
     before = [signal.signal(number, signal.default_int_handler) for number in signals]
     try:
-        chosen = stages(project)[: 1 if options.judge_only else None]
-        with closing(tried_edits(project, chosen, places, options.jobs)) as tried:
-            return campaign(console, tried)
-    except CannotStart as error:
-        console.print(f"the tests do not pass without an edit: {error}")
-        return 2
+        with closing(tried_edits(project, places, options.jobs)) as tried:
+            status, tests = campaign(console, tried)
+        if failed := fail_without_an_edit(project, tests):
+            console.print(f"fails without an edit: {failed}")
+            return 2
+        return status
     except KeyboardInterrupt:
         console.print("interrupted")
         return 2
@@ -65,12 +63,13 @@ def main(arguments=None, project=PROJECT, edits=EDITS, stages=stages) -> int:
             signal.signal(number, handler)
 
 
-def campaign(console, tried) -> int:
-    """A line for each edit that was tried, then the survivors; the exit status."""
-    survivors, count = [], 0
+def campaign(console, tried) -> tuple[int, list[str]]:
+    """A line for each edit that was tried, then the survivors; the exit status, and the tests that caught one."""
+    survivors, count, tests = [], 0, set()
     for one in tried:
         count += 1
         survivors += [] if one.caught else [one]
+        tests |= {one.caught.split("[")[0]} if one.caught.startswith("tests") else set()
         outcome = f"caught by {one.caught}" if one.caught else "harmless" if one.edit.harmless else "SURVIVED"
         console.print(f"{one.seconds:5.1f} s  {one.edit.name}: {outcome}")
     for one in sorted(survivors, key=lambda one: bool(one.edit.harmless)):
@@ -79,7 +78,7 @@ def campaign(console, tried) -> int:
     harmful = sum(not one.edit.harmless for one in survivors)
     console.print(f"\n{count} edits: {count - len(survivors)} caught, {len(survivors) - harmful} declared harmless, "
                   f"{harmful} survived")  # fmt: skip
-    return 1 if harmful else 0
+    return (1 if harmful else 0), sorted(tests)
 
 
 if __name__ == "__main__":

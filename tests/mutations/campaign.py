@@ -2,7 +2,11 @@
 
 import difflib
 import os
+import re
 import shutil
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -13,14 +17,16 @@ from queue import SimpleQueue
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+import psutil
+
 from tmt.compiled.store import cache_folder
 
 from .edit import Edit, Place
-from .trial import Runs, Stage
 
-ASIDE = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "venv", "build", "latest")  # not part of a copy
-PATIENCE = 60.0, 3.0  # seconds and times the time of the unedited copy: then a run counts as endless
-UNEDITED = 1200.0  # s that the unedited copy may take in a stage
+NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "venv", "build", "latest")
+BLIND = ("test_mutations.py", "test_structure.py", "test_interrupt.py")  # they see any edit, or no edit of a judge
+SLICES = (0, 4, 16, 1000)  # the files of tests run in parts, the nearest first: most edits are caught by the first
+PATIENCE = 90.0, 20.0  # s that a part may take, and for each of its files: then an edit counts as an endless run
 
 
 class Tried(NamedTuple):
@@ -32,63 +38,98 @@ class Tried(NamedTuple):
     diff: str
 
 
-class CannotStart(Exception):
-    """The unedited copy does not pass."""
+class Copy(NamedTuple):
+    """A copy of the project with a store of machine code, both in a folder of their own."""
 
+    project: Path
+    store: Path
 
-def tried_edits(project: Path, stages: list[Stage], places: dict[Edit, Place], jobs: int) -> Iterator[Tried]:
-    """Each edit with its outcome, as they end; an edit that survives one stage meets the next.
+    @classmethod
+    def of(cls, project: Path, folder: Path) -> "Copy":
+        copy = cls(folder / "project", folder / "store")
+        shutil.copytree(project, copy.project, ignore=NOT_COPIED)
+        copy.store.mkdir(mode=0o700)
+        with suppress(OSError):  # without what is compiled the first tests take longer
+            shutil.copytree(cache_folder(), copy.store, dirs_exist_ok=True)
+        return copy
 
-    CannotStart: the unedited copy does not pass, which comes first.
-    """
-    runs, copies = Runs(), SimpleQueue()
-    with TemporaryDirectory(prefix="edits-") as place:
-        first, cache = Path(place, "0", "project"), Path(place, "cache")
-        shutil.copytree(project, first, ignore=ASIDE)
-        cache.mkdir(mode=0o700)
-        with suppress(OSError):  # without what is compiled the first run takes a minute longer
-            shutil.copytree(cache_folder(), cache, dirs_exist_ok=True)
-        pool = ThreadPoolExecutor(jobs)
+    def failed(self, tests: list[str]) -> str:
+        """The first of these tests (files or names) that fails, empty if none does."""
+        here, others = str(self.project), os.environ.get("PYTHONPATH", "").split(os.pathsep)
+        path = [here, *(other for other in others if other and not Path(other, "compare").is_dir())]
+        scratch = self.project.parent / "scratch"
+        scratch.mkdir(exist_ok=True)
+        own = {
+            "PYTHONPATH": os.pathsep.join(path),
+            "TMT_CACHE": str(self.store),
+            "TMPDIR": str(scratch),
+            "COLUMNS": "200",
+        }
+        command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-rfE", *tests]
+        limit = PATIENCE[0] + PATIENCE[1] * len(tests)
+        with (self.project.parent / "output").open("w+", errors="replace") as output:
+            streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}
+            process = subprocess.Popen(command, cwd=here, env=os.environ | own, start_new_session=True, **streams)
+            try:
+                process.wait(limit)
+            except subprocess.TimeoutExpired:
+                return f"no end after {limit:.0f} s"
+            finally:
+                end_children(process.pid)
+                with suppress(ProcessLookupError, PermissionError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+            output.seek(0)
+            lines = output.read().splitlines()[-30:]
+        named = [found[1] for line in lines if (found := re.match(r"(?:FAILED|ERROR) (.*?)(?: - .*)?$", line))]
+        otherwise = [f"status {process.returncode}: {(lines or ['no output'])[-1]}"] * bool(process.returncode)
+        return [*named, *otherwise, ""][0]
+
+    def caught(self, name: Path, text: str, files: list[str]) -> str:
+        """Which test notices a changed text of a file. files: of tests, the likeliest first."""
+        file = self.project / name
+        before, store = file.read_text(encoding="utf-8"), self.store.with_name("store of an edit")
+        shutil.copytree(self.store, store, copy_function=os.link)  # its machine code must not reach the next edit
+        edited = self._replace(store=store)
         try:
-            limits = []
-            for stage in stages:
-                started = time.perf_counter()
-                failed, output = pool.submit(runs.failed, first, cache, stage, UNEDITED).result()
-                if failed:
-                    raise CannotStart(f"{failed}\n{output}")
-                limits.append(PATIENCE[0] + PATIENCE[1] * (time.perf_counter() - started))
-            for k in range(jobs):
-                copies.put(shutil.copytree(first, Path(place, str(k + 1), "project"), ignore=ASIDE))
-
-            def tried(edit, changed):
-                name, started, copy = changed.path.relative_to(project), time.perf_counter(), copies.get()
-                ordered = [stage._replace(files=nearest(project, stage, edit)) for stage in stages]
-                caught = caught_by(runs, copy, cache, name, changed.after, list(zip(ordered, limits)))
-                copies.put(copy)
-                return Tried(edit, caught, time.perf_counter() - started, difference(name, changed))
-
-            for done in as_completed([pool.submit(tried, *item) for item in places.items()]):
-                yield done.result()
+            write(file, text)
+            parts = [files[start:end] for start, end in zip(SLICES, SLICES[1:]) if files[start:end]]
+            return next((caught for part in parts if (caught := edited.failed(part))), "")
         finally:
-            runs.end()
-            pool.shutdown(cancel_futures=True)
+            write(file, before)
+            shutil.rmtree(store, ignore_errors=True)
 
 
-def caught_by(runs, copy, cache, name, text, stages) -> str:
-    """What notices a changed text of a file of a copy. stages: with the time that each may take."""
-    file, own_cache = copy / name, copy.parent / "cache"
-    before = file.read_text(encoding="utf-8")
-    shutil.copytree(
-        cache, own_cache, copy_function=os.link
-    )  # machine code of an edited source must not reach the next edit
-    try:
-        write(file, text)
-        return next(
-            (caught for stage, limit in stages if (caught := runs.failed(copy, own_cache, stage, limit)[0])), ""
-        )
-    finally:
-        write(file, before)
-        shutil.rmtree(own_cache, ignore_errors=True)
+def tried_edits(project: Path, places: dict[Edit, Place], jobs: int) -> Iterator[Tried]:
+    """Each edit with its outcome, as they end."""
+    with TemporaryDirectory(prefix="edits-") as folder:
+        copies = SimpleQueue()
+        for k in range(jobs):
+            copies.put(Copy.of(project, Path(folder, str(k))))
+
+        def tried(edit, changed):
+            name, copy = changed.path.relative_to(project), copies.get()
+            started = time.perf_counter()
+            caught = copy.caught(name, changed.after, nearest(project, edit))
+            copies.put(copy)
+            return Tried(edit, caught, time.perf_counter() - started, difference(name, changed))
+
+        with ThreadPoolExecutor(jobs) as pool:
+            under_way = [pool.submit(tried, *place) for place in places.items()]
+            try:
+                for done in as_completed(under_way):
+                    yield done.result()
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
+                while not all(one.done() for one in under_way):  # interrupted
+                    end_children(os.getpid())
+                    time.sleep(0.05)
+
+
+def fail_without_an_edit(project: Path, tests: list[str]) -> str:
+    """The first of these tests that fails in a copy of the project as it is, empty if none does."""
+    with TemporaryDirectory(prefix="edits-") as folder:
+        return Copy.of(project, Path(folder, "0")).failed(tests) if tests else ""
 
 
 def write(file, text) -> None:
@@ -97,15 +138,25 @@ def write(file, text) -> None:
     Path(cache_from_source(file)).unlink(missing_ok=True)
 
 
-def nearest(project: Path, stage: Stage, edit: Edit) -> list[str]:
-    """The files of a stage, those first that name what is edited: most edits are caught by one of these."""
+def end_children(pid: int) -> None:
+    """Kill what a process has started, in whatever group; the process too, unless it is this one."""
+    with suppress(psutil.NoSuchProcess):
+        parent = psutil.Process(pid)
+        for one in [*parent.children(recursive=True), *([parent] if pid != os.getpid() else [])]:
+            with suppress(psutil.NoSuchProcess):
+                one.kill()
+
+
+def nearest(project: Path, edit: Edit) -> list[str]:
+    """The files of tests, those first that name what is edited."""
     words = {*edit.module.split("."), *edit.where.split(".")}
 
     def named(file):
-        text = (project / file).read_text(encoding="utf-8")
-        return sum(word in text for word in words) + (edit.module in Path(file).stem)
+        text = file.read_text(encoding="utf-8")
+        return sum(word in text for word in words) + (edit.module in file.stem)
 
-    return sorted(stage.files, key=named, reverse=True)
+    files = [path for path in sorted(project.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
+    return [str(file.relative_to(project)) for file in sorted(files, key=named, reverse=True)]
 
 
 def difference(name: Path, place: Place) -> str:

@@ -1,0 +1,37 @@
+"""The words of a small report on the arm are those that were last reviewed, in golden.md.
+
+RENEW=1 python -m pytest -n 0 tests/report/test_golden.py writes them anew; the change is reviewed as a diff. Numbers are #, and the
+names of scenes, quantities and coordinates ~: which of them comes out worst depends on the machine. Timings are left out.
+"""
+
+import os
+import re
+from pathlib import Path
+
+from small_runs import report_of_arm
+
+from compare.experiments import EXPERIMENTS
+from compare.robots.arm import ARM
+
+GOLDEN = Path(__file__).with_name("golden.md")
+NUMBER = re.compile(r"(?<![A-Za-z_])[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
+TIMED = "_times", "_needs", "cost_in_mujoco", "times as fast"
+FIXED = "#", "- *Claim", "- *Tolerance"  # lines that no run changes
+
+
+def words(text, names) -> str:
+    """The sentences of a report without what depends on the machine, a figure in a line."""
+    one_of = re.compile(rf"(?<![\w/])({'|'.join(map(re.escape, sorted(names, key=len, reverse=True)))})(?!\w)")
+    sections = [part for part in re.split(r"(?m)^(?=## )", text) if not part.startswith("## Speed")]
+    lines = "".join(sections).replace(" ![", "\n![").splitlines()
+    kept = [line for line in lines if line and line[0] != "|" and not any(word in line for word in TIMED)]
+    return "".join((line if line.startswith(FIXED) else one_of.sub("~", NUMBER.sub("#", line))) + "\n" for line in kept)
+
+
+def test_the_words_of_a_small_report(small, shared):
+    checks = [check for name in EXPERIMENTS for check in small(name).checks]
+    names = {NUMBER.sub("#", name) for check in checks for name in (check.quantity, check.scene) if len(name) > 2}
+    found = words(shared(report_of_arm).text, names | set(ARM.coordinates.names))
+    if "RENEW" in os.environ:
+        GOLDEN.write_text(found, encoding="utf-8")
+    assert found.splitlines() == GOLDEN.read_text(encoding="utf-8").splitlines()
