@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from importlib.util import cache_from_source
+from itertools import pairwise
 from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryDirectory
@@ -93,7 +94,7 @@ class Copy(NamedTuple):
         edited = self._replace(store=store)
         try:
             write(file, text)
-            parts = [files[start:end] for start, end in zip(SLICES, SLICES[1:]) if files[start:end]]
+            parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
             return next((caught for part in parts if (caught := edited.failed(part))), "")
         finally:
             write(file, before)

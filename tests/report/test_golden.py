@@ -1,6 +1,6 @@
 """The words of a small report on the arm are those that were last reviewed, in golden.md.
 
-RENEW=1 python -m pytest -n 0 tests/report/test_golden.py writes them anew; the change is reviewed as a diff. Numbers are #, and the
+RENEW=1 python -m pytest -n 0 tests/report/test_golden.py writes them anew; the change is reviewed as a diff. Numbers are #, and
 names of scenes, quantities and coordinates ~: which of them comes out worst depends on the machine. Timings are left out.
 """
 
