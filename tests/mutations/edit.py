@@ -50,8 +50,8 @@ class Place(NamedTuple):
 
 def applied(project: Path, edit: Edit) -> Place:
     """The file that the edit changes, with its text before and after."""
-    paths = sources(project)
-    named = [path for path in paths if is_named(path.relative_to(project), edit.module) and scopes(path, edit.where)]
+    paths, module = sources(project), f".{edit.module}."
+    named = [path for path, name in paths.items() if module in name and scopes(path, edit.where)]
     holding = named or [path for path in paths if scopes(path, edit.where)]  # moved to another file
     if not holding:
         raise DoesNotApply(f"{edit.name}: there is no {edit.where} below {' or '.join(PACKAGES)}")
@@ -62,33 +62,31 @@ def applied(project: Path, edit: Edit) -> Place:
     if not 1 <= (edit.nth or 1) <= len(hits) or (edit.nth is None and len(hits) > 1):
         raise DoesNotApply(f"{edit.name}: {len(hits)} times {edit.old} in {edit.where}; one is expected, or nth")
     path, node = hits[(edit.nth or 1) - 1]
-    body = parsed(path.read_text(encoding="utf-8")).body
+    body = parsed(text_of(path)).body
     texts = [written(statement) for statement in body]
-    k = next(k for k, statement in enumerate(body) if any(one is node for one in ast.walk(statement)))
+    k = next(k for k, statement in enumerate(body) if node.lineno <= statement.end_lineno)
     after = "\n".join([*texts[:k], edited(body[k], node, edit), *texts[k + 1 :]])
     return Place(path, "\n".join(texts) + "\n", after + "\n")
 
 
 @cache
-def sources(project: Path) -> list[Path]:
-    return [path for package in PACKAGES for path in sorted((project / package).rglob("*.py"))]
+def sources(project: Path) -> dict[Path, str]:
+    """The files, each with its dotted name between dots."""
+    paths = [path for package in PACKAGES for path in sorted((project / package).rglob("*.py"))]
+    return {path: f".{'.'.join(path.relative_to(project).with_suffix('').parts)}." for path in paths}
 
 
-written = cache(ast.unparse)
+written, parsed = cache(ast.unparse), cache(ast.parse)
 
 
-def is_named(path: Path, module: str) -> bool:
-    """Whether a file, or a folder above it, has this dotted name or one that ends so."""
-    parts, wanted = path.with_suffix("").parts, tuple(module.split("."))
-    return any(parts[:end][-len(wanted) :] == wanted for end in range(1, len(parts) + 1))
-
-
-parsed = cache(ast.parse)
+@cache
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
 
 
 def scopes(path: Path, where: str) -> list[ast.AST]:
     """The nodes of this qualified name: definitions, or statements that assign it."""
-    text = path.read_text(encoding="utf-8")
+    text = text_of(path)
     nodes = [parsed(text)] if where.split(".")[0] in text else []
     for name in where.split("."):
         nodes = [inner for node in nodes for inner in named_inside(node, name)]
