@@ -1,11 +1,12 @@
-"""MJCF for the reader's tests: a text with everything that a Tree has, random ones, and a case of any tree."""
+"""MJCF with everything that a Tree has, a case of any tree, and the comparison of both engines: for engines/test_mujoco_*.py."""
 
 from types import SimpleNamespace
 
 import numpy as np
-from trees import random_state, unit_quaternion
+from trees import random_state
 
 import tmt
+from compare.coordinates import Coordinates
 
 EPS = np.finfo(float).eps
 
@@ -62,77 +63,16 @@ def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:
     return f"<mujoco>{before}<worldbody>{content}</worldbody>{after}</mujoco>"
 
 
-def random_mjcf(rng: np.random.Generator, bodies: int = 5) -> str:
-    """A branched tree of every kind of joint, one or two in a body; numbers with all their digits."""
-
-    def numbers(values):
-        return " ".join(map(repr, np.atleast_1d(values).tolist()))
-
-    def joint(kind, number):
-        given = {
-            "armature": rng.uniform(0.01, 0.1),
-            "damping": rng.uniform(0.0, 0.5),
-            "stiffness": rng.uniform(1.0, 5.0),
-        }
-        if kind in ("hinge", "slide"):
-            given |= {"axis": rng.normal(size=3), "ref": rng.uniform(-0.5, 0.5), "springref": rng.uniform(-0.5, 0.5)}
-        if kind != "free":
-            given["pos"] = rng.uniform(-0.1, 0.1, 3)
-        return (
-            f'<joint name="j{number}" type="{kind}" ' + " ".join(f'{k}="{numbers(v)}"' for k, v in given.items()) + "/>"
-        )
-
-    texts, inside = [], [[] for _ in range(bodies)]
-    kinds = ["free", *map(str, rng.choice(["hinge", "slide", "ball"], bodies))]
-    for b in range(bodies):
-        first = kinds[b]  # nothing turns after a ball
-        chosen = [first] if first in ("free", "ball") else [first, str(rng.choice(["hinge", "slide", "ball"]))]
-        chosen = chosen[: rng.integers(1, 3)]
-        moments = rng.uniform(0.02, 0.04, 3)  # each below the sum of the others
-        texts.append(
-            f'<body name="b{b}" pos="{numbers(rng.uniform(-0.3, 0.3, 3))}" quat="{numbers(unit_quaternion(rng))}">'
-            + "".join(joint(kind, f"{b}{i}") for i, kind in enumerate(chosen))
-            + f'<inertial pos="{numbers(rng.uniform(-0.1, 0.1, 3))}" quat="{numbers(unit_quaternion(rng))}"'
-            + f' mass="{numbers(rng.uniform(0.5, 2.0))}" diaginertia="{numbers(moments)}"/>'
-        )
-        if b and rng.random() < 0.7:
-            inside[rng.integers(b)].append(b)
-    nested = {b for children in inside for b in children}
-
-    def whole(b):
-        return texts[b] + "".join(map(whole, inside[b])) + "</body>"
-
-    content = "".join(whole(b) for b in range(bodies) if b not in nested)
-    return mjcf(content, '<compiler angle="radian"/>')
-
-
-class OfTree:
-    """The coordinates of a Tree as the engines ask for them."""
-
-    def __init__(self, tree: tmt.Tree):
-        self.places, self.names, self.kinds = tree.coordinates, tree.hinge_names, tree.kind
-        self.nq, self.nv = self.places.nq, self.places.nv
-
-    def move(self, q, u):
-        rows = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1])
-        q, u = (np.broadcast_to(x, (*rows, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, u))
-        return np.array([self.places.move(list(a), list(b)) for a, b in zip(q, u)]).reshape(*rows, -1)
-
-    def difference(self, q1, q0):
-        return np.array([self.places.difference(list(a), list(b)) for a, b in zip(q1, q0)])
-
-
 def case_of(tree: tmt.Tree, locked=None, damping=0.0, gravity=True):
     """A case of a Tree, as far as MuJoCo's engine asks it; tree is that without the locked joints."""
-    scene = SimpleNamespace(gravity=gravity, damping=damping)
     return SimpleNamespace(
         tree=tree,
         locked=locked or {},
-        scene=scene,
+        scene=SimpleNamespace(gravity=gravity, damping=damping),
         controller=None,
         added_damping=np.full(len(tree.axis), damping),
         joints=tree.hinge_names,
-        coordinates=OfTree(tree),
+        coordinates=Coordinates(tree.hinge_names, tree.kind),
     )
 
 

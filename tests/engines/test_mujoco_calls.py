@@ -1,9 +1,10 @@
-"""MuJoCo's minimal calls in compiled loops."""
+"""MuJoCo's minimal calls in compiled loops, and its batches: the same numbers as its own calls."""
 
 import numpy as np
 import pytest
 
-from compare.engines.mujoco import calls
+from compare.engines.mujoco import batch, calls
+from compare.engines.mujoco.batch import BatchedCalls
 from compare.engines.mujoco.calls import MinimalCalls
 from compare.robots.arm import ARM
 
@@ -23,9 +24,8 @@ def minimal(mujoco):
 def test_the_loops_do_all_of_it_at_the_state_that_is_there(mujoco, minimal, rng, name):
     """Nothing is left of what was found at the state before."""
     (minimal, ways), dynamics = minimal, mujoco.of(ARM.case())
-    states, nothing = rng.uniform(-2.0, 2.0, (2, 2, 3)), np.zeros(3)
-    q, v = states[int(name.endswith("no solve"))]
-    minimal.place(q, v, nothing)
+    q, v = rng.uniform(-2.0, 2.0, (2, 3))
+    minimal.place(q, v, np.zeros(3))
     minimal.force[:] = np.nan
     ways[name][1](0)
     assert np.isnan(minimal.force).all()  # it does as often as it is told
@@ -34,9 +34,6 @@ def test_the_loops_do_all_of_it_at_the_state_that_is_there(mujoco, minimal, rng,
     calls.mujoco.mj_fullM(minimal.model, minimal.data, full)
     assert np.array_equal(full, M) and np.array_equal(minimal.force, dynamics.bias(q, v))
     assert name.endswith("no solve") or np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
-    assert minimal.data.qacc.any() and np.array_equal(
-        minimal.bias(q, v), dynamics.bias(q, v)
-    )  # without an acceleration
 
 
 def test_a_loop_repeats_a_step_of_rk4_and_all_of_mj_forward(mujoco, minimal):
@@ -55,6 +52,21 @@ def test_a_loop_repeats_a_step_of_rk4_and_all_of_mj_forward(mujoco, minimal):
     assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], STATE[2]), rtol=1e-12)
 
 
-def test_without_the_library_it_says_so(monkeypatch, tmp_path):
+@pytest.mark.skipif(BatchedCalls.unavailable() is not None, reason="this MuJoCo has no batches")
+def test_a_batch_has_the_accelerations_of_mj_forward(mujoco, rng):
+    dynamics = mujoco.of(ARM.case())
+    q, v, tau = rng.uniform(-2.0, 2.0, (3, 7, 3))
+    calls, expected = BatchedCalls(dynamics, q, v, tau, threads=2), dynamics.acceleration(q, v, tau)
+    assert np.array_equal(calls.forward(), expected) and np.abs(expected).max() > 1.0
+    calls.batch.bind("qvel")[:] = 0.0
+    calls.forward_loop()(1)
+    assert np.array_equal(calls.found, dynamics.acceleration(q, 0.0 * v, tau))
+    for _ in range(3):
+        calls.step()
+    assert np.allclose(calls.batch.bind("time"), 3 * batch.TINY_STEP, rtol=1e-12)
+
+
+def test_what_is_not_installed_is_said(monkeypatch, tmp_path):
     monkeypatch.setattr(calls.mujoco, "__file__", str(tmp_path / "mujoco" / "__init__.py"))
-    assert MinimalCalls.unavailable()
+    monkeypatch.setattr(batch, "find_spec", lambda name: None)
+    assert MinimalCalls.unavailable() and BatchedCalls.unavailable()

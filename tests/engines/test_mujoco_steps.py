@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 from files import EVERYTHING, PLAIN, assert_the_same, case_of, mjcf
-from trees import random_state
+from trees import random_states
 
 import tmt
 from compare.engines.mujoco import engine, read
@@ -19,35 +19,25 @@ def reading():
     return read(EVERYTHING)
 
 
-@pytest.fixture
-def dynamics(reading):
-    return engine(reading).of(case_of(reading.tree))
-
-
-def test_a_step_is_differenced_in_movements(reading, dynamics, rng):
-    q, _, tau = random_state(rng, reading.tree)
+def test_a_step_is_differenced_in_movements_and_minimal_calls_are_the_same(reading, rng):
+    dynamics, (q, v, tau) = engine(reading).of(case_of(reading.tree)), random_states(rng, reading.tree, 3)
     for integrator in ("Euler", "implicit"):
-        A = transition(dynamics, q, tau, 1e-3, integrator)
+        A = transition(dynamics, q[0], tau[0], 1e-3, integrator)
         assert A.shape == (2 * dynamics.coordinates.nv,) * 2
-        assert np.allclose(A, differenced(dynamics, q, tau, 1e-3, integrator), atol=1e-6)
-    assert np.allclose(transition(dynamics, q, tau, 1e-9, "RK4"), np.eye(len(A)), atol=1e-5)
-
-
-def test_minimal_calls_are_the_same(reading, dynamics, rng):
-    if MinimalCalls.unavailable():
-        pytest.skip("MuJoCo's library is not beside its package")
-    minimal = MinimalCalls(dynamics)
-    q, v, tau = (np.array(values) for values in zip(*(random_state(rng, reading.tree) for _ in range(3))))
-    assert np.allclose(minimal.mass_matrix(q), dynamics.mass_matrix(q), atol=1e-13)
-    assert np.allclose(minimal.bias(q, v), dynamics.bias(q, v), atol=1e-11)
-    assert np.allclose(minimal.acceleration(q, v, tau), dynamics.acceleration(q, v, tau), rtol=1e-9, atol=1e-9)
+        assert np.allclose(A, differenced(dynamics, q[0], tau[0], 1e-3, integrator), atol=1e-6)
+    assert np.allclose(transition(dynamics, q[0], tau[0], 1e-9, "RK4"), np.eye(len(A)), atol=1e-5)
+    if not MinimalCalls.unavailable():
+        minimal = MinimalCalls(dynamics)
+        assert np.allclose(minimal.mass_matrix(q), dynamics.mass_matrix(q), atol=1e-13)
+        assert np.allclose(minimal.bias(q, v), dynamics.bias(q, v), atol=1e-11)
+        assert np.allclose(minimal.acceleration(q, v, tau), dynamics.acceleration(q, v, tau), rtol=1e-9, atol=1e-9)
 
 
 def test_additions_to_a_bare_model(reading, rng):
     engines = with_additions(engine(reading), 0.02, -5.0, -50.0)
-    assert "8 sensors" in engines
-    case, state = case_of(reading.tree), random_state(rng, reading.tree)
+    case, state = case_of(reading.tree), [x[0] for x in random_states(rng, reading.tree, 1)]
     bare = engine(reading).of(case).run(*state, 1e-3, 5, "RK4").states
+    assert "8 sensors" in engines
     for name, addition in engines.items():
         dynamics = addition.of(case)
         if name == MINIMAL:
@@ -60,14 +50,10 @@ def test_additions_to_a_bare_model(reading, rng):
 @pytest.mark.parametrize("flag", ["gravity", "damper", "spring"])
 def test_default_flags_bring_back_no_force_that_the_file_disables(flag):
     joint = PLAIN.replace('name="j"', 'name="j" axis="0 1 0" damping="1" stiffness="3" springref="40"')
-    reading = read(mjcf(joint, f'<option><flag {flag}="disable"/></option>'))
-    case = case_of(reading.tree)
-    found = {
-        name: e.of(case).acceleration([0.3], [0.5], [0.0])
-        for name, e in with_additions(engine(reading), 0.02, -5.0, -9.0).items()
-    }
-    for name, acceleration in found.items():
-        assert acceleration == pytest.approx(tmt.acceleration([0.3], [0.5], [0.0], reading.tree), rel=1e-12), name
+    reading, state = read(mjcf(joint, f'<option><flag {flag}="disable"/></option>')), ([0.3], [0.5], [0.0])
+    for name, addition in with_additions(engine(reading), 0.02, -5.0, -9.0).items():
+        found = addition.of(case_of(reading.tree)).acceleration(*state)
+        assert found == pytest.approx(tmt.acceleration(*state, reading.tree), rel=1e-12), name
 
 
 def test_a_reading_and_its_engine_can_go_to_another_process(reading, rng):
