@@ -94,7 +94,8 @@ def test_every_law_is_the_same_in_both(name):
 def test_actuators_act_in_their_own_scene_alone():
     reading = read(PATHS["gripper"])
     robot, known = robot_of(reading, "gripper"), engine(reading)
-    case, plain = robot.case("servos", posture="open", torque="servos"), robot.case("plain", posture="open")
+    case = robot.case("servos", posture="open", torque="servos", targets=(6.0, 6.0, 0.02, 0.02))
+    plain = robot.case("plain", posture="open")
     assert known.methods_in(plain) == known.methods and Tmt().methods_in(plain).keys() == Tmt().methods.keys()
     assert "implicitfast" in Tmt().methods_in(case) and "implicitfast" not in Tmt().methods
     for one in (plain, case, plain):  # each keeps its own model
