@@ -1,4 +1,4 @@
-"""Actuators under constant controls as a linear controller: the law, moved targets, and the scenes that use it."""
+"""The law of an actuator in plain numbers, and actuators under constant controls as a linear controller of scenes."""
 
 import dataclasses
 
@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from models import PATHS
 
-from compare.actuators import Actuator, Drive
-from compare.case import Case, rates_at
+from compare.actuators import Actuator, Drive, Tendon
+from compare.case import rates_at
 from compare.controller import controller, reason
 from compare.engines.mujoco import read
 from compare.given import WrongField
 from compare.robots.file import robot_of
 
+PLAIN = Actuator("s", "a", (1.0,))
 SERVO = Actuator("servo", "b", (0.0, 2.0), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, -4.0))
 TENDON = Actuator("tendon", "a", (0.5, -0.7), gain=(30.0, 0.0, 0.0), bias=(1.0, -20.0, 0.0))
 MOTOR = Actuator("motor", "a", (3.0, 0.0), gain=(2.0, 0.0, 0.0))
@@ -22,6 +23,41 @@ Q = np.array([0.3, -0.4])
 @pytest.fixture(scope="module")
 def gripper():
     return robot_of(read(PATHS["gripper"]), "gripper.xml")
+
+
+def test_the_law_of_an_actuator():
+    assert SERVO.is_servo and SERVO.target(0.3) == pytest.approx(0.3)
+    assert SERVO.force(SERVO.target(0.3), 0.3) == pytest.approx(0.0)
+    assert (SERVO.stiffness(0.3), SERVO.damping(0.3)) == (50.0, 4.0)
+    # a gain that depends on length and speed is stiff with its control
+    one = dataclasses.replace(PLAIN, gain=(2.0, -4.0, -5.0), bias=(1.0, 0.0, 0.0))
+    assert (one.stiffness(3.0), one.damping(3.0), one.force(3.0, 0.5)) == (12.0, 15.0, 1.0)
+    assert one.is_servo and one.target(0.2) == 0.0
+    assert not MOTOR.is_servo and MOTOR.target(0.7) == 0.0
+    assert not dataclasses.replace(SERVO, off="the file disables group 2").is_servo
+
+
+def test_ranges_of_control_activation_and_force():
+    one = dataclasses.replace(PLAIN, control_range=(-1.0, 2.0), activation_range=(-0.5, 0.5), force_range=(-2.0, 3.0))
+    assert [one.clamped(u) for u in (3.0, -3.0, 1.0)] == [2.0, -1.0, 1.0]
+    assert dataclasses.replace(one, dynamics="filter").clamped(3.0) == 0.5
+    assert [one.is_cut(x) for x in (-2.001, -2.0, -1.999, 2.999, 3.0, 3.001)] == [True, True, False, False, True, True]
+    assert not PLAIN.is_cut(1e9)
+
+
+def test_the_spring_of_a_tendon_is_without_force_in_its_dead_band():
+    tendon = Tendon("t", 0, (1.0,), 10.0, 0.0, 0.2, 0.5)
+    assert [tendon.force(x) for x in (0.1, 0.3, 0.7)] == pytest.approx([1.0, 0.0, -2.0])
+    assert [tendon.pulls(x) for x in (0.199, 0.201, 0.499, 0.501)] == [True, False, False, True]
+    assert [tendon.pulls(x) for x in (0.2 + 1e-12, 0.5 - 1e-12)] == [True, True]
+
+
+def test_controls_are_what_a_keyframe_states_else_the_targets_that_are_the_posture():
+    drive = Drive((SERVO, TENDON), controls={"home": (0.7, None)})
+    assert drive.control("home", (0.1, 0.2)) == pytest.approx([0.7, TENDON.target(0.2)])
+    assert drive.control("elsewhere", (0.1, 0.2)) == pytest.approx([0.1, TENDON.target(0.2)])
+    home, none = (controller(drive, posture, Q).controls for posture in ("home", (0.0, 1.0)))
+    assert (home[0], none[0]) == (0.7, -0.8) and home[1] == none[1]
 
 
 def test_gears_count_twice_and_tendons_couple():
@@ -46,12 +82,6 @@ def test_a_motor_keeps_its_control_when_targets_move():
         assert found.torque.tolist() == [3.0, 0.0] and not found.position_gain.any()
 
 
-def test_a_keyframe_states_the_controls():
-    drive = Drive((SERVO, TENDON), controls={"home": (0.7, None)})
-    home, none = (controller(drive, posture, Q).controls for posture in ("home", (0.0, 1.0)))
-    assert (home[0], none[0]) == (0.7, -0.8) and home[1] == none[1]
-
-
 @pytest.mark.parametrize("changes, takes_part", [
     ({"off": "group 1"}, False), ({"refused": "a muscle"}, False), ({"moment": None}, False),
     ({"moment": (0.0, 0.0)}, False), ({"bias": (0.0, 50.0, -4.0)}, False), ({}, True),
@@ -61,6 +91,9 @@ def test_which_actuators_take_part(changes, takes_part):
     found = controller(Drive((one,)), "none", Q)
     assert (reason(one, 0.0) == "") is takes_part is bool(found.position_gain.any())
     assert set(found.left_out) == (set() if takes_part else {"servo"}) and (found.controls != (None,)) is takes_part
+
+
+# scenes
 
 
 @pytest.mark.parametrize("changes, field", [
@@ -75,13 +108,14 @@ def test_what_cannot_be_a_scene_of_servos_is_refused(gripper, changes, field):
 
 def test_one_number_moves_all_joints_of_one_kind():
     robot = robot_of(read(PATHS["arm6"]), "arm6.xml")
-    one, each = (robot.case("mine", posture="home", torque="servos", targets=by) for by in (2.0, (2.0,) * 6))
+    one, each, still = (
+        robot.case("mine", posture="home", torque="servos", targets=by) for by in (2.0, (2.0,) * 6, 0.0)
+    )
     assert np.array_equal(one.tau, each.tau) and one.tree == each.tree
-    still = robot.case("mine", posture="home", torque="servos")
     assert np.allclose(one.tau - still.tau, np.array(one.tree.position_gain) @ np.radians(np.full(6, 2.0)))
 
 
-def test_a_robot_with_servos_has_two_scenes_of_them(gripper):
+def test_a_robot_with_servos_has_two_scenes_of_them_and_one_without_none(gripper):
     held, step = gripper.scenes[-2:]
     assert held.torque == step.torque == "servos" and not np.any(held.targets)
     assert step.targets == (6.0, 6.0, 0.02, 0.02)
@@ -91,11 +125,7 @@ def test_a_robot_with_servos_has_two_scenes_of_them(gripper):
     for case in gripper.cases[-2:]:  # no step is longer than 1 over the fastest rate, with the servos
         slow, fast = (max(rates_at(tree, case.q)) for tree in (gripper.tree, case.tree))
         assert slow < fast <= 1.0 / case.scene.dt
-
-
-def test_scenes_of_robots_without_targets_or_without_a_base():
-    for name in ("loop", "mixed", "free_body", "pendulum_ball"):
+    for name in ("loop", "mixed", "free_body"):
         assert all(scene.torque != "servos" for scene in robot_of(read(PATHS[name]), name).scenes)
-    floating = robot_of(read(PATHS["quadruped"]), "quadruped")
-    step = Case(floating, floating.scenes[-1])
-    assert step.controller and not step.scene.gravity
+    floating = robot_of(read(PATHS["quadruped"]), "quadruped").cases[-1]
+    assert floating.controller and not floating.scene.gravity
