@@ -4,14 +4,13 @@ import mujoco
 import numpy as np
 import pytest
 from models import PATHS
-from servo_models import FILTERED, FLOATING, acting_of, hinge, posture_of
+from servo_models import FILTERED, acting_of, hinge, posture_of
 
 from compare.engines.mujoco.whole import whole_run
 
 
-@pytest.mark.parametrize("source", [PATHS["mixed"], FLOATING])
-def test_small_movements_of_every_kind_of_joint_are_measured(source, rng):
-    at, reading = posture_of(source)
+def test_small_movements_of_every_kind_of_joint_are_measured(rng):
+    at, reading = posture_of(PATHS["mixed"])
     acting = acting_of(at, reading)
     moved = 1e-6 * rng.normal(size=(4, acting.model.nv))
     positions = np.tile(at.start, (4, 1))
@@ -38,17 +37,6 @@ def test_a_run_in_parts_is_the_run_that_steps_make(integrator):
     for found in np.concatenate(parts):
         mujoco.mj_step(model, data)
         assert found == pytest.approx([data.qpos[0] - at.q[0], data.act[0] - 0.4], rel=1e-12)
-
-
-def test_a_changed_model_leaves_the_first_as_it_was():
-    both = '<position name="p" joint="turn" kp="20" kv="1"/><velocity name="v" joint="turn" kv="3"/>'
-    at, reading = posture_of(hinge(actuator=both))
-    acting = acting_of(at, reading)
-    other = acting.changed(damping={0: 0.5, 1: 2.0}, armature={0: 0.01})
-    assert list(other.model.actuator_biasprm[:, 2]) == [-0.5, -2.0]
-    assert list(other.model.actuator_gainprm[:, 0]) == [20.0, 2.0]  # what holds a speed has one gain
-    assert list(acting.model.actuator_biasprm[:, 2]) == [-1.0, -3.0]
-    assert other.mass_matrix(at.q) - acting.mass_matrix(at.q) == pytest.approx(0.01, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What drives a file's robot, read from its compiled model."""
+"""What drives a file's robot, read from its compiled model; its forces are in truth/test_servos.py."""
 
 import mujoco
 import numpy as np
@@ -31,33 +31,10 @@ def since(text):
     return text
 
 
-LAWS = {  # actuator, and of its record gain, bias, moment, dynamics
-    '<motor joint="j" gear="3"/>': ((1, 0, 0), (0, 0, 0), (3, 0), "none"),
-    '<position jointinparent="k" kp="9" kv="2" gear="-2"/>': ((9, 0, 0), (0, -9, -2), (0, -2), "none"),
-    '<velocity tendon="t" kv="4" gear="5"/>': ((4, 0, 0), (0, 0, -4), (5, 10), "none"),
-    '<damper joint="j" kv="4" ctrlrange="0 1"/>': ((0, 0, -4), (0, 0, 0), (1, 0), "none"),
-    '<intvelocity joint="j" kp="7" kv="1" actrange="-1 1"/>': ((7, 0, 0), (0, -7, -1), (1, 0), "integrator"),
-    '<general joint="j" dyntype="filterexact" dynprm="0.2" gainprm="3"/>': ((3, 0, 0), (0, 0, 0), (1, 0), "filterexact"),
-    '<general joint="j" gaintype="affine" gainprm="1 2 3" biastype="affine" biasprm="4 5 6"/>': (
-        (1, 2, 3), (4, 5, 6), (1, 0), "none",
-    ),
-    # without a kind of bias its numbers mean nothing
-    '<general joint="j" gainprm="2 7 7" biasprm="4 5 6"/>': ((2, 0, 0), (0, 0, 0), (1, 0), "none"),
-    '<motor site="s" gear="1 0 0 0 0 0"/>': ((1, 0, 0), (0, 0, 0), None, "none"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("text", LAWS)
-def test_the_law_of_an_actuator(text):
-    (one,) = drive_of(text, content=SITES).actuators
-    assert (one.gain, one.bias, one.moment, one.dynamics) == LAWS[text] and one.acts
-
-
 REFUSED = {  # actuator, and a word of why it takes no part
     '<muscle joint="k" lengthrange="0 1"/>': "muscle",
     '<general joint="k" dyntype="user"/>': "user",
-    '<general joint="k" gaintype="user"/>': "user",
-    '<general joint="k" biastype="user"/>': "user",
+    '<general joint="k" gaintype="user" biastype="user"/>': "user",
     '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
     '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
     '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
@@ -83,46 +60,9 @@ def test_springs_and_dampers_that_are_not_linear_are_named(what):
     assert drive.refused.keys() == {"joint j", "tendon t"} and all(what in why for why in drive.refused.values())
 
 
-@pytest.mark.parametrize("actuator, what", [
-    ('<position name="s" joint="j" kp="nan"/>', "gain of actuator 's'"),
-    ('<general name="s" joint="j" biastype="affine" biasprm="0 -inf 0"/>', "bias of actuator 's'"),
-    ('<motor name="s" joint="j" gear="nan"/>', "gear of actuator 's'"),
-])  # fmt: skip
-def test_gains_that_are_no_numbers_are_refused_by_name(actuator, what):
-    with pytest.raises(ModelError, match=what):
-        drive_of(actuator)
-
-
-def test_what_the_file_disables_is_off():
-    servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
-    for option, acting in (('actuatorgroupdisable="2"', [False, True]), ("", [True, True])):
-        assert [one.acts for one in drive_of(servos, before=f"<option {option}/>").actuators] == acting
-    off = drive_of(servos, before='<option><flag actuation="disable"/></option>')
-    assert not off.servos and not any(one.acts for one in off.actuators)
-    # springs and dampers of tendons, and weight that is taken away
-    body = TWO.replace('name="b"', 'name="b" gravcomp="0.5"').replace('name="j"', 'name="j" actuatorgravcomp="true"')
-    every = {"tendon": 'stiffness="7" damping="2" springlength="0.1 0.3"', "content": body}
-    flags = {
-        name: drive_of(before=f'<option><flag {name}="disable"/></option>', **every)
-        for name in ("clampctrl", "spring", "damper", "actuation")
-    }
-    assert flags["clampctrl"].tendons[0][:7] == ("t", 0, (1.0, 2.0), 7.0, 2.0, 0.1, 0.3)
-    assert flags["spring"].tendons[0].stiffness == 0.0 and flags["damper"].tendons[0].damping == 0.0
-    assert (flags["spring"].compensation, flags["spring"].lifted, flags["spring"].unlifted) == ((0.5, 0.0), (0,), ())
-    assert (flags["actuation"].lifted, flags["actuation"].unlifted) == ((), (0,))
-    without = '<option><flag spring="disable" damper="disable"/></option>'
-    assert drive_of(before=without, **every).compensation == (0.0, 0.0) and not drive_of().tendons
-
-
-def test_ranges_and_damping_by_an_actuator():
-    joint = TWO.replace('name="k"', 'name="k" actuatorfrcrange="-2 3"')
-    servo = '<position joint="j" kp="5" ctrlrange="-1 2" forcerange="-7 8"/><motor tendon="t"/>'
-    drive = drive_of(servo, 'actuatorfrclimited="true" actuatorfrcrange="-4 5"', joint)
-    one, motor = drive.actuators
-    assert (one.control_range, one.force_range, motor.control_range) == ((-1.0, 2.0), (-7.0, 8.0), None)
-    assert (drive.ranges, drive.tendon_ranges, motor.tendon, one.tendon) == ({1: (-2.0, 3.0)}, {0: (-4.0, 5.0)}, 0, -1)
-    assert drive_of(servo, before='<option><flag clampctrl="disable"/></option>').actuators[0].control_range is None
-    assert read(since(text_of('<general joint="j" damping="3" gear="2"/>'))).drive.damping == (12.0, 0.0)
+def test_a_gain_that_is_no_number_is_refused_by_name():
+    with pytest.raises(ModelError, match="bias of actuator 's'"):
+        drive_of('<general name="s" joint="j" biastype="affine" biasprm="0 -inf 0"/>')
 
 
 KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'

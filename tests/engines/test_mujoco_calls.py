@@ -8,48 +8,33 @@ from compare.engines.mujoco.batch import BatchedCalls
 from compare.engines.mujoco.calls import MinimalCalls
 from compare.robots.arm import ARM
 
-STATE = np.array([0.5, 0.3, 1.0]), np.array([1.0, -2.0, 3.0]), np.zeros(3)
 
-
-@pytest.fixture(scope="module")
-def minimal(mujoco):
-    """The arm by its minimal calls, and its loops, made at a state."""
-    if reason := MinimalCalls.unavailable():
-        pytest.skip(reason)
-    found = MinimalCalls(mujoco.of(ARM.case()))
-    return found, found.loops(*STATE)
-
-
-@pytest.mark.parametrize("name", ["MuJoCo, equal work, no solve", "MuJoCo, equal work"])
-def test_the_loops_do_all_of_it_at_the_state_that_is_there(mujoco, minimal, rng, name):
+@pytest.mark.skipif(MinimalCalls.unavailable() is not None, reason="MuJoCo's library is not beside its package")
+def test_a_loop_does_all_of_it_at_the_state_that_is_there_as_often_as_it_is_told(mujoco, rng):
     """Nothing is left of what was found at the state before."""
-    (minimal, ways), dynamics = minimal, mujoco.of(ARM.case())
-    q, v = rng.uniform(-2.0, 2.0, (2, 3))
-    minimal.place(q, v, np.zeros(3))
-    minimal.force[:] = np.nan
-    ways[name][1](0)
-    assert np.isnan(minimal.force).all()  # it does as often as it is told
-    ways[name][1](1)
-    M, full = dynamics.mass_matrix(q), np.zeros((3, 3))
-    calls.mujoco.mj_fullM(minimal.model, minimal.data, full)
-    assert np.array_equal(full, M) and np.array_equal(minimal.force, dynamics.bias(q, v))
-    assert name.endswith("no solve") or np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
-
-
-def test_a_loop_repeats_a_step_of_rk4_and_all_of_mj_forward(mujoco, minimal):
-    (minimal, ways), dynamics = minimal, mujoco.of(ARM.case())
+    dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)
+    minimal = MinimalCalls(dynamics)
+    loops = {name: way[1] for name, way in minimal.loops(*rng.uniform(-2.0, 2.0, (3, 3))).items()}
+    for name, (q, v) in zip(("MuJoCo, equal work, no solve", "MuJoCo, equal work"), rng.uniform(-2.0, 2.0, (2, 2, 3))):
+        minimal.place(q, v, nothing)
+        minimal.force[:] = np.nan
+        loops[name](0)
+        assert np.isnan(minimal.force).all()
+        loops[name](1)
+        M, full = dynamics.mass_matrix(q), np.zeros((3, 3))
+        calls.mujoco.mj_fullM(minimal.model, minimal.data, full)
+        assert np.array_equal(full, M) and np.array_equal(minimal.force, dynamics.bias(q, v))
+    assert np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
     minimal.data.time = 0.0
-    ways["MuJoCo, mj_step"][1](7)
+    loops["MuJoCo, mj_step"](7)
     assert minimal.data.time == pytest.approx(7 * calls.TINY_STEP, rel=1e-12)
-    minimal.place(*STATE)
+    minimal.place(q, v, nothing)
     minimal.model.opt.timestep = 0.01
-    ways["MuJoCo, mj_step"][1](1)
-    minimal.model.opt.timestep = calls.TINY_STEP
-    run = dynamics.run(*STATE, 0.01, 1, "RK4")
+    loops["MuJoCo, mj_step"](1)
+    run = dynamics.run(q, v, nothing, 0.01, 1, "RK4")
     assert np.array_equal(minimal.data.qpos, run.q[1]) and np.array_equal(minimal.data.qvel, run.v[1])
-    minimal.data.qacc[:] = np.nan
-    ways["MuJoCo, mj_forward"][1](1)
-    assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], STATE[2]), rtol=1e-12)
+    loops["MuJoCo, mj_forward"](1)
+    assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], nothing), rtol=1e-12)
 
 
 @pytest.mark.skipif(BatchedCalls.unavailable() is not None, reason="this MuJoCo has no batches")

@@ -1,23 +1,20 @@
-"""MuJoCo behind the project's symbols: the state that is asked for, runs that end, what of the file's options does not matter."""
+"""MuJoCo behind the project's symbols: states, runs that end, the order of the Tree, options of the file that do not matter."""
 
 import numpy as np
 import pytest
+from crane import crane
 from edited import XML
 
 import tmt
-from compare.engines.mujoco import parse
+from compare.engines.mujoco import load, parse
 from compare.engines.mujoco.engine import METHODS
+from compare.engines.mujoco.linear import differenced, implicit_derivative, left_to_itself, transition
+from compare.engines.mujoco.parameters import parameters
+from compare.experiments.parameters import stated
 from compare.robots.arm import ARM
+from tmt.equations.method import bias_rates
 
 REST = np.zeros(3)
-
-
-def test_quantities_are_those_of_the_state_that_is_asked_for(mujoco, rng):
-    dynamics, (q, v, tau) = mujoco.of(ARM.case()), rng.uniform(-2, 2, (3, 3))
-    before = dynamics.bias(q, v)
-    dynamics.run(q, v, tau, 0.01, 10, "RK4")
-    dynamics.acceleration(q + 1, v, tau)
-    assert np.array_equal(dynamics.bias(q, v), before)
 
 
 def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypatch):
@@ -52,3 +49,21 @@ def test_the_files_own_integrator_does_not_matter_where_states_are_evaluated(rng
         other, same = (parse(of, tmt.ARM).of(sticky) for of in (text, XML))
         assert np.array_equal(other.acceleration(q, v, tau), same.acceleration(q, v, tau))
         assert np.array_equal(other.inverse(q, v, tau), same.inverse(q, v, tau))
+
+
+def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path, rng):
+    """And so are what MuJoCo says of its own steps, and the numbers that it compiled."""
+    robot = crane(tmp_path)
+    case = robot.case("damped", damping=0.2)
+    dynamics, (q, v, tau), dt = load(robot.mjcf, robot.tree).of(case), rng.uniform(-1.0, 1.0, (3, 4)), 0.01
+    ours, motion = tmt.simulate(q, v, tau, dt, 5, "rk4", case.tree), dynamics.run(q, v, tau, dt, 5, "RK4")
+    assert np.allclose(motion.q, ours.q, atol=1e-11) and np.allclose(motion.v, ours.qd, atol=1e-10)
+    alone, motion = left_to_itself(dynamics, q, v, tau, dt, 5, "Euler"), dynamics.run(q, v, tau, dt, 5, "Euler")
+    assert np.allclose(alone["q"], motion.q, atol=1e-13) and np.allclose(alone["qd"], motion.v, atol=1e-12)
+    for integrator in ("Euler", "implicit"):
+        theirs = transition(dynamics, q, tau, dt, integrator)
+        assert np.allclose(theirs, differenced(dynamics, q, tau, dt, integrator), atol=1e-7)
+    rates = np.array(bias_rates(case.tree, list(q), list(v))) + np.diag(case.tree.damping)
+    assert np.allclose(-implicit_derivative(dynamics, q, v), rates, atol=1e-12)
+    compiled = parameters(dynamics)
+    assert all(np.allclose(compiled[name], numbers, atol=1e-14) for name, numbers in stated(case.tree).items())

@@ -52,12 +52,6 @@ def test_what_refers_to_a_locked_joint_goes_too(rng):
     assert_locked(reading, ["k"], rng)
 
 
-def test_a_joint_whose_name_cannot_stand_in_a_line_is_called_by_its_number(rng):
-    reading = read(mjcf(TWO.replace('"j"', '"a&#10;b"')))
-    assert reading.tree.hinge_names == ("joint 0", "k")
-    assert_locked(reading, ["joint 0"], rng)
-
-
 def test_a_free_body_aligned_with_its_inertia_is_compared_and_not_locked(rng):
     body = '<body euler="10 20 30"><freejoint name="f" align="true"/><geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0"/></body>'
     reading = read(mjcf(body))

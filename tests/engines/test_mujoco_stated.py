@@ -64,26 +64,6 @@ def test_the_mass_of_geoms_is_stated_where_each_has_one():
     assert rows_of(mjcf())["b", "mass"].stated is None
 
 
-def test_an_attached_model_keeps_its_own_settings(tmp_path):
-    part = mjcf(
-        '<body name="p"><frame euler="0.1 0.2 0.3"><joint name="pj" pos="0 0 0.1" axis="0 2 1"/></frame>'
-        '<inertial pos="0 0 0" mass="1" diaginertia="1 2 2.5" euler="0.5 0.2 0"/></body>',
-        '<compiler angle="radian" eulerseq="zyx" boundmass="5"/>',
-    )
-    whole = mjcf(
-        f'<frame euler="10 20 30" pos="1 0 0">{BODY}</frame>'.format(
-            "1 1 1", '<attach model="part" body="p" prefix="a_"/>'
-        ),
-        '<compiler boundmass="0.5"/><asset><model name="part" file="part.xml"/></asset>',
-    )
-    (tmp_path / "part.xml").write_text(part)
-    (tmp_path / "whole.xml").write_text(whole)
-    rows = rows_of(tmp_path / "whole.xml")
-    assert rows["a_p", "mass"].why == "boundmass" and not rows["b", "mass"].why
-    for key, row in rows.items():
-        assert key == ("a_p", "mass") or difference(row) <= DIGITS.get(row.quantity, SMALL)
-
-
 def test_a_number_that_differs_without_an_option_is_found():
     reading = read(mjcf(BODY.format("1 1 1", "")))
     reading.model.body_mass[1] = 1.5
