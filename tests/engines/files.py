@@ -1,4 +1,4 @@
-"""MJCF with everything that a Tree has, a case of any tree, and the comparison of both engines: for engines/test_mujoco_*.py."""
+"""Small MJCF, a case of any tree, and the comparison of both engines: for engines/test_mujoco_*.py."""
 
 from types import SimpleNamespace
 
@@ -16,46 +16,6 @@ TWO = PLAIN.replace(
 )
 
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
-
-# a free base with a spring, turned; nested frames; several joints in one body; anchors off the origin; degrees; unnamed elements;
-# references and rest positions away from zero; bodies fixed to the world and to others; armature of an actuator; keyframes
-EVERYTHING = """<mujoco>
-  <compiler angle="degree" eulerseq="zyx"/>
-  <option gravity="1 2 -9"/>
-  <default><joint armature="0.01"/></default>
-  <worldbody>
-    <body name="table" pos="0 0 1"><geom type="box" size="0.4 0.3 0.02"/></body>
-    <frame pos="0.1 0.2 0.3" euler="10 20 30">
-      <body name="base" pos="1 2 3" euler="40 50 60">
-        <joint name="float" type="free" stiffness="3" damping="0.2"/>
-        <inertial pos="0.1 0.02 0.03" mass="3" fullinertia="0.1 0.2 0.15 0.01 0.02 0.01"/>
-        <frame pos="0.3 0 0" euler="0 90 0">
-          <body name="upper" pos="0.1 0 0" euler="15 0 0">
-            <joint axis="1 2 0" pos="0.1 0.2 0.3" ref="20" stiffness="2" springref="-30"/>
-            <joint name="rail" type="slide" axis="0 1 1" ref="0.2" damping="0.4" range="-0.5 0.5" limited="true"/>
-            <joint name="turn" axis="0 0 1" pos="0 0.1 0.05" range="-90 45" limited="true"/>
-            <geom type="capsule" size="0.02 0.1" pos="0.1 0.1 0.1" euler="30 40 0"/>
-            <body pos="0.1 0 0.1" euler="0 20 0"><geom type="box" size="0.01 0.02 0.03" pos="0 0 0.1" density="5000"/></body>
-          </body>
-        </frame>
-      </body>
-    </frame>
-    <body name="arm" pos="0 -1 1" euler="0 0 35">
-      <joint name="shoulder" type="ball" pos="0.02 0.03 0.04" stiffness="4" damping="0.3"/>
-      <inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
-      <body name="hand" pos="0.4 0 0" euler="0 45 0">
-        <joint name="elbow" axis="0 1 0.2" pos="0.2 0 0"/>
-        <joint name="wrist" type="ball"/>
-        <geom type="ellipsoid" size="0.05 0.1 0.15" pos="0.1 0 0"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><general name="motor" joint="turn" gear="3" armature="0.02"/></actuator>
-  <keyframe>
-    <key name="home" qpos="0 0 1 2 0 0 0 0 0.1 0.2 1 0 0 0 0 1 0 0 0"/>
-    <key qpos="0 0 2 1 0 0 0 0 0.1 0.2 1 0 0 0 0 1 0 0 0"/>
-  </keyframe>
-</mujoco>"""
 
 
 def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:

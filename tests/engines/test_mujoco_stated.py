@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from files import EVERYTHING, PLAIN, mjcf
+from files import PLAIN, mjcf
+from models import PATHS
 
 from compare.engines.mujoco import read
 from compare.engines.mujoco.stated import stated_numbers
@@ -20,8 +21,15 @@ def rows_of(text):
     return {(row.place, row.quantity): row for row in stated_numbers(read(text))}
 
 
-def test_a_file_that_asks_for_no_change_states_what_is_compiled():
-    rows = rows_of(EVERYTHING)
+FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3" euler="40 50 60">
+<inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
+<frame pos="0.3 0 0" euler="0 90 0"><joint name="j" axis="1 2 0" pos="0.1 0.2 0.3" damping="2" stiffness="3"/></frame>
+</body></frame>"""
+
+
+@pytest.mark.parametrize("source", [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf()])
+def test_a_file_that_asks_for_no_change_states_what_is_compiled(source):
+    rows = rows_of(source)
     known = {"pos", "mass", "com", "inertia", "axis", "armature", "damping", "stiffness"}
     assert known <= {quantity for _, quantity in rows}
     for row in rows.values():
