@@ -110,9 +110,3 @@ def test_what_nothing_holds_is_set_aside_by_name_and_the_rest_is_answered():
     for name in INTEGRATORS:
         found, alone = one.limits["fixed", name], held.limits["fixed", name]
         assert found.limit == alone.limit and (found.dt is None or found.dt == pytest.approx(alone.dt, rel=1e-3))
-
-
-def test_a_keyframe_without_a_name_is_a_posture_with_its_controls():
-    one, _ = predicted(GRIPPER.format("0.01 1 0"))
-    assert one.name == "key 0" and one.at.u == pytest.approx([0.01])
-    assert one.rests and one.at.moved < 1e-6 and one.at.start == pytest.approx([0.01, 0.02])

@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 import pytest
 from driven_models import with_servos
-from models import PATHS
 from servo_models import acting_of, posture_of
 
 from compare.engines.mujoco.flags import INTEGRATORS
@@ -15,6 +14,14 @@ STEPPED = [name for name in INTEGRATORS if name != "RK4"]  # whose step MuJoCo d
 LINEAR = {"discrete": 1e-3}  # what the linear map of a step may differ by; of the others 1e-8: central differences
 NOISE = 2e-4  # of a spectral radius of 1 in differences: a free base has it twice
 at = lru_cache(maxsize=128)(posture_of)
+
+ONE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody><body><joint name="a" {joint}/>
+<geom size="0.1" mass="1" pos="0.3 0 0"/></body></worldbody><actuator>{actuators}</actuator></mujoco>"""
+# a body that flies, and something beside it
+DRONE = """<mujoco><worldbody><body><freejoint/><geom size="0.1 0.1 0.02" type="box"/><site name="r" pos="0.05 0 0"/></body>{more}
+</worldbody><actuator>{actuators}</actuator></mujoco>"""
+ROD = """<body pos="0 0 2"><joint name="a" axis="0 1 0"/>
+<geom pos="0.3 0 0" size="0.1"/><site name="tip" pos="0.3 0 0"/></body>"""
 
 
 def transition(source, dt, integrator, base="fixed"):
@@ -68,48 +75,19 @@ def test_a_step_is_that_of_mujoco_with_a_stage_switched_off(flag):
     assert_the_same_map(with_servos(8, flags={flag: "disable"}))
 
 
-def test_limits_of_a_gripper_are_where_a_step_of_mujoco_begins_to_grow():
-    assert assert_limits(PATHS["gripper"]) >= 3
-
-
-ONE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody><body><joint name="a" {joint}/>
-<geom size="0.1" mass="1" pos="0.3 0 0"/></body></worldbody><actuator>{actuators}</actuator></mujoco>"""
-
-
-def one(actuators, joint='axis="0 1 0"', gravity=0.0):
-    return ONE.format(actuators=actuators, joint=joint, gravity=gravity)
-
-
-def limit(source, integrator="Euler"):
-    posture, _ = at(source)
-    return posture.small(posture.bases[0]).limit(integrator)
-
-
 def test_discrete_has_nothing_implicit_that_pushes_away_or_speeds_up():
     servo = '<position joint="a" kp="100" kv="5"/>'
     for bias in ("0 20 2", "0 -20 2", "0 20 -2"):
-        assert_the_same_map(one(f'{servo}<general joint="a" biastype="affine" biasprm="{bias}"/>'))
-
-
-def test_armature_and_the_square_of_a_gear_count():
-    plain = limit(one('<position joint="a" kp="100"/>')).dt
-    assert plain / limit(one('<position joint="a" kp="100" gear="3"/>')).dt == pytest.approx(3.0, rel=1e-6)
-    inertia = 0.3**2 + 0.4 * 0.1**2
-    heavier = limit(one('<position joint="a" kp="100"/>', f'axis="0 1 0" armature="{3.0 * inertia}"')).dt
-    assert heavier / plain == pytest.approx(2.0, rel=1e-6)
-
-
-def test_a_servo_on_its_range_is_not_stiff():
-    # m g r = 2.9 N m: it hangs, the servo pulls with 1
-    posture = assert_the_same_map(one('<position joint="a" kp="1000" forcerange="-1 1"/>', gravity=-9.81))
-    assert posture.cut.forces == pytest.approx({0: -1.0}) and posture.whole.K[0, 0] < 10.0
+        more = f'{servo}<general joint="a" biastype="affine" biasprm="{bias}"/>'
+        assert_the_same_map(ONE.format(gravity=0, joint='axis="0 1 0"', actuators=more))
 
 
 def test_where_the_sum_of_a_speed_is_cut_a_tendon_brakes_elsewhere_and_is_implicit_as_it_was():
     arm = '<body pos="0.6 0 0"><joint name="b" axis="0 1 0" damping="0.2"/><geom size="0.1" mass="1" pos="0.2 0 0"/></body>'
     both = '<tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" coef="0.5"/></fixed></tendon>'
     servos = '<position joint="a" kp="1000" kv="50"/><position tendon="t" kp="300" kv="20"/><position joint="b" kp="30" kv="2"/>'
-    source = one(servos, 'axis="0 1 0" actuatorfrcrange="-1 1" damping="0.3"', gravity=-9.81)
+    joint = 'axis="0 1 0" actuatorfrcrange="-1 1" damping="0.3"'
+    source = ONE.format(actuators=servos, joint=joint, gravity=-9.81)
     posture = assert_the_same_map(source.replace("</body></worldbody>", f"{arm}</body></worldbody>{both}"))
     assert posture.cut.sums == pytest.approx({0: -1.0})
     assert posture.whole.D[0].tolist() == pytest.approx([0.3, 0.0]) and posture.whole.uncut[0, 0] == pytest.approx(20.3)
@@ -117,23 +95,9 @@ def test_where_the_sum_of_a_speed_is_cut_a_tendon_brakes_elsewhere_and_is_implic
 
 @pytest.mark.skipif(not hasattr(mujoco.MjModel.from_xml_string("<mujoco/>"), "actuator_damping"), reason="older MuJoCo")
 def test_damping_of_an_actuator_itself_is_the_joints_and_goes_with_the_square_of_its_gear():
-    posture = assert_the_same_map(one('<position joint="a" kp="100" gear="3" damping="0.5"/>'))
+    servo = '<position joint="a" kp="100" gear="3" damping="0.5"/>'
+    posture = assert_the_same_map(ONE.format(actuators=servo, joint='axis="0 1 0"', gravity=0))
     assert posture.whole.D[0, 0] == posture.whole.damping[0] == pytest.approx(0.5 * 3.0**2)
-
-
-@pytest.mark.parametrize("kind, joint", [("filter", "slow"), ("filterexact", "a")])
-def test_the_filter_of_an_actuator_that_limits_is_named(kind, joint):
-    servo = f'<general name="slow" joint="a" dyntype="{kind}" dynprm="0.01" gainprm="30" biastype="affine" biasprm="0 -30 0"/>'
-    found = limit(one(servo, 'axis="0 1 0" damping="1"'))
-    assert found.joint == joint and (joint == "a" or found.dt == pytest.approx(0.02))
-
-
-# bases
-
-DRONE = """<mujoco><worldbody><body><freejoint/><geom size="0.1 0.1 0.02" type="box"/><site name="r" pos="0.05 0 0"/></body>{more}
-</worldbody><actuator>{actuators}</actuator></mujoco>"""
-ROD = """<body pos="0 0 2"><joint name="a" axis="0 1 0"/>
-<geom pos="0.3 0 0" size="0.1"/><site name="tip" pos="0.3 0 0"/></body>"""
 
 
 def test_a_free_body_that_stands_alone_is_left_out_and_one_that_is_pulled_is_not():

@@ -1,6 +1,5 @@
 """The linearised equations and what a step does to them: slides, balls, springs, damping, bodies that float; and rest."""
 
-import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -82,12 +81,6 @@ def test_a_step_is_the_amplification_of_the_methods_own_step(robots, on_servos, 
     assert at.growth(method, dt) == pytest.approx(growth, abs=1e-6)
 
 
-def test_the_stiffness_under_a_controller_has_its_gain():
-    gain = np.diag([5.0, 6.0, 7.0])
-    driven = stiffness(dataclasses.replace(tmt.ARM, position_gain=gain), np.ones(3))
-    assert np.allclose(driven - stiffness(tmt.ARM, np.ones(3)), gain, atol=1e-12)
-
-
 def test_a_spherical_pendulum_swings_alike_to_both_sides_and_spins_freely(robots):
     at = held(robots["pendulum"], "qpos0")
     inertia = 2 * 0.5**2 + 0.4 * 2 * 0.1**2
@@ -123,13 +116,9 @@ def test_downhill_a_robot_comes_to_a_posture_that_needs_no_torque_and_stays(robo
     assert at_rest(lift.tree, lift.posture("qpos0")) is None
 
 
-# the pendulum, and small oscillations of the arm
-
-SWING = next(case for case in ARM.cases if len(case.joints) == 1)
-
-
 def test_the_swing_is_its_elliptic_function():
-    hanging, frequency = pendulum(SWING.tree)
+    tree = next(case for case in ARM.cases if len(case.joints) == 1).tree
+    hanging, frequency = pendulum(tree)
     assert hanging == pytest.approx(np.pi / 2)
     assert frequency**2 == pytest.approx(41.8436, abs=5e-5)  # the assignment's f1
     t = np.linspace(0.0, 3.0, 61)
@@ -137,8 +126,8 @@ def test_the_swing_is_its_elliptic_function():
         exact = swing(t, q, qd, hanging, frequency)
         assert exact[0] == pytest.approx(q) and np.ptp(exact) > 0.3
         assert distance(exact, exact_swing(t, q, qd, hanging, frequency)).max() < 1e-14 * (1.0 + 30.0)
-        _, path, _ = tmt.simulate([q], [qd], [0.0], 3.0 / 6000, 6000, model=SWING.tree)
-        assert np.abs(path[::100, 0] - exact).max() < 1e-10
+        _, path, _ = tmt.simulate([q], [qd], [0.0], 3.0 / 3000, 3000, model=tree)
+        assert np.abs(path[::50, 0] - exact).max() < 2e-9
     assert np.isnan(swing(t, 0.0, 20.0, hanging, frequency)).all()  # turns over
 
 
@@ -161,5 +150,3 @@ def test_the_slope_of_weight_in_closed_form_is_that_of_dual_numbers(rng):
         assert found.torque == pytest.approx(tmt.gravity_balance(q, tree), abs=1e-13 * found.size)
         assert found.slope + spring_slope(tree, q) == pytest.approx(K, abs=1e-13 * np.abs(K).max())
         assert np.abs(found.torque).max() <= found.size
-    none = weight(tree, q, tree.mass, (0.0, 0.0, 0.0))
-    assert not none.torque.any() and not none.slope.any() and none.size == 0.0

@@ -80,16 +80,6 @@ def test_what_a_flag_switches_off_is_off(stage, rng):
     assert_the_same(with_drive(3, flags={stage: "disable"}), rng)
 
 
-def test_what_is_refused_is_left_out_and_the_rest_is_there():
-    servo = '<position joint="a" kp="30" kv="2"/>'
-    more = '<general joint="b" dyntype="user" gainprm="50"/><position joint="b" kp="3" delay="0.02" nsample="3"/>'
-    q, u = np.array([0.3, -0.4]), np.array([0.7, 0.2, 0.1])
-    with_more, without = driven_of(arm(servo + more))[0], driven_of(arm(servo))[0]
-    assert with_more.drive.refused.keys() == {"actuator 1", "actuator 2"}
-    assert (with_more.forces(q, u)[0] == without.forces(q, u[:1])[0]).all()
-    assert (with_more.slopes(q, u).K == without.slopes(q, u[:1]).K).all()
-
-
 CUT = {  # a drive whose ranges cut at the posture (0.3, -0.4) under controls of 1, and what is cut: forces, sums
     "a force": (arm('<position joint="a" kp="30" kv="2" forcerange="-5 5"/>'), {0: 5.0}, {}),
     "no force": (arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>'), {}, {}),  # just inside
@@ -131,15 +121,6 @@ def test_a_length_that_does_not_change_has_no_stiffness_and_one_that_turns_is_na
     slopes = driven.slopes(np.zeros(2), np.zeros(1))
     assert slopes.D[0, 0] > 0.0 and abs(slopes.K[0, 0]) < 100 * 0.3**2 / 2
     assert driven.differenced == ("at the site",)
-
-
-def test_a_dead_band_has_no_spring_inside_and_one_outside():
-    driven, _ = driven_of(arm(tendon='stiffness="50" springlength="0.1 0.4"', gravity=0.0))
-    for angle, stiff in ((0.39, 0.0), (0.41, 50.0), (0.11, 0.0), (0.09, 50.0)):
-        assert driven.slopes(np.array([angle, 0.0]), np.zeros(1)).K[0, 0] == pytest.approx(stiff, abs=1e-9)
-
-
-# rest
 
 
 def test_a_rest_is_found_from_a_posture_that_is_none():
