@@ -6,18 +6,6 @@ import numpy as np
 from models import random_tree
 
 TRANSMISSIONS = ("joint", "jointinparent", "ball", "tendon", "spatial", "site", "refsite", "slidercrank")
-LAWS = [
-    "motor",
-    "position",
-    "velocity",
-    "damper",
-    "general",
-    "affine",
-    "intvelocity",
-    "cylinder",
-    "filter",
-    "filterexact",
-]
 SWITCHED_OFF = 2  # the group of actuators that the files disable
 
 
@@ -25,27 +13,26 @@ def numbers(values) -> str:
     return " ".join(map(repr, np.atleast_1d(np.asarray(values, float)).tolist()))
 
 
-def law(rng, kind: str) -> tuple[str, dict]:
-    """The tag and the attributes of an actuator of a law."""
+def laws(rng) -> dict[str, tuple[str, dict]]:
+    """The tag and the attributes of an actuator of each law, by its name."""
 
     def some(low, high, size=None):
         return numbers(rng.uniform(low, high, size))
 
     bias = {"biastype": "affine", "biasprm": numbers([rng.uniform(-1, 1), rng.uniform(-9, 1), rng.uniform(-1, 1)])}
     affine = {"gaintype": "affine", "gainprm": numbers([rng.uniform(1, 5), *rng.uniform(-3, 3, 2)])} | bias
-    given = {
-        "motor": {},
-        "position": {"kp": some(5, 50), "kv": some(0, 5)},
-        "velocity": {"kv": some(0, 5)},
-        "damper": {"kv": some(0, 5), "ctrlrange": "0 2"},
-        "general": {"gainprm": some(1, 5)} | bias,
-        "affine": affine,
-        "intvelocity": {"kp": some(5, 50), "kv": some(0, 2), "actrange": "-3 3"},
-        "cylinder": {"area": some(0.5, 2), "timeconst": some(0.1, 1), "bias": some(-1, 1, 3)},
-        "filter": affine | {"dyntype": "filter", "dynprm": some(0.01, 0.1)},
-        "filterexact": affine | {"dyntype": "filterexact", "dynprm": some(0.01, 0.1)},
-    }[kind]
-    return "general" if kind in ("affine", "filter", "filterexact") else kind, given
+    return {
+        "motor": ("motor", {}),
+        "position": ("position", {"kp": some(5, 50), "kv": some(0, 5)}),
+        "velocity": ("velocity", {"kv": some(0, 5)}),
+        "damper": ("damper", {"kv": some(0, 5), "ctrlrange": "0 2"}),
+        "general": ("general", {"gainprm": some(1, 5)} | bias),
+        "affine": ("general", affine),
+        "intvelocity": ("intvelocity", {"kp": some(5, 50), "kv": some(0, 2), "actrange": "-3 3"}),
+        "cylinder": ("cylinder", {"area": some(0.5, 2), "timeconst": some(0.1, 1), "bias": some(-1, 1, 3)}),
+        "filter": ("general", affine | {"dyntype": "filter", "dynprm": some(0.01, 0.1)}),
+        "filterexact": ("general", affine | {"dyntype": "filterexact", "dynprm": some(0.01, 0.1)}),
+    }
 
 
 def robot(rng, text: str, flags: dict | None) -> tuple[ET.Element, list[str]]:
@@ -99,8 +86,8 @@ def with_drive(seed: int, transmissions=TRANSMISSIONS, flags: dict | None = None
     names = [joint.get("name") for joint in single]
     add_tendons(rng, root, names, sites, rng.uniform(0, 20), rng.uniform(0, 3), rng.uniform(0, 0.5))
     actuators = ET.SubElement(root, "actuator")
-    for kind in LAWS:
-        (tag, given), where = law(rng, kind), str(rng.choice(transmissions))
+    for kind, (tag, given) in laws(rng).items():
+        where = str(rng.choice(transmissions))
         two = list(map(str, rng.choice(sites, 2, replace=False)))
         place = {
             "joint": {"joint": str(rng.choice(names))},

@@ -10,7 +10,6 @@ import tmt
 from compare.case import Case, Scene
 from compare.engines.mujoco import parse
 from compare.given import WrongField
-from compare.judge.run import required_time
 from compare.robots import Robot
 from compare.robots.arm import ARM
 
@@ -49,15 +48,6 @@ def test_torques_act_on_the_free_joints():
     assert np.allclose(case.q, np.radians([30, 60])) and case.locked == {"beta": np.radians(20.0)}
     held = ARM.case("held", posture="bent", torque="hold", locked=("beta",))
     assert np.allclose(tmt.acceleration(*held.start, held.tau, held.tree), 0.0, atol=1e-12) and held.tau.any()
-
-
-def test_how_long_a_run_must_be_judged():
-    short = {"duration": 2.0, "dt": 0.5}
-    all_along = ARM.case("all", **short)
-    assert required_time(all_along, "rk4", 0.5) == required_time(all_along, "implicit", 0.005) == 2.0
-    assert required_time(all_along, "implicit", 0.5) == 0.3  # stable for no longer with so long a step
-    for judged in (1.5, 0.0):
-        assert required_time(ARM.case("some", judged=judged, **short), "rk4", 0.5) == judged
 
 
 def test_another_robot_has_its_own_joints_and_its_postures_in_degrees():

@@ -25,18 +25,6 @@ def gripper():
     return robot_of(read(PATHS["gripper"]), "gripper.xml")
 
 
-def test_the_law_of_an_actuator():
-    assert SERVO.is_servo and SERVO.target(0.3) == pytest.approx(0.3)
-    assert SERVO.force(SERVO.target(0.3), 0.3) == pytest.approx(0.0)
-    assert (SERVO.stiffness(0.3), SERVO.damping(0.3)) == (50.0, 4.0)
-    # a gain that depends on length and speed is stiff with its control
-    one = dataclasses.replace(PLAIN, gain=(2.0, -4.0, -5.0), bias=(1.0, 0.0, 0.0))
-    assert (one.stiffness(3.0), one.damping(3.0), one.force(3.0, 0.5)) == (12.0, 15.0, 1.0)
-    assert one.is_servo and one.target(0.2) == 0.0
-    assert not MOTOR.is_servo and MOTOR.target(0.7) == 0.0
-    assert not dataclasses.replace(SERVO, off="the file disables group 2").is_servo
-
-
 def test_ranges_of_control_activation_and_force():
     one = dataclasses.replace(PLAIN, control_range=(-1.0, 2.0), activation_range=(-0.5, 0.5), force_range=(-2.0, 3.0))
     assert [one.clamped(u) for u in (3.0, -3.0, 1.0)] == [2.0, -1.0, 1.0]

@@ -1,8 +1,11 @@
 """What every engine promises: another one is one more parameter."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from crane import TREE, XML
+from trees import large_tree
 
 import tmt
 from compare import experiment
@@ -10,7 +13,9 @@ from compare.case import Case, Scene
 from compare.engines import GRID, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import Mujoco, parse
+from compare.engines.mujoco.batch import BatchedCalls
 from compare.engines.mujoco.calls import MinimalCalls
+from compare.engines.pinocchio import PinocchioCalls
 from compare.engines.scipy import Scipy
 from compare.engines.tmt import Tmt
 from compare.judge import scale
@@ -129,20 +134,6 @@ def test_each_method_comes_to_the_same_motion_at_its_own_order_or_tolerance(meth
             dynamics.prepare(*case.start, case.tau, Setting(DURATION, steps), method.name)
 
 
-def test_methods_of_one_scheme_do_the_same_and_others_do_not(engines):
-    """Ten steps of each method: apart by rounding, or by more."""
-    case, ends = ARM.case("thrown", posture="bent", speed=(90.0, -60.0, 120.0)), {}
-    for method in METHODS:
-        if engines[method.engine].unavailable() is None:
-            motion = engines[method.engine].of(case).run(*case.start, case.tau, 0.01, 10, method.name)
-            ends[method] = motion.q[-1]
-    for one in ends:
-        for other in ends:
-            apart, both_first = np.abs(ends[one] - ends[other]).max(), one.order == other.order == 1
-            least = 1e-6 if both_first else 0.0
-            assert apart < 1e-13 if one.scheme == other.scheme else apart > least, (one.label, other.label)
-
-
 def test_a_batch_of_runs_is_each_run_and_so_is_a_prepared_one(followed, rng):
     method, case, dynamics = followed
     q, v, tau = rng.uniform(-1.0, 1.0, (3, 2, len(case.joints)))
@@ -186,3 +177,14 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed
         assert last >= 0 and finite[: last + 1].all() and np.isnan(np.hstack([q, v])[last + 1 :]).all()
         assert both.ended[1].startswith(f"at t = {both.t[last]:g} s: ")
     assert alone.ended == again.ended == both.ended[1] and list(tmp_path.iterdir()) == []  # no log of MuJoCo's
+
+
+def test_what_cannot_take_part_says_so(monkeypatch, tmp_path):
+    monkeypatch.setattr("mujoco.__file__", str(tmp_path / "mujoco" / "__init__.py"))
+    for name in ("heyoka", "pinocchio", "mujoco.batch"):
+        monkeypatch.setattr(f"compare.engines.{name}.find_spec", lambda name: None)
+    for engine in (Heyoka(), PinocchioCalls, BatchedCalls, MinimalCalls):
+        assert engine.unavailable()
+    driven = dataclasses.replace(tmt.ARM, position_gain=np.eye(3))
+    assert "hinges and slides" in PinocchioCalls.unfit(large_tree()) and "controller" in PinocchioCalls.unfit(driven)
+    assert PinocchioCalls.unfit(tmt.ARM) is None

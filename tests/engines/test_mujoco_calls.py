@@ -57,12 +57,6 @@ def test_a_batch_has_the_accelerations_of_mj_forward(mujoco, rng):
     assert np.allclose(calls.batch.bind("time"), 3 * batch.TINY_STEP, rtol=1e-12)
 
 
-def test_what_is_not_installed_is_said(monkeypatch, tmp_path):
-    monkeypatch.setattr(calls.mujoco, "__file__", str(tmp_path / "mujoco" / "__init__.py"))
-    monkeypatch.setattr(batch, "find_spec", lambda name: None)
-    assert MinimalCalls.unavailable() and BatchedCalls.unavailable()
-
-
 # of models with quaternions
 
 

@@ -16,12 +16,9 @@ REFUSED = {  # a word of why, and the file
         PLAIN + '<flexcomp name="soft" type="grid" count="3 3 1" spacing=".1 .1 .1" radius="0.01" dim="2" mass="1"/>'
     ),
     "plugin": mjcf(PLAIN.replace("</body>", '<plugin plugin="mujoco.elasticity.cable"/></body>'), CABLE),
-    "no joint": "<mujoco/>",
     "mass": mjcf("<body><joint/></body>"),
-    "axis of joint 'joint 0'": mjcf(PLAIN.replace('name="j"', 'axis="nan 0 1"')),
     "pos of body 'far'": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
     "damping of joint 'j' is -1": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
-    "gravity": mjcf(before='<option gravity="0 nan 0"/>'),
     "keyframe 'up'": mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'),
     "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")),
     "'w x'": mjcf(BALL),
@@ -40,16 +37,14 @@ def test_what_cannot_be_compared_is_refused_in_one_line(why, capfd):
 
 @pytest.mark.parametrize("name, content", [
     ("No such file", None), ("gone.xml", "<mujoco><include file='gone.xml'/></mujoco>"),
-    ("gone.stl", "<mujoco><asset><mesh name='m' file='gone.stl'/></asset>"
-     "<worldbody><body><joint/><geom type='mesh' mesh='m'/></body></worldbody></mujoco>"),
 ])  # fmt: skip
 def test_a_file_that_cannot_be_read_is_named_in_one_line(name, content, tmp_path):
     path = tmp_path / "robot.xml"
     if content:
         path.write_text(content)
-    with pytest.raises(ModelError, match=r"robot\.xml") as error:
+    with pytest.raises(ModelError, match=rf"robot\.xml.*{name}") as error:
         read(path)
-    assert name in str(error.value) and "\n" not in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 def test_a_callback_is_refused():

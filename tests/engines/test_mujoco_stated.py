@@ -70,11 +70,3 @@ def test_the_mass_of_geoms_is_stated_where_each_has_one():
         row = rows_of(text)["b", "mass"]
         assert (row.stated, row.compiled, row.why) == expected
     assert rows_of(mjcf())["b", "mass"].stated is None
-
-
-def test_a_number_that_differs_without_an_option_is_found():
-    reading = read(mjcf(BODY.format("1 1 1", "")))
-    reading.model.body_mass[1] = 1.5
-    reading.model.dof_damping[0] = 0.1
-    wrong = [row[:4] for row in stated_numbers(reading) if not row.why and difference(row) > SMALL]
-    assert wrong == [("b", "mass", 1.0, 1.5), ("j", "damping", 0.0, 0.1)]

@@ -27,13 +27,6 @@ FOUR_BARS = """<mujoco><default><geom type="capsule" size="0.01" mass="0.1"/></d
   <body name="rocker" pos="0.2 0 0"><joint name="rocker" axis="0 1 0"/><geom fromto="0 0 0 0 0 0.15"/></body></worldbody>
   <equality><connect body1="rocker" body2="last" anchor="0 0 0.15" solref="0.01 1"/></equality>
   <actuator><position name="crank" joint="crank" kp="20" kv="1"/></actuator></mujoco>"""
-# a finger of two hinges that one tendon moves together and gravity bends, as far as a limit
-FINGER = """<mujoco><default><joint axis="0 1 0" damping="0.1" range="0 90" limited="true"/>
-  <geom type="capsule" size="0.01" mass="0.05"/></default><worldbody>
-  <body><joint name="middle"/><geom fromto="0 0 0 0.05 0 0"/>
-  <body pos="0.05 0 0"><joint name="tip"/><geom fromto="0 0 0 0.05 0 0"/></body></body></worldbody>
-  <tendon><fixed name="both"><joint joint="middle" coef="1"/><joint joint="tip" coef="1"/></fixed></tendon>
-  <actuator><position name="bend" tendon="both" kp="5"/></actuator></mujoco>"""
 # an arm with a servo, and a finger that may slide down
 SLIDE = '<joint name="finger" type="slide" axis="0 0 1"/>'
 LOOSE = f"""<mujoco><worldbody><geom type="plane" size="1 1 1" pos="0 0 -1"/>
@@ -91,16 +84,6 @@ def test_constraints_at_rest_carry_what_mujoco_says_and_are_stiff_by_turning():
     for j, step in enumerate(1e-7 * np.eye(len(K))):
         ahead, behind = (constraint_forces(rows, coordinates, coordinates.move(at.q, s * step))[0] for s in (1, -1))
         assert -(ahead - behind) / 2e-7 == pytest.approx(K[:, j], rel=1e-3, abs=1e-3 * np.abs(K).max())
-
-
-def test_a_finger_rests_at_its_limit_and_not_far_away():
-    one, reading = predicted(FINGER)
-    assert one.is_known and one.at.moved < 0.1 and one.at.limits and one.at.beyond(0.0)
-    # the file's own model with everything on comes to rest there
-    data = mujoco.MjData(reading.model)
-    data.ctrl[:] = one.at.u
-    mujoco.mj_step(reading.model, data, nstep=3000)
-    assert data.qpos == pytest.approx(one.at.q, abs=2e-3)
 
 
 def test_what_nothing_holds_is_set_aside_by_name_and_the_rest_is_answered():

@@ -13,7 +13,7 @@ from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.conserved import floats
 from compare.truth.derivative import holding, stiffness
-from compare.truth.linear import Held, held, modes, small_oscillation
+from compare.truth.linear import Held, held
 from compare.truth.pendulum import exact_swing, pendulum, swing
 from compare.truth.postures import posture_names
 from compare.truth.rest import at_rest
@@ -129,17 +129,6 @@ def test_the_swing_is_its_elliptic_function():
         _, path, _ = tmt.simulate([q], [qd], [0.0], 3.0 / 3000, 3000, model=tree)
         assert np.abs(path[::50, 0] - exact).max() < 2e-9
     assert np.isnan(swing(t, 0.0, 20.0, hanging, frequency)).all()  # turns over
-
-
-def test_modes_and_small_oscillations():
-    q = ARM.posture("hanging")
-    frequencies, shapes = modes(tmt.ARM, q)
-    assert np.allclose(shapes.T @ tmt.mass_matrix(q) @ shapes, np.eye(3), atol=1e-12)
-    assert np.allclose(shapes.T @ stiffness(tmt.ARM, q) @ shapes, np.diag(frequencies**2), atol=1e-9)
-    away = np.array([0.1, -0.2, 0.3])
-    start = small_oscillation(np.array([0.0, 1e-4]), tmt.ARM, q, away)
-    acceleration = -np.linalg.solve(tmt.mass_matrix(q), stiffness(tmt.ARM, q) @ away)
-    assert np.allclose(start[0] - q, away) and np.allclose((start[1] - start[0]) * 2e8, acceleration, rtol=1e-3)
 
 
 def test_the_slope_of_weight_in_closed_form_is_that_of_dual_numbers(rng):

@@ -109,20 +109,6 @@ def test_what_a_range_cuts_has_neither_stiffness_nor_damping(name, rng):
     assert cut.forces == pytest.approx(forces) and cut.sums == pytest.approx(sums)
 
 
-def test_weight_that_an_actuator_takes_away_has_the_slope_of_weight(rng):
-    text = arm('<motor joint="b"/>', 'gravcomp="1"', 'actuatorgravcomp="true"')
-    driven, slopes, _ = assert_the_same(text, rng, np.array([0.3, -0.4]), np.zeros(1))
-    assert driven.drive.lifted == (0,) and np.abs(slopes.K).max() < 1e-9
-
-
-def test_a_length_that_does_not_change_has_no_stiffness_and_one_that_turns_is_named():
-    """MuJoCo's length of a site without a reference is 0: a servo there has a force and no target that can be missed."""
-    driven, _ = driven_of(arm('<position name="at the site" site="s" kp="100" kv="3" gear="0 0 1 0 0 0"/>'))
-    slopes = driven.slopes(np.zeros(2), np.zeros(1))
-    assert slopes.D[0, 0] > 0.0 and abs(slopes.K[0, 0]) < 100 * 0.3**2 / 2
-    assert driven.differenced == ("at the site",)
-
-
 def test_a_rest_is_found_from_a_posture_that_is_none():
     driven, model = driven_of(arm('<position joint="a" kp="300"/><position joint="b" kp="300"/>'))
     q, left = driven.at_rest(np.zeros(2), np.zeros(2))

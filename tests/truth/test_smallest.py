@@ -7,7 +7,7 @@ import pytest
 
 import tmt
 from compare.robots.arm import ARM
-from compare.truth.smallest import needed, reduced
+from compare.truth.smallest import needed
 
 KNOWN = {"zero, free": ("beta",), "ball catch, held": ARM.joints, "bent, held": ARM.joints}
 SCENES = {  # what is not needed, and the scene
@@ -41,11 +41,3 @@ def test_what_does_not_fold_is_kept_and_named():
     robot = dataclasses.replace(ARM, name="top", tree=dataclasses.replace(tmt.ARM, **axes, **body, inertia=inertia))
     found = needed(robot.case("top", posture=(0, 30, 40)))
     assert found.stays == () and set(found.moves) == {"beta"} and found.undecided == ("alpha", "gamma")
-
-
-def test_the_smaller_case_is_the_same_with_more_joints_locked():
-    case = ARM.case("plane", posture=(20, 0, 40), speed=(30, 0, -50), damping=0.2, torque=(0.5, 0, 0.25))
-    smaller = reduced(case)
-    assert smaller.joints == ("alpha", "gamma") and smaller.scene.duration == case.duration
-    assert smaller.tau.tolist() == [0.5, 0.25] and smaller.v.tolist() == case.v[[0, 2]].tolist()
-    assert reduced(ARM.case("all", posture="bent")) is None and reduced(ARM.case("none", torque="hold")) is None

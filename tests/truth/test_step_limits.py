@@ -173,8 +173,3 @@ def test_a_free_base_moves_so_that_no_momentum_arises(rng):
             if limit.limit == "finite":
                 assert_passes_one(whole, name, limit.dt, 0.001)  # with the zero modes left in, the same
                 assert limit.dt <= (whole.locked([0, 1]).limit(name).dt or np.inf)
-
-
-def test_without_speeds_there_is_no_limit_but_that_of_filters():
-    empty = alone([0, 0], [0, 0], poles=(("rotor", 0.1, False),)).free([0, 1])
-    assert not empty.names and empty.limit("Euler").dt == pytest.approx(0.2)
