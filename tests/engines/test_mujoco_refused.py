@@ -20,6 +20,7 @@ REFUSED = {  # a word of why, and the file
     "pos of body 'far'": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
     "damping of joint 'j' is -1": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
     "keyframe 'up'": mjcf(after='<keyframe><key name="up" qpos="inf"/></keyframe>'),
+    "gain of actuator 's'": mjcf(after='<actuator><position name="s" joint="j" kp="nan"/></actuator>'),
     "together": mjcf(PLAIN.replace('<joint name="j"/>', "<joint/><joint/>")),
     "'w x'": mjcf(BALL),
     "MJCF": "hello",
@@ -45,15 +46,6 @@ def test_a_file_that_cannot_be_read_is_named_in_one_line(name, content, tmp_path
     with pytest.raises(ModelError, match=rf"robot\.xml.*{name}") as error:
         read(path)
     assert "\n" not in str(error.value)
-
-
-def test_a_callback_is_refused():
-    mujoco.set_mjcb_passive(lambda model, data: None)
-    try:
-        with pytest.raises(ModelError, match="mjcb_passive"):
-            read(mjcf())
-    finally:
-        mujoco.set_mjcb_passive(None)
 
 
 @pytest.mark.parametrize("text, names, name", [

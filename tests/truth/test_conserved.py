@@ -63,7 +63,6 @@ def test_which_momenta_there_are():
         (ball, ball.armature, ["angular"]),
         (ball, (0.1, 0.1, 0.2, 0, 0, 0), []),
         (ball, (0.1, 0.1, 0.1, 0, 0.3, 0), ["angular"]),
-        (free, free.armature, ["linear", "angular"]),
         (free, (0, 0, 0, 0.1, 0, 0), ["linear"]),
         (free, (0.2,) * 3 + (0.1,) * 3, ["linear", "angular"]),
     ):

@@ -2,7 +2,6 @@
 
 from functools import lru_cache
 
-import mujoco
 import numpy as np
 import pytest
 from driven_models import with_servos
@@ -91,13 +90,6 @@ def test_where_the_sum_of_a_speed_is_cut_a_tendon_brakes_elsewhere_and_is_implic
     posture = assert_the_same_map(source.replace("</body></worldbody>", f"{arm}</body></worldbody>{both}"))
     assert posture.cut.sums == pytest.approx({0: -1.0})
     assert posture.whole.D[0].tolist() == pytest.approx([0.3, 0.0]) and posture.whole.uncut[0, 0] == pytest.approx(20.3)
-
-
-@pytest.mark.skipif(not hasattr(mujoco.MjModel.from_xml_string("<mujoco/>"), "actuator_damping"), reason="older MuJoCo")
-def test_damping_of_an_actuator_itself_is_the_joints_and_goes_with_the_square_of_its_gear():
-    servo = '<position joint="a" kp="100" gear="3" damping="0.5"/>'
-    posture = assert_the_same_map(ONE.format(actuators=servo, joint='axis="0 1 0"', gravity=0))
-    assert posture.whole.D[0, 0] == posture.whole.damping[0] == pytest.approx(0.5 * 3.0**2)
 
 
 def test_a_free_body_that_stands_alone_is_left_out_and_one_that_is_pulled_is_not():

@@ -112,8 +112,8 @@ def test_downhill_a_robot_comes_to_a_posture_that_needs_no_torque_and_stays(robo
     q = at_rest(loop.tree, start)
     assert np.abs(tmt.gravity_balance(q, loop.tree)).max() < 1e-8 < np.abs(tmt.gravity_balance(start, loop.tree)).max()
     assert np.linalg.eigvalsh(stiffness(loop.tree, q)).min() > 0.0
-    lift = robot(CART.format(-9.81))  # falls for ever
-    assert at_rest(lift.tree, lift.posture("qpos0")) is None
+    lift = robot(CART.format(-9.81))
+    assert at_rest(lift.tree, lift.posture("qpos0")) is None  # it falls for ever
 
 
 def test_the_swing_is_its_elliptic_function():
