@@ -36,12 +36,6 @@ def test_a_wrong_field_is_named(field, value, more):
     assert error.field == field and "\n" not in str(error)
 
 
-def test_numbers_are_kept_as_floats_and_tuples_of_floats():
-    scene = Scene("mine", np.array([1, 2, 3]), speed=[0, 1, 0], locked=["gamma"] * 2, damping=1, judged=np.array(2))
-    assert (scene.posture, scene.speed, scene.locked) == ((1.0, 2.0, 3.0), (0.0, 1.0, 0.0), ("gamma",))
-    assert all(type(value) is float for value in (scene.damping, scene.duration, scene.dt, scene.judged))
-
-
 def test_torques_act_on_the_free_joints():
     case = ARM.case("pushed", posture="bent", torque=(1.0, 0.5, -1.0), locked=("beta",))
     assert case.joints == ("alpha", "gamma") and case.tau.tolist() == [1.0, -1.0]

@@ -132,9 +132,8 @@ def test_what_has_no_name_is_called_as_nothing_else():
     body = '<body><joint name="joint 1" type="ball"/><joint type="slide"/><geom size="0.1" pos="0.1 0 0"/></body>'
     found = read(mjcf(body, after='<keyframe><key name="key 1" qpos="0 0 2 0 0"/><key qpos="2 0 0 0 0"/></keyframe>'))
     assert found.tree.hinge_names == ("joint 1", "unnamed joint 1")
-    assert {name: q.tolist() for name, q in found.keyframes.items()} == {  # quaternions of length 1
-        "key 1": [0.0, 0.0, 1.0, 0.0, 0.0], "unnamed key 1": [1.0, 0.0, 0.0, 0.0, 0.0],
-    }  # fmt: skip
+    keys = {"key 1": [0.0, 0.0, 1.0, 0.0, 0.0], "unnamed key 1": [1.0, 0.0, 0.0, 0.0, 0.0]}  # quaternions of length 1
+    assert {name: q.tolist() for name, q in found.keyframes.items()} == keys
 
 
 # locked joints

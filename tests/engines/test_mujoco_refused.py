@@ -1,13 +1,11 @@
 """Files that cannot be compared, and what a newer MuJoCo brings: one line each."""
 
-import mujoco
 import pytest
 from files import PLAIN, TENDON, TWO, mjcf
 
 from compare.engines.mujoco import ModelError, known, read, unknown
 
 ALONG = '<actuator><general name="a" tendon="t" armature="1"/></actuator>'
-CABLE = '<extension><plugin plugin="mujoco.elasticity.cable"/></extension>'
 BALL = '<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'
 REFUSED = {  # a word of why, and the file
     "tendon 't'": mjcf(TWO, after=TENDON.format('armature="1"')),
@@ -15,7 +13,6 @@ REFUSED = {  # a word of why, and the file
     "flex 'soft'": mjcf(
         PLAIN + '<flexcomp name="soft" type="grid" count="3 3 1" spacing=".1 .1 .1" radius="0.01" dim="2" mass="1"/>'
     ),
-    "plugin": mjcf(PLAIN.replace("</body>", '<plugin plugin="mujoco.elasticity.cable"/></body>'), CABLE),
     "mass": mjcf("<body><joint/></body>"),
     "pos of body 'far'": mjcf('<body name="far" pos="inf 0 0"><geom size="1"/></body>' + PLAIN),
     "damping of joint 'j' is -1": mjcf(PLAIN.replace('name="j"', 'name="j" damping="-1"')),
@@ -29,8 +26,6 @@ REFUSED = {  # a word of why, and the file
 
 @pytest.mark.parametrize("why", REFUSED)
 def test_what_cannot_be_compared_is_refused_in_one_line(why, capfd):
-    if why == "plugin" and mujoco.__version__ >= "4":
-        pytest.skip("this MuJoCo's package brings no plugin with a passive force")
     with pytest.raises(ModelError, match=why) as error:
         read(REFUSED[why])
     assert "\n" not in str(error.value) and capfd.readouterr() == ("", "")
