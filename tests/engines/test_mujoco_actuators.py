@@ -76,7 +76,10 @@ def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expec
     assert controls.get("home") == expected and "plain" not in controls
 
 
-def test_damping_by_an_actuator_goes_with_the_square_of_its_gear():
+def test_a_disabled_group_is_off_and_damping_by_an_actuator_goes_with_the_square_of_its_gear():
+    servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
+    drive = drive_of(servos, before='<option actuatorgroupdisable="2"/>')
+    assert [one.acts for one in drive.actuators] == [False, True]
     assert read(since(text_of('<general joint="j" damping="3" gear="2"/>'))).drive.damping == (12.0, 0.0)
 
 

@@ -38,7 +38,6 @@ LAWS = {  # actuators, what the keyframe states, and how many take part
     "the law in full": (
         '<general joint="a" gaintype="affine" gainprm="20 3 -4" biastype="affine" biasprm="0.3 -20 -3"/>', 'ctrl="0.3"', 1
     ),
-    "a gain that drives": ('<general joint="a" gainprm="20" biastype="affine" biasprm="0.3 -20 3"/>', 'ctrl="0.3"', 1),
     "a filter": ('<position joint="a" kp="50" kv="4" timeconst="0.03"/><motor joint="c"/>', 'ctrl="0.3 2"', 2),
     "an integrator": ('<intvelocity joint="a" kp="50" kv="4" actrange="-1 1"/>', 'act="0.3"', 1),
     "a damper": ('<damper joint="a" kv="3" ctrlrange="0 1"/><position joint="b" kp="30"/>', 'ctrl="0.7 0.1"', 2),
