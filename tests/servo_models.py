@@ -1,4 +1,4 @@
-"""Small robots with servos, as MJCF text, and how they are asked."""
+"""Small robots with servos, as MJCF text, and how they are asked: for engines, truth and experiments/stability."""
 
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting

@@ -1,29 +1,17 @@
 """A scene changes what it says and nothing else; what cannot be a scene of a robot is refused in one line."""
 
-import dataclasses
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from edited import XML
 
 import tmt
 from compare.case import Case, Scene
 from compare.engines.mujoco import parse
 from compare.given import WrongField
-from compare.judge.run import required_time
 from compare.robots import Robot
 from compare.robots.arm import ARM
-
-XML = ARM.mjcf.read_text(encoding="utf-8")
-FIELDS = [field.name for field in dataclasses.fields(Scene)]
-ODD = [None, 3, -1, 0, True, 2.5, "x", "", b"alpha", [], (), {}, [["alpha"]], ("alpha", 1), (1, 2), ("1", "2", "3"),
-       ((1,), (2, 3), 4), 1j, (1j, 2, 3), np.nan, np.inf, (np.nan, 0, 0), 10**400, (10**400, 0, 0), 1e308, 5e-324, "5",
-       object(), lambda: 0, Fraction(1, 2), np.zeros((2, 2)), np.array(["a"]), np.ones(3), {"alpha"}, "line\nline",
-       "x" * 10_000, [0] * 10_000, range(3), (True, False, True), np.float32(1.0), np.array(5.0), np.bool_(True),
-       {1: 2, 3: 4, 5: 6}, iter([1, 2, 3]), ("alpha", "alpha"), ARM.scenes[0]]  # fmt: skip
 
 
 def refused(robot=ARM, **fields) -> WrongField | None:
@@ -35,48 +23,17 @@ def refused(robot=ARM, **fields) -> WrongField | None:
     return None
 
 
-@pytest.mark.parametrize("field", FIELDS)
-def test_every_field_takes_a_value_or_is_refused_in_one_short_line(field):
-    for value in ODD:
-        error = refused(**{field: value})
-        if error is not None:
-            assert "\n" not in str(error) and len(str(error)) < 300
-        else:
-            case = ARM.case(**{"name": "mine"} | {field: value})
-            assert case == dataclasses.replace(case) and hash(case) == hash(dataclasses.replace(case))
-            assert case.steps > 0
-            assert case.q.shape == case.v.shape == case.tau.shape == (len(case.joints),) == (len(case.tree.parent),)
-            assert np.isfinite([case.q, case.v, case.tau]).all()
-
-
 @pytest.mark.parametrize("field, value, more", [
-    ("name", 3, {}), ("name", "a\nb", {}), ("judged", "x", {}), ("judged", 5.001, {}), ("judged", -0.001, {}),
-    ("gravity", "no", {}), ("locked", None, {}), ("locked", ("wrist",), {}), ("locked", "beta", {}),
-    ("locked", ("alpha", "beta", "gamma"), {}), ("speed", None, {}), ("speed", (1, 2), {}), ("speed", "fast", {}),
-    ("speed", (0, 1, 0), {"locked": ("beta",)}), ("duration", "5", {}), ("duration", 0, {}), ("dt", 1e-300, {}),
-    ("dt", 0.3, {}), ("dt", 7.0, {}), ("damping", True, {}), ("damping", -1, {}), ("posture", "sitting", {}),
-    ("posture", (1, 2), {}), ("torque", "pull", {}), ("torque", "servos", {}), ("torque", (1, 2, np.inf), {}),
-    ("torque", (), {}), ("targets", 2.0, {}), ("targets", "far", {"torque": "servos"}),
+    ("name", "a\nb", {}), ("judged", 5.001, {}), ("judged", -0.001, {}), ("gravity", "no", {}), ("locked", "beta", {}),
+    ("locked", ("wrist",), {}), ("locked", ("alpha", "beta", "gamma"), {}), ("speed", None, {}), ("speed", (1, 2), {}),
+    ("speed", (0, 1, 0), {"locked": ("beta",)}), ("duration", 0, {}), ("dt", 1e-300, {}), ("dt", 0.3, {}),
+    ("dt", 7.0, {}), ("damping", -1, {}), ("posture", "sitting", {}), ("posture", (1, 2), {}), ("torque", "pull", {}),
+    ("torque", "servos", {}), ("torque", (1, 2, np.inf), {}), ("targets", 2.0, {}),
+    ("targets", "far", {"torque": "servos"}),
 ])  # fmt: skip
 def test_a_wrong_field_is_named(field, value, more):
     error = refused(**{field: value} | more)
     assert error.field == field and "\n" not in str(error)
-
-
-@settings(max_examples=20)
-@given(
-    st.dictionaries(
-        st.sampled_from(FIELDS), st.one_of(st.floats(), st.text(), st.none(), st.tuples(*[st.floats()] * 3)), min_size=1
-    )
-)
-def test_any_fields_are_a_scene_or_one_line(fields):
-    assert "\n" not in str(refused(**fields) or "")
-
-
-def test_numbers_are_kept_as_floats_and_tuples_of_floats():
-    scene = Scene("mine", np.array([1, 2, 3]), speed=[0, 1, 0], locked=["gamma"] * 2, damping=1, judged=np.array(2))
-    assert (scene.posture, scene.speed, scene.locked) == ((1.0, 2.0, 3.0), (0.0, 1.0, 0.0), ("gamma",))
-    assert all(type(value) is float for value in (scene.damping, scene.duration, scene.dt, scene.judged))
 
 
 def test_torques_act_on_the_free_joints():
@@ -87,41 +44,15 @@ def test_torques_act_on_the_free_joints():
     assert np.allclose(tmt.acceleration(*held.start, held.tau, held.tree), 0.0, atol=1e-12) and held.tau.any()
 
 
-def test_how_long_a_run_must_be_judged():
-    short = {"duration": 2.0, "dt": 0.5}
-    all_along = ARM.case("all", **short)
-    assert required_time(all_along, "rk4", 0.5) == required_time(all_along, "implicit", 0.005) == 2.0
-    assert required_time(all_along, "implicit", 0.5) == 0.3  # stable for no longer with so long a step
-    for judged in (1.5, 0.0):
-        assert required_time(ARM.case("some", judged=judged, **short), "rk4", 0.5) == judged
-
-
-# another robot
-
-
-def robot(**fields) -> Robot:
-    """A robot of two hinges."""
-    known = {"name": "two", "mjcf": Path("none.xml"), "tree": tmt.ARM.lock({"alpha": 0.0}), "scenes": ()}
-    return Robot(**known | {"postures": {"low": (0, 90)}} | fields)
-
-
-@pytest.mark.parametrize("fields, field, value", [
-    ({}, "posture", "high"), ({"postures": {}}, "posture", "low"), ({"postures": {"low": (0, 0, 90)}}, "posture", "low"),
-    ({}, "torque", (1, 2, 3)), ({}, "locked", ("alpha",)), ({}, "locked", ("beta", "gamma")),
-])  # fmt: skip
-def test_a_case_has_the_joints_of_its_robot(fields, field, value):
-    error = refused(robot(**fields), **{field: value})
-    assert error.field == field and "beta" in error.accepted and "alpha" not in error.accepted
-
-
-def test_a_case_takes_the_angles_of_a_posture_in_degrees():
-    case = Case(robot(), Scene("low", "low", speed=(0, 180), locked=("beta",)))
-    assert case.joints == case.tree.hinge_names == ("gamma",) and case.coordinates.names == case.joints
+def test_another_robot_has_its_own_joints_and_its_postures_in_degrees():
+    two = Robot("two", Path("none.xml"), tmt.ARM.lock({"alpha": 0.0}), {"low": (0, 90)}, ())
+    for field, value in (("posture", "high"), ("torque", (1, 2, 3)), ("locked", ("beta", "gamma"))):
+        error = refused(two, **{field: value})
+        assert error.field == field and "beta" in error.accepted and "alpha" not in error.accepted
+    case = Case(two, Scene("low", "low", speed=(0, 180), locked=("beta",)))
+    assert case.joints == case.tree.hinge_names == case.coordinates.names == ("gamma",)
     assert case.q.tolist() == [np.pi / 2] and case.v.tolist() == [np.pi] and case.locked == {"beta": 0.0}
-    assert robot().case().q.tolist() == [0.0, 0.0] and robot().case().joints == ("beta", "gamma")
-
-
-# what a case changes in the engine
+    assert two.case().q.tolist() == [0.0, 0.0] and two.case().joints == ("beta", "gamma")
 
 
 def test_a_case_keeps_the_gravity_and_the_damping_of_the_file():
@@ -136,24 +67,14 @@ def test_a_case_keeps_the_gravity_and_the_damping_of_the_file():
         assert case.tree.damping == (damping,) * len(case.joints)
 
 
-def test_an_engine_keeps_the_models_of_the_last_cases_only():
-    engine = parse(XML, ARM.tree)
-    first = engine.of(ARM.case())
-    for k in range(80):
-        engine.of(ARM.case("damped", damping=0.01 * k))
-        assert engine.of(ARM.case()) is first  # asked for again and again
-    assert len(engine.known) <= 64
-
-
-@pytest.mark.parametrize("again", [False, True])
-def test_cases_that_differ_in_one_change_have_their_own_models(again):
+def test_cases_that_differ_in_one_change_have_their_own_models():
     changes = [
         {}, {"gravity": False}, {"damping": 0.1}, {"damping": 0.1001}, {"locked": ("beta",)}, {"locked": ("gamma",)},
         {"locked": ("beta",), "posture": (0.0, 40.0, 0.0)}, {"locked": ("beta",), "posture": (0.0, 40.001, 0.0)},
         {"locked": ("beta",), "posture": (0.0, 40.0, 0.0), "gravity": False}, {"locked": ("alpha", "beta")},
     ]  # fmt: skip
     engine, cases = parse(XML, ARM.tree), [ARM.case("one", **change) for change in changes]
-    for case in cases[::-1] * again + cases:
+    for case in cases[::-1] + cases:
         q, v = np.full((2, len(case.joints)), 0.7)
         found = engine.of(case).acceleration(q, v, v)
         assert np.allclose(found, tmt.acceleration(q, v, v, case.tree), rtol=1e-10, atol=1e-10), case.scene

@@ -1,4 +1,4 @@
-"""Actuators under constant controls as a linear controller: the law, moved targets, and the scenes that use it."""
+"""The law of an actuator in plain numbers, and actuators under constant controls as a linear controller of scenes."""
 
 import dataclasses
 
@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from models import PATHS
 
-from compare.actuators import Actuator, Drive
-from compare.case import Case, rates_at
+from compare.actuators import Actuator, Drive, Tendon
+from compare.case import rates_at
 from compare.controller import controller, reason
 from compare.engines.mujoco import read
 from compare.given import WrongField
 from compare.robots.file import robot_of
 
+PLAIN = Actuator("s", "a", (1.0,))
 SERVO = Actuator("servo", "b", (0.0, 2.0), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, -4.0))
 TENDON = Actuator("tendon", "a", (0.5, -0.7), gain=(30.0, 0.0, 0.0), bias=(1.0, -20.0, 0.0))
 MOTOR = Actuator("motor", "a", (3.0, 0.0), gain=(2.0, 0.0, 0.0))
@@ -24,32 +25,32 @@ def gripper():
     return robot_of(read(PATHS["gripper"]), "gripper.xml")
 
 
-def test_gears_count_twice_and_tendons_couple():
-    found = controller(Drive((SERVO, TENDON)), "none", Q)
-    assert np.allclose(found.position_gain, [[0.25 * 20, -0.35 * 20], [-0.35 * 20, 0.49 * 20 + 4 * 50]])
-    assert np.allclose(found.speed_gain, [[0, 0], [0, 16]]) and found.left_out == {}
-    assert np.allclose(found.torque - found.position_gain @ Q, 0.0)  # targets that are the posture
+def test_ranges_of_control_activation_and_force():
+    one = dataclasses.replace(PLAIN, control_range=(-1.0, 2.0), activation_range=(-0.5, 0.5), force_range=(-2.0, 3.0))
+    assert [one.clamped(u) for u in (3.0, -3.0, 1.0)] == [2.0, -1.0, 1.0]
+    assert dataclasses.replace(one, dynamics="filter").clamped(3.0) == 0.5
+    assert [one.is_cut(x) for x in (-2.001, -2.0, -1.999, 2.999, 3.0, 3.001)] == [True, True, False, False, True, True]
+    # of a tendon's spring the dead band
+    tendon = Tendon("t", 0, (1.0,), 10.0, 0.0, 0.2, 0.5)
+    assert [tendon.force(x) for x in (0.1, 0.3, 0.7)] == pytest.approx([1.0, 0.0, -2.0])
+    assert [tendon.pulls(x) for x in (0.199, 0.2 + 1e-12, 0.201, 0.499, 0.501)] == [True, True, False, False, True]
 
 
-@pytest.mark.parametrize("one", [SERVO, TENDON])
+def test_controls_are_what_a_keyframe_states_else_the_targets_that_are_the_posture():
+    drive = Drive((SERVO, TENDON), controls={"home": (0.7, None)})
+    assert drive.control("home", (0.1, 0.2)) == pytest.approx([0.7, TENDON.target(0.2)])
+    assert drive.control("elsewhere", (0.1, 0.2)) == pytest.approx([0.1, TENDON.target(0.2)])
+    home, none = (controller(drive, posture, Q).controls for posture in ("home", (0.0, 1.0)))
+    assert (home[0], none[0]) == (0.7, -0.8) and home[1] == none[1]
+
+
+@pytest.mark.parametrize("one", [SERVO, TENDON, MOTOR])
 def test_a_servo_is_without_force_at_its_moved_target(one):
     moved = np.array([0.1, 0.02])
     still, far = (controller(Drive((one,)), "none", Q, by) for by in (0.0, moved))
     length = np.array(one.moment) @ Q + np.abs(one.moment) @ moved
-    assert one.force(far.controls[0], length) == pytest.approx(0.0, abs=1e-12)
+    assert one.force(far.controls[0], length) == pytest.approx(0.0, abs=1e-12)  # of a motor everywhere
     assert np.array_equal(still.position_gain, far.position_gain)
-
-
-def test_a_motor_keeps_its_control_when_targets_move():
-    for moved in (0.0, 1.0):
-        found = controller(Drive((MOTOR,), controls={"home": (0.5,)}), "home", Q, moved)
-        assert found.torque.tolist() == [3.0, 0.0] and not found.position_gain.any()
-
-
-def test_a_keyframe_states_the_controls():
-    drive = Drive((SERVO, TENDON), controls={"home": (0.7, None)})
-    home, none = (controller(drive, posture, Q).controls for posture in ("home", (0.0, 1.0)))
-    assert (home[0], none[0]) == (0.7, -0.8) and home[1] == none[1]
 
 
 @pytest.mark.parametrize("changes, takes_part", [
@@ -63,6 +64,9 @@ def test_which_actuators_take_part(changes, takes_part):
     assert set(found.left_out) == (set() if takes_part else {"servo"}) and (found.controls != (None,)) is takes_part
 
 
+# scenes
+
+
 @pytest.mark.parametrize("changes, field", [
     ({"targets": 2.0}, "targets"), ({"targets": (2.0,)}, "targets"), ({"targets": (2.0, np.nan, 0.0, 0.0)}, "targets"),
     ({"locked": ("wrist",)}, "locked"),
@@ -73,29 +77,15 @@ def test_what_cannot_be_a_scene_of_servos_is_refused(gripper, changes, field):
     assert error.value.field == field and "\n" not in str(error.value)
 
 
-def test_one_number_moves_all_joints_of_one_kind():
-    robot = robot_of(read(PATHS["arm6"]), "arm6.xml")
-    one, each = (robot.case("mine", posture="home", torque="servos", targets=by) for by in (2.0, (2.0,) * 6))
-    assert np.array_equal(one.tau, each.tau) and one.tree == each.tree
-    still = robot.case("mine", posture="home", torque="servos")
-    assert np.allclose(one.tau - still.tau, np.array(one.tree.position_gain) @ np.radians(np.full(6, 2.0)))
-
-
-def test_a_robot_with_servos_has_two_scenes_of_them(gripper):
+def test_a_robot_with_servos_has_two_scenes_of_them_and_one_without_none(gripper):
     held, step = gripper.scenes[-2:]
     assert held.torque == step.torque == "servos" and not np.any(held.targets)
-    assert step.targets == (6.0, 6.0, 0.02, 0.02)
-    assert ("full only" in held.tags, "full only" in step.tags) == (True, False)
-    assert ("speed" in held.tags, "speed" in step.tags) == (False, True)
+    assert step.targets == (6.0, 6.0, 0.02, 0.02) and "full only" in held.tags and "speed" in step.tags
     assert [case.scene.torque for case in gripper.cases_of_torque] == ["hold", "free", "free"]
     for case in gripper.cases[-2:]:  # no step is longer than 1 over the fastest rate, with the servos
         slow, fast = (max(rates_at(tree, case.q)) for tree in (gripper.tree, case.tree))
         assert slow < fast <= 1.0 / case.scene.dt
-
-
-def test_scenes_of_robots_without_targets_or_without_a_base():
-    for name in ("loop", "mixed", "free_body", "pendulum_ball"):
+    for name in ("loop", "mixed", "free_body"):
         assert all(scene.torque != "servos" for scene in robot_of(read(PATHS[name]), name).scenes)
-    floating = robot_of(read(PATHS["quadruped"]), "quadruped")
-    step = Case(floating, floating.scenes[-1])
-    assert step.controller and not step.scene.gravity
+    floating = robot_of(read(PATHS["quadruped"]), "quadruped").cases[-1]
+    assert floating.controller and not floating.scene.gravity

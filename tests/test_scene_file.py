@@ -24,11 +24,7 @@ name = "held high"
 posture = "upright"
 torque = "hold"
 locked = ["beta"]
-duration = 2.0
 dt = 0.03125
-
-[[scene]]
-name = "as it is"
 """
 
 
@@ -38,49 +34,40 @@ def from_text(tmp_path, text, robot=ARM):
     return read_scenes(path, robot)
 
 
-def test_every_key_is_read(tmp_path):
-    thrown, held, plain = (Case(ARM, scene) for scene in from_text(tmp_path, WHOLE))
-    assert np.allclose(thrown.q, np.radians([10, 20.5, -30])) and np.allclose(thrown.v, np.radians([100, 0, -50]))
-    assert thrown.tau.tolist() == [0.5, 0, 0] and thrown.tree.gravity == (0, 0, 0)
-    assert thrown.tree.damping == (0.05,) * 3 and (thrown.duration, thrown.steps) == (1.0, 64)
-    assert held.joints == ("alpha", "gamma") and held.is_held and held.scene.dt == 0.03125
-    assert plain.q.tolist() == [0, 0, 0] and plain.is_free and plain.scene.gravity and plain.duration == 5.0
-
-
-@pytest.mark.parametrize("text, word", [
-    ("x = 1", "x is unknown"), ("[scene]\nname = 'a'", "array"), ("", "array"), ("[[scene]\n", "line 1"),
-    ("[[scene]]\nposture = 'bent'", "scene 1: .* no name"),
-    ("[[scene]]\nname = 'a'\n[[scene]]\nname = 'a'", r"scene 2 \('a'\): .* scene 1"),
-    ("[[scene]]\nname = 'bent, free'", "of arm"), ("[[scene]]\nname = ''", "name is ''"),
-    ("[[scene]]\nname = 3", "name is 3"), ("[[scene]]\nname = { a = true }", r"name is \{a = true\}"),
-])  # fmt: skip
-def test_a_wrong_file_is_one_line_with_its_name(tmp_path, text, word):
-    refused(tmp_path, text, word)
-
-
-@pytest.mark.parametrize("line, word", [
-    ("foo = 1", "foo is unknown"), ("posture = 'bnt'", "posture is 'bnt'; zero, hanging"),
-    ("posture = [1, 2, 3]", "posture is"), ("posture = 'bent'\nq = [1, 2, 3]", "posture and q"),
-    ("q = [1, 2]", r"q is \[1, 2\]; 3 numbers"), ("q = [1, 2, nan]", "3 numbers"),
-    ("q = { a = [1, nan] }", r"q is \{a = \[1, nan\]\}; 3 numbers"), ("speed = 'fast'", "speed is 'fast'"),
-    ("speed = []", "3 numbers"), ("torque = 'hodl'", "torque is 'hodl'"), ("torque = [true, 1, 2]", "3 numbers"),
-    ("gravity = 1", "gravity is 1"), ("gravity = [true]", r"gravity is \[true\]; true"), ("damping = -1", "damping is -1"),
-    ("damping = 'x'", "damping is 'x'"), ("locked = ['delta']", "locked is"), ("locked = 'alpha'", "locked is 'alpha'"),
-    ("locked = ['alpha', 'beta', 'gamma']", "at most 2"), ("speed = [1, 0, 0]\nlocked = ['alpha']", "'?alpha"),
-    ("duration = 'x'", "duration is 'x'"), ("duration = 1.0\ndt = 0.3", "dt is 0.3"),
-])  # fmt: skip
-def test_a_wrong_entry_is_one_line_with_file_and_entry(tmp_path, line, word):
-    refused(tmp_path, f"[[scene]]\nname = 'a'\n{line}", rf"scene 1 \('a'\): .*{word}")
-
-
 def refused(tmp_path, text, word, robot=ARM):
     with pytest.raises(SceneError, match=word) as error:
         from_text(tmp_path, text, robot)
     assert str(tmp_path / "my.toml") in str(error.value) and "\n" not in str(error.value)
 
 
+def test_every_key_is_read(tmp_path):
+    thrown, held = (Case(ARM, scene) for scene in from_text(tmp_path, WHOLE))
+    assert np.allclose(thrown.q, np.radians([10, 20.5, -30])) and np.allclose(thrown.v, np.radians([100, 0, -50]))
+    assert thrown.tau.tolist() == [0.5, 0, 0] and thrown.tree.gravity == (0, 0, 0)
+    assert thrown.tree.damping == (0.05,) * 3 and (thrown.duration, thrown.steps) == (1.0, 64)
+    assert held.joints == ("alpha", "gamma") and held.is_held and held.scene.dt == 0.03125
+    assert held.scene.gravity and held.duration == 5.0 and thrown.scene.locked == ()
+
+
+@pytest.mark.parametrize("text, word", [
+    ("x = 1", "x is"), ("[scene]\nname = 'a'", "array"), ("[[scene]\n", "line 1"),
+    ("[[scene]]\nposture = 'bent'", "scene 1: .* name"), ("[[scene]]\nname = 'bent, free'", "of arm"),
+    ("[[scene]]\nname = 'a'\n[[scene]]\nname = 'a'", r"scene 2 \('a'\): .* scene 1"),
+    ("[[scene]]\nname = { a = true }", r"name is \{a = true\}"),
+    *((f"[[scene]]\nname = 'a'\n{line}", rf"scene 1 \('a'\): .*{word}") for line, word in (
+        ("foo = 1", "foo is"), ("posture = 'bnt'", "posture is 'bnt'; zero, hanging"), ("posture = [1, 2, 3]", "posture is"),
+        ("posture = 'bent'\nq = [1, 2, 3]", "posture and q"), ("q = [1, 2]", r"q is \[1, 2\]; 3 numbers"),
+        ("speed = 'fast'", "speed is 'fast'"), ("gravity = [true]", r"gravity is \[true\]; true"),
+        ("damping = -1", "damping is -1"), ("locked = ['alpha', 'beta', 'gamma']", "at most 2"),
+        ("duration = 'x'", "duration is 'x'"), ("duration = 1.0\ndt = 0.3", "dt is 0.3"),
+    )),
+])  # fmt: skip
+def test_what_is_wrong_is_one_line_with_file_and_entry(tmp_path, text, word):
+    refused(tmp_path, text, word)
+
+
 @pytest.mark.parametrize("length, accepted", [
-    (0.99899, False), (0.99901, True), (0.9999990001, True), (1.0, True), (1.00099, True), (1.00101, False), (0.0, False),
+    (0.99899, False), (0.99901, True), (1.00099, True), (1.00101, False), (0.0, False),
 ])  # fmt: skip
 def test_a_quaternion_of_few_digits_is_made_one_of_length_1(tmp_path, length, accepted):
     robot, turn = compared_with("model", str(PATHS["pendulum_ball"])).robot, np.array([0.5, 0.5, -0.5, 0.5])
@@ -92,8 +79,5 @@ def test_a_quaternion_of_few_digits_is_made_one_of_length_1(tmp_path, length, ac
 
 
 def test_a_file_that_cannot_be_read(tmp_path):
-    (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe")
-    for path in (tmp_path / "no.toml", tmp_path, tmp_path / "bytes.toml"):
-        with pytest.raises(SceneError) as error:
-            read_scenes(path, ARM)
-        assert str(path) in str(error.value) and "\n" not in str(error.value)
+    with pytest.raises(SceneError, match=r"no\.toml"):
+        read_scenes(tmp_path / "no.toml", ARM)

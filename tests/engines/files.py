@@ -1,11 +1,12 @@
-"""MJCF for the reader's tests: a text with everything that a Tree has, random ones, and a case of any tree."""
+"""Small MJCF, a case of any tree, and the comparison of both engines: for engines/test_mujoco_*.py."""
 
 from types import SimpleNamespace
 
 import numpy as np
-from trees import random_state, unit_quaternion
+from trees import random_state
 
 import tmt
+from compare.coordinates import Coordinates
 
 EPS = np.finfo(float).eps
 
@@ -16,123 +17,22 @@ TWO = PLAIN.replace(
 
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
 
-# a free base with a spring, turned; nested frames; several joints in one body; anchors off the origin; degrees; unnamed elements;
-# references and rest positions away from zero; bodies fixed to the world and to others; armature of an actuator; keyframes
-EVERYTHING = """<mujoco>
-  <compiler angle="degree" eulerseq="zyx"/>
-  <option gravity="1 2 -9"/>
-  <default><joint armature="0.01"/></default>
-  <worldbody>
-    <body name="table" pos="0 0 1"><geom type="box" size="0.4 0.3 0.02"/></body>
-    <frame pos="0.1 0.2 0.3" euler="10 20 30">
-      <body name="base" pos="1 2 3" euler="40 50 60">
-        <joint name="float" type="free" stiffness="3" damping="0.2"/>
-        <inertial pos="0.1 0.02 0.03" mass="3" fullinertia="0.1 0.2 0.15 0.01 0.02 0.01"/>
-        <frame pos="0.3 0 0" euler="0 90 0">
-          <body name="upper" pos="0.1 0 0" euler="15 0 0">
-            <joint axis="1 2 0" pos="0.1 0.2 0.3" ref="20" stiffness="2" springref="-30"/>
-            <joint name="rail" type="slide" axis="0 1 1" ref="0.2" damping="0.4" range="-0.5 0.5" limited="true"/>
-            <joint name="turn" axis="0 0 1" pos="0 0.1 0.05" range="-90 45" limited="true"/>
-            <geom type="capsule" size="0.02 0.1" pos="0.1 0.1 0.1" euler="30 40 0"/>
-            <body pos="0.1 0 0.1" euler="0 20 0"><geom type="box" size="0.01 0.02 0.03" pos="0 0 0.1" density="5000"/></body>
-          </body>
-        </frame>
-      </body>
-    </frame>
-    <body name="arm" pos="0 -1 1" euler="0 0 35">
-      <joint name="shoulder" type="ball" pos="0.02 0.03 0.04" stiffness="4" damping="0.3"/>
-      <inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
-      <body name="hand" pos="0.4 0 0" euler="0 45 0">
-        <joint name="elbow" axis="0 1 0.2" pos="0.2 0 0"/>
-        <joint name="wrist" type="ball"/>
-        <geom type="ellipsoid" size="0.05 0.1 0.15" pos="0.1 0 0"/>
-      </body>
-    </body>
-  </worldbody>
-  <actuator><general name="motor" joint="turn" gear="3" armature="0.02"/></actuator>
-  <keyframe>
-    <key name="home" qpos="0 0 1 2 0 0 0 0 0.1 0.2 1 0 0 0 0 1 0 0 0"/>
-    <key qpos="0 0 2 1 0 0 0 0 0.1 0.2 1 0 0 0 0 1 0 0 0"/>
-  </keyframe>
-</mujoco>"""
-
 
 def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:
     """MJCF text of bodies, with something before and after them."""
     return f"<mujoco>{before}<worldbody>{content}</worldbody>{after}</mujoco>"
 
 
-def random_mjcf(rng: np.random.Generator, bodies: int = 5) -> str:
-    """A branched tree of every kind of joint, one or two in a body; numbers with all their digits."""
-
-    def numbers(values):
-        return " ".join(map(repr, np.atleast_1d(values).tolist()))
-
-    def joint(kind, number):
-        given = {
-            "armature": rng.uniform(0.01, 0.1),
-            "damping": rng.uniform(0.0, 0.5),
-            "stiffness": rng.uniform(1.0, 5.0),
-        }
-        if kind in ("hinge", "slide"):
-            given |= {"axis": rng.normal(size=3), "ref": rng.uniform(-0.5, 0.5), "springref": rng.uniform(-0.5, 0.5)}
-        if kind != "free":
-            given["pos"] = rng.uniform(-0.1, 0.1, 3)
-        return (
-            f'<joint name="j{number}" type="{kind}" ' + " ".join(f'{k}="{numbers(v)}"' for k, v in given.items()) + "/>"
-        )
-
-    texts, inside = [], [[] for _ in range(bodies)]
-    kinds = ["free", *map(str, rng.choice(["hinge", "slide", "ball"], bodies))]
-    for b in range(bodies):
-        first = kinds[b]  # nothing turns after a ball
-        chosen = [first] if first in ("free", "ball") else [first, str(rng.choice(["hinge", "slide", "ball"]))]
-        chosen = chosen[: rng.integers(1, 3)]
-        moments = rng.uniform(0.02, 0.04, 3)  # each below the sum of the others
-        texts.append(
-            f'<body name="b{b}" pos="{numbers(rng.uniform(-0.3, 0.3, 3))}" quat="{numbers(unit_quaternion(rng))}">'
-            + "".join(joint(kind, f"{b}{i}") for i, kind in enumerate(chosen))
-            + f'<inertial pos="{numbers(rng.uniform(-0.1, 0.1, 3))}" quat="{numbers(unit_quaternion(rng))}"'
-            + f' mass="{numbers(rng.uniform(0.5, 2.0))}" diaginertia="{numbers(moments)}"/>'
-        )
-        if b and rng.random() < 0.7:
-            inside[rng.integers(b)].append(b)
-    nested = {b for children in inside for b in children}
-
-    def whole(b):
-        return texts[b] + "".join(map(whole, inside[b])) + "</body>"
-
-    content = "".join(whole(b) for b in range(bodies) if b not in nested)
-    return mjcf(content, '<compiler angle="radian"/>')
-
-
-class OfTree:
-    """The coordinates of a Tree as the engines ask for them."""
-
-    def __init__(self, tree: tmt.Tree):
-        self.places, self.names, self.kinds = tree.coordinates, tree.hinge_names, tree.kind
-        self.nq, self.nv = self.places.nq, self.places.nv
-
-    def move(self, q, u):
-        rows = np.broadcast_shapes(np.shape(q)[:-1], np.shape(u)[:-1])
-        q, u = (np.broadcast_to(x, (*rows, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, u))
-        return np.array([self.places.move(list(a), list(b)) for a, b in zip(q, u)]).reshape(*rows, -1)
-
-    def difference(self, q1, q0):
-        return np.array([self.places.difference(list(a), list(b)) for a, b in zip(q1, q0)])
-
-
 def case_of(tree: tmt.Tree, locked=None, damping=0.0, gravity=True):
     """A case of a Tree, as far as MuJoCo's engine asks it; tree is that without the locked joints."""
-    scene = SimpleNamespace(gravity=gravity, damping=damping)
     return SimpleNamespace(
         tree=tree,
         locked=locked or {},
-        scene=scene,
+        scene=SimpleNamespace(gravity=gravity, damping=damping),
         controller=None,
         added_damping=np.full(len(tree.axis), damping),
         joints=tree.hinge_names,
-        coordinates=OfTree(tree),
+        coordinates=Coordinates(tree.hinge_names, tree.kind),
     )
 
 

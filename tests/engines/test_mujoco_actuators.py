@@ -1,60 +1,26 @@
-"""What drives a file's robot, read from its compiled model."""
+"""What drives a file's robot, read from its compiled model, and runs under it; its forces are in truth/test_servos.py."""
 
 import mujoco
 import numpy as np
 import pytest
 from files import TENDON, TWO, mjcf
+from models import PATHS
+from servo_models import FILTERED, acting_of, hinge, posture_of
 
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting, add_armature
-from compare.engines.mujoco.lock import ModelError
-from compare.robots.file import robot_of
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
+FREE = '<body><freejoint/><geom size="0.1"/></body>'
 
 
-def drive_of(actuators="", tendon="", content=TWO, before="", keys=""):
-    after = (TENDON.format(tendon) if tendon is not None else "") + f"<actuator>{actuators}</actuator>{keys}"
-    return robot_of(read(mjcf(content, before, after)), "robot.xml").drive
+def text_of(actuators='<motor joint="k"/>', tendon="", content=TWO, before="", keys=""):
+    return mjcf(content, before, TENDON.format(tendon) + f"<actuator>{actuators}</actuator>{keys}")
 
 
-LAWS = {  # actuator, and of its record gain, bias, moment, dynamics
-    '<motor joint="j" gear="3"/>': ((1, 0, 0), (0, 0, 0), (3, 0), "none"),
-    '<position joint="k" kp="9" kv="2"/>': ((9, 0, 0), (0, -9, -2), (0, 1), "none"),
-    '<position jointinparent="k" kp="9" gear="-2"/>': ((9, 0, 0), (0, -9, 0), (0, -2), "none"),
-    '<velocity tendon="t" kv="4" gear="5"/>': ((4, 0, 0), (0, 0, -4), (5, 10), "none"),
-    '<damper joint="j" kv="4" ctrlrange="0 1"/>': ((0, 0, -4), (0, 0, 0), (1, 0), "none"),
-    '<intvelocity joint="j" kp="7" kv="1" actrange="-1 1"/>': ((7, 0, 0), (0, -7, -1), (1, 0), "integrator"),
-    '<general joint="j" dyntype="filterexact" dynprm="0.2" gainprm="3"/>': ((3, 0, 0), (0, 0, 0), (1, 0), "filterexact"),
-    '<general joint="j" gaintype="affine" gainprm="1 2 3" biastype="affine" biasprm="4 5 6"/>': (
-        (1, 2, 3), (4, 5, 6), (1, 0), "none",
-    ),
-    # without a kind of bias its numbers mean nothing
-    '<general joint="j" gainprm="2 7 7" biasprm="4 5 6"/>': ((2, 0, 0), (0, 0, 0), (1, 0), "none"),
-    '<motor site="s" gear="1 0 0 0 0 0"/>': ((1, 0, 0), (0, 0, 0), None, "none"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("text", LAWS)
-def test_the_law_of_an_actuator(text):
-    (one,) = drive_of(text, content=SITES).actuators
-    assert (one.gain, one.bias, one.moment, one.dynamics) == LAWS[text] and one.acts
-
-
-REFUSED = {  # actuator, and a word of why it takes no part
-    '<muscle joint="k" lengthrange="0 1"/>': "muscle",
-    '<general joint="k" dyntype="user"/>': "user",
-    '<general joint="k" gaintype="user"/>': "user",
-    '<general joint="k" biastype="user"/>': "user",
-    '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
-    '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
-    '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
-    '<general joint="k" damping="1 2"/>': "polynomial",
-    '<general tendon="t" damping="1"/>': "damping",
-    '<pid joint="k" kp="3" ki="1"/>': "pid",
-    '<orientation site="s" refsite="s" kp="1"/>': "so3",
-}
+def drive_of(*args, **more):
+    return read(text_of(*args, **more)).drive
 
 
 def since(text):
@@ -66,11 +32,24 @@ def since(text):
     return text
 
 
+REFUSED = {  # actuator, and a word of why it takes no part
+    '<muscle joint="k" lengthrange="0 1"/>': "muscle",
+    '<general joint="k" dyntype="user"/>': "user",
+    '<general joint="k" gaintype="user" biastype="user"/>': "user",
+    '<dcmotor joint="k" motorconst="0.1" resistance="1"/>': "DC",
+    '<adhesion body="b" ctrlrange="0 1" gain="2"/>': "body",
+    '<position joint="k" kp="3" delay="0.02" nsample="3"/>': "delay",
+    '<general joint="k" damping="1 2"/>': "polynomial",
+    '<general tendon="t" damping="1"/>': "damping",
+    '<pid joint="k" kp="3" ki="1"/>': "pid",
+    '<orientation site="s" refsite="s" kp="1"/>': "so3",
+}
+
+
 @pytest.mark.parametrize("text", REFUSED)
 def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
     more = text.replace(" ", ' name="x" ', 1)
-    since(mjcf(SITES, after=TENDON.format("") + f"<actuator>{more}</actuator>"))
-    drive = drive_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES)
+    drive = read(since(text_of('<position name="p" joint="j" kp="5"/>' + more, content=SITES))).drive
     assert drive.refused.keys() == {"x"} and REFUSED[text] in drive.refused["x"]
     assert [one.name for one in drive.servos] == ["p"]
 
@@ -78,108 +57,86 @@ def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
 @pytest.mark.parametrize("what", ["stiffness", "damping"])
 def test_springs_and_dampers_that_are_not_linear_are_named(what):
     joint, tendon = TWO.replace('name="j"', f'name="j" {what}="1 2"'), f'{what}="1 2"'
-    since(mjcf(joint, after=TENDON.format(tendon)))
-    drive = drive_of('<motor joint="k"/>', tendon, joint)
+    drive = read(since(text_of(tendon=tendon, content=joint))).drive
     assert drive.refused.keys() == {"joint j", "tendon t"} and all(what in why for why in drive.refused.values())
 
 
-def test_what_the_file_disables_is_off():
-    group = '<option actuatorgroupdisable="2"/>'
-    servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
-    first, second = drive_of(servos, before=group).actuators
-    assert (first.off, second.off) == ("the file disables group 2", "")
-    off = drive_of(servos, before='<option><flag actuation="disable"/></option>')
-    assert not off.servos and {one.off for one in off.actuators} == {"the file disables actuation"}
-
-
-def test_ranges():
-    joint = TWO.replace('name="k"', 'name="k" actuatorfrcrange="-2 3"')
-    servo = '<position joint="j" kp="5" ctrlrange="-1 2" forcerange="-7 8"/><motor tendon="t"/>'
-    drive = drive_of(servo, 'actuatorfrclimited="true" actuatorfrcrange="-4 5"', joint)
-    one, motor = drive.actuators
-    assert (one.control_range, one.force_range, motor.control_range) == ((-1.0, 2.0), (-7.0, 8.0), None)
-    assert (drive.ranges, drive.tendon_ranges, motor.tendon, one.tendon) == ({1: (-2.0, 3.0)}, {0: (-4.0, 5.0)}, 0, -1)
-    assert drive_of(servo, before='<option><flag clampctrl="disable"/></option>').actuators[0].control_range is None
-
-
-def test_tendons_pull_as_far_as_a_flag_lets_them():
-    spring = 'stiffness="7" damping="2" springlength="0.1 0.3"'
-    (tendon,) = drive_of(tendon=spring).tendons
-    assert tendon[:7] == ("t", 0, (1.0, 2.0), 7.0, 2.0, 0.1, 0.3)
-    flag = '<option><flag {}="disable"/></option>'
-    assert drive_of(tendon=spring, before=flag.format("spring")).tendons[0].stiffness == 0.0
-    assert drive_of(tendon=spring, before=flag.format("damper")).tendons[0].damping == 0.0
-    assert not drive_of(tendon="").tendons
-
-
-def test_gravity_compensation_and_damping_by_actuators():
-    body = TWO.replace('name="b"', 'name="b" gravcomp="0.5"').replace('name="j"', 'name="j" actuatorgravcomp="true"')
-    drive = drive_of('<general joint="j" damping="3" gear="2"/>', content=body)
-    assert (drive.compensation, drive.lifted, drive.unlifted, drive.damping) == ((0.5, 0.0), (0,), (), (12.0, 0.0))
-    off = drive_of('<motor joint="j"/>', content=body, before='<option><flag actuation="disable"/></option>')
-    assert (off.lifted, off.unlifted) == ((), (0,))
-    without = '<option><flag spring="disable" damper="disable"/></option>'
-    assert drive_of('<motor joint="j"/>', content=body, before=without).compensation == (0.0, 0.0)
-
-
 KEYS = '<keyframe><key name="plain" qpos="0.1 0"/><key name="home" qpos="0.2 0" {}/></keyframe>'
+PLAIN = '<position joint="j" kp="5"/><motor joint="k"/>'
+KEPT = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
 
 
-def test_a_keyframe_states_controls_activations_or_neither():
-    plain = '<position joint="j" kp="5"/><motor joint="k"/>'
-    kept = '<intvelocity joint="j" kp="5" actrange="-1 1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
-    for actuators, key, expected in (
-        (plain, 'ctrl="0.5 0.25"', (0.5, 0.25)),
-        (plain, 'ctrl="0 0"', (0.0, 0.0)),
-        (plain, "", None),
-        (kept, 'ctrl="0.9 0.8" act="0.3 0.2"', (0.3, 0.8)),  # an integrator's activation, a filter's control
-        (kept, 'act="0.3 0.2"', (0.3, None)),
-    ):
-        controls = drive_of(actuators, keys=KEYS.format(key)).controls
-        assert controls.get("home") == expected and "plain" not in controls
+@pytest.mark.parametrize("actuators, key, expected", [
+    (PLAIN, 'ctrl="0.5 0.25"', (0.5, 0.25)), (PLAIN, 'ctrl="0 0"', (0.0, 0.0)), (PLAIN, "", None),
+    (KEPT, 'ctrl="0.9 0.8" act="0.3 0.2"', (0.3, 0.8)),  # an integrator's activation, a filter's control
+    (KEPT, 'act="0.3 0.2"', (0.3, None)),
+])  # fmt: skip
+def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expected):
+    controls = drive_of(actuators, keys=KEYS.format(key)).controls
+    assert controls.get("home") == expected and "plain" not in controls
 
 
-def test_armature_is_added_to_bodies_whose_inertia_never_changes():
+def test_a_disabled_group_is_off_and_damping_by_an_actuator_goes_with_the_square_of_its_gear():
+    servos = '<position joint="j" kp="5" group="2"/><position joint="k" kp="5" group="1"/>'
+    drive = drive_of(servos, before='<option actuatorgroupdisable="2"/>')
+    assert [one.acts for one in drive.actuators] == [False, True]
+    assert read(since(text_of('<general joint="j" damping="3" gear="2"/>'))).drive.damping == (12.0, 0.0)
+
+
+def test_armature_is_added_to_bodies_whose_inertia_never_changes_and_a_locked_speed_does_not_move():
     """A free body, a slide and a wheel: their inertia is stored."""
-    bodies = '<body><freejoint/><geom size="0.1"/></body><body><joint type="slide"/><geom size="0.1"/></body>' + TWO
-    model = read(mjcf(bodies)).model
-    drive = read(mjcf(bodies)).drive
-    before = Acting(model, drive).mass_matrix(model.qpos0)
+    reading = read(mjcf(FREE + '<body><joint type="slide"/><geom size="0.1"/></body>' + TWO))
+    model = reading.model
     heavy = mujoco.MjModel.__copy__(model)
     add_armature(heavy, list(range(model.nv)), 2.0)
-    assert Acting(heavy, drive).mass_matrix(model.qpos0) - before == pytest.approx(2.0 * np.eye(model.nv), abs=1e-12)
-
-
-def test_a_speed_that_is_locked_does_not_move():
-    bodies = '<body><freejoint/><geom size="0.1"/></body>' + TWO
-    reading = read(mjcf(bodies))
-    locked = Acting(reading.model, reading.drive, locked=[0, 1, 2, 3, 4, 5])
-    model, data = locked.at(reading.model.qpos0, np.zeros(0), 0.01, "Euler")
+    after, before = (Acting(one, reading.drive).mass_matrix(model.qpos0) for one in (heavy, model))
+    assert after - before == pytest.approx(2.0 * np.eye(model.nv), abs=1e-12)
+    locked = Acting(model, reading.drive, locked=[0, 1, 2, 3, 4, 5])
+    moved, data = locked.at(model.qpos0, np.zeros(0), 0.01, "Euler")
     data.qfrc_applied[:] = 1.0
-    mujoco.mj_step(model, data)
+    mujoco.mj_step(moved, data)
     assert np.abs(data.qvel[:6]).max() < 1e-6 < np.abs(data.qvel[6:]).max()
 
 
 def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():
     before = '<orientation site="s" refsite="s" kp="1"/>'
     motor = '<motor joint="j" gear="3" armature="0.1"/><position tendon="t" kp="2" gear="5"/>'
-    text = since(mjcf(SITES, after=TENDON.format("") + f"<actuator>{before}{motor}</actuator>"))
+    text = since(text_of(before + motor, content=SITES))
     reading, model = read(text), mujoco.MjModel.from_xml_string(text)
     assert [one.moment for one in reading.drive.actuators[1:]] == [(3.0, 0.0), (5.0, 10.0)]
-    data = mujoco.MjData(model)
+    data, full = mujoco.MjData(model), np.zeros((2, 2))
     mujoco.mj_forward(model, data)
-    full = np.zeros((2, 2))
     mujoco.mj_fullM(model, data, full)
     assert tmt.mass_matrix(np.zeros(2), reading.tree) == pytest.approx(full)
     _, moments = Acting(model, reading.drive).along(np.zeros(2))
     assert moments[1:].tolist() == [[3.0, 0.0], [5.0, 10.0]]
 
 
-@pytest.mark.parametrize("actuator, what", [
-    ('<position name="s" joint="j" kp="nan"/>', "gain of actuator 's'"),
-    ('<general name="s" joint="j" biastype="affine" biasprm="0 -inf 0"/>', "bias of actuator 's'"),
-    ('<motor name="s" joint="j" gear="nan"/>', "gear of actuator 's'"),
-])  # fmt: skip
-def test_gains_that_are_no_numbers_are_refused_by_name(actuator, what):
-    with pytest.raises(ModelError, match=what):
-        drive_of(actuator)
+def test_small_movements_of_every_kind_of_joint_are_measured(rng):
+    at, reading = posture_of(PATHS["mixed"])
+    acting = acting_of(at, reading)
+    moved = 1e-6 * rng.normal(size=(4, acting.model.nv))
+    positions = np.tile(at.start, (4, 1))
+    for q, dx in zip(positions, moved):
+        mujoco.mj_integratePos(acting.model, q, dx, 1.0)
+    # a quaternion and its opposite are one turn
+    for j in np.flatnonzero(acting.model.jnt_type == mujoco.mjtJoint.mjJNT_BALL):
+        a = acting.model.jnt_qposadr[j]
+        positions[1, a : a + 4] *= -1.0
+    assert acting.movements(positions, at.start) == pytest.approx(moved, abs=1e-15)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+def test_a_run_in_parts_is_the_run_that_steps_make(integrator):
+    at, reading = posture_of(hinge(actuator=FILTERED.format(kind="filter", constant=0.01)))
+    acting, u, jump = acting_of(at, reading), np.array([0.3]), np.array([0.1])
+    parts = list(acting.deviations(at.q, u, 0.004, integrator, [3, 5], 1e-3, 2e-3, 0.05, jump))
+    assert [part.shape for part in parts] == [(3, 2), (5, 2)]
+    model, data = acting.at(at.q, u + jump, 0.004, integrator)
+    assert data.ctrl[0] == data.act[0] == pytest.approx(0.4)
+    data.qpos += 1e-3
+    data.qvel[:] = 2e-3
+    data.act += 0.05
+    for found in np.concatenate(parts):
+        mujoco.mj_step(model, data)
+        assert found == pytest.approx([data.qpos[0] - at.q[0], data.act[0] - 0.4], rel=1e-12)

@@ -1,60 +1,95 @@
-"""MuJoCo's minimal calls in compiled loops."""
+"""MuJoCo's minimal calls in compiled loops, its batches, additions to a model, derivatives of steps: beside its own calls."""
 
 import numpy as np
 import pytest
+from files import PLAIN, case_of, mjcf
+from models import PATHS
+from trees import random_states
 
-from compare.engines.mujoco import calls
+from compare.engines.mujoco import batch, calls, engine, read
+from compare.engines.mujoco.additions import MINIMAL, contacts, with_additions
+from compare.engines.mujoco.batch import BatchedCalls
 from compare.engines.mujoco.calls import MinimalCalls
+from compare.engines.mujoco.linear import differenced, transition
 from compare.robots.arm import ARM
 
-STATE = np.array([0.5, 0.3, 1.0]), np.array([1.0, -2.0, 3.0]), np.zeros(3)
+
+@pytest.mark.skipif(MinimalCalls.unavailable() is not None, reason="MuJoCo's library is not beside its package")
+def test_a_loop_does_all_of_it_at_the_state_that_is_there_as_often_as_it_is_told(mujoco, rng):
+    """Nothing is left of what was found at the state before."""
+    dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)
+    minimal = MinimalCalls(dynamics)
+    loops = {name: way[1] for name, way in minimal.loops(*rng.uniform(-2.0, 2.0, (3, 3))).items()}
+    for name, (q, v) in zip(("MuJoCo, equal work, no solve", "MuJoCo, equal work"), rng.uniform(-2.0, 2.0, (2, 2, 3))):
+        minimal.place(q, v, nothing)
+        minimal.force[:] = np.nan
+        loops[name](0)
+        assert np.isnan(minimal.force).all()
+        loops[name](1)
+        M, full = dynamics.mass_matrix(q), np.zeros((3, 3))
+        calls.mujoco.mj_fullM(minimal.model, minimal.data, full)
+        assert np.array_equal(full, M) and np.array_equal(minimal.force, dynamics.bias(q, v))
+    assert np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
+    minimal.data.time = 0.0
+    loops["MuJoCo, mj_step"](7)
+    assert minimal.data.time == pytest.approx(7 * calls.TINY_STEP, rel=1e-12)
+    minimal.place(q, v, nothing)
+    minimal.model.opt.timestep = 0.01
+    loops["MuJoCo, mj_step"](1)
+    run = dynamics.run(q, v, nothing, 0.01, 1, "RK4")
+    assert np.array_equal(minimal.data.qpos, run.q[1]) and np.array_equal(minimal.data.qvel, run.v[1])
+    loops["MuJoCo, mj_forward"](1)
+    assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], nothing), rtol=1e-12)
+
+
+@pytest.mark.skipif(BatchedCalls.unavailable() is not None, reason="this MuJoCo has no batches")
+def test_a_batch_has_the_accelerations_of_mj_forward(mujoco, rng):
+    dynamics = mujoco.of(ARM.case())
+    q, v, tau = rng.uniform(-2.0, 2.0, (3, 7, 3))
+    calls, expected = BatchedCalls(dynamics, q, v, tau, threads=2), dynamics.acceleration(q, v, tau)
+    assert np.array_equal(calls.forward(), expected) and np.abs(expected).max() > 1.0
+    calls.batch.bind("qvel")[:] = 0.0
+    calls.forward_loop()(1)
+    assert np.array_equal(calls.found, dynamics.acceleration(q, 0.0 * v, tau))
+    for _ in range(3):
+        calls.step()
+    assert np.allclose(calls.batch.bind("time"), 3 * batch.TINY_STEP, rtol=1e-12)
+
+
+# of models with quaternions
 
 
 @pytest.fixture(scope="module")
-def minimal(mujoco):
-    """The arm by its minimal calls, and its loops, made at a state."""
-    if reason := MinimalCalls.unavailable():
-        pytest.skip(reason)
-    found = MinimalCalls(mujoco.of(ARM.case()))
-    return found, found.loops(*STATE)
+def reading():
+    return read(PATHS["mixed"])
 
 
-@pytest.mark.parametrize("name", ["MuJoCo, equal work, no solve", "MuJoCo, equal work"])
-def test_the_loops_do_all_of_it_at_the_state_that_is_there(mujoco, minimal, rng, name):
-    """Nothing is left of what was found at the state before."""
-    (minimal, ways), dynamics = minimal, mujoco.of(ARM.case())
-    states, nothing = rng.uniform(-2.0, 2.0, (2, 2, 3)), np.zeros(3)
-    q, v = states[int(name.endswith("no solve"))]
-    minimal.place(q, v, nothing)
-    minimal.force[:] = np.nan
-    ways[name][1](0)
-    assert np.isnan(minimal.force).all()  # it does as often as it is told
-    ways[name][1](1)
-    M, full = dynamics.mass_matrix(q), np.zeros((3, 3))
-    calls.mujoco.mj_fullM(minimal.model, minimal.data, full)
-    assert np.array_equal(full, M) and np.array_equal(minimal.force, dynamics.bias(q, v))
-    assert name.endswith("no solve") or np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
-    assert minimal.data.qacc.any() and np.array_equal(
-        minimal.bias(q, v), dynamics.bias(q, v)
-    )  # without an acceleration
+def test_a_step_is_differenced_in_movements(reading, rng):
+    dynamics, (q, v, tau) = engine(reading).of(case_of(reading.tree)), random_states(rng, reading.tree, 1)
+    for integrator in ("Euler", "implicit"):
+        A = transition(dynamics, q[0], tau[0], 1e-3, integrator)
+        assert A.shape == (2 * dynamics.coordinates.nv,) * 2
+        assert np.allclose(A, differenced(dynamics, q[0], tau[0], 1e-3, integrator), atol=1e-6)
+    assert np.allclose(transition(dynamics, q[0], tau[0], 1e-9, "RK4"), np.eye(len(A)), atol=1e-5)
+    if not MinimalCalls.unavailable():
+        found, expected = (one.acceleration(q, v, tau) for one in (MinimalCalls(dynamics), dynamics))
+        assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-def test_a_loop_repeats_a_step_of_rk4_and_all_of_mj_forward(mujoco, minimal):
-    (minimal, ways), dynamics = minimal, mujoco.of(ARM.case())
-    minimal.data.time = 0.0
-    ways["MuJoCo, mj_step"][1](7)
-    assert minimal.data.time == pytest.approx(7 * calls.TINY_STEP, rel=1e-12)
-    minimal.place(*STATE)
-    minimal.model.opt.timestep = 0.01
-    ways["MuJoCo, mj_step"][1](1)
-    minimal.model.opt.timestep = calls.TINY_STEP
-    run = dynamics.run(*STATE, 0.01, 1, "RK4")
-    assert np.array_equal(minimal.data.qpos, run.q[1]) and np.array_equal(minimal.data.qvel, run.v[1])
-    minimal.data.qacc[:] = np.nan
-    ways["MuJoCo, mj_forward"][1](1)
-    assert np.allclose(minimal.data.qacc, dynamics.acceleration(run.q[1], run.v[1], STATE[2]), rtol=1e-12)
+def test_additions_to_a_bare_model(reading, rng):
+    engines, case = with_additions(engine(reading), 0.02, -5.0, -50.0), case_of(reading.tree)
+    state = [x[0] for x in random_states(rng, reading.tree, 1)]
+    bare = engine(reading).of(case).run(*state, 1e-3, 5, "RK4").states
+    assert MINIMAL in engines and any("sensors" in name for name in engines)
+    for name, addition in engines.items():
+        dynamics = addition.of(case)
+        if "capsules" not in name:
+            assert np.allclose(dynamics.run(*state, 1e-3, 5, "RK4").states, bare, rtol=1e-12, atol=1e-12)
+            assert contacts(dynamics, *state, 1e-3, 5, "RK4") == (0.0, False)
 
 
-def test_without_the_library_it_says_so(monkeypatch, tmp_path):
-    monkeypatch.setattr(calls.mujoco, "__file__", str(tmp_path / "mujoco" / "__init__.py"))
-    assert MinimalCalls.unavailable()
+def test_default_flags_bring_back_no_force_that_the_file_disables():
+    joint = PLAIN.replace('name="j"', 'name="j" axis="0 1 0" damping="1" stiffness="3" springref="40"')
+    reading = read(mjcf(joint, '<option><flag gravity="disable" damper="disable" spring="disable"/></option>'))
+    for name, addition in with_additions(engine(reading), 0.02, -5.0, -9.0).items():
+        assert not addition.of(case_of(reading.tree)).acceleration([0.3], [0.5], [0.0]).any(), name

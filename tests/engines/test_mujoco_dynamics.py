@@ -1,50 +1,56 @@
-"""MuJoCo behind the project's symbols: states, torques, divergence."""
+"""Runs of MuJoCo behind the project's symbols: how they end, and the order of the Tree."""
 
 import numpy as np
 import pytest
+from crane import crane
 from edited import XML
 
 import tmt
-from compare.engines.mujoco import parse
-from compare.engines.mujoco.engine import METHODS
+from compare.engines.mujoco import load, parse
+from compare.engines.mujoco.linear import differenced, implicit_derivative, left_to_itself, transition
+from compare.engines.mujoco.parameters import parameters
+from compare.experiments.parameters import stated
 from compare.robots.arm import ARM
+from tmt.equations.method import bias_rates
 
 REST = np.zeros(3)
-
-
-@pytest.fixture
-def dynamics(mujoco):
-    """The arm as it is."""
-    return mujoco.of(ARM.case())
-
-
-def test_quantities_are_those_of_the_state_that_is_asked_for(dynamics, rng):
-    q, v, tau = rng.uniform(-2, 2, (3, 3))
-    before = dynamics.bias(q, v)
-    dynamics.run(q, v, tau, 0.01, 10, "RK4")
-    dynamics.acceleration(q + 1, v, tau)
-    assert np.array_equal(dynamics.bias(q, v), before)
 
 
 def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert XML.count(' autoreset="disable"') == 1
-    lenient = parse(XML.replace(' autoreset="disable"', ""), tmt.ARM).of(ARM.case())
-    motion = lenient.run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4")
-    strict = parse(XML, tmt.ARM).of(ARM.case()).run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4")
-    assert not np.isfinite(motion.q[-1]).any() and np.array_equal(motion.q, strict.q, equal_nan=True)
-    assert motion.ended == strict.ended
-    assert list(tmp_path.iterdir()) == []
+    lenient, strict = (
+        parse(text, tmt.ARM).of(ARM.case()).run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4")
+        for text in (XML.replace(' autoreset="disable"', ""), XML)
+    )
+    assert not np.isfinite(lenient.q[-1]).any() and np.array_equal(lenient.q, strict.q, equal_nan=True)
+    assert lenient.ended == strict.ended and list(tmp_path.iterdir()) == []
 
 
-def test_the_files_own_integrator_does_not_matter_where_states_are_evaluated(dynamics, rng):
-    """One that damps implicitly would change accelerations, and what mj_inverse finds."""
-    assert XML.count('integrator="RK4"') == 1
-    names = [name for name in ("implicit", "discrete") if name in METHODS]
-    q, v, tau = rng.uniform(-2, 2, (3, 3))
-    sticky = ARM.case("sticky", damping=0.5)
-    for name in names:
-        text = XML.replace('integrator="RK4"', f'integrator="{name}"').replace("<flag ", '<flag invdiscrete="enable" ')
-        other, same = (parse(of, tmt.ARM).of(sticky) for of in (text, XML))
-        assert np.array_equal(other.acceleration(q, v, tau), same.acceleration(q, v, tau))
-        assert np.array_equal(other.inverse(q, v, tau), same.inverse(q, v, tau))
+@pytest.mark.parametrize("place, value, last", [((2, 0), 0.2, 2), ((1, 5), np.inf, 1)])
+def test_a_run_is_no_number_from_where_its_clock_stands_or_a_number_is_not_finite(mujoco, place, value, last):
+    dynamics, states, start = mujoco.of(ARM.case()), np.ones((1, 4, 7)), np.zeros((1, 7))
+    states[0, :, 0] = [0.1, 0.2, 0.3, 0.4]
+    states[0][place] = value
+    q, v, ended = dynamics.path(start, states, 0.1)
+    for values in (q, v):
+        assert np.isfinite(values[0]).all(axis=1).tolist() == [k <= last for k in range(5)]
+    assert ended[0].startswith(f"at t = {0.1 * last:g} s: ")
+
+
+def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path, rng):
+    """And so are what MuJoCo says of its own steps, and the numbers that it compiled."""
+    robot = crane(tmp_path)
+    case = robot.case("damped", damping=0.2)
+    dynamics, (q, v, tau), dt = load(robot.mjcf, robot.tree).of(case), rng.uniform(-1.0, 1.0, (3, 4)), 0.01
+    ours, motion = tmt.simulate(q, v, tau, dt, 5, "rk4", case.tree), dynamics.run(q, v, tau, dt, 5, "RK4")
+    assert np.allclose(motion.q, ours.q, atol=1e-11) and np.allclose(motion.v, ours.qd, atol=1e-10)
+    alone, motion = left_to_itself(dynamics, q, v, tau, dt, 5, "Euler"), dynamics.run(q, v, tau, dt, 5, "Euler")
+    assert np.allclose(alone["q"], motion.q, atol=1e-13) and np.allclose(alone["qd"], motion.v, atol=1e-12)
+    for integrator in ("Euler", "implicit"):
+        theirs = transition(dynamics, q, tau, dt, integrator)
+        assert np.allclose(theirs, differenced(dynamics, q, tau, dt, integrator), atol=1e-7)
+    rates = np.array(bias_rates(case.tree, list(q), list(v))) + np.diag(case.tree.damping)
+    assert np.allclose(-implicit_derivative(dynamics, q, v), rates, atol=1e-12)
+    compiled = parameters(dynamics)
+    assert all(np.allclose(compiled[name], numbers, atol=1e-14) for name, numbers in stated(case.tree).items())

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from files import EVERYTHING, PLAIN, mjcf
+from files import PLAIN, mjcf
+from models import PATHS
 
 from compare.engines.mujoco import read
 from compare.engines.mujoco.stated import stated_numbers
-from compare.robots.arm import ARM
 
 SMALL = 1e-14  # relative; of a tensor up to MuJoCo 3.10: its principal moments are found to about 1e-6
 DIGITS = {"inertia": 1e-6}
@@ -21,87 +21,52 @@ def rows_of(text):
     return {(row.place, row.quantity): row for row in stated_numbers(read(text))}
 
 
-@pytest.mark.parametrize("text", [EVERYTHING, ARM.mjcf], ids=["everything", "arm"])
-def test_a_file_that_asks_for_no_change_states_what_is_compiled(text):
-    rows = stated_numbers(read(text))
-    assert {"pos", "mass", "com", "inertia", "axis", "armature", "damping", "stiffness"} <= {
-        row.quantity for row in rows
-    }
-    for row in rows:
+FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3" euler="40 50 60">
+<inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
+<frame pos="0.3 0 0" euler="0 90 0"><joint name="j" axis="1 2 0" pos="0.1 0.2 0.3" damping="2" stiffness="3"/></frame>
+</body></frame>"""
+
+
+@pytest.mark.parametrize("source", [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf()])
+def test_a_file_that_asks_for_no_change_states_what_is_compiled(source):
+    rows = rows_of(source)
+    known = {"pos", "mass", "com", "inertia", "axis", "armature", "damping", "stiffness"}
+    assert known <= {quantity for _, quantity in rows}
+    for row in rows.values():
         if row.stated is None:
             assert row.why == "inertia from geoms"
         else:
             assert difference(row) <= DIGITS.get(row.quantity, SMALL) and not row.why
 
 
-BODY = '<body name="b"><joint name="j"/><inertial pos="0.1 0 0" mass="1" diaginertia="1 1 1"/>{}</body>'
-OPTIONS = {  # option: file, and the quantities that it changes
-    "boundmass": (mjcf(BODY.format(""), '<compiler boundmass="2"/>'), {"mass"}),
-    "boundinertia": (
-        mjcf(BODY.format("").replace("1 1 1", "1 1.5 2"), '<compiler boundinertia="1.9"/>'),
-        {"inertia"},
-    ),
-    "balanceinertia": (
-        mjcf(BODY.format("").replace("1 1 1", "1 1 3"), '<compiler balanceinertia="true"/>'),
-        {"inertia"},
-    ),
-    "settotalmass": (mjcf(BODY.format(""), '<compiler settotalmass="3"/>'), {"mass", "inertia"}),
-    "inertiafromgeom": (
-        mjcf(BODY.format('<geom size="0.1" pos="0 0.2 0"/>'), '<compiler inertiafromgeom="true"/>'),
-        {"mass", "com", "inertia"},
-    ),
-    "springdamper": (
-        mjcf(BODY.format("").replace('name="j"', 'name="j" springdamper="1 0.5"')),
-        {"damping", "stiffness"},
-    ),
+BODY = '<body name="b"><joint name="j"/><inertial pos="0.1 0 0" mass="1" diaginertia="{}"/>{}</body>'
+OPTIONS = {  # the quantities that it changes: of a file with these principal moments and something in its body
+    'boundmass="2"': ({"mass"}, "1 1 1", ""),
+    'boundinertia="1.9"': ({"inertia"}, "1 1.5 2", ""),
+    'balanceinertia="true"': ({"inertia"}, "1 1 3", ""),
+    'settotalmass="3"': ({"mass", "inertia"}, "1 1 1", ""),
+    'inertiafromgeom="true"': ({"mass", "com", "inertia"}, "1 1 1", '<geom size="0.1" pos="0 0.2 0"/>'),
+    'springdamper="1 0.5"': ({"damping", "stiffness"}, "1 1 1", ""),
 }
 
 
 @pytest.mark.parametrize("option", OPTIONS)
 def test_an_option_that_asks_for_a_change_is_named_where_it_changes(option):
-    text, quantities = OPTIONS[option]
-    rows = rows_of(text)
-    assert {row.quantity for row in rows.values() if row.why == option} == quantities
+    (quantities, *body), name = OPTIONS[option], option.split("=")[0]
+    of_joint = name == "springdamper"
+    text = BODY.format(*body).replace('name="j"', f'name="j" {option if of_joint else ""}')
+    rows = rows_of(mjcf(text, "" if of_joint else f"<compiler {option}/>"))
+    assert {row.quantity for row in rows.values() if row.why == name} == quantities
     for row in rows.values():
-        assert row.why in ("", option)
-        assert (difference(row) > 0.1) == (row.quantity in quantities)
+        assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
 
 
 def test_the_mass_of_geoms_is_stated_where_each_has_one():
-    rows = rows_of(mjcf(PLAIN.replace('name="g"', 'name="g" mass="2"')))
-    assert (rows["b", "mass"].stated, rows["b", "mass"].compiled, rows["b", "mass"].why) == (2.0, 2.0, "")
+    heavy = PLAIN.replace('name="g"', 'name="g" mass="2"')
+    for text, expected in (
+        (mjcf(heavy), (2.0, 2.0, "")),
+        (mjcf(heavy, '<compiler settotalmass="3"/>'), (2.0, 3.0, "settotalmass")),
+    ):
+        row = rows_of(text)["b", "mass"]
+        assert (row.stated, row.compiled, row.why) == expected
     assert rows_of(mjcf())["b", "mass"].stated is None
-    rows = rows_of(mjcf(PLAIN.replace('name="g"', 'name="g" mass="2"'), '<compiler settotalmass="3"/>'))
-    assert (rows["b", "mass"].stated, rows["b", "mass"].compiled, rows["b", "mass"].why) == (2.0, 3.0, "settotalmass")
-
-
-def test_an_attached_model_keeps_its_own_settings(tmp_path):
-    part = mjcf(
-        '<body name="p"><frame euler="0.1 0.2 0.3"><joint name="pj" pos="0 0 0.1" axis="0 2 1"/></frame>'
-        '<inertial pos="0 0 0" mass="1" diaginertia="1 2 2.5" euler="0.5 0.2 0"/></body>',
-        '<compiler angle="radian" eulerseq="zyx" boundmass="5"/>',
-    )
-    (tmp_path / "part.xml").write_text(part)
-    whole = mjcf(
-        '<frame euler="10 20 30" pos="1 0 0">'
-        + BODY.format('<attach model="part" body="p" prefix="a_"/>')
-        + "</frame>",
-        '<compiler boundmass="0.5"/><asset><model name="part" file="part.xml"/></asset>',
-    )
-    path = tmp_path / "whole.xml"
-    path.write_text(whole)
-    rows = rows_of(path)
-    assert rows["a_p", "mass"].why == "boundmass" and not rows["b", "mass"].why
-    for key, row in rows.items():
-        assert key == ("a_p", "mass") or difference(row) <= DIGITS.get(row.quantity, SMALL)
-
-
-def test_a_number_that_differs_without_an_option_is_found():
-    reading = read(mjcf(BODY.format("")))
-    reading.model.body_mass[1] = 1.5
-    reading.model.dof_damping[0] = 0.1
-    wrong = [row for row in stated_numbers(reading) if not row.why and difference(row) > SMALL]
-    assert [(row.place, row.quantity, row.stated, row.compiled) for row in wrong] == [
-        ("b", "mass", 1.0, 1.5),
-        ("j", "damping", 0.0, 0.1),
-    ]

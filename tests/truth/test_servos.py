@@ -17,15 +17,15 @@ ROUNDING, DIFFERENCED = 1e-12, 1e-6  # of the largest force; of the largest deri
 NUDGE = 1e-5
 
 ARM = """<mujoco><compiler angle="radian"/>
-<option gravity="0 0 -9.81"><flag contact="disable" constraint="disable" {flags}/></option>
-<worldbody><body {body}><joint name="a" axis="0 1 0" {joint}/><geom size="0.1" pos="0.3 0 0"/>
+<option gravity="0 0 {gravity}"><flag contact="disable" constraint="disable"/></option>
+<worldbody><body {body}><joint name="a" axis="0 1 0" {joint}/><geom size="0.1" pos="0.3 0 0"/><site name="s" pos="0.3 0 0"/>
 <body pos="0.3 0 0" {body}><joint name="b" axis="0 1 0"/><geom size="0.1" pos="0.2 0.1 0"/></body></body></worldbody>
 <tendon><fixed name="t" {tendon}><joint joint="a" coef="1"/><joint joint="b" coef="2"/></fixed></tendon>
 <actuator>{actuators}</actuator></mujoco>"""
 
 
-def arm(actuators='<motor joint="a"/>', body="", joint="", tendon="", flags=""):
-    return ARM.format(actuators=actuators, body=body, joint=joint, tendon=tendon, flags=flags)
+def arm(actuators='<motor joint="a"/>', body="", joint="", tendon="", gravity=-9.81):
+    return ARM.format(actuators=actuators, body=body, joint=joint, tendon=tendon, gravity=gravity)
 
 
 @lru_cache(maxsize=64)
@@ -67,7 +67,7 @@ def assert_the_same(text, rng, q=None, u=None):
     slopes = driven.slopes(q, u)
     for ours, theirs in ((slopes.K, K), (slopes.D, D)):
         assert np.abs(ours - theirs).max() <= DIFFERENCED * max(1.0, np.abs(theirs).max())
-    return driven, q, u
+    return driven, slopes, driven.cut(q, u)
 
 
 @pytest.mark.parametrize("transmission", TRANSMISSIONS)
@@ -80,18 +80,9 @@ def test_what_a_flag_switches_off_is_off(stage, rng):
     assert_the_same(with_drive(3, flags={stage: "disable"}), rng)
 
 
-def test_what_is_refused_is_left_out_and_the_rest_is_there(rng):
-    servo = '<position joint="a" kp="30" kv="2"/>'
-    more = '<general joint="b" dyntype="user" gainprm="50"/><position joint="b" kp="3" delay="0.02" nsample="3"/>'
-    q, u = np.array([0.3, -0.4]), np.array([0.7, 0.2, 0.1])
-    with_more, without = driven_of(arm(servo + more))[0], driven_of(arm(servo))[0]
-    assert with_more.drive.refused.keys() == {"actuator 1", "actuator 2"}
-    assert (with_more.forces(q, u)[0] == without.forces(q, u[:1])[0]).all()
-    assert (with_more.slopes(q, u).K == without.slopes(q, u[:1]).K).all()
-
-
 CUT = {  # a drive whose ranges cut at the posture (0.3, -0.4) under controls of 1, and what is cut: forces, sums
     "a force": (arm('<position joint="a" kp="30" kv="2" forcerange="-5 5"/>'), {0: 5.0}, {}),
+    "no force": (arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>'), {}, {}),  # just inside
     "the sum of a speed": (
         arm('<position joint="a" kp="30" kv="2"/><motor joint="a"/><position tendon="t" kp="3"/>',
             joint='actuatorfrcrange="-9 9"'),
@@ -113,39 +104,13 @@ CUT = {  # a drive whose ranges cut at the posture (0.3, -0.4) under controls of
 @pytest.mark.parametrize("name", CUT)
 def test_what_a_range_cuts_has_neither_stiffness_nor_damping(name, rng):
     text, forces, sums = CUT[name]
-    q, u = np.array([0.3, -0.4]), np.ones(text.count("<motor") + text.count("<position"))
-    driven, q, u = assert_the_same(text, rng, q, u)
-    cut = driven.cut(q, u)
+    u = np.ones(text.count("<motor") + text.count("<position"))
+    _, _, cut = assert_the_same(text, rng, np.array([0.3, -0.4]), u)
     assert cut.forces == pytest.approx(forces) and cut.sums == pytest.approx(sums)
 
 
-def test_weight_that_an_actuator_takes_away_has_the_slope_of_weight(rng):
-    text = arm('<motor joint="b"/>', 'gravcomp="1"', 'actuatorgravcomp="true"')
-    driven, q, u = assert_the_same(text, rng, np.array([0.3, -0.4]), np.zeros(1))
-    assert driven.drive.lifted == (0,) and np.abs(driven.slopes(q, u).K).max() < 1e-9
-
-
-def test_just_inside_a_range_nothing_is_cut(rng):
-    text = arm('<position joint="a" kp="30" kv="2" forcerange="-21.001 21.001"/>')
-    driven, q, u = assert_the_same(text, rng, np.array([0.3, 0.0]), np.ones(1))
-    assert not driven.cut(q, u).forces and driven.slopes(q, u).D[0, 0] == 2.0
-
-
-def test_a_length_that_does_not_change_has_no_stiffness_and_one_that_turns_is_named():
-    """MuJoCo's length of a site without a reference is 0: a servo there has a force and no target that can be missed."""
-    text = arm('<position name="at the site" site="s" kp="100" kv="3" gear="0 0 1 0 0 0"/><motor joint="a"/>')
-    driven, _ = driven_of(text.replace("<geom", '<site name="s" pos="0.3 0 0"/><geom', 1))
-    slopes = driven.slopes(np.zeros(2), np.zeros(2))
-    assert slopes.D[0, 0] > 0.0 and abs(slopes.K[0, 0]) < 100 * 0.3**2 / 2
-    assert driven.differenced == ("at the site",)
-
-
-# rest
-
-
-def test_a_rest_is_found_from_a_posture_that_is_none(rng):
-    text = arm('<position joint="a" kp="300"/><position joint="b" kp="300"/>')
-    driven, model = driven_of(text)
+def test_a_rest_is_found_from_a_posture_that_is_none():
+    driven, model = driven_of(arm('<position joint="a" kp="300"/><position joint="b" kp="300"/>'))
     q, left = driven.at_rest(np.zeros(2), np.zeros(2))
     assert left == 0.0 and 0.01 < np.abs(q).max() < 0.5
     assert np.abs(of_mujoco(driven, model, q, np.zeros(2), np.zeros(2))).max() < 1e-9
@@ -163,30 +128,19 @@ def test_a_servo_that_is_too_weak_for_its_range_finds_no_rest(most, left):
 
 def test_what_only_rounding_leaves_is_a_rest():
     """At the targets of servos whose gains are no numbers in binary; and straight up."""
-    text = arm("".join(f'<general joint="{name}" gainprm="0.7" biastype="affine" biasprm="0.1 -0.3 0"/>' for name in "ab"),
-               flags='gravity="disable"')  # fmt: skip
-    driven, _ = driven_of(text)
+    servo = '<general joint="{}" gainprm="0.7" biastype="affine" biasprm="0.1 -0.3 0"/>'
+    driven, _ = driven_of(arm(servo.format("a") + servo.format("b"), gravity=0.0))
     q = np.array([0.1, 0.7])
     assert driven.at_rest(q, np.array([one.target(angle) for one, angle in zip(driven.drive.actuators, q)]))[1] == 0.0
     rod = '<body euler="0.3 0 0"><joint axis="0 1 0" ref="0.1"/><geom size="0.1" pos="0.1 0 0.7"/></body>'
     driven, _ = driven_of(f'<mujoco><compiler angle="radian"/><worldbody>{rod}</worldbody></mujoco>')
-    up, left = driven.at_rest(np.array([0.1 - np.arctan(0.1 / 0.7)]), np.zeros(0))
-    assert left == 0.0 and driven.at_rest(up, np.zeros(0))[1] == 0.0
+    assert driven.at_rest(np.array([0.1 - np.arctan(0.1 / 0.7)]), np.zeros(0))[1] == 0.0
 
 
-def test_a_rest_is_found_from_where_a_force_is_on_its_range():
+@pytest.mark.parametrize("start", [0.05, -2.0])
+def test_a_rest_is_found_from_where_a_force_is_on_its_range(start):
     """The servo is stiff within 5 mrad of its target only; it rests there from wherever it starts."""
-    text = arm(
-        '<position joint="a" kp="1000" forcerange="-5 5"/><position joint="b" kp="1000"/>', flags='gravity="disable"'
-    )
-    driven, _ = driven_of(text)
-    for start in (0.05, -2.0):
-        q, left = driven.at_rest(np.array([start, 0.1]), np.array([0.2, 0.1]))
-        assert left == 0.0 and q == pytest.approx([0.2, 0.1], abs=1e-9)
-
-
-def test_a_dead_band_has_no_spring_inside_and_one_outside():
-    text = arm('<motor joint="a"/>', tendon='stiffness="50" springlength="0.1 0.4"', flags='gravity="disable"')
-    driven, _ = driven_of(text)
-    for angle, stiff in ((0.39, 0.0), (0.41, 50.0), (0.2, 0.0), (0.09, 50.0)):
-        assert driven.slopes(np.array([angle, 0.0]), np.zeros(1)).K[0, 0] == pytest.approx(stiff, abs=1e-9)
+    servos = '<position joint="a" kp="1000" forcerange="-5 5"/><position joint="b" kp="1000"/>'
+    driven, _ = driven_of(arm(servos, gravity=0.0))
+    q, left = driven.at_rest(np.array([start, 0.1]), np.array([0.2, 0.1]))
+    assert left == 0.0 and q == pytest.approx([0.2, 0.1], abs=1e-9)
