@@ -1,10 +1,7 @@
-"""Rows of speed whose conclusions are known, for its tests."""
+"""Rows of speed whose conclusions are known: for test_judge_speed and test_speed_costs."""
 
-from compare.engines import Method
 from compare.experiments.speed.evaluations import EACH, EQUAL, FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WAITING, WHOLE
 
-RK4 = Method("tmt", "rk4", 4, "rk4")
-SCHEMES = {"Euler": "semi_implicit_euler", "implicit": "implicit", "RK4": "rk4"}  # of MuJoCo's integrators
 NS = {
     (FORWARD, WHOLE, 1, 1): 1000.0, (FORWARD, EQUAL, 1, 1): 500.0, (RK4_STEP, MJ_STEP, 1, 1): 4000.0,
     (FORWARD, WAITING, 1, 1): 50.0, (FORWARD, EACH, 1000, 1): 25.0, (FORWARD, IN_LANES, 1000, 1): 10.0,
@@ -32,9 +29,3 @@ def known_rows():
             row("tmt", "dopri8", error**2, steps, 2e-3 * 2**k),
         ]
     return [*rows, row("scipy", "DOP853", 1e-9, 500, 1e-4), row("mujoco", "implicit", None, 64, 1e-9)]
-
-
-def absent(scene="bent, free"):
-    """A row of an engine that cannot take part."""
-    named = {"scene": scene, "engine": "own", "method": "RK4, Heun", "why_not": "own is not here"}
-    return dict.fromkeys(row("own", "RK4", 1.0)) | named
