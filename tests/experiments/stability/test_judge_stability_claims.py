@@ -5,7 +5,7 @@ import pytest
 
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
-from compare.experiments.stability import beyond, claims, claims_judged, departure, figures_claims
+from compare.experiments.stability import beyond, claims, claims_judged, figures_claims
 from compare.robots.arm import ARM
 
 RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])
@@ -17,24 +17,26 @@ def verdict(note) -> str:
     return note.split(":")[0].split(", ")[1]
 
 
-def torque_rows(times=(4.7, 4.7), ulps=2.0, moved=0.0, sides=(1, 1), clear=(1, 1)):
-    """Rows of claims.holding_torques, for TMT and for MuJoCo."""
+def torque_rows(times=(4.7, 4.7), ulps=2.0, moved=0.0, sides=(1, 1), clear=(1, 1), leaving=27):
+    """Rows of claims.holding_torques, for TMT and for MuJoCo; leaving: how many of TMT's variants do."""
     rows = []
     for method, time, side, away in zip(RK4, times, sides, clear):
-        for name in NAMES:
-            pushed = away if "ulps" in name else 1
+        for k, name in enumerate(NAMES):
+            stays = method.engine == "tmt" and leaving <= k < 27
             rows.append({
                 "scene": "ball catch", "engine": method.engine, "method": method.name, "dt_s": 5 / 64, "torque": name,
-                "push_rad_per_s2": 1e-14 * pushed, "predicted_s": time, "observed_s": time, "direction": side,
-                "largest_residual_n_m": 1e-15, "moved_rad": moved if "own" in name else 1.0, "residual_ulps": ulps,
+                "push_rad_per_s2": 1e-14 * (away if "ulps" in name else 1), "predicted_s": time,
+                "observed_s": None if stays else time, "direction": None if stays else side, "largest_residual_n_m": 1e-15,
+                "moved_rad": moved if "own" in name else 1.0, "residual_ulps": ulps,
             })  # fmt: skip
     return rows
 
 
 @pytest.mark.parametrize("changed, word, passes", [
-    ({}, "reproduced", True), ({"times": (5.49, 3.51)}, "reproduced", True),
-    ({"times": (5.51, 4.7)}, "not reproduced", True), ({"times": (4.7, 3.49)}, "not reproduced", True),
+    ({"times": (5.49, 3.51)}, "reproduced", True), ({"times": (5.51, 4.7)}, "not reproduced", True),
+    ({"times": (4.7, 3.49)}, "not reproduced", True),
     ({"ulps": 15.9}, "reproduced", True), ({"ulps": 16.1}, "not reproduced", True),
+    ({"leaving": 14}, "reproduced", True), ({"leaving": 13}, "not reproduced", True),  # more than half leave
     ({"moved": 1e-17}, "not reproduced", False), ({"clear": (1, -1)}, "not reproduced", False),  # against its push
     ({"sides": (1, None)}, "not reproduced", False),
 ])  # fmt: skip
@@ -44,26 +46,12 @@ def test_claim_1(result, changed, word, passes):
     assert verdict(result.notes[-1]) == word and all(check.passed for check in result.checks[1:]) is passes
 
 
-@pytest.mark.parametrize("leaving, word", [(14, "reproduced"), (13, "not reproduced")])
-def test_claim_1_asks_for_more_than_half(result, leaving, word):
-    rows = torque_rows()
-    for row in rows[leaving:27]:
-        row["observed_s"] = row["direction"] = None
-    claims_judged.check_torques(result, ARM, rows)
-    assert verdict(result.notes[-1]) == word
-
-
-def test_what_each_engine_does_is_said_and_drawn_of_that_engine(result):
-    rows = torque_rows(times=(4.11, 5.22), sides=(1, -1), clear=(1, -1))
-    claims_judged.check_torques(result, ARM, rows)
-    ours, theirs = result.notes[-1].split("TMT: ")[1].split("MuJoCo: ")
-    assert "4.11 s" in ours and "27 to larger alpha" in ours and "5.22 s" in theirs and "27 to smaller" in theirs
+def test_what_each_engine_does_is_drawn_of_that_engine(result):
+    claims_judged.check_torques(result, ARM, torque_rows(times=(4.11, 5.22), sides=(1, -1), clear=(1, -1)))
     _, fig, caption = figures_claims.draw_torques(result, ARM)
     assert caption.index("TMT") < caption.index("4.11 s") < caption.index("5.22 s")
     for ax, engine, time in zip(fig.axes, ("TMT", "MuJoCo"), (4.11, 5.22)):
         assert engine in ax.get_ylabel() and {line.get_xdata()[0] for line in ax.lines} == {time}
-    marks = [line for line in fig.axes[2].lines if line.get_marker() in "^v" and len(line.get_ydata())]
-    assert {(line.get_ydata()[0], line.get_fillstyle()) for line in marks} == {(4.11, "full"), (5.22, "none")}
 
 
 @pytest.mark.parametrize("to, found", [(0.3, 1), (-0.3, -1), (np.nan, None)])
@@ -86,23 +74,25 @@ def finer_rows(moved=0.0, directions=(1, -1), times=(5.0, 6.0)):
 @pytest.mark.parametrize("changed, word, passes", [
     ({}, "reproduced", True), ({"directions": (1, 1)}, "reproduced in part", True),
     ({"moved": 1e-17}, "reproduced in part", False),
-    ({"moved": 1e-17, "directions": (1, 1)}, "not reproduced", False),
     ({"directions": (None, None), "times": (None, None)}, "not reproduced", True),
 ])  # fmt: skip
 def test_claim_2(result, changed, word, passes):
     claims_judged.check_finer_steps(result, ARM, finer_rows(**changed))
     assert verdict(result.notes[-1]) == word and [check.passed for check in result.checks] == 4 * [passes]
-    figures_claims.draw_finer_steps(result, ARM)
 
 
 def test_the_printed_torque_is_judged_as_every_departure(result):
-    row = {"scene": "ball catch, printed torque", "engine": "tmt", "method": "rk4", "dt_s": 0.01,
-           "perturbation_rad": 1e-5}  # fmt: skip
-    printed = [row | {"observed_s": observed, "predicted_s": predicted}
-               for observed, predicted in ((1.4, 1.4 - 0.029), (1.4, 1.4 - 0.031), (None, None))]  # fmt: skip
+    row = {
+        "scene": "ball catch, printed torque",
+        "engine": "tmt",
+        "method": "rk4",
+        "dt_s": 0.01,
+        "perturbation_rad": 1e-5,
+    }
+    times = ((1.4, 1.371), (1.4, 1.369), (None, None))
+    printed = [row | {"observed_s": observed, "predicted_s": predicted} for observed, predicted in times]
     claims_judged.check_claims(result, ARM, torque_rows(), [], printed)
-    assert [check.passed for check in result.checks[-3:]] == [True, False, True] and "1.40 s" in result.notes[-1]
-    assert departure.near(0.01) == pytest.approx(0.03)
+    assert [check.passed for check in result.checks[-3:]] == [True, False, True]
 
 
 def kept_runs(observed=None, largest=0.06, leaves=(), acceleration=50.0, rest=0.0):

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from judged import BOTH, INSIDE, only
+from judged import INSIDE, only
 
 import tmt
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
-from compare.experiments.stability import choice, failure, figures_failure, long_runs
+from compare.experiments.stability import choice, failure, long_runs
 from compare.judge.scale import gravity_scale
 from compare.robots.arm import ARM
 
@@ -26,26 +26,22 @@ def test_growth_at_the_resonance(result, small, large, posture, passes):
     assert [check.passed for check in result.checks] == passes
 
 
-def silent_run(since=1.0, caught=1.0, warnings=0, resets=0, definite=-0.5):
+def silent_run(since=None, caught=None, definite=-0.5):
     return {
-        "t": np.array([0.0, 1.0, 2.0]), "energy": np.zeros(3), "clock": np.arange(3.0), "warnings": warnings, "range": 18.8,
-        "gain": 30.0, "since_s": since, "caught_in_it_s": caught, "resets": resets, "caught_at_s": caught, "finite": True,
-        "first_reset_s": 1.5 if resets else None, "after_q": np.zeros(3), "smallest": np.zeros(3),
-        "definite": {64: definite, 128: 0.1}, "case": FREE,
+        "t": np.arange(3.0), "energy": np.zeros(3), "clock": np.arange(3.0), "warnings": 0, "range": 18.8, "gain": 30.0,
+        "since_s": since, "caught_in_it_s": caught, "resets": 0, "caught_at_s": caught, "finite": True,
+        "first_reset_s": None, "after_q": np.zeros(3), "smallest": np.zeros(3), "definite": {64: definite, 128: 0.1},
+        "case": FREE,
     }  # fmt: skip
 
 
-@BOTH
-def test_a_silent_failure_is_caught_within_a_step(result, share, passes):
-    failure.check_silent(result, silent_run(None, None), silent_run(1.0, 1.0 + share * 5 / 64))
-    assert only(result) is passes
-
-
-def test_a_silent_failure_that_is_not_caught_fails_and_nothing_else_has_to_be(result):
-    failure.check_silent(result, silent_run(None, None), silent_run(None, None, definite=0.0123))
-    assert not result.checks and "0.0123" in result.notes[1]
-    failure.check_silent(result, silent_run(1.0, None, resets=1), silent_run(None, None))
-    assert not only(result) and "1.50 s" in result.notes[2]
+@pytest.mark.parametrize("since, caught, passes", [
+    (1.0, 1.0 + 0.999 * 5 / 64, [True]), (1.0, 1.0 + 1.001 * 5 / 64, [False]), (1.0, None, [False]), (None, None, []),
+])  # fmt: skip
+def test_a_silent_failure_is_caught_within_a_step(result, since, caught, passes):
+    failure.check_silent(result, silent_run(since, caught), silent_run())
+    failure.check_silent(result, silent_run(), silent_run(since, caught))
+    assert [check.passed for check in result.checks] == 2 * passes
 
 
 def test_definiteness_is_the_sign_of_an_eigenvalue():
@@ -53,16 +49,12 @@ def test_definiteness_is_the_sign_of_an_eigenvalue():
     assert "loses" in lost and "loses" not in kept
 
 
-def run_with_gain(share):
-    """A free run from the centre that gains a share of the physical bound on its energy as motion in its second state."""
-    q, qd = FREE.start
-    rate = np.sqrt(2.0 * share * 2.0 * gravity_scale(ARM.tree) / tmt.mass_matrix(q)[0, 0])
-    return {"q": np.array([q, q, q]), "qd": np.array([qd, [rate, 0.0, 0.0], qd]), "time": np.arange(3.0), "warnings": 0}
-
-
 @pytest.mark.parametrize("share, found", [(INSIDE, None), (1.001, 1.0)])
 def test_energy_gives_a_failure_away(share, found):
-    t, run = np.arange(3.0), run_with_gain(share)
+    """A free run from the centre that gains a share of the physical bound on its energy as motion in its second state."""
+    t, (q, qd) = np.arange(3.0), FREE.start
+    rate = np.sqrt(2.0 * share * 2.0 * gravity_scale(ARM.tree) / tmt.mass_matrix(q)[0, 0])
+    run = {"q": np.array([q, q, q]), "qd": np.array([qd, [rate, 0.0, 0.0], qd]), "time": t, "warnings": 0}
     assert failure.caught(FREE, t, run) == found
     seen = failure.observed(FREE, t, run)
     assert seen["since_s"] == seen["caught_in_it_s"] == found
@@ -76,16 +68,12 @@ def test_the_range_of_the_potential_is_found_from_any_postures():
     assert failure.potential_range(one) == pytest.approx(failure.potential_range(FREE), rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    "back, fast, first", [(3, 2, 2.0), (2, 3, 2.0), (None, 3, 3.0), (4, None, 4.0), (None, None, None)]
-)
+@pytest.mark.parametrize("back, fast, first", [(3, 2, 2.0), (2, 3, 2.0), (None, 3, 3.0), (4, None, 4.0)])
 def test_a_failure_is_caught_at_the_first_of_its_signs(back, fast, first):
     """A clock that goes back, and more energy than the arm can have: whichever comes first."""
     t, time, qd = np.arange(5.0), np.arange(5.0), np.zeros((5, 3))
-    if back is not None:
-        time[back:] -= 2.0
-    if fast is not None:
-        qd[fast:] = 1e3
+    time[slice(back, None) if back else slice(0)] -= 2.0
+    qd[slice(fast, None) if fast else slice(0)] = 1e3
     run = {"time": time, "q": np.tile(FREE.q, (5, 1)), "qd": qd, "warnings": 0}
     assert failure.caught(FREE, t, run) == first == failure.observed(FREE, t, run)["since_s"]
 
@@ -100,21 +88,14 @@ def test_energy_drifts_by_three_standard_deviations(deviations, kind):
     assert long_runs.behaviour(off) == (kind, pytest.approx(deviations))
 
 
-def minute(engine, method, kind, size=0.0):
+def minute(engine, method, kind):
     ended = 1.0 if kind == "diverges" else None
     row = {"scene": "bent, free", "engine": engine, "method": method, "dt_s": 0.01, "energy": kind,
            "largest_j": None if ended else 0.1, "change_j": None if ended else 0.2, "diverged_at_s": ended}  # fmt: skip
-    return {"row": row, "scheme": "rk4", "t": np.arange(60.0), "off": np.full(60, size), "seconds": 60.0}
+    return {"row": row, "scheme": "rk4", "t": np.arange(60.0), "off": np.zeros(60), "seconds": 60.0}
 
 
 @pytest.mark.parametrize("theirs, passes", [("drifts", True), ("bounded", False), ("diverges", False)])
 def test_energy_does_as_by_the_same_scheme(result, theirs, passes):
     long_runs.check_minutes(result, [minute("tmt", "rk4", "drifts"), minute("mujoco", "RK4", theirs)])
-    assert only(result) is passes and "rk4" in result.notes[0] and "+0.2 J" in result.notes[0]
-
-
-def test_minute_figure_draws_lines_of_tmt_and_marks_of_mujoco(result):
-    runs = [minute("tmt", "rk4", "drifts", 0.1), minute("mujoco", "RK4", "drifts", 0.2)]
-    result.curves |= {"minutes": runs, "silent": {"gain": {"range": 18.8}}}
-    lines = figures_failure.draw_minutes(result, ARM)[1].axes[0].lines
-    assert [(line.get_marker(), line.get_ydata()[0]) for line in lines] == [("None", 0.1), ("o", 0.2)]
+    assert only(result) is passes
