@@ -1,16 +1,60 @@
-"""What is concluded from errors, orders and times: every rule with a row just inside and one just outside."""
+"""What is concluded from errors, orders and times, every rule with a row just inside and one just outside; what is timed."""
+
+import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from speed_rows import known_rows, row
+from matplotlib.colors import to_hex
 
-from compare.engines import Method
-from compare.experiments.speed import accuracy, advice
+import tmt
+from compare.engines import Method, Setting
+from compare.experiments import speed
+from compare.experiments.speed import (
+    accuracy,
+    advice,
+    evaluations,
+    figures_evaluations,
+    figures_panels,
+    figures_times,
+    peers,
+    times,
+)
+from compare.experiments.speed.evaluations import EACH, EQUAL, FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WAITING, WHOLE
 from compare.judge.check import Result
+from compare.robots.arm import ARM
 
 RK4 = Method("tmt", "rk4", 4, "rk4")
 BESIDE = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
 STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
+MUJOCOS, OURS = "#e69f00", "#0072b2"  # colours
+NS = {
+    (FORWARD, WHOLE, 1, 1): 1000.0, (FORWARD, EQUAL, 1, 1): 500.0, (RK4_STEP, MJ_STEP, 1, 1): 4000.0,
+    (FORWARD, WAITING, 1, 1): 50.0, (FORWARD, EACH, 1000, 1): 25.0, (FORWARD, IN_LANES, 1000, 1): 10.0,
+    (RK4_STEP, EACH, 1, 1): 200.0, (RK4_STEP, IN_LANES, 1000, 1): 40.0,
+}  # fmt: skip
+
+
+def row(engine, method, error, steps=64, seconds=1e-3, **more):
+    """A row of speed: diverged where the error is None."""
+    return {
+        "scene": "bent, free", "engine": engine, "method": method, "dt_s": 5.0 / steps, "tolerance": None, "steps": steps,
+        "evaluations": 4 * steps, "seconds": seconds, "error_rad": error, "worst_error_rad": error, "energy_error_J": error,
+        "diverged": error is None, "why_not": None, "early": error, "whole": None,
+    } | more  # fmt: skip
+
+
+def known_rows():
+    """MuJoCo's RK4 20 times slower than tmt's; of its integrators Euler is never as near; dopri8 needs fewest steps."""
+    rows = []
+    for k in range(5):
+        steps, error = 64 << k, 2e-2 / 16**k
+        rows += [row("mujoco", "RK4", error, steps, 20e-3 * 2**k), row("tmt", "rk4", error, steps, 1e-3 * 2**k)]
+        rows += [
+            row("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k),
+            row("tmt", "dopri8", error**2, steps, 2e-3 * 2**k),
+        ]
+    return [*rows, row("scipy", "DOP853", 1e-9, 500, 1e-4), row("mujoco", "implicit", None, 64, 1e-9)]
 
 
 def judged(check, rows, *arguments):
@@ -61,16 +105,6 @@ def test_smallest_errors(theirs, ours, left, found):
 ])  # fmt: skip
 def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
     assert accuracy.gained_nothing(found, work, best, last, 1e-15) is ends
-
-
-def test_the_true_error_is_that_of_rk4_with_the_coarsest_steps():
-    rows = [
-        row("tmt", "rk4", 1.5),
-        row("mujoco", "RK4", None),
-        row("tmt", "rk4", 1e-3, 128),
-        row("tmt", "dopri8", 1e-6),
-    ]
-    assert accuracy.true_error(rows, {"bent, free": 64}) == {"bent, free": (1.5, None)}
 
 
 # orders
@@ -140,3 +174,87 @@ def test_what_to_use_for_a_step_response_is_of_the_error_asked_for():
     (said,) = advice.step_response_in_words(table, ["step"])
     assert said.index("step: mujoco") < said.index("let go: mujoco") and "9 steps" not in said
     assert advice.step_response_in_words(table, []) == []
+
+
+# times
+
+
+def test_a_row_gets_the_least_of_its_times():
+    rows = [row("tmt", "rk4", 1.0), row("mujoco", "RK4", 1.0)]
+    assert times.fill_in(rows, [[3e-3, 2e-3, 5e-3], [0.4]]) == [pytest.approx(1.5)]
+    assert [r["seconds"] for r in rows] == [2e-3, 0.4]
+
+
+def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
+    now, case = [0.0], setup.robot.cases[0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    methods = Method("mujoco", "RK4", 4, "rk4"), RK4
+    rows = [{"run": (case, method, Setting(5.0, 16384))} for method in methods]
+
+    def call():
+        now[0] += 0.5
+
+    ready = [(call, longer) for _, longer in times.prepared(rows, setup)]
+    assert times.take_times(ready, setup) == [[pytest.approx(2.0)], [pytest.approx(0.5)]]
+
+
+def test_nanoseconds_of_a_state():
+    found = evaluations.per_state({(FORWARD, WHOLE, 1, 1): 100, (RK4_STEP, MJ_STEP, 1, 1): 10}, [[3e-4, 2e-4], [1e-4]])
+    assert found == {(FORWARD, WHOLE, 1, 1): pytest.approx(2000.0), (RK4_STEP, MJ_STEP, 1, 1): pytest.approx(10_000.0)}
+
+
+def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):
+    log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
+    monkeypatch.setattr(speed, "take_times", lambda runs, setup: log.append("timed") or [])
+    monkeypatch.setattr(speed.evaluations, "made_ways", lambda setup: log.append("made"))
+    monkeypatch.setattr(speed.evaluations, "costs", lambda setup, ways: ([], []))
+    speed.add_times(Result("speed", curves={"floors": {}}), setup, {"a": []})
+    assert log == ["made", "quiet", "timed"]
+
+
+class Off:
+    """A Pinocchio of other numbers at the last state, by so much."""
+
+    def __init__(self, by):
+        self.by, self.tree = by, ARM.tree
+
+    def acceleration(self, q, v, tau):
+        found = tmt.literal.acceleration(q, v, tau)
+        found[-1] *= 1.0 + self.by
+        return found
+
+
+def test_accelerations_that_differ_by_more_than_rounding_are_not_timed(rng):
+    states = list(rng.uniform(-2.0, 2.0, (3, 40, 3)))
+    assert peers.difference(Off(0.0), states) == 0.0
+    assert peers.differs_in_words(0.999) is None and peers.differs_in_words(1.1)
+    assert peers.differs_in_words(peers.difference(Off(1e-6), states))
+
+
+# figures
+
+
+def test_the_fewest_evaluations_are_those_of_the_coarsest_step_that_is_near_enough():
+    result = Result("speed", rows=known_rows())
+    assert "rk4 needs 1024, dopri8 256" in figures_panels.fewest(result, "bent, free", 1e-3)
+
+
+def test_the_figures_draw_the_numbers_of_each_engine():
+    result = Result("speed", rows=known_rows(), curves={"floors": {"bent, free": 1e-15}, "regular": "bent, free"})
+    result.tables["what_should_i_use"] = advice.advice(result.rows, ["bent, free"], {"bent, free": 1e-15})
+    result.tables["evaluations"] = evaluations.evaluation_rows(NS)
+    absent = {"engine": "own", "method": "RK4, Heun", "scene": "bent, free", "why_not": "own is not here"}
+    result.rows.append(dict.fromkeys(result.rows[0]) | absent)
+    _, fig, caption = figures_times.draw_times(result, "bent, free")
+    lines = {(to_hex(line.get_color()), tuple(np.round(line.get_ydata(), 9))) for line in fig.axes[0].get_lines()}
+    assert (MUJOCOS, (20.0, 40.0, 80.0, 160.0, 320.0)) in lines and (OURS, (1.0, 2.0, 4.0, 8.0, 16.0)) in lines
+    assert "20 times as long for 1e-02" in caption and "40 times as long for 1e-03 rad" in caption
+    for figure in (figures_panels.draw_evaluations(result)[1], figures_panels.draw_energy(result)[1]):
+        data = {line.get_label(): line for line in figure.axes[0].get_lines()}
+        assert to_hex(data["MuJoCo: RK4"].get_color()) == MUJOCOS and to_hex(data["tmt: rk4"].get_color()) == OURS
+    assert np.allclose(data["MuJoCo: RK4"].get_ydata(), [20.0, 40.0, 80.0, 160.0, 320.0])
+    ax = figures_evaluations.draw_cost(result, "arm")[1].axes[0]
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    bars = {name: (bar.get_width(), to_hex(bar.get_facecolor())) for name, bar in zip(names, ax.patches)}
+    assert bars["MuJoCo, mj_forward, 1 state"] == (1000.0, MUJOCOS)
+    assert bars["compiled, side by side, 1,000 states"] == (10.0, OURS)
