@@ -16,10 +16,9 @@ from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import engine, read
 from compare.engines.scipy import Scipy
 from compare.experiments import speed
-from compare.experiments.speed import accuracy, evaluations, floors, runs, settings, tumbling
+from compare.experiments.speed import accuracy, floors, runs, settings, tumbling
 from compare.judge.check import Result
 from compare.judge.rounding import growth
-from compare.judge.units import renamed, said, value
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import Setup
@@ -78,20 +77,12 @@ def test_methods_are_those_of_the_engines_that_are_there_or_the_same_schemes_of_
     assert {m.name for m in same if m.engine == "tmt"} == set(theirs.values())
 
 
-class Elsewhere:
-    """An engine that cannot take part."""
-
-    name = "own"
-    methods = {name: Method("own", name, 4, "rk4") for name in ("RK4", "Heun")}  # noqa: RUF012
-
-    def unavailable(self):
-        return "own.py is not there"
-
-
 def test_who_is_not_there_has_a_row_with_the_reason_but_in_a_quick_run(engines):
-    rows = settings.unavailable(Setup.small(ARM, engines | {"own": Elsewhere()}), ["bent, free"])
+    methods = {name: Method("own", name, 4, "rk4") for name in ("RK4", "Heun")}
+    own = SimpleNamespace(name="own", methods=methods, unavailable=lambda: "own.py is not there")
+    rows = settings.unavailable(Setup.small(ARM, engines | {"own": own}), ["bent, free"])
     assert {"scene": "bent, free", "engine": "own", "method": "RK4, Heun", "why_not": "own.py is not there"} in rows
-    assert settings.unavailable(Setup.quick(ARM, engines | {"own": Elsewhere()}), ["bent, free"]) == []
+    assert settings.unavailable(Setup.quick(ARM, engines | {"own": own}), ["bent, free"]) == []
 
 
 def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has(of_gripper):
@@ -138,15 +129,6 @@ def test_steps_are_halved_from_the_scenes_own_to_the_finest(engine, name, finest
 def test_steps_of_any_scene_are_multiples_of_the_grid(duration, dt, coarsest, last):
     found = settings.settings_of(RK4, Case(ARM, Scene("mine", duration=duration, dt=dt)))
     assert (found[0].steps, found[-1].steps) == (coarsest, last) and all(s.steps % 64 == 0 for s in found)
-
-
-def test_states_of_any_joints_are_evaluated():
-    q, qd, _ = evaluations.states_of(robot_in("free_body").coordinates, np.random.default_rng(1), 5)
-    assert q.shape == (5, 7) and qd.shape == (5, 6) and np.allclose(np.linalg.norm(q[:, 3:], axis=1), 1.0)
-    assert [evaluations.most_states(robot.tree) for robot in (HUMANOID, ARM)] == [10_000, 1_000_000]
-
-
-# runs
 
 
 def test_every_method_follows_the_scene(engines, known_reference):
@@ -245,9 +227,6 @@ def test_a_wrong_model_is_far_from_the_reference():
     assert {"smallest error of MuJoCo's RK4, beside that of tmt's rk4", "the same error as tmt's rk4"} <= failed
 
 
-# a body that turns freely
-
-
 @pytest.fixture(scope="module")
 def stone():
     """A body that tumbles, and its exact quaternions at nine times."""
@@ -286,11 +265,3 @@ def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
     turned = case.coordinates.move(known.high[:, :7], [0.0, 0.0, 0.0, 0.0, 1e-3, 0.0])
     assert known.error(turned[:, 3:], [3]) == pytest.approx(1e-3)
     assert known.error(turned, range(4)) == pytest.approx(1e-3)
-
-
-def test_columns_say_rad_only_of_what_is_in_rad():
-    rows = [{"scene": "s", "worst_error_rad": 0.5}]
-    assert renamed(rows, "rad") == rows and value(rows[0], "worst_error") == 0.5
-    (other,) = renamed(rows, "rad or m")
-    assert other == {"scene": "s", "worst_error": 0.5, "unit": "rad or m"} and value(other, "worst_error") == 0.5
-    assert said("0.1 rad, target_rad", "rad or m") == "0.1 rad or m, target"

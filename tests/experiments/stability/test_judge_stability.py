@@ -8,7 +8,7 @@ from judged import BOTH, INSIDE, OUTSIDE, only
 from models import PATHS
 
 from compare.engines.mujoco import reading
-from compare.experiments.stability import departure, equilibria, falling, figures_limits, limits, limits_judged, torques
+from compare.experiments.stability import departure, equilibria, falling, limits, limits_judged, torques
 from compare.judge import run
 from compare.judge.check import About
 from compare.robots.arm import ARM
@@ -97,24 +97,6 @@ def test_a_limit_that_runs_show_no_nearer_than_a_tenth_is_not_decided_by_them():
     arm7 = held(robot_of(reading.read(PATHS["arm7"]), "arm7.xml"), "ready")
     assert limits.why_undecided(arm7, 0.0999) is None and limits.why_undecided(arm7, 0.1001)
     assert limits.why_undecided(held(ARM, "bent"), 1.0) is None
-
-
-def test_limits_figure_marks_mujoco_where_mujoco_is(result):
-    check_limits(
-        result,
-        limit_row(0.1, 0.1001),
-        limit_row(0.1, 0.0999, engine="mujoco", method="RK4"),
-        limit_row(0.2, None, method="implicit", seen="never_fails"),
-    )
-    result.curves["schemes"] = {("tmt", "rk4"): "rk4", ("tmt", "implicit"): "implicit", ("mujoco", "RK4"): "rk4"}
-    result.curves["looked at"] = {"centres": ("bent",)}
-    ax = figures_limits.draw_limits(result, ARM)[1].axes[0]
-    marks = [line.get_xdata() for line in ax.lines if line.get_marker() == "|" and len(line.get_xdata())]
-    ends = sorted(bar.get_x() + bar.get_width() for bar in ax.patches if bar.get_y() >= -1)
-    assert [float(*x) for x in marks] == [0.0999] and ends == pytest.approx([0.1, 0.1001, 0.2])
-
-
-# departures
 
 
 def departure_row(observed, predicted, **more):

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 from models import PATHS
-from small_runs import on_the_moon
 
 import tmt
 from compare.engines.mujoco import reading
@@ -113,9 +112,6 @@ def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(
     assert {"rk4", "RK4", "implicit"} <= names and not {"gauss_legendre_4", "implicit_midpoint"} & names
 
 
-# runs
-
-
 @pytest.fixture
 def method(engines):
     """method(engine, name): one method of integration."""
@@ -203,12 +199,6 @@ def test_silent_failures_are_caught(mujoco, engines):
     assert failure.caught(FREE, 1e-3 * np.arange(101), calm) is None and calm["warnings"] == 0
 
 
-def verdicts(notes):
-    """What is said of each claim: {"1": "reproduced"}."""
-    heads = [note.split(":")[0] for note in notes if note.startswith("Claim ")]
-    return dict(head.removeprefix("Claim ").split(", ") for head in heads)
-
-
 @pytest.mark.slow
 def test_a_small_run_fills_every_table(small):
     small = small("stability")
@@ -216,16 +206,9 @@ def test_a_small_run_fills_every_table(small):
         "departure", "stability_modes", "stability_growth", "stability_torques", "stability_finer_steps",
         "stability_bent", "stability_energy", "stability_newton",
     }  # fmt: skip
-    assert verdicts(small.notes) == {"1": "reproduced", "2": "reproduced", "3": "bounded"}
+    heads = [note.split(":")[0] for note in small.notes if note.startswith("Claim ")]
+    assert heads == ["Claim 1, reproduced", "Claim 2, reproduced", "Claim 3, bounded"]
     assert any("silent" in check.quantity for check in small.checks)
-
-
-@pytest.mark.slow
-def test_on_the_moon_many_checks_fail_and_nothing_raises(shared):
-    """Gravity 1.62: the engines hold other models, and the arm that is stated is not the one that runs."""
-    result, _ = shared(on_the_moon, "stability")
-    assert sum(not check.passed for check in result.checks) > 100 and verdicts(result.notes)["1"] == "not reproduced"
-    assert not any("silent" in check.quantity for check in result.checks)  # nothing failed, so nothing has to be caught
 
 
 @pytest.mark.parametrize("posture, kinds, drawn", [
