@@ -95,9 +95,6 @@ def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
     assert accuracy.gained_nothing(found, work, best, last, 1e-15) is ends
 
 
-# orders
-
-
 @pytest.mark.parametrize(
     "order, measured, passes",
     [(4, 4.149, True), (4, 4.151, False), (4, 3.851, True), (4, 3.849, False), (8, 7.01, True), (8, 6.99, False),
@@ -140,9 +137,6 @@ def test_an_order_of_a_file_is_asked_where_it_has_settled(orders, floor, asked):
     assert bool(table) is bool(result.checks) is asked
 
 
-# advice
-
-
 def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
     table = {line["target_rad"]: line for line in advice.advice(known_rows(), ["bent, free"], {"bent, free": 1e-16})}
     line = table[1e-3]
@@ -162,9 +156,6 @@ def test_what_to_use_for_a_step_response_is_of_the_error_asked_for():
     (said,) = advice.step_response_in_words(table, ["step"])
     assert said.index("step: mujoco") < said.index("let go: mujoco") and "9 steps" not in said
     assert advice.step_response_in_words(table, []) == []
-
-
-# times
 
 
 def test_a_row_gets_the_least_of_its_times():
