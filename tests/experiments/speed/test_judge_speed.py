@@ -1,0 +1,234 @@
+"""What is concluded from errors, orders and times, every rule with a row just inside and one just outside; what is timed."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+import tmt
+from compare.engines import Method, Setting
+from compare.experiments import speed
+from compare.experiments.speed import accuracy, advice, evaluations, figures_panels, peers, times
+from compare.experiments.speed.evaluations import FORWARD, IN_LANES, MJ_STEP, RK4_STEP, WHOLE
+from compare.experiments.speed.figures_evaluations import draw_cost
+from compare.experiments.speed.figures_times import draw_times
+from compare.judge.check import Result
+from compare.robots.arm import ARM
+
+RK4 = Method("tmt", "rk4", 4, "rk4")
+BESIDE = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
+STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
+MUJOCOS, OURS = "#e69f00", "#0072b2"  # colours
+
+
+def row(engine, method, error, steps=64, seconds=1e-3, **more):
+    """A row of speed: diverged where the error is None."""
+    return {
+        "scene": "bent, free", "engine": engine, "method": method, "dt_s": 5.0 / steps, "tolerance": None, "steps": steps,
+        "evaluations": 4 * steps, "seconds": seconds, "error_rad": error, "worst_error_rad": error, "energy_error_J": error,
+        "diverged": error is None, "why_not": None, "early": error, "whole": None,
+    } | more  # fmt: skip
+
+
+def known_rows():
+    """MuJoCo's RK4 20 times slower than tmt's; of its integrators Euler is never as near; dopri8 needs fewest steps."""
+    rows = [row("scipy", "DOP853", 1e-9, 500, 1e-4), row("mujoco", "implicit", None, 64, 1e-9)]
+    for k in range(5):
+        steps, error = 64 << k, 2e-2 / 16**k
+        rows += [row("mujoco", "RK4", error, steps, 20e-3 * 2**k), row("tmt", "rk4", error, steps, 1e-3 * 2**k)]
+        rows += [
+            row("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k),
+            row("tmt", "dopri8", error**2, steps, 2e-3 * 2**k),
+        ]
+    return rows
+
+
+def judged(check, rows, *arguments):
+    """(quantity, passed) of each check that is made of rows."""
+    result = Result("speed", rows=rows)
+    check(result, *arguments)
+    return {check.quantity: check.passed for check in result.checks}
+
+
+def runs(engine, method, errors):
+    """A row for each error, from coarse to fine."""
+    return [row(engine, method, error, 64 << k) for k, error in enumerate(errors)]
+
+
+@pytest.mark.parametrize("ours, theirs, verdict", [
+    (1e-3, 1e-3 + 63e-10, True), (1e-3, 1e-3 + 65e-10, False), (1e-3, 1e-3 - 65e-10, False), (None, 1e-3, False),
+    (0.0999, 0.2, False), (0.1001, 0.2, None), (None, None, None),
+])  # fmt: skip
+def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
+    rows = [row("tmt", "rk4", ours), row("mujoco", "RK4", theirs), row("tmt", "rk4", 1.0, 128)]
+    found = judged(accuracy.check_same_schemes, rows, {"bent, free": 1e-10}, {"bent, free": {"RK4": "rk4"}})
+    assert found == ({} if verdict is None else {"the same error as tmt's rk4": verdict})
+
+
+@pytest.mark.parametrize("theirs, ours, left, found", [
+    # errors that have stopped are of the size of rounding
+    ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 63, {STOPPED: True, BESIDE: True}),
+    ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 65, {STOPPED: False, BESIDE: True}),
+    # MuJoCo comes as near as tmt
+    ([2e-9 + 63e-14], [1e-9], 1e-14, {BESIDE: True}), ([2e-9 + 65e-14], [1e-9], 1e-14, {BESIDE: False}),
+    ([None], [1e-9], 1e-14, {BESIDE: False}), ([63e-14], [None], 1e-14, {BESIDE: True}),
+    ([65e-14], [None], 1e-14, {BESIDE: False}),
+    # where tmt has a step as coarse, and one of them ends
+    ([1e-3, 1e-5], [], 1e-16, {}), ([None, None], [None, None, 1e-9], 1e-16, {}),
+    # where MuJoCo's steps end before its errors stop, tmt's are no finer
+    ([1e-6, 1.99e-7], [1e-6, 1e-7, 1e-8], 1e-20, {BESIDE: True}),
+    ([1e-6, 2.01e-7], [1e-6, 1e-7, 1e-8], 1e-20, {BESIDE: False}),
+    ([1e-6, 1.99e-7, 1e-6], [1e-6, 1e-7, 1e-8], 1e-20, {STOPPED: False, BESIDE: False}),
+])  # fmt: skip
+def test_smallest_errors(theirs, ours, left, found):
+    rows = runs("mujoco", "RK4", theirs) + runs("tmt", "rk4", ours)
+    assert judged(accuracy.check_smallest_errors, rows, {"bent, free": left}) == found
+
+
+@pytest.mark.parametrize("found, work, best, last, ends", [
+    (0.71e-14, 121, 1e-14, 100, True), (0.69e-14, 121, 1e-14, 100, False), (0.71e-14, 119, 1e-14, 100, False),
+    (29e-15, 200, 29e-15, 100, True), (31e-15, 200, 31e-15, 100, False), (np.nan, 200, 1e-15, 100, True),
+])  # fmt: skip
+def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
+    assert accuracy.gained_nothing(found, work, best, last, 1e-15) is ends
+
+
+@pytest.mark.parametrize(
+    "order, measured, passes",
+    [(4, 4.149, True), (4, 4.151, False), (4, 3.851, True), (4, 3.849, False), (8, 7.01, True), (8, 6.99, False),
+     (8, 12.0, True), (4, np.nan, False)],
+)  # fmt: skip
+def test_the_order_is_measured_within_its_margin(order, measured, passes):
+    result = Result("speed")
+    advice.check_order(result, "bent, free, tmt rk4", order, measured)
+    assert [check.passed for check in result.checks] == [passes]
+
+
+@pytest.mark.parametrize("errors, complete, measured, passed", [
+    ([0.29, 2.9e-2, 2.9e-2 / 16], True, [4.0], [True, True]),
+    ([3.1e-2, 2.9e-2 / 16], True, [], [False]),  # one error only is below 3e-2 rad
+    ([3.1e-2, 2.9e-2 / 16], False, [], []),
+    ([0.29, 16 * 2.1e-12, 2.1e-12], True, [4.0], [True, True]),
+    ([0.29, 16 * 1.9e-12, 1.9e-12], True, [], [False]),
+    ([2.9e-2, 2.8e-2, 2.8e-2 / 16], True, [4.0], [True, True]),  # the finest two count
+    # with half of the coarsest steps the error would be below 2e-12 rad, where rounding shows
+    ([16 * 1.99e-12, 1e-13], True, [], []),
+    ([16 * 2.01e-12, 1e-13], True, [], [False]),
+    ([], True, [], [False]),  # it did not run
+])  # fmt: skip
+def test_an_order_is_measured_where_errors_fall_regularly(errors, complete, measured, passed):
+    result = Result("speed", rows=runs("tmt", "rk4", errors))
+    table = advice.orders(result, ["bent, free"], [RK4], complete)
+    assert [line["measured_order"] for line in table] == pytest.approx(measured)
+    assert [check.passed for check in result.checks] == passed
+
+
+@pytest.mark.parametrize("orders, floor, asked", [
+    ([4.298, 4.149], 1e-16, True), ([4.302, 4.151], 1e-16, False),  # where it has settled
+    ([4.0, 4.0], 1.29e-8, True), ([4.0, 4.0], 1.31e-8, False),  # 30 times as far as rounding
+    ([4.0], 1e-16, False),  # seen once
+])  # fmt: skip
+def test_an_order_of_a_file_is_asked_where_it_has_settled(orders, floor, asked):
+    rows = runs("tmt", "rk4", 1e-4 / 2.0 ** np.cumsum([0.0, *orders]))
+    result = Result("speed", rows=rows, curves={"floors": {"bent, free": floor}, "of_file": True})
+    table = advice.orders(result, ["bent, free"], [RK4], complete=False)
+    assert bool(table) is bool(result.checks) is asked
+
+
+def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
+    table = {line["target_rad"]: line for line in advice.advice(known_rows(), ["bent, free"], {"bent, free": 1e-16})}
+    line = table[1e-3]
+    assert (line["mujoco"], line["tmt"], line["of_all"]) == (
+        "mujoco RK4, 256 steps", "tmt dopri8, 64 steps", "scipy DOP853, 500 steps")  # fmt: skip
+    times = [line[f"{engine}_ms"] for engine in ("mujoco", "tmt", "of_all")]
+    assert times == pytest.approx([80.0, 2.0, 0.1]) and line["mujoco_evaluations"] == 1024
+    assert (line["ratio"], line["kernel_part"], line["method_part"]) == pytest.approx((40.0, 20.0, 2.0))
+    assert line["integrator_part"] == pytest.approx(1.0) and line["why_not"] is None
+    assert table[1e-12]["mujoco"] is None and "3.1e-07" in table[1e-12]["why_not"]
+
+
+def test_what_to_use_for_a_step_response_is_of_the_error_asked_for():
+    line = {"target_rad": 1e-3, "mujoco": "mujoco implicitfast, 128 steps", "mujoco_dt_s": 1 / 512, "mujoco_ms": 0.4,
+            "tmt": None, "scene": "let go"}  # fmt: skip
+    table = [line, line | {"target_rad": 1e-6, "mujoco": "mujoco RK4, 9 steps"}, line | {"scene": "step"}]
+    (said,) = advice.step_response_in_words(table, ["step"])
+    assert said.index("step: mujoco") < said.index("let go: mujoco") and "9 steps" not in said
+    assert advice.step_response_in_words(table, []) == []
+
+
+def test_a_row_gets_the_least_of_its_times():
+    rows = [row("tmt", "rk4", 1.0), row("mujoco", "RK4", 1.0)]
+    assert times.fill_in(rows, [[3e-3, 2e-3, 5e-3], [0.4]]) == [pytest.approx(1.5)]
+    assert [r["seconds"] for r in rows] == [2e-3, 0.4]
+
+
+def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
+    now, case, theirs = [0.0], setup.robot.cases[0], Method("mujoco", "RK4", 4, "rk4")
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    rows = [{"run": (case, method, Setting(5.0, 16384))} for method in (theirs, RK4)]
+
+    def call():
+        now[0] += 0.5
+
+    ready = [(call, longer) for _, longer in times.prepared(rows, setup)]
+    assert times.take_times(ready, setup) == [[pytest.approx(2.0)], [pytest.approx(0.5)]]
+
+
+def test_nanoseconds_of_a_state():
+    found = evaluations.per_state({(FORWARD, WHOLE, 1, 1): 100, (RK4_STEP, MJ_STEP, 1, 1): 10}, [[3e-4, 2e-4], [1e-4]])
+    assert found == {(FORWARD, WHOLE, 1, 1): pytest.approx(2000.0), (RK4_STEP, MJ_STEP, 1, 1): pytest.approx(10_000.0)}
+
+
+def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):
+    log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
+    monkeypatch.setattr(speed, "take_times", lambda runs, setup: log.append("timed") or [])
+    monkeypatch.setattr(speed.evaluations, "made_ways", lambda setup: log.append("made"))
+    monkeypatch.setattr(speed.evaluations, "costs", lambda setup, ways: ([], []))
+    speed.add_times(Result("speed", curves={"floors": {}}), setup, {"a": []})
+    assert log == ["made", "quiet", "timed"]
+
+
+class Off:
+    """A Pinocchio of other numbers at the last state, by so much."""
+
+    def __init__(self, by):
+        self.by, self.tree = by, ARM.tree
+
+    def acceleration(self, q, v, tau):
+        found = tmt.literal.acceleration(q, v, tau)
+        found[-1] *= 1.0 + self.by
+        return found
+
+
+def test_accelerations_that_differ_by_more_than_rounding_are_not_timed(rng):
+    states = list(rng.uniform(-2.0, 2.0, (3, 40, 3)))
+    assert peers.difference(Off(0.0), states) == 0.0
+    assert peers.differs_in_words(0.999) is None and peers.differs_in_words(1.1)
+    assert peers.differs_in_words(peers.difference(Off(1e-6), states))
+
+
+def test_the_fewest_evaluations_are_those_of_the_coarsest_step_that_is_near_enough():
+    result = Result("speed", rows=known_rows())
+    assert "rk4 needs 1024, dopri8 256" in figures_panels.fewest(result, "bent, free", 1e-3)
+
+
+def test_the_figures_draw_the_numbers_of_each_engine():
+    result = Result("speed", rows=known_rows(), curves={"floors": {"bent, free": 1e-15}, "regular": "bent, free"})
+    result.tables["what_should_i_use"] = advice.advice(result.rows, ["bent, free"], {"bent, free": 1e-15})
+    absent = {"engine": "own", "method": "RK4, Heun", "scene": "bent, free", "why_not": "own is not here"}
+    result.rows.append(dict.fromkeys(result.rows[0]) | absent)
+    _, fig, caption = draw_times(result, "bent, free")
+    lines = {(to_hex(line.get_color()), tuple(np.round(line.get_ydata(), 9))) for line in fig.axes[0].get_lines()}
+    assert (MUJOCOS, (20.0, 40.0, 80.0, 160.0, 320.0)) in lines and (OURS, (1.0, 2.0, 4.0, 8.0, 16.0)) in lines
+    assert "20 times as long for 1e-02" in caption and "40 times as long for 1e-03 rad" in caption
+    for figure in (figures_panels.draw_evaluations(result)[1], figures_panels.draw_energy(result)[1]):
+        data = {line.get_label(): line for line in figure.axes[0].get_lines()}
+        assert to_hex(data["MuJoCo: RK4"].get_color()) == MUJOCOS and to_hex(data["tmt: rk4"].get_color()) == OURS
+    assert np.allclose(data["MuJoCo: RK4"].get_ydata(), [20.0, 40.0, 80.0, 160.0, 320.0])
+    result.tables["evaluations"] = evaluations.evaluation_rows(
+        {(FORWARD, WHOLE, 1, 1): 9.0, (FORWARD, IN_LANES, 1000, 1): 1.0}
+    )
+    bars = [(bar.get_width(), to_hex(bar.get_facecolor())) for bar in draw_cost(result, "arm")[1].axes[0].patches]
+    assert bars == [(9.0, MUJOCOS), (1.0, OURS)]

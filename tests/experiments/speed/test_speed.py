@@ -1,0 +1,255 @@
+"""Speed against accuracy: who takes part, with which steps; runs and what they are measured against; orders on a free body."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from edited import XML, setup_of
+from models import PATHS
+
+import tmt
+from compare.case import Scene
+from compare.engines import Method, Setting
+from compare.engines.heyoka import Heyoka
+from compare.engines.mujoco import engine, read
+from compare.engines.scipy import Scipy
+from compare.experiments import speed
+from compare.experiments.speed import accuracy, floors, runs, settings, tumbling
+from compare.judge.check import Result
+from compare.judge.rounding import growth
+from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.setup import Setup
+from compare.setup import engines as engines_of
+from compare.truth import reference
+from compare.truth.free_body import free_turning
+
+OWN = Scene("my swing", (0, 0, 120), duration=2.0, dt=1 / 50, tags=("own",))
+MINE = dataclasses.replace(ARM, scenes=(*ARM.scenes, OWN))
+BENT = next(case for case in ARM.cases if case.name == "bent, free")  # in which errors fall regularly
+RK4 = Method("mujoco", "RK4", 4, "rk4")
+
+
+def robot_in(name):
+    return robot_of(read(PATHS[name]), f"{name}.xml")
+
+
+GRIPPER, HUMANOID = robot_in("gripper"), robot_in("humanoid29_free")
+FREE, STEP = settings.scenes_of(GRIPPER)
+
+
+@pytest.fixture(scope="module")
+def known_reference():
+    """The arm's run with many digits, in pairs of doubles."""
+    return reference.reference(BENT)
+
+
+@pytest.fixture(scope="module")
+def of_gripper():
+    """Its engines."""
+    return engines_of(engine(read(PATHS["gripper"])))
+
+
+def test_scenes_are_those_with_the_tag_and_a_users_own():
+    names = [case.name for case in settings.scenes_of(MINE)]
+    assert names == ["zero, free", "ball catch, free", "bent, free", "bent, damped", "my swing"]
+    alone = dataclasses.replace(ARM, scenes=(OWN,))
+    assert settings.coarsest_steps(settings.scenes_of(MINE)[-1]) == 128  # of 100 steps: a multiple of the grid
+    assert (settings.regular_of(MINE).name, settings.regular_of(alone).name) == ("bent, free", "my swing")
+    sizes = {"full": names, "quick": ["bent, free", "my swing"], "small": ["zero, free", "bent, free"]}
+    for size, expected in sizes.items():
+        assert [case.name for case in settings.followed(MINE, size)] == expected
+    # held scenes of a file are not followed
+    assert [case.name for case in settings.followed(GRIPPER, "full")] == ["open, let go", "open, step of the servos"]
+    assert speed.skipped(ARM) is None and "bare" in speed.skipped(dataclasses.replace(ARM, scenes=(), name="bare"))
+
+
+def test_methods_are_those_of_the_engines_that_are_there_or_the_same_schemes_of_both(engines):
+    full, quick = (settings.methods(engines, size) for size in ("full", "quick"))
+    there = [engine for engine in engines.values() if engine.unavailable() is None]
+    assert full == settings.methods(engines, "small") == [m for engine in there for m in engine.methods.values()]
+    assert quick == [m for m in full if m.engine in ("mujoco", "tmt")] and len(quick) < len(full)
+    same = settings.methods(engines, "full", "same schemes")
+    theirs = {m.name: m.scheme for m in same if m.engine == "mujoco"}
+    assert set(theirs) == {"Euler", "implicit", "RK4"}
+    assert {m.name for m in same if m.engine == "tmt"} == set(theirs.values())
+
+
+def test_who_is_not_there_has_a_row_with_the_reason_but_in_a_quick_run(engines):
+    methods = {name: Method("own", name, 4, "rk4") for name in ("RK4", "Heun")}
+    own = SimpleNamespace(name="own", methods=methods, unavailable=lambda: "own.py is not there")
+    rows = settings.unavailable(Setup.small(ARM, engines | {"own": own}), ["bent, free"])
+    assert {"scene": "bent, free", "engine": "own", "method": "RK4, Heun", "why_not": "own.py is not there"} in rows
+    assert settings.unavailable(Setup.quick(ARM, engines | {"own": own}), ["bent, free"]) == []
+
+
+def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has(of_gripper):
+    stiff = robot_in("arm7").cases[-1]
+    assert settings.coarsest_steps(stiff) == 64 < stiff.steps and settings.coarsest_steps(FREE) == FREE.steps
+    of_step, of_free = (
+        {(m.engine, m.name): m.scheme for m in settings.methods(of_gripper, "full", "all", GRIPPER, case)}
+        for case in (STEP, FREE)
+    )
+    schemes = [of["mujoco", "implicitfast"] for of in (of_step, of_free)]
+    assert schemes == ["implicitfast", "semi_implicit_euler"]
+    assert ("tmt", "implicitfast") in of_step and ("tmt", "implicitfast") not in of_free
+    following = settings.methods_following(Setup(GRIPPER, of_gripper), [FREE, STEP], "all")
+    assert sorted((method.engine, method.name) for method in following) == sorted({*of_step, *of_free})
+
+
+def test_what_takes_too_long_is_left_out(engines):
+    assert Heyoka().too_long(HUMANOID.tree) and Heyoka().too_long(ARM.tree) is None
+    slow = settings.left_out(engines, "full", HUMANOID)
+    assert slow and not {(m.engine, m.name) for m in settings.methods(engines, "full", "all", HUMANOID)} & set(slow)
+    implicit, arm7 = ("tmt", "implicit_midpoint"), robot_in("arm7")
+    assert [implicit in settings.left_out(engines, size, arm7) for size in ("quick", "full")] == [True, False]
+    few, fewer = (settings.halvings(RK4, settings.regular_of(robot))[-1].steps for robot in (GRIPPER, HUMANOID))
+    assert few > 8 * fewer
+
+
+@pytest.mark.parametrize("engine, name, finest", [
+    ("mujoco", "Euler", 2**16), ("mujoco", "RK4", 2**17), ("tmt", "rk4", 2**18), ("tmt", "gauss_legendre_4", 2**15),
+    ("another", "RK4", 2**15),
+])  # fmt: skip
+def test_steps_are_halved_from_the_scenes_own_to_the_finest(engine, name, finest):
+    method = Method(engine, name, 4, "rk4")
+    found = settings.settings_of(method, BENT)
+    assert [s.steps for s in found] == [64 << k for k in range(len(found))] and found[-1].steps == finest
+    assert settings.settings_of(method, BENT, "quick") == found[: 2 if engine == "another" else 5]
+    assert [s.steps for s in settings.settings_of(method, BENT, "full", "same schemes")] == [512, 1024, 2048, 4096]
+    adaptive = settings.settings_of(method._replace(name="Radau", adaptive=True), BENT)
+    assert [s.tolerance for s in adaptive] == [1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
+
+
+def test_every_method_follows_the_scene(engines, known_reference):
+    """Each method with a fine setting is near the reference, and costs evaluations; one that diverges has no error."""
+    for method in settings.methods(engines, "full"):
+        steps = None if method.adaptive else 2**13 if method.order == 1 else 1024
+        setting = Setting(5.0, steps, 1e-5 if method.adaptive else None)
+        row = runs.row_of_run(BENT, BENT, engines, method, setting, known_reference)
+        tolerance = {1: 0.6, 2: 0.03, None: 1e-3}.get(method.order, 1e-4)
+        assert 0.0 < row["error_rad"] <= row["worst_error_rad"] < tolerance and not row["diverged"], method
+        assert row["energy_error_J"] > 0.0 and row["dt_s"] == (5.0 / steps if steps else None)
+    method = engines["tmt"].methods["explicit_euler"]
+    row = runs.row_of_run(BENT, BENT, engines, method, Setting(5.0, 64), known_reference)
+    assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
+
+
+def test_the_smaller_model_has_the_error_of_the_whole_one(engines):
+    zero = next(case for case in ARM.cases if case.name == "zero, free")
+    known, smaller = reference.reference(zero), runs.reduced(zero)
+    method, setting = engines["tmt"].methods["rk4"], Setting(5.0, 1024)
+    whole, small = (runs.row_of_run(case, zero, engines, method, setting, known) for case in (zero, smaller))
+    for name in ("worst_error_rad", "energy_error_J"):
+        assert small[name] == pytest.approx(whole[name], rel=1e-3)
+    assert (whole["whole"], small["whole"], small["scene"]) == (None, "zero, free", "zero, free, beta locked")
+
+
+def test_rounding_leaves_eps_times_the_growth(engines, of_gripper):
+    slow = BENT.changed(posture=(), gravity=False, duration=1.0, dt=1 / 64)
+    at_rest, left = (floors.floor(case, engines["tmt"].of(case)) for case in (slow, BENT))
+    assert 1.0 <= at_rest / np.finfo(float).eps < 3.0 and left > 10 * at_rest
+    fast = BENT.changed(speed=(1e7, 1e7, 1e7))
+    with pytest.raises(ValueError, match="scene 'bent, free'"):
+        floors.floor(fast, engines["tmt"].of(fast))
+    dt = FREE.duration / 1024
+    motion = of_gripper["tmt"].of(FREE).run(*FREE.start, FREE.tau, dt, 1024, "rk4")
+    given = tmt.METHODS["rk4"], FREE.tree, motion.q, motion.v, FREE.tau, dt, 16
+    assert np.abs(growth(*given) - floors.sampled_growth(*given)).max() < 0.1
+
+
+def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_gripper, known_reference, monkeypatch):
+    truth, method = reference.in_doubles(FREE)._replace(why="too stiff"), of_gripper["tmt"].methods["dopri8"]
+    row = runs.row_of_run(FREE, FREE, of_gripper, method, settings.halvings(method, FREE)[1], truth, 1e-11)
+    assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]
+    monkeypatch.setattr(runs, "methods", lambda *_: [])
+    known = {"bent, free": known_reference._replace(apart=1e-6)}
+    assert runs.rows_of_scene(BENT, engines, known, "small", "same schemes") == ([], 1e-6)
+
+
+def test_a_reference_in_doubles_says_its_digits():
+    known = reference.in_doubles(FREE)
+    assert known.apart < 1e-13 and known.low.max() == 0.0 and known.steps > FREE.steps
+    finer = tmt.simulate(*FREE.start, FREE.tau, FREE.duration / 2**14, 2**14, "rk4", FREE.tree)
+    assert known.error(finer.q[::256], range(4)).max() < 10 * max(known.apart, 1e-15)
+
+
+def test_a_step_response_has_the_same_error_in_both(of_gripper):
+    truth, setting = reference.references([STEP])[STEP.name], Setting(STEP.duration, 128)
+    ours, theirs = (
+        runs.row_of_run(STEP, STEP, of_gripper, of_gripper[name].methods_in(STEP)["implicitfast"], setting, truth)
+        for name in ("tmt", "mujoco")
+    )
+    assert ours["worst_error_rad"] == pytest.approx(theirs["worst_error_rad"], abs=1e-12)
+    assert 1e-7 < ours["worst_error_rad"] < 1e-2 and not ours["diverged"]
+
+
+@pytest.mark.slow
+def test_a_small_run_takes_every_path(engines, small):
+    result = small("speed")
+    table = pd.DataFrame(result.rows)
+    ran = table[table.why_not.isna()]
+    assert list(table.columns) == speed.COLUMNS and (ran.seconds > 0.0).all()
+    assert {*zip(ran.engine, ran.method)} == {(m.engine, m.name) for m in settings.methods(engines, "full")}
+    diverged = ran[ran.diverged.astype(bool)]
+    assert len(diverged) and diverged[["error_rad", "worst_error_rad", "energy_error_J"]].isna().all(axis=None)
+    costs = pd.DataFrame(result.tables["evaluations"])
+    timed = costs[costs.why_not.isna()]
+    assert {"mass_matrix_and_bias", "forward_dynamics", "rk4_step"} <= set(timed.quantity)
+    assert (timed.ns_per_state > 0.0).all() and costs[costs.why_not.notna()].ns_per_state.isna().all()
+    counted = timed[timed.operations.notna()]
+    assert np.allclose(counted.operations_per_ns, counted.operations / counted.ns_per_state)
+    errors = accuracy.true_error(result.rows, dict.fromkeys(("zero, free", "bent, free"), 64))
+    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1)
+    assert errors["bent, free"] == pytest.approx((0.27, 0.27), abs=0.01)
+
+
+def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engines):
+    result = speed.rows(Setup.small(ARM, engines), timed=False)
+    assert len(result.checks) > 10 and all(check.passed for check in result.checks)
+    assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result, ARM)) == []
+    checks = speed.rows(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"')), timed=False).checks
+    failed = {check.quantity for check in checks if not check.passed}
+    assert {"smallest error of MuJoCo's RK4, beside that of tmt's rk4", "the same error as tmt's rk4"} <= failed
+
+
+@pytest.fixture(scope="module")
+def stone():
+    """A body that tumbles, and its exact quaternions at nine times."""
+    case = tumbling.stone().case("tumbling", posture=tumbling.QUATERNION, speed=tumbling.SPEEDS)
+    times = np.linspace(0.0, tumbling.TUMBLED, tumbling.READ + 1)
+    return case, free_turning(times, tumbling.MOMENTS, case.v, case.q)[1].astype(float)
+
+
+def test_each_method_keeps_its_order_on_a_free_body(engines, stone):
+    """One claims an order that it has not."""
+    ours, theirs, result = engines["tmt"], engine(read(tumbling.mjcf())), Result("speed")
+    assert (
+        np.abs(tmt.mass_matrix(stone[0].q, stone[0].tree) - theirs.of(stone[0]).mass_matrix(stone[0].q)).max() < 1e-17
+    )
+    claims = {name: ours.methods[name] for name in ("dopri8", "semi_implicit_euler")}
+    claims["rk4"] = ours.methods["rk4"]._replace(order=5)
+    table = tumbling.orders_on_a_body(result, {"tmt": SimpleNamespace(of=ours.of, methods=claims)})
+    assert [check.scene for check in result.checks if not check.passed] == [f"{tumbling.BODY}, tmt rk4"]
+    found = {(line["engine"], line["method"]): line["measured_order"] for line in table}
+    assert found["tmt", "rk4"] == pytest.approx(4.0, abs=0.1) and found["tmt", "dopri8"] == pytest.approx(8.0, abs=0.5)
+    assert found["tmt", "semi_implicit_euler"] == pytest.approx(1.0, abs=0.05)
+    assert len(found) == 3 + len(theirs.methods)
+
+
+def test_a_coarse_run_of_scipy_has_quaternions_of_length_1(stone):
+    case, exact = stone
+    motion = Scipy().of(case).run(*case.start, case.tau, tumbling.TUMBLED / 8, 8, "RK45", tolerance=1e-2)
+    assert np.abs(np.linalg.norm(motion.q, axis=1) - 1.0).max() < 1e-15
+    assert np.abs(case.coordinates.difference(motion.q, exact)).max() > 1e-6
+
+
+def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
+    case = settings.regular_of(robot_of(read(PATHS["free_body"]), "free_body.xml"))
+    known = reference.in_doubles(case)
+    assert known.error(-known.high[:, 3:7], [3]).max() < 1e-15  # -q is the same turn
+    turned = case.coordinates.move(known.high[:, :7], [0.0, 0.0, 0.0, 0.0, 1e-3, 0.0])
+    assert known.error(turned[:, 3:], [3]) == pytest.approx(1e-3)
+    assert known.error(turned, range(4)) == pytest.approx(1e-3)

@@ -1,0 +1,161 @@
+"""Checks of amplification, limits, growth, departures: a row just inside of each tolerance and one just outside; no runs."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from judged import BOTH, INSIDE, OUTSIDE, only
+from models import PATHS
+
+from compare.engines.mujoco import reading
+from compare.experiments.stability import departure, equilibria, falling, limits, limits_judged, torques
+from compare.judge import run
+from compare.judge.check import About
+from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.truth.linear import held
+
+
+@pytest.mark.parametrize("off, rounded, passes", [
+    (INSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, True), (OUTSIDE * 64 * 2.0**-52 * 3.0 * 7.0 / 1e-6, 0.0, False),
+    (INSIDE * 1e-9 / 1e-6, 1e-9, True), (OUTSIDE * 1e-9 / 1e-6, 1e-9, False), (np.nan, 0.0, False),
+])  # fmt: skip
+def test_amplification_within_the_rounding_of_a_difference_quotient_or_of_a_step(result, off, rounded, passes):
+    ours, q = np.diag([3.0, -7.0]), np.array([1.0, -2.0])
+    equilibria.check_amplification(result, "", q, ours, ours + [[0.0, off], [0.0, 0.0]], rounded)
+    assert only(result) is passes
+
+
+def limit_row(predicted=0.1, observed=0.1, kind="finite", seen="finite", **more):
+    return {
+        "scene": "bent", "engine": "tmt", "method": "rk4", "damping": 0.0, "mode_per_s": 9.1, "predicted_dt_s": predicted,
+        "observed_dt_s": observed, "limit": kind, "criterion": "", "seen": seen, "allowed": 1e-3, **more,
+    }  # fmt: skip
+
+
+def check_limits(result, *rows, **more):
+    limits_judged.check_limits(result, ARM, [{"rows": list(rows), "growths": []} | more])
+
+
+@BOTH
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_observed_limit_within_a_thousandth(result, share, passes, sign):
+    check_limits(result, limit_row(observed=0.1 * (1 + sign * share * 1e-3)))
+    assert only(result) is passes
+
+
+@pytest.mark.parametrize("kind, seen, passes", [
+    ("never_fails", "never_fails", True), ("never_fails", "finite", False), ("always_fails", "always_fails", True),
+    ("always_fails", "never_fails", False), ("finite", "never_fails", False),
+])  # fmt: skip
+def test_kind_of_limit_is_as_predicted(result, kind, seen, passes):
+    check_limits(result, limit_row(0.1 if kind == "finite" else None, None, kind, seen))
+    assert only(result) is passes
+
+
+@pytest.mark.parametrize("theirs, about", [(0.12, About.PREDICTION), (0.1, About.MODELS)])
+def test_what_both_engines_do_and_is_not_predicted_is_no_difference_of_the_models(result, theirs, about):
+    result.curves["schemes"] = {("mujoco", "RK4"): "rk4"}
+    check_limits(result, limit_row(observed=0.12), limit_row(observed=theirs, engine="mujoco", method="RK4"))
+    assert result.checks[0].about == about and not result.checks[0].passed
+
+
+def test_what_no_run_decides_is_not_checked(result):
+    check_limits(result, limit_row(), limit_row(observed=None, seen=None, undecided="a reason", method="implicit"))
+    assert only(result) and "a reason" in result.notes[1]
+
+
+def test_the_largest_difference_of_a_limit_is_said():
+    (text,) = limits_judged.limits_in_words(ARM, [limit_row(observed=observed) for observed in (0.1, 0.1005, 0.0998)])
+    assert "0.500 %" in text
+
+
+@BOTH
+def test_growth_in_all_steps_within_a_thousandth(result, share, passes):
+    row = {"scene": "upright", "engine": "mujoco", "method": "Euler", "dt_s": 0.01, "predicted_growth": 1.1,
+           "observed_growth": 1.1, "steps": 70, "total_off": share * 1e-3}  # fmt: skip
+    check_limits(result, growths=[row])
+    assert only(result) is passes
+
+
+@pytest.mark.parametrize("early, late, grown", [
+    (1.0, 1.0009, False), (1.0, 1.0011, True),
+    (1e-4, 0.9e-3, False), (1e-4, 1.1e-3, True),  # what has decayed leaves rounding
+    (200.0, 99.0, False), (200.0, 101.0, True), (1.1e4, 0.5, True), (np.nan, np.nan, True),
+])  # fmt: skip
+def test_when_a_deviation_grows(early, late, grown):
+    assert limits.grows(np.array([0.5, early]), np.array([0.4, late])) is grown
+
+
+def test_a_slow_mode_that_does_not_grow_by_itself_is_not_seen_in_a_short_run():
+    rates = np.array([3.0j, 0.01j, -0.01, 0.01, -50.0])
+    np.testing.assert_array_equal(limits.is_seen(rates, 1e-6, 10.0), [True, False, False, True, True])
+    assert limits.is_seen(np.array([0.01j]), 1e-6, 10.0).all()  # there is no other
+
+
+def test_a_limit_that_runs_show_no_nearer_than_a_tenth_is_not_decided_by_them():
+    arm7 = held(robot_of(reading.read(PATHS["arm7"]), "arm7.xml"), "ready")
+    assert limits.why_undecided(arm7, 0.0999) is None and limits.why_undecided(arm7, 0.1001)
+    assert limits.why_undecided(held(ARM, "bent"), 1.0) is None
+
+
+def departure_row(observed, predicted, **more):
+    return {"scene": "ball catch", "engine": "tmt", "method": "rk4", "dt_s": 0.01, "perturbation_rad": 1e-6,
+            "predicted_s": predicted, "observed_s": observed} | more  # fmt: skip
+
+
+@pytest.mark.parametrize("observed, predicted, more, passes", [
+    *((2.0 + off, 2.0, {}, passes) for off, passes in ((0.0299, True), (0.0301, False), (-0.0299, True), (-0.0301, False))),
+    (2.0 + INSIDE * 5 / 64, 2.0, {"dt_s": 5 / 64}, True), (2.0 + OUTSIDE * 5 / 64, 2.0, {"dt_s": 5 / 64}, False),
+    (2.199, 2.0, {"allowed_s": 0.2}, True), (2.201, 2.0, {"allowed_s": 0.2}, False),  # a row may say how near
+    (None, None, {}, True), (1.0, None, {}, False), (None, 1.0, {}, False),
+])  # fmt: skip
+def test_departure_within_one_step_or_three_hundredths(result, observed, predicted, more, passes):
+    departure.check_departures(result, [departure_row(observed, predicted, **more)])
+    assert only(result) is passes
+
+
+def test_the_farthest_departure_is_said():
+    rows = [departure_row(1.01, 1.0), departure_row(2.02, 2.0, engine="mujoco"), departure_row(3.0, 3.0)]
+    assert "0.020 s (ball catch, MuJoCo rk4" in departure.departures_in_words(rows)
+
+
+def test_left_is_a_tenth_of_a_radian():
+    paths = [np.array([[0.0], [size], [0.0]]) for size in (0.0999, -0.1001)]
+    assert [run.departure(np.arange(3.0), path) for path in paths] == [None, 1.0]
+
+
+def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
+    at, size = held(ARM, "ball catch"), 1e-4
+    values, vectors = at.modes
+    shape = size * vectors[:3, 0].real / np.abs(vectors[:3, 0]).max()
+    (found,) = departure.predicted(at, "rk4", 1e-3, shape[None], np.zeros((1, 3)))
+    assert found == pytest.approx(np.arccosh(0.1 / size + 1.0) / values[0].real, abs=2e-3)  # cosh - 1, from rest
+
+
+@pytest.mark.parametrize("joints, reach, count", [(4, 2, 625), (5, 1, 243), (6, 1, 13)])
+def test_torques_within_some_ulps_are_bounded_in_number(joints, reach, count):
+    tau = np.linspace(-3.0, 5.0, joints)
+    found = torques.variants(tau, reach)
+    assert found.shape == (count, joints) and (found[count // 2] == tau).all()
+    away = np.abs(found - tau) / np.spacing(np.abs(tau))
+    assert len({tuple(row) for row in found}) == count and (away.max(axis=0) == reach).all()
+
+
+@BOTH
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_exponent_of_the_time_to_leave_a_marginal_posture(result, share, passes, sign):
+    power = -0.5 + sign * share * 0.02
+    falls = [departure_row(10.0 * (size / 1e-4) ** power, 10.0, perturbation_rad=size) for size in (1e-2, 1e-4, 1e-5)]
+    falling.check_falls(result, falls)
+    assert [check.passed for check in result.checks] == [passes, False]  # of the other side there are no runs
+
+
+def test_the_law_is_left_out_where_the_potential_is_not_cubic():
+    assert falling.without_law(held(ARM, "zero")) is None
+    # about an axis along gravity no posture has stiffness, nor a cubic potential
+    about = dataclasses.replace(ARM.tree, axis=((0.0, 0.0, 1.0), *ARM.tree.axis[1:]))
+    turning = held(dataclasses.replace(ARM, tree=about), "bent")
+    assert turning.kind == "marginal" and falling.without_law(turning)
+    floating = held(dataclasses.replace(ARM, tree=dataclasses.replace(ARM.tree, gravity=(0.0, 0.0, 0.0))), "bent")
+    assert "3 " in falling.without_law(floating)  # modes without stiffness

@@ -1,0 +1,293 @@
+"""Steps under a robot's own servos: what is judged and said, what runs show, what lifts a limit, tables of a run."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from models import PATHS
+from servo_models import FILTERED, FLOATING, FORK, INERTIA, acting_of, hinge, posture_of
+
+from compare.engines.mujoco import reading
+from compare.engines.mujoco.flags import INTEGRATORS
+from compare.experiments.stability import servos
+from compare.experiments.stability.servos import figures_step, full_model, observed, predicted, response
+from compare.experiments.stability.servos.lifting import lifts
+from compare.experiments.stability.servos.observed import grows_in_runs, hardly_grows
+from compare.experiments.stability.servos.sentences import at_the_top, shaking
+from compare.judge.check import AT_OWN_STEP, Result
+from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.setup import Setup
+from compare.setup import engines as engines_of
+
+SERVO = '<position name="servo" joint="swing" kp="50" kv="4"/>'
+SWING = """<mujoco><option timestep="0.002" integrator="{integrator}"/><worldbody><body>
+  <joint name="swing" axis="0 1 0" damping="0.01"/><geom type="sphere" size="0.1" pos="{com}" mass="2"/></body></worldbody>
+  <actuator>{servo}</actuator><keyframe>{key}</keyframe></mujoco>"""
+UP = '<key name="up" qpos="1"/>'
+
+
+def swing(servo=SERVO, key="", integrator="Euler", com="0 0 -0.5"):
+    return SWING.format(servo=servo, key=key, integrator=integrator, com=com)
+
+
+def row(**more):
+    """A row of step_limits.csv."""
+    return {
+        "posture": "p", "base": "fixed", "integrator": "Euler", "limit": "finite", "predicted_dt_s": 0.1, "file_dt_s": 0.1,
+        "observed_dt_s": None, "file_integrator": "Euler", "limiting_joint": "joint7", "stable_at_file_dt": None,
+        "step_response_error": None,
+    } | more  # fmt: skip
+
+
+NONE = {"limit": "none", "predicted_dt_s": None}
+
+
+@pytest.mark.parametrize("more, kind, passed", [
+    ({"observed_dt_s": 0.100999}, "finite", [True]), ({"observed_dt_s": 0.10101}, "finite", [False]),
+    ({"observed_dt_s": 0.099001}, "finite", [True]), ({"observed_dt_s": 0.09899}, "finite", [False]),
+    ({}, "none", [False]), ({}, "always", [False]), (NONE, "none", []), (NONE | {"observed_dt_s": 1.0}, "finite", [False]),
+    # below the shortest step that is tried nothing is compared
+    ({"predicted_dt_s": 0.99e-7}, "always", []), ({"predicted_dt_s": 1.01e-7}, "always", [False]),
+])  # fmt: skip
+def test_an_observed_limit_is_within_a_hundredth(result, more, kind, passed):
+    servos.check_observed(result, row(**more), kind, False)
+    assert [check.passed for check in result.checks] == passed
+
+
+@pytest.mark.parametrize("apart, beside, passed", [
+    (0.99e-6, 0.99e-4, [True, True]), (1.01e-6, 1.01e-4, [False, False]), (None, None, []), (np.inf, np.nan, [False, False]),
+])  # fmt: skip
+def test_forms_of_a_limit_and_growth_of_a_step(result, apart, beside, passed):
+    one = SimpleNamespace(name="p", at=SimpleNamespace(bases=("fixed",)))
+    servos.check_steps(result, one, [predicted.Steps("fixed", "Euler", apart, beside)])
+    assert [check.passed for check in result.checks] == passed
+
+
+@pytest.mark.parametrize("more, passed", [
+    ({}, [True]), ({"file_dt_s": 0.1001}, [False]), ({"base": "locked"}, []), ({"integrator": "RK4"}, []), (NONE, [True]),
+    ({"limit": "saddle", "predicted_dt_s": None}, []),
+])  # fmt: skip
+def test_a_step_is_stable_up_to_its_limit_where_one_counts(result, more, passed):
+    servos.check_own_step(result, [row(**more)])
+    assert [check.passed for check in result.checks] == passed
+
+
+@pytest.mark.parametrize("speeds, kind", [
+    ([], ""), ([("Euler", 0.4)], "shakes"), ([("Euler", 1e-5)], "calm"), ([("Euler", None)], "shakes"),
+    # beside what it does under an integrator that is stable
+    ([("Euler", 0.99), ("RK4", 0.1)], "both"), ([("Euler", 1.01), ("RK4", 0.1)], "shakes"),
+])  # fmt: skip
+def test_what_the_full_model_does_where_a_step_is_not_stable(speeds, kind):
+    full = [
+        {"posture": "p", "integrator": name, "rms_speed": speed, "warnings": 1, "resets": 0, "predicted_stable": name == "RK4",
+         "calm": speed is not None and speed < 1e-3}
+        for name, speed in speeds
+    ]  # fmt: skip
+    found, warned = shaking(full, [row()])
+    assert found == kind and ("1 warning" in warned) is (kind == "shakes")
+
+
+def of_euler(kp, explicit, implicit=0.0):
+    """4 I + 2 dt (implicit - explicit) - dt^2 kp = 0."""
+    off = implicit - explicit
+    return (off + np.sqrt(off**2 + 4.0 * INERTIA * kp)) / kp
+
+
+@pytest.mark.parametrize("source, integrator, expected", [
+    (hinge(20.0, 50.0), "Euler", of_euler(20.0, 50.0)),
+    # explicit and implicit damping nearly cancel: above the limit it hardly grows
+    (hinge(20.0, 40.0, joint='damping="39"'), "Euler", of_euler(20.0, 40.0, 39.0)),
+    (hinge(20.0), "implicitfast", of_euler(20.0, 0.0)),  # it swings and nothing damps it
+    (hinge(4.0 * INERTIA / 4.9**2), "Euler", 4.9), (hinge(4.0 * INERTIA / 5.1**2), "Euler", None),  # sought up to 5 s
+    # a filter that is too fast for the step is seen, unless it is exact
+    (hinge(actuator=FILTERED.format(kind="filter", constant=1e-4)), "implicitfast", 2e-4),
+    (hinge(actuator=FILTERED.format(kind="filterexact", constant=1e-4)), "Euler", of_euler(20.0, 2.0)),
+])  # fmt: skip
+def test_the_limit_of_one_hinge_is_that_of_the_formula(source, integrator, expected):
+    at, reading = posture_of(source)
+    found = observed.limit(acting_of(at, reading), at, integrator)
+    assert found == (("finite", pytest.approx(expected, rel=2e-3)) if expected else ("none", None))
+
+
+@pytest.mark.parametrize("source, base, integrator", [
+    (FORK.format(kv=60), None, "Euler"),  # fingers alike, against each other
+    (FLOATING, None, "implicitfast"), (FLOATING, "locked", "Euler"), (PATHS["mixed"], None, "RK4"),
+])  # fmt: skip
+def test_runs_show_the_predicted_limit(source, base, integrator):
+    at, reading = posture_of(source)
+    acting, predicted = acting_of(at, reading, base), at.small(base or at.bases[0]).limit(integrator)
+    assert predicted.limit == "finite"
+    grows = [grows_in_runs(acting, at, integrator, share * predicted.dt) for share in (0.997, 1.003)]
+    assert grows == [False, True]
+
+
+@pytest.mark.parametrize("turning, growing", [
+    (0.1 * 1.001 ** np.arange(8), True),
+    (0.1 * 1.0005 ** np.arange(8), False),  # by too little in all
+    (0.1 * np.array([9.0, 5.0, 1.0, 1.001, 1.002, 1.003, 1.004, 1.005]), True),  # what decays first does not count
+    (0.1 * np.array([1.0, 1.0, 1.0, 1.001, 1.002, 1.0021, 1.003, 1.004]), False),  # not evenly
+    (1.1e-5 * 1.001 ** np.arange(8), True), (0.9e-5 * 1.001 ** np.arange(8), False),
+])  # fmt: skip
+def test_hardly_growing_is_told_by_evenness(turning, growing):
+    assert hardly_grows(turning) is growing
+
+
+def errors(source, integrator, dts, base=None):
+    at, reading = posture_of(source)
+    acting = acting_of(at, reading, base)
+    return [response.response_error(acting, at, base or at.bases[0], integrator, dt) for dt in dts]
+
+
+@pytest.mark.parametrize("source, base", [(FORK.format(kv=5), None), (FLOATING, "locked")])
+def test_errors_fall_with_the_order_of_the_method(source, base):
+    coarse, fine = errors(source, "implicitfast", (1e-3, 5e-4), base)
+    assert coarse / fine == pytest.approx(2.0, rel=0.1) and 1e-6 < fine < 0.1
+    coarse, fine, finest = errors(source, "RK4", (1.6e-3, 8e-4, 1e-4), base)
+    assert coarse / fine == pytest.approx(16.0, rel=0.4)
+    assert finest < 1e-7  # the exact response is that of MuJoCo
+
+
+def test_the_exact_response_of_one_hinge_is_the_known_one():
+    at, _ = posture_of(hinge(20.0, 0.0))
+    found = response.exact_response(at, "fixed", response.jump_of(at), 0.01, 20)
+    swing = 1.0 - np.cos(np.sqrt(20.0 / INERTIA) * 0.01 * np.arange(1, 21))
+    assert found[:, 0] == pytest.approx([*swing, 1.0], abs=1e-9)
+
+
+def lifts_of(source, dt):
+    at, reading = posture_of(source)
+    found = lifts(acting_of(at, reading), at, at.bases[0], "Euler", dt)
+    return {one.names[0] if one.kind == "integrator" else one.kind: one for one in found}
+
+
+def test_one_hinge_is_lifted_by_the_numbers_of_the_formula():
+    kp, dt, inertia = 20.0, 0.02, INERTIA + 0.01
+    found = lifts_of(hinge(kp, 30.0, joint='armature="0.01"'), dt)
+    assert all(one.tried and (one.limit.dt or np.inf) >= dt for one in found.values())
+    # 4 I > 2 dt kv + dt^2 kp
+    most = (4.0 * inertia - dt**2 * kp) / (2.0 * dt)
+    assert found["kv"].names == ("servo",) and 0.9 * most < found["kv"].values[0] < most
+    least = (2.0 * dt * 30.0 + dt**2 * kp) / 4.0 - INERTIA  # with what the joint has
+    assert found["armature"].names == ("turn",) and least < found["armature"].values[0] < 1.1 * least
+
+
+def test_all_that_is_needed_is_named_and_no_more():
+    found = lifts_of(FORK.format(kv=5), 0.05)
+    assert set(found["armature"].names) >= {"left", "right"} and found["armature"].tried
+    # the tendon's kv alone is too large: its actuator is named
+    found = lifts_of(FORK.format(kv=60), 0.01)
+    assert found["kv"].names == ("grip",) and found["kv"].tried and found["kv"].values[0] < 60.0
+    # without any kv the stiffness alone is too much for the step
+    assert "kv" not in lifts_of(hinge(2000.0, 5.0), 0.03)
+    # a filter is as fast as it is
+    assert list(lifts_of(hinge(actuator=FILTERED.format(kind="filter", constant=1e-3)), 2.5e-3)) == ["RK4"]
+    # within the limit
+    assert not {"kv", "armature"} & set(lifts_of(hinge(20.0, 1.0), 0.002))
+
+
+@pytest.mark.parametrize("joint, start, calm", [
+    ("", 'qpos="0.01"', False), ('frictionloss="5"', 'qpos="0.01"', True),  # friction calms what is unstable
+    ("", "", False),  # what is unstable and rests exactly does not pass for calm
+])  # fmt: skip
+def test_rows_of_the_full_model_say_what_it_does(joint, start, calm):
+    servo, key = '<position name="s" joint="turn" kp="20" kv="300" forcerange="-1 1"/>', f'<key {start} ctrl="0"/>'
+    source = hinge(actuator=servo, joint=joint).replace("</mujoco>", f"<keyframe>{key}</keyframe></mujoco>")
+    at, reading = posture_of(source)
+    shaken, still = full_model.rows(reading.model, at, 0.002, {"Euler": False, "implicitfast": True})
+    assert (shaken["calm"], still["calm"]) == (calm, True) and (shaken["rms_speed"] < 0.01) is calm
+    assert (shaken["predicted_stable"], still["predicted_stable"]) == (False, True)
+
+
+def read(source, make=Setup.quick, **more):
+    found = reading.read(source)
+    robot = robot_of(found, "robot.xml")
+    return make(robot, engines_of(reading.engine(found)), reading=found, **more)
+
+
+def done(setup):
+    """What is said, and the result."""
+    result = Result("stability")
+    return servos.add(result, setup, servos.begin(setup)), result
+
+
+def at_qpos0(source=None):
+    setup = read(source or swing())
+    return setup, predicted.predicted_at(setup.robot, "qpos0", setup.reading)
+
+
+def test_a_quick_run_has_every_limit_and_observes_the_files_own_integrator_and_euler_at_one_posture():
+    said, result = done(read(swing(SERVO.replace('"4"', '"10"'), UP, "implicitfast")))
+    rows, full = result.tables["step_limits"], result.tables["full_model"]
+    places = [(row["posture"], row["base"], row["integrator"]) for row in rows]
+    assert places == [(posture, "fixed", name) for posture in ("up", "qpos0") for name in INTEGRATORS]
+    assert [row["integrator"] for row in full] == 2 * ["Euler", "implicitfast"] and all(row["calm"] for row in full)
+    seen = {(row["posture"], row["integrator"]) for row in rows if row["observed_dt_s"]}
+    assert ("up", "Euler") in seen <= {("up", "Euler"), ("up", "implicitfast")}
+    euler = rows[0]
+    assert (euler["limit"], euler["limiting_joint"], euler["stable_at_file_dt"]) == ("finite", "swing", True)
+    assert euler["observed_dt_s"] == pytest.approx(euler["predicted_dt_s"], rel=5e-3)
+    assert euler["observed_dt_s"] != euler["predicted_dt_s"] and 0.0 < euler["step_response_error"] < 0.1
+    assert all(check.passed for check in result.checks) and said[0].startswith("Stable")
+    assert sum(check.quantity == AT_OWN_STEP for check in result.checks) == 2
+
+
+def test_a_full_run_observes_every_integrator_and_draws_curves(result):
+    for alone in (True, False):
+        setup = read(swing(key=UP), Setup.small, alone=alone)
+        work = servos.begin(setup)
+        # every integrator at the first posture with a limit; `stability` alone the file's, which is Euler, at the other
+        assert [one.name for one, *_ in work["tried"]] == ["up"] * len(INTEGRATORS) + ["qpos0"] * alone
+    drawn, curves = work["curves"]
+    assert drawn == [*INTEGRATORS]
+    servos.add(result, setup, work | {"tried": [], "curves": (drawn[:1], curves)})  # one curve, and no limit is sought
+    row, (curve,) = result.tables["step_limits"][0], result.curves["step response"]["lines"].values()
+    assert curve[0][0] < 0.002 < curve[-1][0] <= row["predicted_dt_s"] < 1.5 * curve[-1][0]
+    lines = figures_step.draw_step_response(result, None)[1].axes[0].lines
+    (own,) = (line.get_xydata().tolist() for line in lines if line.get_marker() == "*")
+    assert own == [[0.002, row["step_response_error"]]]
+
+
+def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_and_is_told_what_helps():
+    said, result = done(read(swing(SERVO.replace('"4"', '"800"'))))
+    failed = [(check.quantity, check.scene) for check in result.checks if not check.passed]
+    assert said[0].startswith("Not stable") and failed == [(AT_OWN_STEP, "qpos0")]
+    assert any("armature" in text for text in said)
+    assert [row["predicted_stable"] for row in result.tables["full_model"] if row["integrator"] == "Euler"] == [False]
+
+
+def test_motors_are_neither_stable_nor_not(engines):
+    assert servos.begin(Setup.quick(ARM, engines)) is None
+    _, one = at_qpos0(swing('<motor name="servo" joint="swing"/>'))
+    assert {row["stable_at_file_dt"] for row in predicted.limit_rows([one], 0.002, "Euler")} == {None}
+
+
+def test_a_saddle_has_a_rate_and_neither_a_joint_that_limits_nor_an_answer():
+    _, one = at_qpos0(swing(SERVO.replace('"50" kv="4"', '"1"'), com="0 0 0.5"))
+    rows = predicted.limit_rows([one], 0.002, "Euler")
+    for row in rows:
+        assert (row["limit"], row["limiting_joint"], row["stable_at_file_dt"]) == ("saddle", None, None)
+        assert row["mode_per_s"] > 1.0
+    assert at_the_top(rows, []).startswith("Whether")
+
+
+def test_runs_have_the_base_the_weight_and_the_cuts_of_the_rest():
+    at, found = posture_of(FLOATING)
+    locked, free = (predicted.acting_at(found, at, base) for base in ("locked", "free"))
+    assert (locked.locked, free.locked) == (tuple(at.base), ()) and not locked.model.opt.gravity.any()
+    at, found = posture_of(swing('<position name="s" joint="swing" kp="1000" forcerange="-1 1"/>', com="0.5 0 0"))
+    assert predicted.acting_at(found, at, "fixed").model.actuator_biasprm[0, 0] == pytest.approx(-1.0)
+
+
+def test_a_closed_form_or_a_step_that_is_off_is_seen():
+    setup, one = at_qpos0()
+    small, limit = one.at.small("fixed"), one.limits["fixed", "Euler"]
+    assert predicted.forms_apart(small, "Euler", limit) < 1e-8
+    for off in (1e-5, 0.1):
+        wrong = limit._replace(dt=(1 + off) * limit.dt)
+        assert predicted.forms_apart(small, "Euler", wrong) == pytest.approx(off, rel=1e-3)
+    acting = predicted.acting_at(setup.reading, one.at, "fixed")
+    assert predicted.radius_apart(acting, one.at, small, "Euler", limit.dt) < 1e-6
+    # above the limit the factor of a stiffness that is 1 % too large is farther off than below it
+    assert predicted.radius_apart(acting, one.at, replace(small, K=1.01 * small.K), "Euler", limit.dt) > 1e-3

@@ -1,0 +1,210 @@
+"""What is known of postures and of a step of each method, the same in runs, and the whole of it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from models import PATHS
+
+import tmt
+from compare.engines.mujoco import reading
+from compare.engines.mujoco.linear import left_to_itself, transition
+from compare.experiments import stability
+from compare.experiments.stability import choice, departure, failure, falling, growth, limits, torques
+from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
+from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.setup import Setup
+from compare.setup import engines as engines_of
+from compare.truth.linear import held
+from compare.truth.postures import all_of_kind, of_kind, posture_names
+from compare.truth.steps import region
+
+BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
+FREE = choice.free_motion(ARM)
+SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
+  <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body></worldbody>{keys}</mujoco>"""
+CART_POLE = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0" damping="1"/>
+  <geom type="sphere" size="0.1" mass="1"/><body><joint name="pole" axis="0 1 0" damping="0.1"/>
+  <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("name, kind, rates", [
+    ("zero", "marginal", [0.0, 0.0]), ("hanging", "centre", [10.995j, 4.975j, 4.867j]),
+    ("upright", "saddle", [10.995, 4.975, 4.867]), ("ball catch", "saddle", [7.513, 5.300]),
+    ("bent", "centre", [9.101j, 5.039j, 4.314j]),
+])  # fmt: skip
+def test_what_each_posture_is(name, kind, rates):
+    at = held(ARM, name)
+    values = at.modes[0]
+    assert at.kind == kind and all(np.abs(values - rate).min() < 5e-4 for rate in rates)
+    assert np.abs(values.sum()) < 1e-9  # undamped: they come in opposite pairs
+
+
+def test_the_posture_that_stands_for_a_kind_is_the_robots_choice_or_the_first():
+    assert (all_of_kind(ARM, "centre"), all_of_kind(ARM, "saddle")) == (("bent", "hanging"), ("ball catch", "upright"))
+    other = dataclasses.replace(
+        ARM, kinds={}, postures={name: ARM.postures[name] for name in ("upright", "ball catch")}
+    )
+    assert all_of_kind(other, "saddle") == ("upright", "ball catch") and of_kind(other, "centre") is None
+
+
+@pytest.mark.parametrize("name, imaginary, real", [
+    ("semi_implicit_euler", 2.0, None), ("implicit", 2.0, None), ("rk4", 2.0 * np.sqrt(2.0), 2.785294),
+    ("explicit_euler", 0.0, 2.0),
+])  # fmt: skip
+def test_known_limits_on_the_axes(name, imaginary, real):
+    below, above = region(name, 1j * (imaginary + np.array([-1e-4, 1e-4])))
+    assert above > 1.0 + 1e-9 and (below < 1.0 + 1e-12 or imaginary == 0.0)
+    if real:
+        assert region(name, np.array([-real + 1e-5 + 0j])) < 1.0 < region(name, np.array([-real - 1e-5 + 0j]))
+
+
+@pytest.mark.parametrize("name", ["implicit_midpoint", "gauss_legendre_4"])
+def test_a_stable_method_has_no_limit_but_on_a_saddle(name):
+    far = np.linspace(1e-3, 20.0, 400)
+    assert region(name, 1j * far).max() < 1.0 + 1e-12 and region(name, -far + 0j).max() < 1.0
+    assert BENT.limit(name) == ("never_fails", None) and BALL.limit(name) == ("always_fails", None)
+
+
+@pytest.mark.parametrize("at, name, product", [
+    (BENT, "rk4", 2.0 * np.sqrt(2.0)), (held(ARM, "hanging"), "implicit", 2.0),
+    (held(ARM, "bent", 50.0), "rk4", 2.785294),  # damped it meets the real limit at the stiffest mode
+])  # fmt: skip
+def test_limit_of_the_arm_is_that_of_its_fastest_mode(at, name, product):
+    kind, dt = at.limit(name)
+    assert kind == "finite" and dt * np.abs(at.modes[0]).max() == pytest.approx(product, rel=1e-6)
+
+
+def read(source):
+    found = reading.read(source)
+    return robot_of(found, "robot.xml"), reading.engine(found)
+
+
+def test_of_many_keyframes_the_first_are_looked_at():
+    keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
+    seen = subjects_of(read(SWING.format(keys=f"<keyframe>{keys}</keyframe>"))[0])
+    assert posture_names(seen.robot) == (*(f"k{i}" for i in range(MOST_POSTURES)), "at rest") and seen.left_out
+    assert seen.centres[-1] == "at rest" and np.abs(held(seen.robot, "at rest").tau).max() < 1e-6
+    assert subjects_of(read(PATHS["gripper"])[0]).marginal is None  # of what is marginal, but nothing pushes
+    body = read(PATHS["free_body"])[0]
+    assert not subjects_of(body).centres and held(body, "qpos0").sizes[3:].tolist() == [1.0, 1.0, 1.0]
+
+
+def test_a_limit_is_sought_about_the_predicted_one_and_found_again():
+    robot, mujoco = read(SWING.format(keys=""))
+    at, known = held(subjects_of(robot).robot, "at rest"), engines_of(mujoco)
+    predicted, rk4 = at.limit("rk4")[1], known["mujoco"].methods["RK4"]
+    seen, observed = limits.observed_limit(rk4, known, at, 1000, limits.tried_at(at, predicted))
+    assert seen == "finite" and observed == pytest.approx(predicted, rel=1e-3)
+    assert departure.not_lost(held(robot, "qpos0"), 1e-9)
+    assert not departure.not_lost(held(robot, "qpos0"), 1e-18)  # which rounding swamps
+
+
+def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(result):
+    robot, mujoco = read(CART_POLE)
+    known = engines_of(mujoco)
+    rows = departure.departures(1 / 512, held(robot, "qpos0"), known, (known["mujoco"].methods["RK4"],))
+    assert "perturbation_m_or_rad" in rows[0] and "perturbation_rad" not in rows[0]
+    departure.check_departures(result, rows)
+    assert len(result.checks) > 5 and all(check.passed for check in result.checks)
+    # methods that solve their stages are not run for a file
+    names = {method.name for method in choice.explicit(choice.all_methods(known))}
+    assert {"rk4", "RK4", "implicit"} <= names and not {"gauss_legendre_4", "implicit_midpoint"} & names
+
+
+@pytest.fixture
+def method(engines):
+    """method(engine, name): one method of integration."""
+    return lambda engine, name: engines[engine].methods[name]
+
+
+def test_predicted_and_observed_limits_agree(engines, method):
+    ours = [method("tmt", scheme) for scheme in ("semi_implicit_euler", "implicit_midpoint")]
+    rows = limits.limits_and_growths(BENT, engines, (*ours, method("mujoco", "RK4")))["rows"]
+    assert [row["seen"] for row in rows] == [row["limit"] for row in rows] == ["finite", "never_fails", "finite"]
+    for row in (rows[0], rows[2]):
+        assert row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=limits.LIMIT_TOLERANCE)
+    # a forearm of another mass has another one
+    heavy = held(dataclasses.replace(ARM, tree=dataclasses.replace(tmt.ARM, mass=(1.9, 1.65))), "bent")
+    assert abs(rows[2]["observed_dt_s"] / heavy.limit("rk4")[1] - 1.0) > 2.0 * limits.LIMIT_TOLERANCE
+    # growth beyond the limit is slow with little damping: 100-fold in 2000 steps comes 6 % later
+    row = limits.limits_and_growths(held(ARM, "bent", 0.5), engines, (method("tmt", "explicit_euler"),))["rows"][0]
+    assert row["seen"] == "finite" and row["observed_dt_s"] == pytest.approx(row["predicted_dt_s"], rel=5e-4)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "RK4"])
+def test_amplification_is_mujocos_and_sees_damping(mujoco, integrator):
+    at, scheme = held(ARM, "bent", 0.5), mujoco.methods[integrator].scheme
+    theirs = transition(mujoco.of(at.case), at.q, at.tau, 0.01, integrator)
+    assert np.abs(at.step(scheme, 0.01) - theirs).max() < 1e-8
+    assert np.abs(BENT.step(scheme, 0.01) - theirs).max() > 1e-2
+
+
+def test_departure_is_predicted_where_no_other_mode_grows_faster_than_that_of_the_saddle(engines, method, result):
+    rows = departure.departures(5 / 64, BALL, engines, (method("tmt", "rk4"), method("mujoco", "Euler")))
+    assert len({row["observed_s"] for row in rows}) > 8  # the arm left, at other times from other starts
+    departure.check_departures(result, rows)
+    assert len(result.checks) == len(rows) and all(check.passed for check in result.checks)
+    # with steps of 1 s a swing grows 9.5-fold in each, what leaves 8.5-fold
+    assert departure.departures(1.0, BALL, engines, (method("tmt", "explicit_euler"),)) == []
+
+
+def test_a_marginal_posture_is_left_with_one_over_the_square_root(engines, method):
+    at = held(ARM, "zero")
+    rows = falling.fall(method("tmt", "rk4"), at, engines)
+    times = {row["perturbation_rad"]: row["observed_s"] for row in rows}
+    assert times[1e-5] / times[1e-4] == pytest.approx(np.sqrt(10.0), rel=0.03)
+    shape, slope = falling.cubic(at)
+    step = 1e-4 * shape  # q'' along the mode is slope q^2: from the accelerations themselves
+    found = tmt.acceleration(at.q + step, np.zeros(3), tmt.gravity_balance(at.q)) @ shape / (shape @ shape)
+    assert found == pytest.approx(slope * 1e-8, rel=1e-3)
+
+
+def test_own_bias_holds_for_ever(engines, method):
+    tau = torques.own_torque(method("mujoco", "RK4"), engines, BALL)
+    assert not engines["mujoco"].of(BALL.case).run(BALL.q, np.zeros(3), tau, 5 / 64, 200, "RK4").v.any()
+    ours = method("tmt", "rk4")  # no double need be the bias of compiled code: the nearest is taken
+    left = torques.residual(ours, engines, BALL, torques.own_torque(ours, engines, BALL)[None])
+    assert np.abs(left).max() <= np.spacing(np.abs(BALL.tau).max())
+
+
+def test_resonance_needs_a_large_perturbation(engines, method):
+    sizes = [growth.LINEAR_DEVIATION, failure.LARGE_DEVIATION]
+    near = failure.edge_growth(method("tmt", "implicit"), BENT, engines, sizes, failure.RESONANT_SWINGS)
+    assert near[0].max() < 3.0 and near[1].max() > limits.GROWTH_ALLOWED
+
+
+def test_silent_failures_are_caught(mujoco, engines):
+    reset = failure.own_reset(FREE, engines)
+    assert reset["finite"] and reset["resets"] >= 1 and reset["caught_in_it_s"] <= reset["first_reset_s"]
+    gain = failure.silent_gain(FREE, engines)
+    assert gain["gain"] > 5.0 * gain["range"] and gain["caught_in_it_s"] == gain["since_s"]
+    assert gain["definite"][64] < 0.0 < gain["definite"][128]
+    calm = left_to_itself(mujoco.of(FREE), *FREE.start, np.zeros(3), 1e-3, 100, "RK4")
+    assert failure.caught(FREE, 1e-3 * np.arange(101), calm) is None and calm["warnings"] == 0
+
+
+@pytest.mark.slow
+def test_a_small_run_fills_every_table(small):
+    small = small("stability")
+    assert set(small.tables) == {
+        "departure", "stability_modes", "stability_growth", "stability_torques", "stability_finer_steps",
+        "stability_bent", "stability_energy", "stability_newton",
+    }  # fmt: skip
+    heads = [note.split(":")[0] for note in small.notes if note.startswith("Claim ")]
+    assert heads == ["Claim 1, reproduced", "Claim 2, reproduced", "Claim 3, bounded"]
+    assert any("silent" in check.quantity for check in small.checks)
+
+
+@pytest.mark.parametrize("posture, kinds, drawn", [
+    ("upright", [1, 1, 0], ["stability_regions", "stability_departure"]),
+    ("hanging", [0, 1, 1], ["stability_limits", "stability_regions", "stability_silent"]),
+])  # fmt: skip
+def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, kinds, drawn):
+    robot = dataclasses.replace(ARM, claims=None, kinds={}, scenes=(), postures={"one": ARM.postures[posture]})
+    result = stability.rows(Setup.quick(robot, engines))
+    assert result.checks and all(check.passed for check in result.checks)
+    left_out = [note for note in result.notes if "left out" in note]
+    assert [sum(kind in note for note in left_out) for kind in ("a centre", "marginal", "a saddle")] == kinds
+    assert [figure()[0] for figure in stability.figures(result, robot)] == drawn
