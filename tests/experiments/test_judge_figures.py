@@ -6,8 +6,7 @@ import matplotlib.colors
 import numpy as np
 import pytest
 from crane import crane
-from edited import MOON, setup_of
-from jointed import CART, setup_between
+from edited import CART, MOON, setup_between, setup_of
 from models import PATHS
 
 import tmt
