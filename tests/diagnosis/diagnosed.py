@@ -7,7 +7,7 @@ from compare.diagnosis import diagnose, packed
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 
-STATES = 24
+STATES = 16
 
 
 def states(tree=tmt.ARM, seed=0, count=STATES):

@@ -17,22 +17,15 @@ Q, QD = states()
 @pytest.mark.parametrize("share, differs", [(0.999, False), (1.001, True)])
 def test_a_difference_is_one_beyond_its_tolerance(share, differs):
     given, allowed = values(), tolerance(ARM, Q, QD)
-    assert not diagnosis(given).differs
     given[5, 7] += share * allowed[5, 7]
     allowed[5, 7] = abs(given[5, 7] - values()[5, 7]) / share  # rounded as the sum is
     assert diagnose(ARM, ARM.hinge_names, Q, QD, given, allowed).differs is differs
 
 
-def added(column, force):
+def added(column, force, factor=1.0):
     """The arm's values with something added to one of M00, M10, M11, M20, M21, M22, h0, h1, h2."""
     given = values()
-    given[:, column] += force
-    return given
-
-
-def times(columns, factor):
-    given = values()
-    given[:, columns] *= factor
+    given[:, column] = factor * given[:, column] + force
     return given
 
 
@@ -46,42 +39,32 @@ def given_inertia(change):
     return packed(M, tmt.bias(Q, QD) + np.einsum("sci,sc->si", turns, moment), 3, len(Q))
 
 
-ONLY = {  # the given values, or the tree whose values these are: rank and place of the one cause, and what it explains
-    "a number": (HEAVY, 2, "mass of forearm", 1.52),
-    "two masses exchanged": (replace(ARM, mass=ARM.mass[::-1]), 2, "masses of upper arm and forearm", "exchanged"),
-    "a moment of inertia": (given_inertia(0.001), 2, "inertia yy of forearm", 0.02),
-    "a moment that no body has": (given_inertia(0.171), 2, "inertia yy of forearm", 0.19),
-    "damping in h": (added(7, 0.1 * QD[:, 1]), 2, "damping of beta in h", 0.1),
-}
-AMONG = {
-    "a factor of M": (times(slice(6), 1.25), 2, "all of M", 1.25),
-    "a factor of h": (times(slice(6, None), 1.25), 2, "all of h", 1.25),
-    "a factor of both": (times(slice(None), 1.25), 2, "all of M and h", 1.25),
-    "a factor of a row": (times(7, 1.25), 2, "h[beta]", 1.25),
-    "a row in another": (added(6, -tmt.gravity_balance(Q)[:, 1]), 2, "h[beta] at rest in h[alpha]", -1.0),
-    "no bias": (times(slice(6, None), 0.0), 1, "bias", "left out"),
-    "no gravity": (replace(ARM, gravity=(0.0, 0.0, 0.0)), 1, "gravity", "off"),
-    "an armature": (added(5, 0.1), 2, "armature of gamma", 0.1),
+CAUSES = {  # the given values, or the tree whose values these are: rank, place and what explains it; whether it is the only one
+    "a number": (HEAVY, 2, "mass of forearm", 1.52, True),
+    "two masses exchanged": (
+        replace(ARM, mass=ARM.mass[::-1]), 2, "masses of upper arm and forearm", "exchanged", True,
+    ),
+    "a moment of inertia that no body has": (given_inertia(0.171), 2, "inertia yy of forearm", 0.19, True),
+    "damping in h": (added(7, 0.1 * QD[:, 1]), 2, "damping of beta in h", 0.1, True),
+    "a factor of both": (added(slice(None), 0.0, 1.25), 2, "all of M and h", 1.25, False),
+    "a factor of a row": (added(7, 0.0, 1.25), 2, "h[beta]", 1.25, False),
+    "a row in another": (added(6, -tmt.gravity_balance(Q)[:, 1]), 2, "h[beta] at rest in h[alpha]", -1.0, False),
+    "no bias": (added(slice(6, None), 0.0, 0.0), 1, "bias", "left out", False),
+    "an armature": (added(5, 0.1), 2, "armature of gamma", 0.1, False),
     "two numbers": (
-        replace(HEAVY, gravity=(0.0, 0.0, -9.8)), 3, "mass of forearm and gravity z", "1.52 and -9.8",
+        replace(HEAVY, gravity=(0.0, 0.0, -9.8)), 3, "mass of forearm and gravity z", "1.52 and -9.8", False,
     ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("given, rank, place, explains", ONLY.values(), ids=ONLY)
-def test_one_cause_is_named_with_its_value(given, rank, place, explains):
-    (cause,) = diagnosis(given).causes
-    assert (cause.rank, cause.place, cause.tied) == (rank, place, 0)
-    assert cause.explains == (explains if isinstance(explains, str) else pytest.approx(explains, rel=1e-9))
-    assert cause.left_over < 1e-11 and (OF_NO_BODY in cause.text) is (explains == 0.19)
-
-
-@pytest.mark.parametrize("given, rank, place, explains", AMONG.values(), ids=AMONG)
-def test_a_cause_is_named_among_those_of_its_rank(given, rank, place, explains):
+@pytest.mark.parametrize("given, rank, place, explains, alone", CAUSES.values(), ids=CAUSES)
+def test_a_cause_is_named_with_its_value_and_its_rank(given, rank, place, explains, alone):
     causes = diagnosis(given).causes
     assert {cause.rank for cause in causes} == {rank} and {cause.tied for cause in causes} == {len(causes) - 1}
-    found = {cause.place: cause.explains for cause in causes}
-    assert found[place] == (explains if isinstance(explains, str) else pytest.approx(explains))
+    assert len(causes) == 1 or not alone
+    (cause,) = (cause for cause in causes if cause.place == place)
+    assert cause.explains == (explains if isinstance(explains, str) else pytest.approx(explains, rel=1e-9))
+    assert cause.left_over < 1e-11 and (OF_NO_BODY in cause.text) is (explains == 0.19)
 
 
 def test_ties_are_all_listed():
@@ -114,27 +97,17 @@ def test_angles_to_the_world_are_an_option_of_parallel_hinges():
     assert "angles" in {cause.place for cause in found.causes}
 
 
-def test_what_no_body_can_have_is_not_offered():
-    for given, place in (
-        (given_inertia(-0.03), "inertia yy of forearm"),
-        (added(5, -0.1), "armature of gamma"),
-    ):
-        assert not any(place in cause.place for cause in diagnosis(given).causes)
-
-
 def test_a_factor_beside_a_number_is_not_offered():
     """M[alpha][alpha] + a and times b: both together make any number of it and of what it is added to."""
-    given = values()
-    given[:, 0] = 0.8125 * given[:, 0] + 0.1529
-    assert diagnosis(given).causes == ()
+    assert diagnosis(added(0, 0.1529, 0.8125)).causes == ()
 
 
 def test_what_nothing_explains_names_the_entries():
     given = added(1, np.sin(3.0 * Q[:, 0]))
     given[:, 8] += np.cos(5.0 * Q[:, 1]) * QD[:, 2] ** 3
-    found = diagnosis(given)
+    found = diagnosis(given, seconds=1.0)
     assert found.differs and found.causes == () and 0.0 < found.left <= 1.0
-    assert found.entries == ("M[alpha][beta]", "h[gamma]") and set(found.entries) <= set(found.sentence.split())
+    assert found.entries == ("M[alpha][beta]", "h[gamma]")
 
 
 def test_only_what_is_given_is_compared():
