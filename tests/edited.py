@@ -36,10 +36,6 @@ CART = """<mujoco model="cart">
       <body name="arm" pos="0 0 0.2" quat="0.8 0 0.5 0.3">
         <joint name="swing" axis="0 1 0.3" pos="0.01 0 0" ref="0.4" armature="0.02" stiffness="5" springref="-0.3"/>
         <inertial pos="0.1 0 0.02" mass="1.2" diaginertia="0.004 0.01 0.009"/>
-        <body name="rod" pos="0.1 0.1 0">
-          <joint name="reach" type="slide" axis="0.3 1 0" ref="0.05" range="-0.2 0.3" limited="true"/>
-          <inertial pos="0 0.1 0" mass="0.4" diaginertia="0.001 0.0005 0.001"/>
-        </body>
         <body name="bob" pos="0.3 0 0" quat="0.7 0.6 0 0.1">
           <joint name="wrist" type="ball" pos="0 0.01 0" armature="0.01" stiffness="2"/>
           <inertial pos="0.03 0.02 0.1" mass="0.5" diaginertia="0.002 0.003 0.004" quat="0.9 0.2 0.1 0"/>

@@ -20,13 +20,6 @@ def test_the_states_are_spread_and_the_same_in_every_run(engines):
     assert [named.describe(k) for k in range(5)] == list(ARM.postures) == [single.name for single in named.each()]
 
 
-def test_sizes_of_a_run(engines):
-    full, quick, small = (make(ARM, engines) for make in (Setup, Setup.quick, Setup.small))
-    assert [s.of("f", "q", "s") for s in (full, quick, small)] == ["f", "q", "s"]
-    assert (full.states, full.exact_states, full.finer) == (10_000, 200, (1, 16, 128))
-    assert full.is_quick is small.is_quick is False and quick.is_quick is True
-
-
 def larger(joints):
     """The arm with this many times its joints and bodies, one chain."""
     tree, n = ARM.tree, 3 * joints
@@ -46,7 +39,7 @@ def test_a_large_robot_gets_fewer_states_with_a_note():
     assert affordable * states.seconds(robot) <= states.SECONDS_OF_EXACT and 4 < affordable < 20
     named, some = states.named(robot), states.random(robot, 100, 50)
     assert named.exact_states + some.exact_states <= affordable and named.exact_states == min(4, affordable // 2)
-    assert len(some.notes) == 1 and some.describe(1) == "state 1"
+    assert len(some.notes) == 1
     giant = larger(30)
     assert len(states.named(giant).notes) == 1 and states.of_named(giant) == 0
     some = states.random(giant, 10_000, 5)
@@ -59,5 +52,4 @@ def test_the_first_states_of_a_sample_are_a_sample():
     first = sample.first(2)
     assert first.q.tolist() == sample.q[:2].tolist() and first.qd.tolist() == sample.qd[:2].tolist()
     assert first.describe(1) == "b" and sample.first(3) is sample
-    singles = sample.each()
-    assert [single.exact_states for single in singles] == [1, 1, 0] and len(singles[2].truths) == 0
+    assert [single.exact_states for single in sample.each()] == [1, 1, 0]

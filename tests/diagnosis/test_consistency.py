@@ -63,19 +63,6 @@ def test_each_condition_is_broken_by_its_fault(mass_matrix, bias, expected):
     assert [k for k, condition in enumerate(found) if not condition.is_met] == expected
 
 
-@pytest.mark.parametrize("share, met", [(0.95, True), (1.05, False)])  # h itself is rounded by some 0.5 %
-def test_the_odd_part_just_inside_and_outside(share, met):
-    even = asked()[EVEN]
-
-    def bias(q, qd):
-        h = tmt.bias(q, qd)
-        h[even.state, 0] += share * even.tolerance * np.sign(qd[even.state, 0])
-        return h
-
-    found = asked(bias=bias)[EVEN]
-    assert found.state == even.state and found.is_met is met
-
-
 def test_derivatives_are_of_fourth_order_and_know_their_error():
     slope, error, _ = derivative(lambda t: np.array([np.sin(3.0 + 5.0 * t), (1.0 + t) ** 4]))
     exact = np.array([5.0 * np.cos(3.0), 4.0])

@@ -1,15 +1,12 @@
 """Each quantity is compared with what the other engine and the compiled code say of it: one that is off fails its own checks."""
 
-import numpy as np
 import pytest
 from edited import setup_of
 
 import tmt
-from compare.engines.tmt import Compiled
 from compare.experiment import Setup
 from compare.experiments import acceleration, gravity, kinematics, mass
-from compare.robots.arm import ARM
-from tmt import answers, literal
+from tmt import literal
 
 OF_MUJOCO = [  # the experiment, what is off (of a pair which; without gravity only), the checks of both engines that fail
     (kinematics, "com_positions", {}, {"x_b"}),
@@ -95,10 +92,3 @@ def test_an_error_of_the_compiled_functions_alone_fails_their_own_check(mujoco, 
         monkeypatch.setattr(tmt, quantity, lambda *given, right=right, **named: off(right(*given, **named)))
     names = {name for of in COMPILED[experiment].values() for name in of}
     assert failing(experiment, mujoco) == {f"{name}, compiled" for name in names}
-
-
-def test_what_is_compared_is_compiled(monkeypatch):
-    compiled = Compiled(ARM.tree)
-    monkeypatch.setattr(answers, "literal", None)  # whoever asks for that form fails
-    q = np.random.default_rng(0).uniform(-3.0, 3.0, (20, 3))
-    assert compiled.mass_matrix(q).shape == (20, 3, 3) and compiled.acceleration(q, q, q).shape == (20, 3)

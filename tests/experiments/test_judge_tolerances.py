@@ -1,25 +1,23 @@
-"""Tolerances and rules of what is compared at states, from the stated numbers written out."""
+"""Tolerances and rules of what is compared at states and with printed numbers, from the stated numbers written out."""
 
 import dataclasses
 
 import numpy as np
 import pytest
-from edited import XML, setup_of
+from edited import MOON, setup_of
 from judged import verdicts
-from model_edits import ALPHA, BETA, edited
 
 import tmt
 from compare.engines.mujoco import parse
-from compare.experiment import Setup, engines
-from compare.experiments import acceleration, gravity, kinematics, mass
+from compare.experiment import Setup
+from compare.experiments import acceleration, gravity, kinematics, mass, published
 from compare.judge.check import Result
-from compare.robots.arm import ARM
+from compare.robots.arm import ARM, PRINTED
 from compare.states import Sample
 
 EPS = 2.0**-52
 WEIGHT = 9.81 * (1.9 * 0.15 + 1.5 * 0.45)  # N m: sum of m g reach
 BOUND = 64 * EPS * 126.8333**2  # of the largest condition number
-FEW = {"states": 20, "exact_states": 1, "size": "small"}
 
 
 def tolerances(module, qd) -> dict:
@@ -28,10 +26,6 @@ def tolerances(module, qd) -> dict:
     setup.__dict__["random"] = Sample(ARM.tree, "random states", zero, np.array([qd]), zero, 1)
     checks = module.rows(setup).checks
     return {check.quantity: check.tolerance / (64 * EPS) for check in checks if check.scene == "random states"}
-
-
-def failing(result) -> set:
-    return {check.quantity for check in result.checks if not check.passed}
 
 
 def test_tolerances_are_64_eps_of_the_sums_that_are_added_up():
@@ -102,23 +96,60 @@ def test_the_worst_posture_and_its_condition_number_are_those_of_the_stated_arm(
     assert [check.passed for check in result.checks] == passes
 
 
-def test_the_worst_posture_of_each_engine_is_its_own():
-    edits = ('mass="1.5"', 'mass="2.5"'), ('"gamma" type="hinge" axis="0 1', '"gamma" type="hinge" axis="0 -1')
-    result = mass.rows(setup_of(edited(*edits), make=Setup, **FEW))
-    of_place, worst = "{}: distance from (+-90, 90) deg", result.curves["worst"]
-    assert of_place.format("MuJoCo") in failing(result) and of_place.format("TMT") not in failing(result)
-    assert worst["tmt"][0] == pytest.approx(126.83, abs=0.01) and worst["mujoco"][0] > 190.0
+# printed numbers
+
+ITEMS = {item.item: item for item in PRINTED}
 
 
-def test_damping_takes_from_energy_and_momentum_what_it_must():
-    robot = dataclasses.replace(ARM, tree=dataclasses.replace(ARM.tree, damping=(0.3, 0.1, 0.0)))
+def of_item(name, ours=0.0, theirs=0.0, scale=0.0, exactly=0.0, printed=True):
+    """The verdicts on an item: each answer is so far from what is printed, or from the exact value."""
+    item, result = ITEMS[name], Result("published")
+    value = np.array(item.values)
+    truth = value + exactly if printed else np.zeros_like(value)
+    answer = published.Answer(truth.astype(object), truth + ours, truth + theirs, scale)
+    published.check_answer(result, item, answer, ARM.joints)
+    return verdicts(result)
 
-    def rows(compiled):
-        text = edited((ALPHA, f'{ALPHA} damping="{compiled}"'), (BETA, f'{BETA} damping="0.1"'))
-        return acceleration.rows(Setup(robot, engines(parse(text, robot.tree)), **FEW))
 
-    right, failed = rows(0.3), failing(rows(0.31))
-    names = {f"{of} at MuJoCo's qdd" for of in ("dE/dt - (tau - D qd).qd", "dp_alpha/dt + D qd")}
-    assert failing(right) == set() and XML.count("damping") == 0
-    assert names | {"qdd", "tau from MuJoCo's qdd by TMT"} <= {name.removesuffix(", no gravity") for name in failed}
-    assert "tau from TMT's qdd by mj_inverse" in failed and not any("at TMT's qdd" in name for name in failed)
+@pytest.mark.parametrize("name", ["c", "f1", "g", "h"])
+@pytest.mark.parametrize("off, inside", [(0.499e-4, True), (-0.499e-4, True), (0.501e-4, False), (-0.501e-4, False)])
+def test_four_decimals_are_met_to_half_a_unit_of_the_last(name, off, inside):
+    what = ITEMS[name].quantity + " - printed"
+    assert of_item(name, ours=off) == {f"TMT: {what}": inside, f"MuJoCo: {what}": True, f"exact: {what}": True}
+    assert of_item(name, theirs=off) == {f"TMT: {what}": True, f"MuJoCo: {what}": inside, f"exact: {what}": True}
+
+
+@pytest.mark.parametrize("name", ["f2", "f3", "f4"])
+@pytest.mark.parametrize("share, inside", [(0.99, True), (1.01, False)])
+def test_what_is_zero_but_for_rounding_is_met_to_64_eps_of_its_scale(name, share, inside):
+    away = share * 64 * EPS * 1e5
+    for off, verdict in (({"ours": away}, (inside, True)), ({"theirs": away}, (True, inside))):
+        found = of_item(name, scale=1e5, printed=False, **off)
+        assert (found["TMT: qdd - exact"], found["MuJoCo: qdd - exact"]) == verdict
+
+
+@pytest.mark.parametrize("off, inside", [(0.49e-18, True), (0.51e-18, False)])
+def test_the_printed_digits_of_f2_and_f3_are_met_to_half_a_unit_of_the_last(off, inside):
+    assert of_item("f3", ours=off)["TMT: qdd - printed"] is inside
+    assert of_item("f3", exactly=off)["exact: qdd - printed"] is inside
+    assert of_item("f2", exactly=off)["exact: |qdd_alpha| - |printed|"] is inside
+
+
+def test_each_column_is_whose_it_says_and_f4_is_asked_under_the_torque_of_c():
+    of_moon = published.rows(setup_of(MOON)).rows
+    moon = {(row["item"], row["component"]): row for row in of_moon}
+    ours, least = tmt.gravity_balance(np.zeros(3)), np.linalg.eigvalsh(tmt.mass_matrix(ARM.posture("hanging")))
+    theirs = parse(MOON, tmt.ARM).of(ARM.case()).gravity_balance(np.zeros(3))
+    assert [moon["c", name]["tmt"] for name in ARM.joints] == list(ours)
+    assert [moon["c", name]["mujoco"] for name in ARM.joints] == list(theirs)
+    of_alpha = moon["c", "alpha"]
+    assert of_alpha["exact"] == pytest.approx(-2.20725) and of_alpha["tolerance"] == pytest.approx(0.5e-4, rel=1e-6)
+    for name in ("tmt", "exact"):
+        assert max(abs(float(row[name])) for row in of_moon if row["item"] == "f4") < 1e-12
+    assert max(abs(float(row["tmt"])) for row in of_moon if row["item"] == "f1") > 40.0
+    allowed = 64 * EPS * (least[-1] / least[0] + 1.0) / least[0] * 9.4176
+    assert moon["f2", "alpha"]["tolerance"] == pytest.approx(allowed, rel=1e-9)
+
+
+def test_a_robot_of_which_nothing_is_printed_is_skipped():
+    assert published.skipped(ARM) is None and published.skipped(dataclasses.replace(ARM, printed=()))

@@ -44,7 +44,7 @@ def test_a_check_passes_within_its_tolerance_only(rule, inside, outside):
             assert (check.value is None) == (value is None or not np.isfinite(value))
 
 
-@pytest.mark.parametrize("tolerance, rule", [(np.inf, "at most"), (np.nan, "at most"), (1.0, "below")])
+@pytest.mark.parametrize("tolerance, rule", [(np.inf, "at most"), (1.0, "below")])
 def test_a_check_has_a_rule_and_a_finite_tolerance(tolerance, rule):
     with pytest.raises(ValueError, match="Mbar"):
         Result("mass").check("zero", "Mbar", 0.0, tolerance, "kg m2", rule=rule)
@@ -87,12 +87,6 @@ def test_each_entry_has_its_own_tolerance_if_the_scale_has(eps, passes, entry):
 def test_a_value_that_is_no_number_fails_wherever_it_is(bad, scale):
     (check,), row = agreed([[0.0], [0.0], [bad]], [[0.0], [1e-20], [0.0]], scale)
     assert not check.passed and check.value is None and row["largest_difference"] is None and row["passed"] is False
-
-
-@pytest.mark.parametrize("value, passes", [(0.0, True), (1e-300, False)])
-def test_nothing_may_differ_where_the_scale_is_zero(value, passes):
-    (check,), _ = agreed(np.zeros((1, 2)), [[value, 0.0]], np.array([[0.0, 1.0]]))
-    assert check.passed is passes
 
 
 @pytest.mark.parametrize("eps, passes", [(63, True), (65, False)])

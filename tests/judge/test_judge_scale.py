@@ -112,11 +112,6 @@ def test_stated_hinges_alone_keep_one_number_for_each_state():
     assert isinstance(entries.scales(tmt.ARM, True, ANGLES, RATES), entries.Entries)
 
 
-def test_the_scale_of_gravity_is_the_sum_of_weights_times_reaches():
-    assert np.allclose(scale.reaches(tmt.ARM), [0.15, 0.3 + 0.15], rtol=1e-15)
-    assert scale.gravity_scale(tmt.ARM) == pytest.approx(9.81 * (1.9 * 0.15 + 1.5 * 0.45), rel=1e-15)
-
-
 def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
     """State by state and body by body, without the sums of the code under test."""
     for q, qd, size in zip(ANGLES, RATES, scale.bias_scale(tmt.ARM, ANGLES, RATES)):
