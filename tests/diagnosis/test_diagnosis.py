@@ -122,6 +122,15 @@ def test_what_nothing_explains_names_the_entries():
     assert found.entries == ("M[alpha][beta]", "h[gamma]")
 
 
+def test_only_what_is_given_is_compared():
+    found = diagnosis(packed(tmt.mass_matrix(Q, HEAVY), None, 3, len(Q)))
+    assert "mass of forearm" in {cause.place for cause in found.causes} and found.compared == 6
+
+
+def test_what_no_body_can_have_is_not_offered():
+    assert not any("armature of gamma" in cause.place for cause in diagnosis(added(5, -0.1)).causes)
+
+
 def test_without_time_options_are_still_sought():
     found = diagnosis(HEAVY, seconds=0.0)
     assert found.differs and found.causes == () and found.searched
@@ -235,3 +244,13 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     found = diagnosis(right * (1.0 + size * noise) if size < 1.0 else noise, TREE)
     assert found.differs and found.causes == ()
     assert found.digits == pytest.approx(-np.log10(size), abs=1.5) if size < 1.0 else len(found.entries) == 5
+
+
+def test_slides_have_powers():
+    """A cart with a rod: M[slide][slide] is the constant, M[slide][hinge] has cos(hinge)."""
+    cart = {"kind": ("slide", "hinge"), "axis": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "offset": ((0.0,) * 3,) * 2}
+    tree = replace(TREE, hinge_names=("cart", "rod"), **cart)
+    given = values(tree, RODS, SPEEDS)
+    given[:, 0] += 0.3 * HIP * np.cos(KNEE)
+    (cause,) = diagnosis(given, tree).causes
+    assert cause.place == "M[cart][cart]" and "0.3 cart cos(rod)" in cause.text
