@@ -1,9 +1,12 @@
 """A second robot, of four hinges: nothing in compare knows it.
 
 Its hinges branch, and stand in another order in the file; one body is fixed to the world, and two are on one hinge.
+For test_second_robot, small_runs and engines/test_mujoco_crane.
 """
 
 from pathlib import Path
+
+import numpy as np
 
 import tmt
 from compare.case import Scene
@@ -38,10 +41,7 @@ XML = """
 """
 
 
-def diagonal(x, y, z):
-    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
-
-
+MOMENTS = (0.2, 0.2, 0.3), (0.03, 0.028, 0.004), (0.012, 0.011, 0.002), (0.001, 0.0012, 0.0009), (0.002, 0.0018, 0.0009)
 TREE = tmt.Tree(
     hinge_names=("swing", "lift", "bend", "twist"),  # the file has twist before bend
     parent=(-1, 0, 1, 1),
@@ -52,13 +52,7 @@ TREE = tmt.Tree(
     body_hinge=(-1, 1, 2, 2, 3),
     mass=(4.0, 2.0, 1.2, 0.3, 0.5),
     com=((0.0, 0.1, -0.5), (0.02, 0.0, -0.2), (0.0, 0.01, -0.15), (0.03, 0.0, -0.3), (0.0, 0.05, -0.08)),
-    inertia=(
-        diagonal(0.2, 0.2, 0.3),
-        diagonal(0.03, 0.028, 0.004),
-        diagonal(0.012, 0.011, 0.002),
-        diagonal(0.001, 0.0012, 0.0009),
-        diagonal(0.002, 0.0018, 0.0009),
-    ),
+    inertia=tuple(np.diag(moments).tolist() for moments in MOMENTS),
     gravity=(0.0, 0.0, -9.81),
 )
 SHORT = {"duration": 0.25, "dt": 0.25 / 64}

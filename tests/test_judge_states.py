@@ -15,22 +15,9 @@ def test_the_states_are_spread_and_the_same_in_every_run(engines):
     assert np.array_equal(first.q, again.q) and np.array_equal(first.tau, again.tau)
     assert np.abs(first.q).max() <= np.pi and np.ptp(first.q, axis=0).min() > 6.0
     assert np.ptp(first.qd, axis=0).min() > 19.0 and np.ptp(first.tau, axis=0).min() > 19.0
-    assert not np.array_equal(first.qd, first.tau)
     named = Setup(ARM, engines).named
     assert named.exact_states == len(named.q) == 5 and np.abs(named.qd).min() > 0.0
     assert [named.describe(k) for k in range(5)] == list(ARM.postures) == [single.name for single in named.each()]
-
-
-def test_sizes_of_a_run(engines):
-    full, quick, small = (make(ARM, engines) for make in (Setup, Setup.quick, Setup.small))
-    assert [s.of("f", "q", "s") for s in (full, quick, small)] == ["f", "q", "s"]
-    assert (full.states, full.exact_states, full.finer) == (10_000, 200, (1, 16, 128))
-    assert full.is_quick is small.is_quick is False and quick.is_quick is True
-
-
-def test_a_robot_without_postures_is_compared_where_all_its_joints_are_at_zero(engines):
-    named = Setup(dataclasses.replace(ARM, postures={}, scenes=()), engines).named
-    assert len(named.states) == 1 and named.q.tolist() == [[0.0, 0.0, 0.0]]
 
 
 def larger(joints):
@@ -45,28 +32,19 @@ def larger(joints):
     return dataclasses.replace(ARM, tree=tree, postures=postures)
 
 
-def test_a_large_robot_gets_fewer_exact_states_with_a_note():
+def test_a_large_robot_gets_fewer_states_with_a_note():
     assert states.of_named(ARM) == 5 and states.affordable(ARM) > 205 and states.random(ARM, 10, 7).notes == ()
     robot = larger(9)  # 27 joints, 18 bodies
     affordable = states.affordable(robot)
     assert affordable * states.seconds(robot) <= states.SECONDS_OF_EXACT and 4 < affordable < 20
     named, some = states.named(robot), states.random(robot, 100, 50)
     assert named.exact_states + some.exact_states <= affordable and named.exact_states == min(4, affordable // 2)
-    assert len(some.notes) == 1 and f" {some.exact_states} " in some.notes[0] and " 50" in some.notes[0]
+    assert len(some.notes) == 1
     giant = larger(30)
-    assert states.of_named(giant) == states.random(giant, 5, 5).exact_states == 0
-    assert len(states.named(giant).notes) == 1
-
-
-def test_a_large_robot_gets_fewer_random_states_with_a_note():
-    some = states.random(larger(20), 10_000, 1)
-    assert len(some.q) * 3 * 60 * 40 <= states.MOST_NUMBERS < (len(some.q) + 1) * 3 * 60 * 40
-    assert f"{len(some.q):,}" in some.notes[0] and "10,000" in some.notes[0]
-
-
-def test_a_state_of_many_numbers_is_named_by_its_number():
-    assert states.random(ARM, 2, 1).describe(1).startswith("state 1: q = (")
-    assert states.random(larger(3), 2, 1).describe(1) == "state 1"
+    assert len(states.named(giant).notes) == 1 and states.of_named(giant) == 0
+    some = states.random(giant, 10_000, 5)
+    assert some.exact_states == 0 and len(some.notes) == 2
+    assert len(some.q) * 3 * 60 * 90 <= states.MOST_NUMBERS < (len(some.q) + 1) * 3 * 60 * 90
 
 
 def test_the_first_states_of_a_sample_are_a_sample():
@@ -74,5 +52,4 @@ def test_the_first_states_of_a_sample_are_a_sample():
     first = sample.first(2)
     assert first.q.tolist() == sample.q[:2].tolist() and first.qd.tolist() == sample.qd[:2].tolist()
     assert first.describe(1) == "b" and sample.first(3) is sample
-    singles = sample.each()
-    assert [single.exact_states for single in singles] == [1, 1, 0] and len(singles[2].truths) == 0
+    assert [single.exact_states for single in sample.each()] == [1, 1, 0]

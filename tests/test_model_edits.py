@@ -1,34 +1,224 @@
-"""A wrong model fails wherever it matters: edits of the MJCF x experiments, each must be seen or cannot be, with the reason."""
+"""A wrong model fails wherever it matters: edits of the MJCF x experiments, each must be seen or cannot be, with the reason.
+
+Every experiment in its smallest setting, in one process. In that of parameters each number that differs fails its own check and
+is the cause.
+"""
+
+import re
+from functools import partial
+from math import pi
 
 import pytest
-from model_edits import EDITS, EXPERIMENTS, failing
+from edited import XML, setup_of
 
-STATIC = ("parameters", "published", "kinematics", "mass", "gravity", "acceleration")
-IN_ALL = ("inertia 1 % larger",)  # whose runs are compared by default, too
-
-
-def judge(found, names, reasons):
-    """Compare the experiments of these names that fail with those that must."""
-    if found is None:
-        pytest.skip("this MuJoCo does not know what the edit asks for")
-    hidden = {experiment for experiments in reasons.values() for experiment in experiments}
-    assert found == {*names} - hidden
-
-
-@pytest.mark.parametrize("names", [STATIC, pytest.param(tuple(EXPERIMENTS), marks=pytest.mark.slow)])
-def test_the_stated_arm_fails_nowhere(names):
-    assert failing("</mujoco>", "</mujoco>", names) == set()
-
-
-@pytest.mark.parametrize("name", [name for name in EDITS if name not in IN_ALL])
-def test_a_wrong_model_fails_in_single_states(name):
-    old, new, reasons = EDITS[name]
-    judge(failing(old, new, STATIC), STATIC, reasons)
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in IN_ALL else pytest.mark.slow) for name in EDITS]
+from compare.experiment import Setup, new_causes
+from compare.experiments import (
+    acceleration,
+    gravity,
+    kinematics,
+    mass,
+    parameters,
+    published,
+    reduction,
+    speed,
+    stability,
+    trajectory,
 )
-def test_a_wrong_model_fails_wherever_it_matters(name, shared):
-    old, new, reasons = EDITS[name]
-    judge(shared(failing, old, new), EXPERIMENTS, reasons)
+from compare.judge.check import Result
+from compare.report.verdict import Section
+from compare.robots.arm import ARM
+
+ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
+FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
+STAGES_OFF = 'contact="disable" constraint="disable"'
+ON_THE_WORLD = XML.replace('<body name="fore', '</body><body name="fore').replace("</body>\n    </body>", "</body>")
+GEOM = '<geom size="0.001" pos="0.2 0.2 0.2"/>'
+TOUCHING = XML.replace("</worldbody>", f"{GEOM}</worldbody>").replace(FOREARM, FOREARM + GEOM)
+TABLE = '<body pos="1 0 0"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></worldbody>'
+TENDON = '<tendon><fixed armature="0.1"><joint joint="beta" coef="1"/></fixed></tendon>'
+
+# experiments that cannot see an edit
+MOTION = "published mass gravity acceleration trajectory speed stability reduction"
+SEEN = ""  # by all
+NO_FORCE = "kinematics"  # no masses nor forces in positions, speeds and Jacobians
+NO_WEIGHT = "kinematics gravity"  # no inertia in the torque that holds
+NO_MASS = "kinematics mass"  # it is no part of M
+NOT_AT_REST = "kinematics mass published gravity"
+NOT_AT_ZERO = "kinematics mass published"  # where springs and servos are at rest
+STANDS_STILL = OFF = f"kinematics {MOTION}"  # beside the arm; the file switches the constraint stage off
+MIRROR = MOTION  # M, torques and runs are those of the arm turned about beta the other way
+NO_PLACE = MOTION.replace("acceleration ", "")  # the equations do not depend on where the shoulder is
+NOT_TRIED = None  # with others than `parameters`
+
+EDITS = {  # by quantity: what is replaced by what; the causes: rank, place, stated, compiled; who cannot see it
+    "flag gravity": ("<flag", '<flag gravity="disable"', [(1, "flag gravity", 1, 0)], NO_MASS),
+    "flag damper": ("<flag", '<flag damper="disable"', [(1, "flag damper", 1, 0)], f"{NOT_AT_REST} acceleration speed reduction"),
+    "flag eulerdamp": ("<flag", '<flag eulerdamp="disable"', [(1, "flag eulerdamp", 1, 0)], NOT_TRIED),
+    "order": (f'{ALPHA} axis="0 1 0"/>\n      {BETA} axis="1 0 0"/>', f'{BETA} axis="1 0 0"/>\n      {ALPHA} axis="0 1 0"/>',
+              [(1, "order of alpha", 0, 1), (1, "order of beta", 1, 0)], SEEN),
+    "parent": (XML, ON_THE_WORLD, [(1, "parent of gamma", 1, -1)], NOT_TRIED),
+    "ref": (GAMMA, f'{GAMMA} ref="0.5"', [(1, "ref of gamma", 0, 0.5)], SEEN),
+    "axis": (f'{BETA} axis="1', f'{BETA} axis="-1', [(1, "axis x of beta", 1, -1)], MIRROR),
+    "anchor": ('pos="0 0 -0.3"', 'pos="0 0 -0.301"', [(2, "anchor z of gamma", -0.3, -0.301)], SEEN),
+    "anchor of all": ('name="upper_arm" pos="0 0 0"', 'name="upper_arm" pos="0 0 0.01"',
+                      [(2, f"anchor z of {of}", at, at + 0.01) for of, at in (("alpha", 0), ("beta", 0), ("gamma", -0.3))],
+                      NO_PLACE),
+    "damping": (BETA, f'{BETA} damping="0.1"', [(2, "damping of beta", 0, 0.1)], NOT_AT_REST),
+    "armature": (ALPHA, f'{ALPHA} armature="0.1"', [(2, "armature of alpha", 0, 0.1)], NO_WEIGHT),
+    "frictionloss": (BETA, f'{BETA} frictionloss="0.2"', [(2, "frictionloss of beta", 0, 0.2)], OFF),
+    "stiffness": (BETA, f'{BETA} stiffness="1"', [(2, "stiffness of beta", 0, 1)], NOT_AT_ZERO),
+    "limited": (GAMMA, f'{GAMMA} limited="true" range="-1 1"', [(2, "limited of gamma", 0, 1)], OFF),
+    "mass": ('mass="1.5"', 'mass="1.515"', [(2, "mass of forearm", 1.5, 1.515)], NO_FORCE),
+    "com": ('pos="0.15 0 0"', 'pos="0.151 0 0"', [(2, "com x of forearm", 0.15, 0.151)], SEEN),
+    "inertia": ("0.001 0.019 0.019", "0.001 0.01919 0.019", [(2, "inertia yy of forearm", 0.019, 0.01919)], NO_WEIGHT),
+    "gravcomp": ('<body name="forearm"', '<body name="forearm" gravcomp="1"', [(2, "gravcomp of forearm", 0, 1)], NO_MASS),
+    "gravity": ("-9.81", "-9.80665", [(2, "gravity z", -9.81, -9.80665)], NO_MASS),
+    "density": ("<option", '<option density="100"', [(1, "density", 0, 100)], NOT_AT_REST),
+    "viscosity": ("<option", '<option viscosity="1"', [(1, "viscosity", 0, 1)], NOT_AT_REST),
+    "other mass": ("</worldbody>", TABLE, [(2, "other mass", 0, 2)], STANDS_STILL),
+    "contact pairs": (XML, TOUCHING.replace(STAGES_OFF, ""), [(1, "contact pairs", 0, 1)], NOT_TRIED),
+    "damping beyond linear": (BETA, f'{BETA} damping="0 0.1"', [(2, "damping beyond linear", 0, 0.1)], NOT_TRIED),
+    "stiffness beyond linear": (BETA, f'{BETA} stiffness="0 0.1"', [(2, "stiffness beyond linear", 0, 0.1)], NOT_TRIED),
+    "actuator damping": ("</mujoco>", '<actuator><motor joint="beta" damping="0.1"/></actuator></mujoco>',
+                         [(2, "actuator damping", 0, 0.1)], NOT_TRIED),
+    "actuator armature": ("</mujoco>", '<actuator><motor joint="beta" armature="0.1"/></actuator></mujoco>',
+                          [(2, "actuator armature", 0, 0.1)], NOT_TRIED),
+    "tendon armature": ("</worldbody>", f"</worldbody>{TENDON}", [(2, "tendon armature", 0, 0.1)], NO_WEIGHT),
+    "no forces of actuators": ("</mujoco>", '<actuator><position joint="beta" kp="3"/></actuator></mujoco>',
+                               [(2, "forces of actuators", 0, pytest.approx(3.0 * pi, rel=0.05))], NOT_AT_ZERO),
+}  # fmt: skip
+
+
+def edited(*edits) -> str:
+    """The arm's file with each of these replaced, which must be there once."""
+    text = XML
+    for old, new in edits:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return text
+
+
+KNOWN = {}  # what TMT gives, the same for every edit
+FOLLOWED = tuple(case for case in ARM.cases if case.name in ("bent, free", "bent, damped"))
+
+
+def follow(setup) -> Result:
+    result = Result("trajectory")
+    for case in FOLLOWED:
+        result.checks += trajectory.runs.follow(case, setup.engines, setup.finer, KNOWN).checks
+    return result
+
+
+def linearise(setup) -> Result:
+    result = Result("stability")
+    stability.check_equilibria(result, setup)
+    return result
+
+
+STATES = {
+    module.__name__.split(".")[-1]: module.rows for module in (published, kinematics, mass, gravity, acceleration)
+}
+RUNS = {
+    "trajectory": follow,
+    "speed": partial(speed.rows, timed=False),
+    "stability": linearise,
+    "reduction": partial(reduction.rows, timed=False),
+}
+
+
+@pytest.mark.parametrize("experiments", [STATES, pytest.param(RUNS, marks=pytest.mark.slow)], ids=["states", "runs"])
+@pytest.mark.parametrize("name", [None, *(name for name, (*_, unseen) in EDITS.items() if unseen is not None)])
+def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
+    old, new, _, unseen = EDITS[name] if name else ("</mujoco>", "</mujoco>", [], " ".join(experiments))
+    try:
+        setup = setup_of(edited((old, new)), Setup, states=20, exact_states=1, finer=(1,), size="small")
+    except ValueError:
+        pytest.skip("this MuJoCo does not know what the edit asks for")
+    failing = {each for each, rows in experiments.items() if not all(check.passed for check in rows(setup).checks)}
+    assert failing == experiments.keys() - set(unseen.split())
+
+
+# the cause, by the experiment of parameters
+
+OF_A_SOLUTION = "rest"  # compared with a solution alone
+BODY = '<body name="forearm" pos="0 0 -0.3"'
+SERVO = EDITS["no forces of actuators"][:2]
+
+
+def found(text):
+    """What the experiment finds of a model in MJCF text."""
+    result = parameters.rows(setup_of(text, make=Setup, states=20))
+    failed = {check.quantity for check in result.checks if not check.passed}
+    assert bool(failed) == bool(result.curves["causes"])
+    return failed, result.curves["causes"]
+
+
+def places(text):
+    return [cause["place"] for cause in found(text)[1]]
+
+
+def test_every_quantity_is_one_that_can_differ():
+    assert EDITS.keys() >= parameters.QUANTITIES.keys() - {OF_A_SOLUTION}
+    assert found(XML) == (set(), [])
+
+
+@pytest.mark.parametrize("quantity", EDITS)
+def test_a_number_that_differs_fails_its_own_check_and_is_the_cause(quantity):
+    old, new, causes, _ = EDITS[quantity]
+    try:
+        failed, known = found(edited((old, new)))
+    except ValueError:
+        if quantity == "flag damper":  # one flag for springs and dampers before there were two
+            failed, known = found(edited((old, '<flag passive="disable"')))
+        elif quantity in parameters.NOT_HAD:
+            pytest.skip("this MuJoCo does not have it")
+        else:
+            raise
+    assert quantity.removesuffix(" of all") in failed
+    assert [(c["rank"], c["place"], c["stated"], pytest.approx(c["found"], rel=1e-14)) for c in known] == causes
+
+
+@pytest.mark.parametrize("off, fails", [(60, False), (70, True)])
+def test_a_parameter_is_compared_within_64_eps_and_told_with_all_its_digits(off, fails):
+    mass = 1.5 * (1.0 + off * 2.0**-52)
+    failed, causes = found(edited(('mass="1.5"', f'mass="{mass!r}"')))
+    assert bool(failed) is fails
+    assert all(cause["text"].index("1.5 kg") < cause["text"].index(repr(mass)) for cause in causes)
+
+
+def test_causes_come_by_rank_then_by_size():
+    """Not in the order in which numbers are read: mass, CoM, air."""
+    edits = (
+        ('mass="1.9"', 'mass="1.9000001"'),
+        ('pos="0.15 0 0"', 'pos="0.151 0 0"'),
+        ("<option ", '<option density="1.2" '),
+    )
+    causes = found(edited(*edits))[1]
+    assert [cause["place"] for cause in causes] == ["density", "com x of forearm", "mass of upper arm"]
+    assert re.findall(r"\d\.\d+", causes[1]["text"]) == ["0.15", "0.151"]  # the stated number first
+
+
+def test_a_force_that_no_number_explains_is_the_cause():
+    assert set(places(edited(SERVO, ('mass="1.5"', 'mass="1.501"')))) == {"forces of actuators", "mass of forearm"}
+    held = "</mujoco>", '<equality><joint joint1="gamma" polycoef="0.3 0 0 0 0"/></equality></mujoco>'
+    assert places(edited(held, ('constraint="disable" ', ""))) == ["forces of constraints and contacts"]
+
+
+def test_geoms_that_cannot_touch_are_no_cause():
+    """They are excluded, or MuJoCo has no contact stage."""
+    excluded = '<contact><exclude body1="world" body2="forearm"/></contact></mujoco>'
+    for stages, end in (('contact="disable"', "</mujoco>"), ('constraint="disable"', "</mujoco>"), ("", excluded)):
+        assert places(TOUCHING.replace(STAGES_OFF, stages).replace("</mujoco>", end)) == []
+
+
+@pytest.mark.parametrize("edits, causes", [
+    ([('"0.015 0.014 0.002"', '"0.002 0.014 0.015"')], ["axes x and z of the inertia of upper arm exchanged"]),
+    ([('mass="1.9"', 'mass="3.9"'), ('pos="0.15 0 0"', 'pos="0.16 0 0"')], ["mass of upper arm", "com x of forearm"]),
+    # 90 degrees where radians are meant
+    ([(BODY, f'{BODY} euler="0 90 0"'), (GAMMA, f'{GAMMA} damping="0.1"')], ["zero of gamma", "damping of gamma"]),
+    ([(BETA, f'{BETA} pos="0.01 0 0"')], ["anchor x of beta", "com x of upper arm"]),
+])  # fmt: skip
+def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, causes):
+    setup = setup_of(edited(*edits), make=Setup, states=20)
+    sections = [Section("parameters", "", "", "", parameters.rows(setup))]
+    assert [cause["place"] for cause in new_causes(setup, sections, [])] == causes

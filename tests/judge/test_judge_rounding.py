@@ -14,17 +14,20 @@ from tmt.methods import METHODS, amplification
 from tmt.model.coordinates import coordinates_of
 
 EPS = 2.0**-52
+EULER = METHODS["semi_implicit_euler"]
 TURN = tmt.Tree(  # one hinge without gravity: a linear system, and nothing but a sum of roundings
     hinge_names=("turn",), parent=(-1,), offset=((0.0, 0.0, 0.0),), axis=((0.0, 0.0, 1.0),), damping=(0.0,),
     body_names=("disc",), body_hinge=(0,), mass=(1.0,),
     com=((0.0, 0.0, 0.0),), inertia=(((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)),),
     gravity=(0.0, 0.0, 0.0),
 )  # fmt: skip
+TORQUE = np.array([3.0])
 
 
-def turning(steps, dt, torque=3.0, rate=5.0):
+def turning(steps, dt, rate=5.0):
     """States of the disc under a constant torque, and the rounding of each step as the report states it."""
-    t, a = dt * np.arange(steps + 1), torque / 2.0
+    t, torque = dt * np.arange(steps + 1), TORQUE[0]
+    a = torque / 2.0
     q, qd = 1.0 + rate * t + a * t**2 / 2, rate + a * t
     rounding = (64 * EPS * 2.0 * a + 64 * EPS * torque) / 2.0
     rates = dt * rounding + 8 * EPS * (qd + dt * a)
@@ -34,20 +37,12 @@ def turning(steps, dt, torque=3.0, rate=5.0):
 def test_what_a_controller_feeds_back_is_rounded_too():
     """64 eps of |P| |q| + |S| |qd|, of the disc whose torque these gains all but take away."""
     driven = dataclasses.replace(TURN, position_gain=((50.0,),), speed_gain=((4.0,),))
-    q, qd, tau, M = np.array([[1.0], [-3.0]]), np.array([[5.0], [-2.0]]), np.array([3.0]), 2.0
+    q, qd, M = np.array([[1.0], [-3.0]]), np.array([[5.0], [-2.0]]), 2.0
     fed = 50.0 * np.abs(q) + 4.0 * np.abs(qd)
     assert gain_scale(driven, q, qd) == pytest.approx(fed) and not gain_scale(TURN, q, qd).any()
-    _, size, bound = slope_rounding(METHODS["rk4"], driven, q, qd, tau, 0.1)
+    _, size, bound = slope_rounding(METHODS["rk4"], driven, q, qd, TORQUE, 0.1)
     assert size == pytest.approx(np.abs(3.0 - 50.0 * q - 4.0 * qd)[:, 0] / M)
     assert bound == pytest.approx(64 * EPS * (M * size + 3.0 + fed[:, 0]) / M, rel=1e-9)
-
-
-@pytest.mark.parametrize("method", ["semi_implicit_euler", "rk4"])
-def test_the_rounding_of_a_step_is_64_eps_of_the_solve_and_8_eps_of_the_sums(method):
-    q, qd, angles, rates = turning(8, 0.1)
-    found = step_rounding(METHODS[method], TURN, q, qd, np.array([3.0]), 0.1)
-    # the stages of RK4 lie ahead of the state, where nothing of the disc's sums is larger
-    assert found == pytest.approx(np.stack([angles, rates], axis=1), rel=1e-9)
 
 
 def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
@@ -61,37 +56,21 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     expected = [8 * EPS * (q + dt * 4.0) + dt * rates, rates]
     at = tree, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt
     assert step_rounding(METHODS["explicit_euler"], *at)[0] == pytest.approx(expected, rel=1e-9)
-    implicit = step_rounding(METHODS["semi_implicit_euler"], *at)
-    assert 0.85 < implicit[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
+    assert 0.85 < step_rounding(EULER, *at)[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
 
 
-@pytest.mark.parametrize("every", [1, 4, 64])
+@pytest.mark.parametrize("every", [1, 64])
 def test_the_band_is_the_sum_of_what_each_step_adds_carried_to_the_present(every):
     """J of the disc is ((1, dt), (0, 1)): an error of rate becomes m dt times as much of angle after m steps."""
     steps, dt = 128, 0.05
     q, qd, angles, rates = turning(steps, dt)
-    found = band(METHODS["semi_implicit_euler"], TURN, q, qd, np.array([3.0]), dt, every)
+    found = band(EULER, TURN, q, qd, TORQUE, dt, every)
     assert found.shape == (steps // every + 1, 2) and not found[0].any()
     for row, n in zip(found[1:], range(every, steps + 1, every)):
         k = np.arange(n)
         # an error of rate reaches the angle in its own step through the sum, in each later one through dt
         expected = [(angles[:n] + (n - 1 - k) * dt * rates[:n]).sum(), rates[:n].sum()]
         assert row == pytest.approx(expected, rel=1e-9 if every == 1 else 0.04)
-
-
-@pytest.mark.parametrize("share, inside", [(0.999, True), (1.001, False)])
-def test_errors_of_every_step_within_its_bound_stay_in_the_band_and_larger_ones_leave_it(share, inside):
-    """Each step is off by a share of its bound, all to one side; a million times as large, so that nothing else counts."""
-    steps, dt, tau, large = 64, 0.05, np.array([3.0]), 1e6
-    q, qd, *delta = turning(steps, dt)
-    path = tmt.simulate(q[0], qd[0], tau, dt, steps, "semi_implicit_euler", TURN)[1:]
-    width = band(METHODS["semi_implicit_euler"], TURN, *path, tau, dt)
-    state = [q[0], qd[0]]
-    for k in range(steps):
-        state = [x[1] for x in tmt.simulate(*state, tau, dt, 1, "semi_implicit_euler", TURN)[1:]]
-        state = [x + large * share * d[k] for x, d in zip(state, delta)]
-        off = np.concatenate([x - p[k + 1] for x, p in zip(state, path)])
-        assert (np.abs(off) <= large * width[k + 1]).all() == inside
 
 
 def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():
@@ -106,10 +85,10 @@ def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():
 
 
 def test_the_rounding_of_a_turn_is_that_of_a_product_of_quaternions():
-    """Of 300 movements and differences of a ball, beside 50 digits: no more than what the bound counts for them."""
+    """Of 100 movements and differences of a ball, beside 50 digits: no more than what the bound counts for them."""
     ball, rng = coordinates_of(("ball",)), np.random.default_rng(3)
     turned, measured = [], []
-    for _ in range(300):
+    for _ in range(100):
         p, u = rng.normal(size=4), rng.uniform(-2.0, 2.0, 3)
         p, near = p / np.linalg.norm(p), np.array(ball.move(list(p / np.linalg.norm(p)), list(1e-9 * u)))
         found = ball.move(list(p), list(u))
@@ -131,23 +110,18 @@ def test_a_slide_is_rounded_by_its_length_and_a_ball_by_a_whole_turn():
     )  # fmt: skip
     q, qd = np.array([[2.0, 0.6, 0.0, 0.8, 0.0]]), np.array([[1.0, 0.0, 0.0, 4.0]])
     (found,) = step_rounding(METHODS["rk4"], tree, q, qd, np.zeros(4), 1e-3)
-    rates = found[4:]
-    expected = 8 * EPS * np.array([2.0 + 1e-3, 4.0, 4.0, 4.0 + 4e-3]) + 1e-3 * rates
+    expected = 8 * EPS * np.array([2.0 + 1e-3, 4.0, 4.0, 4.0 + 4e-3]) + 1e-3 * found[4:]
     assert found[:4] == pytest.approx(expected, rel=1e-12) and OF_A_BALL == 8 * EPS * 4.0
 
 
-def test_from_where_a_run_diverges_the_band_is_infinite_and_the_growth_no_number():
-    q, qd, *_ = turning(8, 0.1)
+def test_the_band_is_infinite_from_where_a_run_diverges_or_after_the_steps_that_are_asked_for():
+    q, qd, *_ = turning(16, 0.1)
+    run = METHODS["rk4"], TURN, q, qd, TORQUE, 0.1
+    whole, part = (band(*run, 4, most) for most in (None, 11))
+    assert np.array_equal(part[:3], whole[:3]) and np.isinf(part[3:]).all() and np.isfinite(whole).all()
     q[5:] = np.nan
-    run = METHODS["rk4"], TURN, q, qd, np.array([3.0]), 0.1
     width, grown = band(*run), growth(*run, every=2)
     assert np.isfinite(width[:5]).all() and np.isinf(width[5:]).all()
-    assert np.isfinite(grown[:3]).all() and np.isnan(grown[3:]).all() and len(grown) == 5
+    assert np.isfinite(grown[:3]).all() and np.isnan(grown[3:]).all()
     q[0] = np.nan
     assert np.isinf(band(*run)[1:]).all()
-
-
-def test_a_band_of_so_many_steps_at_most_is_infinite_after_them():
-    q, qd, *_ = turning(16, 0.1)
-    whole, part = (band(METHODS["rk4"], TURN, q, qd, np.array([3.0]), 0.1, 4, most) for most in (None, 11))
-    assert np.array_equal(part[:3], whole[:3]) and np.isinf(part[3:]).all() and np.isfinite(whole).all()

@@ -43,17 +43,13 @@ def summed(of_body) -> np.ndarray:
     return np.array([sum(COUNT[b] * of_body(b, s, L) for b in range(3)) for s, L in enumerate(LENGTH)])
 
 
-def test_the_reach_has_what_slides_have_moved():
+def test_lengths_have_what_slides_have_moved():
     assert np.allclose(scale.reaches(TREE, Q)[0], [0.3 + 0.75 + 0.1, LENGTH[0], 0.6 + 0.3], rtol=1e-14)
     assert np.allclose(scale.reaches(TREE), [0.4, LENGTH[1], 0.9], rtol=1e-14)
     assert scale.gravity_scale(TREE, Q)[0] == pytest.approx(5.0 * np.dot(TREE.mass, [1.15, LENGTH[0], 0.9]), rel=1e-14)
     assert np.allclose(OF.length, LENGTH, rtol=1e-14)
-
-
-def test_a_column_of_a_slide_has_no_length():
-    T = np.broadcast_to(OF.T, (2, 3, 3, 6))
-    for b in range(3):
-        assert np.allclose(T[0, b, 1], COUNT[b] * (SLIDES[b] + LENGTH[0] * TURNS[b]))
+    for b, T in enumerate(np.broadcast_to(OF.T, (2, 3, 3, 6))[0]):
+        assert np.allclose(T[1], COUNT[b] * (SLIDES[b] + LENGTH[0] * TURNS[b]))
         assert np.allclose(OF.B[0, b], COUNT[b]) and np.allclose(OF.positions[:, b, 0], COUNT[b] * LENGTH)
 
 
@@ -65,8 +61,6 @@ def test_the_mass_matrix_sums_every_term_where_it_is_largest():
         )
     ) + np.diag(TREE.armature)
     assert np.allclose(OF.mass_matrix, expected, rtol=1e-13)
-    assert (OF.mass_matrix >= np.abs(tmt.mass_matrix(Q, TREE))).all()
-    assert OF.mass_matrix[0, 1, 5] == 0.0  # no body is moved by both
 
 
 def test_forces_sum_weight_springs_and_what_moves():
@@ -81,7 +75,6 @@ def test_forces_sum_weight_springs_and_what_moves():
         return newton * (SLIDES[b] + L * TURNS[b]) + (TREE.mass[b] * V**2 + LARGEST[b] * S**2) * TURNS[b]
 
     assert np.allclose(OF.bias, summed(moving) + weight, rtol=1e-13)
-    assert np.array_equal(OF.bias[1], OF.weight[1])  # at rest
     tau, drag = np.full(6, 3.0), np.array(TREE.damping) * np.abs(QD)
     assert np.allclose(OF.force(tau)[0], OF.bias[0] + 3.0 + drag[0] + springs[0], rtol=1e-14)
 
@@ -104,18 +97,6 @@ def test_errors_go_through_the_inverse_entry_by_entry():
     assert np.allclose(OF.change(qdd)[0], OF.closing(OF.force(), qdd)[0])
 
 
-def test_without_gravity_at_rest_nothing_is_allowed():
-    weightless = dataclasses.replace(TREE, gravity=(0.0, 0.0, 0.0))
-    of = entries.Entries(weightless, Q[1:], QD[1:])
-    assert not of.bias.any() and not of.weight.any() and of.acceleration(of.force(1.0), 0.0).min() > 0.0
-
-
-def test_units_are_those_of_the_joints_that_there_are():
-    assert entries.unit(tmt.ARM, "N m", "N") == "N m" and entries.unit(TREE, "N m", "N") == "N m or N"
-    sliding = dataclasses.replace(tmt.ARM, kind=("slide",) * 3)
-    assert entries.unit(sliding, "N m", "N") == "N"
-
-
 # the stated arm: one number for each state
 
 ANGLES, RATES = np.random.default_rng(3).uniform(-4, 4, (2, 20, 3))
@@ -131,13 +112,6 @@ def test_stated_hinges_alone_keep_one_number_for_each_state():
     assert isinstance(entries.scales(tmt.ARM, True, ANGLES, RATES), entries.Entries)
 
 
-def test_the_scale_of_gravity_is_the_sum_of_weights_times_reaches():
-    assert np.allclose(scale.reaches(tmt.ARM), [0.15, 0.3 + 0.15], rtol=1e-15)
-    assert scale.gravity_scale(tmt.ARM) == pytest.approx(9.81 * (1.9 * 0.15 + 1.5 * 0.45), rel=1e-15)
-    other = dataclasses.replace(tmt.ARM, gravity=(0.0, 3.0, -4.0))
-    assert scale.gravity_scale(other) == pytest.approx(5.0 * (1.9 * 0.15 + 1.5 * 0.45), rel=1e-15)
-
-
 def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
     """State by state and body by body, without the sums of the code under test."""
     for q, qd, size in zip(ANGLES, RATES, scale.bias_scale(tmt.ARM, ANGLES, RATES)):
@@ -149,7 +123,6 @@ def test_the_scale_of_the_bias_is_the_sum_of_its_absolute_terms():
             moment = np.abs(inertia @ w[b]) + np.abs(np.cross(omega, inertia @ omega))
             terms += np.abs(T[b]).T @ (tmt.ARM.mass[b] * np.abs(v[b])) + np.abs(B[b]).T @ moment
         assert size == pytest.approx(terms.max() + 9.4176, rel=1e-12)
-    assert np.allclose(scale.bias_scale(tmt.ARM, ANGLES, 0.0 * RATES), 9.4176, rtol=1e-14)
 
 
 def test_the_scales_of_mass_and_acceleration():

@@ -1,8 +1,5 @@
 """`compare diagnosis`: a file or one's own equations beside the reference, and its place beside other experiments."""
 
-from types import SimpleNamespace
-
-import numpy as np
 import pytest
 from edited import XML, setup_of
 from small_runs import Here, Lines
@@ -24,24 +21,25 @@ def test_the_arm_has_nothing_to_explain(monkeypatch):
     setup = setup_of()
     result = diagnosis.rows(setup)
     assert failed(result) == [] and result.rows == [] and result.curves["causes"] == []
-    steps = [check.quantity for check in result.checks if "one step of" in check.quantity]
-    assert len(steps) == len(setup.engines["mujoco"].methods)
     monkeypatch.setattr(single_steps, "MOST_SPEEDS_STEPPED", 2)
-    assert len(diagnosis.rows(setup_of()).checks) == len(result.checks) - len(steps)
+    assert len(diagnosis.rows(setup_of()).checks) == len(result.checks) - len(setup.engines["mujoco"].methods)
+    found = setup.background["diagnosis"]  # a ratio of 1 is allowed
+    for k, field in enumerate(("ratio", "force_ratio")):
+        for ratio, passes in ((1.0, True), (1.001, False)):
+            setup.background["diagnosis"] = found._replace(steps=(), **{field: ratio})
+            assert diagnosis.rows(setup).checks[k].passed is passes
 
 
 def test_a_cause_is_a_row_a_note_of_the_check_that_fails_and_a_bar_of_the_figure():
     result = diagnosis.rows(setup_of(HEAVY))
     (row,), (check,), (cause,) = result.rows, failed(result), result.curves["causes"]
-    assert list(row) == ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
     assert row["explains"] == pytest.approx(1.51, rel=1e-12) and row["left_over"] < 1e-9
     named = {"rank": 2, "kind": "number", "place": "mass of forearm", "stated": 1.5, "unit": "kg", "tied": 0}
     assert row.items() >= named.items() and (cause["place"], cause["found"]) == (row["place"], row["explains"])
     assert "mass of forearm" in check.note and "1.51 kg" in check.note
     ((name, figure, caption),) = [draw() for draw in diagnosis.figures(result, None)]
-    (ax,) = figure.axes
     assert name == "diagnosis_nearest" and "mass of forearm" in caption
-    assert ax.get_xscale() == "log" and len(ax.patches) == len(result.curves["nearest"])
+    assert len(figure.axes[0].patches) == len(result.curves["nearest"])
     assert list(diagnosis.figures(Result("diagnosis"), None)) == []
 
 
@@ -54,51 +52,24 @@ def test_damping_is_seen_in_accelerations_alone():
 def test_a_wrong_integrator_is_named_where_all_else_agrees():
     setup = setup_of()
     methods = setup.engines["mujoco"].methods
-    setup.engines["mujoco"].methods = methods | {"Euler": methods["Euler"]._replace(scheme="implicit")}
+    setup.engines["mujoco"].methods = {"Euler": methods["Euler"]._replace(scheme="implicit")}
     result = diagnosis.rows(setup)
     (check,), (row,) = failed(result), result.rows
     assert "Euler" in check.quantity
     assert (row["place"], row["stated"], row["explains"]) == ("scheme", "implicit", "semi_implicit_euler")
 
 
-def test_a_ratio_of_one_is_allowed():
-    setup = setup_of()
-    found = diagnosis.diagnosed(setup)
-    for k, field in enumerate(("ratio", "force_ratio")):
-        for ratio, passes in ((1.0, True), (1.001, False)):
-            setup.background["diagnosis"] = found._replace(steps=(), **{field: ratio})
-            assert diagnosis.rows(setup).checks[k].passed is passes
-
-
-def test_values_that_are_no_numbers_fail():
-    setup = setup_of()
-    right = setup.engines["mujoco"].of
-
-    def broken(case):
-        dynamics = right(case)
-        values = {name: getattr(dynamics, name) for name in ("bias", "acceleration")}
-        return SimpleNamespace(mass_matrix=lambda q: dynamics.mass_matrix(q) * np.nan, **values)
-
-    setup.engines["mujoco"].of = broken
-    assert not diagnosis.rows(setup).checks[0].passed
-
-
 @pytest.mark.parametrize(
     "names, text, made, found",
     [
-        (["mass", "diagnosis"], XML, ["mass"], []),
+        (["mass", "diagnosis"], XML, ["mass"], []),  # nothing failed
         (["mass", "diagnosis"], HEAVY, ["mass", "diagnosis"], ["mass of forearm"]),
         (["diagnosis"], XML, ["diagnosis"], []),
     ],
-    ids=["nothing failed", "one failed", "alone"],
 )
-def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path):
-    sections, causes, reasons = experiment.examine(names, setup_of(text), tmp_path, Lines(), Here())
+def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path, monkeypatch):
+    monkeypatch.setattr(experiment, "find_causes", lambda setup: [])  # not by parameters, but in the values
+    setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
+    sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), Here())
     assert [section.name for section in sections] == made and list(reasons) == [n for n in names if n not in made]
     assert [cause["place"] for cause in causes] == found
-
-
-def test_what_parameters_do_not_name_is_sought_in_the_values(tmp_path, monkeypatch):
-    monkeypatch.setattr(experiment, "find_causes", lambda setup: [])
-    _, causes, _ = experiment.examine(["mass"], setup_of(HEAVY), tmp_path, Lines(), Here())
-    assert [(cause["place"], cause["found"]) for cause in causes] == [("mass of forearm", pytest.approx(1.51))]
