@@ -1,4 +1,4 @@
-"""A scene followed by both engines: each level by its own bound, which rules are applied, what is kept; joints of all kinds."""
+"""A scene followed by both engines: each level by its own bound, which rules are applied, what is kept."""
 
 import numpy as np
 import pytest
@@ -7,15 +7,14 @@ from trajectory_curves import DAMPED, FREE, HELD
 
 import tmt
 from compare.engines.mujoco import parse, reading
-from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
+from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
-from compare.experiments.trajectory import derivative, horizon, leaving, runs, sentences
+from compare.experiments.trajectory import derivative, horizon, runs, sentences
 from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import engines as engines_of
-from tmt.methods import METHODS, one_step
 
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("derivative", "one step", "open loop")}
 
@@ -34,7 +33,7 @@ def damped():
 def judged_with(mujoco, mine, case=DAMPED, result=None) -> dict:
     """The checks of a run whose TMT side may be edited, by quantity."""
     result = result or Result("trajectory")
-    runs.compare_runs(result, case, mujoco.of(case), case.steps, [OF_MUJOCO["RK4"]], mine)
+    runs.compare_runs(result, case, mujoco.of(case), case.steps, [METHODS["RK4"]], mine)
     return {check.quantity: check for check in result.checks}
 
 
@@ -89,26 +88,6 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
     assert {row["diverged_at_s"] for row in result.rows} == {kept["ended"]["mujoco"]}
 
 
-@pytest.mark.parametrize("more", [0.0, 1e-15])
-def test_an_integrator_of_other_bits_is_seen(more, mujoco):
-    dynamics, result = mujoco.of(FREE), Result("trajectory")
-    run = dynamics.run
-
-    def other(*arguments):
-        motion = run(*arguments)
-        return motion._replace(q=motion.q + more * (arguments[-1] == "implicitfast"))
-
-    dynamics.run = other
-    runs.compare_runs(result, FREE, dynamics, 64, [OF_MUJOCO["Euler"], OF_MUJOCO["implicitfast"]], side(FREE))
-    assert [check.passed for check in result.checks if check.quantity == "the same bits as Euler"] == [more == 0.0]
-
-
-def test_a_run_of_which_nothing_is_judged_is_said(engines):
-    case = FREE.changed(duration=1 / 64, dt=1 / 512)
-    notes = [runs.follow(case, engines, (1,), entries=entries).notes for entries in (0, 100_000)]
-    assert [any("RK4, 8 steps" in note for note in of_run) for of_run in notes] == [True, False]
-
-
 def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the_scene_itself_has():
     """Of 40 hinges a step has 6400 entries."""
     assert runs.counts(FREE, (1, 16, 128)) == [64, 1024, 8192] and runs.counts(FREE.changed(dt=5 / 8193), (1,)) == [
@@ -124,41 +103,7 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
     assert [horizon.growth_run(long, [case], small) for small in (False, True)] == [(416 / 512, 416), (0.25, 128)]
 
 
-def test_a_start_is_moved_by_eps_of_a_radian_and_by_more_where_a_number_has_no_such_place():
-    eps = 2.0**-52
-    moved = runs.nudged(np.array([0.0, -0.5, 6.0, -6.0]))
-    np.testing.assert_array_equal(moved, [eps, -0.5 + eps, 6.0 + 4 * eps, -6.0 + 4 * eps])
-
-
-# joints of all kinds: a free body, balls, slides, hinges, springs; so short that nothing is compiled for it
-
-READ = reading.read(random_tree(2, joints=5))
-ROBOT = robot_of(READ, "kinds.xml")
-
-
-def test_every_level_of_a_run_is_compared_as_movements():
-    """From a state and its negative quaternions: the same turns, so nothing is off."""
-    coordinates, rng = ROBOT.coordinates, np.random.default_rng(0)
-    q, v = coordinates.random(rng, 5), rng.normal(size=(5, coordinates.nv))
-    other, moved = q.copy(), 1e-3 * rng.normal(size=v.shape)
-    for joint in coordinates.places.balls:
-        other[:, joint.q] *= -1.0
-    assert np.abs(runs.off_by(coordinates, (q, v), (other, v))).max() < 1e-14
-    off = runs.off_by(coordinates, (coordinates.move(q, moved), v + moved), (other, v))
-    assert off == pytest.approx(np.hstack([moved, moved]), abs=1e-13)
-
-
-def test_the_derivative_of_the_bias_is_that_of_mujoco():
-    result = Result("trajectory")
-    derivative.compare_derivatives(result, ROBOT, engines_of(reading.engine(READ)))
+def test_the_derivative_of_the_bias_is_that_of_mujoco_for_joints_of_all_kinds():
+    read, result = reading.read(random_tree(2, joints=5)), Result("trajectory")
+    derivative.compare_derivatives(result, robot_of(read, "kinds.xml"), engines_of(reading.engine(read)))
     assert result.checks[0].passed and result.checks[0].unit == "N m s/rad or N s/m"
-
-
-def test_the_linear_map_is_that_of_rk4():
-    """Small deviations from where it is held, in movements and speeds: after a step they are where the map has them."""
-    case = ROBOT.case("held", torque="hold")
-    J, _ = leaving.linear_map(case)
-    n, off = case.coordinates.nv, 1e-6 * np.random.default_rng(1).normal(size=len(J))
-    q, v = one_step(METHODS["rk4"], case.tree, case.coordinates.move(case.q, off[:n]), off[n:], case.tau, case.scene.dt)
-    found = np.concatenate([case.coordinates.difference(np.array(q), case.q), v])
-    assert found == pytest.approx(J @ off, abs=1e-3 * np.abs(J @ off).max())

@@ -1,12 +1,13 @@
 """The motion of the runs: its table, the pictures of it, who leaves when and where to, and the GIF."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
+from models import PATHS
 from PIL import Image
-from trajectory_curves import CASES, HELD
+from trajectory_curves import CASES, HELD, run_of
 
 from compare.coordinates import Coordinates
 from compare.engines import GRID, compared
@@ -16,16 +17,11 @@ from compare.experiments.trajectory import motion
 from compare.experiments.trajectory import motion_frames as frames
 from compare.experiments.trajectory.runs import follow
 from compare.judge.check import Result
-from compare.judge.run import departure
 from compare.robots.arm import ARM, landmarks
 from compare.robots.file import robot_of
 from compare.robots.stick import as_seen, stick_figure
 
-CATCH, SWING = (
-    CASES[name] for name in ("ball catch, free", "elbow swing")
-)  # in the first a method of order 1 diverges
-ABOUT = ["scene", "engine", "integrator", "dt_s", "t_s"]
-OF_ARM = [f"q_{name}_rad" for name in ARM.joints] + [f"qd_{name}_rad_per_s" for name in ARM.joints]
+CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
 METHOD = {"tmt": "rk4", "mujoco": "RK4"}
 
 
@@ -38,30 +34,26 @@ def runs(engines):
 # the table
 
 
-def table_of(curves, robot=ARM) -> tuple[Result, pd.DataFrame]:
+def tabulated(curves, robot=ARM) -> Result:
     result = Result("trajectory", curves={"runs": curves})
     motion.tabulate_motion(result, robot)
-    return result, pd.DataFrame(result.tables["motion"], columns=ABOUT + motion.motion_columns(robot.coordinates))
+    return result
 
 
-def test_every_run_of_a_scene_has_65_equal_times_its_own_values_and_none_after_it_has_diverged(runs, engines):
-    result, table = table_of(runs | follow(SWING, engines, (1,)).curves)
-    assert list(table.columns) == ABOUT + OF_ARM and result.filed == ("motion",) and result.notes == []
-    methods = engines["mujoco"].methods
-    assert len(table) == 2 * (len(methods) + len({method.scheme for method in methods.values()})) * (GRID + 1)
-    for _, run in table.groupby(["scene", "engine", "integrator"]):
-        assert run["dt_s"].unique().tolist() == [5.0 / 64]  # of the two steps that were run the scene's own
-        np.testing.assert_array_equal(run["t_s"], np.arange(GRID + 1) * (5.0 / 64))
+def test_every_run_of_a_scene_has_65_equal_times_its_own_values_and_none_after_it_has_diverged(runs):
+    result, columns = tabulated(runs), motion.motion_columns(ARM.coordinates)
+    assert result.filed == ("motion",) and result.notes == []
     for scheme, integrator in (("rk4", "RK4"), ("semi_implicit_euler", "Euler")):
         curve = runs[CATCH.name, scheme, 64]
-        for engine, name in (("tmt", scheme), ("mujoco", integrator)):
-            run = table[(table.scene == CATCH.name) & (table.engine == engine) & (table.integrator == name)]
-            alive = curve["t"] < (np.inf if curve["ended"][engine] is None else curve["ended"][engine])
+        for of in (("tmt", scheme), ("mujoco", integrator)):
+            run = [row for row in result.tables["motion"] if (row["engine"], row["integrator"]) == of]
+            about = [(row["scene"], row["dt_s"], row["t_s"]) for row in run]
+            assert about == [(CATCH.name, 5 / 64, k * 5 / 64) for k in range(GRID + 1)]  # by the scene's own step
+            alive = curve["t"] < (np.inf if curve["ended"][of[0]] is None else curve["ended"][of[0]])
             assert alive.all() == (scheme == "rk4") and alive[0]
-            expected = np.where(alive[:, None], np.concatenate(curve[engine], axis=1), np.nan)
-            np.testing.assert_array_equal(run[OF_ARM].to_numpy(float), expected)
-    swing = table[table.scene == SWING.name]  # of locked joints too
-    assert (swing[OF_ARM[:2]].to_numpy(float) == SWING.posture[:2]).all() and (swing[OF_ARM[3:5]] == 0.0).all(axis=None)
+            expected = np.where(alive[:, None], np.concatenate(curve[of[0]], axis=1), np.nan)
+            found = np.array([[row[column] for column in columns] for row in run], dtype=float)
+            np.testing.assert_array_equal(found, expected)
 
 
 def test_a_run_ends_in_the_table_at_the_very_state_at_which_it_has_diverged():
@@ -75,18 +67,18 @@ def test_a_run_ends_in_the_table_at_the_very_state_at_which_it_has_diverged():
 
 
 def test_a_scene_whose_steps_do_not_fall_on_the_times_says_which_run_it_shows_or_that_there_is_none(engines):
-    odd = SWING.changed(name="odd", dt=5.0 / 12)
+    odd = CASES["elbow swing"].changed(name="odd", dt=5.0 / 12)
     robot, runs = dataclasses.replace(ARM, scenes=(odd.scene,)), follow(odd, engines, (1, 16)).curves
-    result, table = table_of(runs, robot)
-    assert table["dt_s"].unique().tolist() == [5.0 / 192] and "192" in result.notes[0]
-    result, table = table_of({key: run for key, run in runs.items() if key[2] == 12}, robot)
-    assert len(table) == 0 and "odd" in result.notes[0]
+    result = tabulated(runs, robot)
+    assert {row["dt_s"] for row in result.tables["motion"]} == {5.0 / 192} and "192" in result.notes[0]
+    assert {(row["q_beta_rad"], row["qd_beta_rad_per_s"]) for row in result.tables["motion"]} == {(odd.posture[1], 0.0)}
+    result = tabulated({key: run for key, run in runs.items() if key[2] == 12}, robot)
+    assert result.tables["motion"] == [] and "odd" in result.notes[0]
 
 
 def test_columns_of_every_kind_of_joint_and_of_names_that_differ_in_signs_alone():
-    of = Coordinates(
-        ("root x", "root y", "root z", "root turn", "my knee"), ("slide", "slide", "slide", "ball", "hinge")
-    )
+    names = ("root x", "root y", "root z", "root turn", "my knee")
+    of = Coordinates(names, ("slide", "slide", "slide", "ball", "hinge"))
     assert motion.motion_columns(of) == [
         "q_root_x_m", "q_root_y_m", "q_root_z_m", "q_root_w", "q_root_x", "q_root_y", "q_root_z", "q_my_knee_rad",
         "qd_root_x_m_per_s", "qd_root_y_m_per_s", "qd_root_z_m_per_s",
@@ -117,23 +109,18 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
     assert frames.drawn_motion(CATCH, engines, {key: run for key, run in runs.items() if key[1] != "rk4"}) is None
 
 
-def test_what_is_held_is_drawn_by_its_own_step_until_both_have_left(engines):
-    """In a scene that ends between the times at which they leave, which rounding decides."""
-    dt, of_engines = HELD.scene.dt, compared(engines, HELD).items()
-    long = {name: of.run(*HELD.start, HELD.tau, dt, 128, METHOD[name]) for name, of in of_engines}
-    left = {name: departure(run.t, run.q) for name, run in long.items()}
-    if None in left.values() or left["tmt"] == left["mujoco"]:
-        pytest.skip("here both leave at the same time, or one stays")
-    case = HELD.changed(duration=round(min(left.values()) / dt) * dt, judged=0.0)
-    curves = follow(case, engines, (1, 4)).curves
-    scene, curve = frames.drawn_motion(case, engines, curves), curves[case.name, "rk4", case.steps]
-    assert sum(time is None for time in curve["left"].values()) == 1
-    assert scene.left == left and scene.run.endswith(f"/{case.steps} s")
-    assert max(left.values()) < scene.t[-1] <= max(left.values()) + 0.11 * case.duration
-    for name in left:  # what was run is drawn as it was
-        parts = 128 // case.steps
-        run = scene.points[name][: parts * case.steps + 1 : parts]
-        np.testing.assert_allclose(run, seen(curve[name][0]), atol=1e-12)
+def test_what_is_held_is_followed_until_both_have_left():
+    t = np.arange(129) * 5 / 64
+
+    def leaves(at):
+        q = HELD.q + 0.2 * (t >= at)[:, None]
+        return SimpleNamespace(run=lambda *_: SimpleNamespace(t=t, q=q, v=0.0 * q))
+
+    dynamics, both = {"tmt": leaves(6.25), "mujoco": leaves(3.75)}, {"tmt": 6.25, "mujoco": 3.75}
+    for left, end in (((None, 3.75), 6.75), ((3.75, 3.75), 5.0), ((None, None), 5.0)):
+        seen, paths, _, found = frames.followed_on(HELD, dynamics, METHOD, run_of(HELD, left=left), 64)
+        assert seen[-1] == pytest.approx(end, abs=5 / 64) and len(paths["tmt"][0]) == len(seen)
+        assert found == (both if end > 5.0 else dict(zip(both, left)))
 
 
 def test_between_two_states_stands_what_the_method_gives_with_half_a_step_and_nothing_after_divergence(runs, engines):
@@ -158,14 +145,12 @@ def test_first_comes_what_is_held_and_left_then_what_is_let_go_from_there(drawn)
 
 
 def test_a_free_body_is_a_cross_that_turns_with_it():
-    mjcf = """<mujoco><worldbody><body name="stone"><freejoint name="root"/>
-      <inertial pos="0 0 0" mass="2" diaginertia="0.05 0.05 0.05"/></body></worldbody></mujoco>"""
-    robot, half = robot_of(reading.read(mjcf), "stone.xml"), np.sqrt(0.5)
-    quarter_turn = np.array([[0.0, 0.0, 2.0, half, 0.0, 0.0, half]])  # about z
-    points, links = stick_figure(robot, quarter_turn, crosses=True)
-    assert points.shape == (1, 5, 3) and links == [(0, 1), (0, 2), (0, 3), (0, 4)]
-    turned = np.sqrt(0.15 / (1.2 * 2.0)) * np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    np.testing.assert_allclose(points[0, 2:] - [0.0, 0.0, 2.0], turned, atol=1e-15)
+    robot, half = robot_of(reading.read(PATHS["free_body"]), "stone.xml"), np.sqrt(0.5)
+    a_quarter_about_z = np.array([[0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, half, 0.0, 0.0, half]])
+    points, links = stick_figure(robot, a_quarter_about_z, crosses=True)
+    before, after = points[:, -3:] - points[:, :1]
+    assert links[-3:] == [(0, 2), (0, 3), (0, 4)] and np.abs(before).max() > 0.1
+    np.testing.assert_allclose(after, before @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], atol=1e-15)
 
 
 # the GIF
