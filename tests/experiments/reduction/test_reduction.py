@@ -1,4 +1,4 @@
-"""The whole experiment: a small run, wrong models, a robot of another kind, what is timed when; and what additions cost."""
+"""The whole experiment: a small run, joints that are locked in both engines, what each scene needs, and what additions cost."""
 
 import dataclasses
 from pathlib import Path
@@ -6,18 +6,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edited import XML, setup_of
+from models import PATHS, chain
 from trees import mjcf
 
 import tmt
 from compare.case import Scene
-from compare.engines.mujoco import ModelError, additions, engine, parse, read
-from compare.experiment import Setup, engines
+from compare.engines.mujoco import ModelError, Mujoco, additions, engine, parse, read
 from compare.experiments import reduction
-from compare.experiments.reduction import cost
+from compare.experiments.reduction import cost, needs, sub_blocks, times
 from compare.judge.check import Result
 from compare.robots import Robot
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
+from compare.setup import Setup, engines
+from compare.truth.smallest import needed, reduced
+
+
+def of_file(source) -> Setup:
+    """A robot of a file, its engines, and few states."""
+    reading = read(source)
+    return Setup.small(robot_of(reading, "robot.xml"), engines(engine(reading)))
+
+
+def failed(result) -> list[str]:
+    return [str(check) for check in result.checks if not check.passed]
 
 
 def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
@@ -31,32 +43,20 @@ def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
     drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, ARM))}
     names = ["reduction_needs", "reduction_elbow_swing", "reduction_modes", "reduction_cost_in_mujoco"]
     assert list(drawn) == names and not any("nan" in caption for caption in drawn.values())
-    assert "elliptic" in reduction.claim(ARM) and "1e-" not in reduction.tolerance(ARM)
 
 
-@pytest.mark.parametrize(
-    "old, new, fails",
-    [
-        ("-9.81", '-9.81" density="50" viscosity="1', "order of the error against the elliptic function, from 4"),
-        (
-            "</mujoco>",
-            '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>',
-            "models whose hinges can be locked",
-        ),
-    ],
-    ids=["air", "a tendon that cannot go with one joint"],
-)
-def test_a_wrong_model_fails(old, new, fails):
-    result = reduction.rows(setup_of(XML.replace(old, new)), timed=False)
-    assert fails in {check.quantity for check in result.checks if not check.passed}
+def test_a_model_whose_joints_cannot_be_locked_fails():
+    tendon = '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
+    (check,) = reduction.rows(setup_of(XML.replace("</mujoco>", tendon)), timed=False).checks
+    assert check.quantity == "models whose hinges can be locked" and not check.passed
 
 
 def test_a_robot_of_two_hinges_without_postures_and_scenes_goes_through():
     tree = dataclasses.replace(tmt.ARM.lock({"alpha": 0.3}), hinge_names=("a", "b"))
     bare = Robot("bare", Path("bare.xml"), tree, {}, ())
     result = reduction.rows(Setup.small(bare, engines(parse(mjcf(tree), tree))))
-    assert [str(check) for check in result.checks if not check.passed] == []
-    assert [figure()[0] for figure in reduction.figures(result, bare)] == ["reduction_cost_in_mujoco"]
+    names = [figure()[0] for figure in reduction.figures(result, bare)]
+    assert failed(result) == [] and names == ["reduction_cost_in_mujoco"]
 
 
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
@@ -77,12 +77,98 @@ def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_do
     assert log == ["computed"]  # of another kind than what was begun
 
 
+# locked joints
+
+
+def blocks(setup, angles=1) -> Result:
+    result = Result("reduction")
+    sub_blocks.compare_blocks(result, setup, angles)
+    return result
+
+
+def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
+    class Deleted(Mujoco):
+        """Joints that are only deleted stay at zero."""
+
+        def of(self, case):
+            return mujoco.of(case.changed(posture=()) if case.locked else case)
+
+    wrong = Deleted(mujoco.model, mujoco.joints, mujoco.bodies, mujoco.source)
+    right, deleted = (blocks(Setup.small(ARM, engines(engine)), 2) for engine in (mujoco, wrong))
+    assert len(right.checks) == 6 * 2 * 3 and failed(right) == []
+    expected = {f"{' and '.join(locked)} locked" for locked in sub_blocks.subsets(ARM.joints)}
+    assert {check.scene for check in deleted.checks if not check.passed} == expected
+
+
+@pytest.mark.parametrize("model, joints", [("gripper", 4), ("free_body", 4), ("pendulum_ball", 2)])
+def test_slides_balls_and_each_part_of_a_free_joint_are_locked_alike(model, joints):
+    of_blocks = blocks(of_file(PATHS[model]))
+    assert len(of_blocks.checks) == (2**joints - 2) * 6 and failed(of_blocks) == []
+
+
+def test_subsets_of_many_joints_are_each_alone_and_some_at_random():
+    assert sub_blocks.subsets("abc") == [("a",), ("b",), ("c",), ("a", "b"), ("a", "c"), ("b", "c")]
+    many = sub_blocks.subsets("abcdefghijkl")
+    assert len(set(many)) == len(many) == 12 + 20 and many[:12] == [(name,) for name in "abcdefghijkl"]
+    assert all(2 <= len(names) < 12 for names in many[12:])
+    of_many = blocks(of_file(chain(7)))
+    assert len({check.scene for check in of_many.checks}) == 5 and failed(of_many) == []  # 1 in 6 of 27
+    assert not blocks(of_file(chain(60))).checks
+
+
+def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
+    body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
+    aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
+    result = reduction.rows(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"), timed=False)
+    assert any("aligned" in note for note in result.notes) and failed(result) == []
+
+
+# what a scene needs
+
+
+def test_the_planar_arm_moves_as_the_whole_one(engines):
+    case, setup, result = ARM.cases[0], Setup.small(ARM, engines), Result("reduction", curves={"apart": {}})
+    smaller = reduced(case)
+    assert smaller.joints == ("alpha", "gamma") and times.operations(tmt.ARM) > 2 * times.operations(smaller.tree) > 0
+    needs.compare_smaller(result, case, smaller, setup, "RK4")
+    assert len(result.checks) == 6 and failed(result) == []
+    # a planar arm that starts elsewhere is another motion
+    needs.compare_smaller(result, case, smaller.changed(posture=(0, 0, 1e-6)), setup, "RK4")
+    assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
+
+
+@pytest.mark.parametrize(
+    "scene, smallest",
+    [
+        ({"posture": (30, 20, 60), "torque": "hold", "locked": ("gamma",)}, ["none"]),
+        ({"posture": (10, 20, 30), "torque": (0, 1, 0), "locked": ("beta",), "damping": 0.1}, ["alpha gamma"]),
+        ({"posture": "hanging", "speed": (0, 1e-3, 0)}, []),  # a motion that is small is no failure
+    ],
+)
+def test_a_users_own_scene_needs_what_it_needs(engines, scene, smallest):
+    case, result = ARM.case("own", duration=0.5, dt=1 / 64, judged=0.0, tags=("own",), **scene), Result("reduction")
+    result.curves = {"needs": {}, "apart": {}}
+    (_, whole), *smaller = needs.of_case(result, case, Setup.small(ARM, engines))
+    assert failed(result) == [] and "movement" not in {check.quantity for check in result.checks}
+    found = [" ".join(model.joints) if model else "none" for _, model in smaller]
+    assert whole.joints == ARM.joints and found == smallest
+
+
+def test_a_robot_that_falls_does_not_bend():
+    """Its accelerations are 0 with 50 digits of the very numbers of the file: a sum of masses in doubles would bend it."""
+    case = next(case for case in of_file(PATHS["quadruped"]).robot.cases if case.name == "stand, let go")
+    need = needed(case)
+    assert set(need.moves) == {"root z"} and len(need.undecided) == 15
+    assert sum(row["found"] == "not decided" for row in needs.joint_rows(case, need)) == 15
+
+
 # what additions cost
 
 
-def changing(engines, case, steps=256) -> set:
+def changing(mujoco, case) -> set:
     """The additions with which the motion of a case has other bits."""
-    paths = {name: e.of(case).run(*case.start, case.tau, 1 / 200, steps, "Euler").q for name, e in engines.items()}
+    engines = additions.with_additions(mujoco, *cost.sizes(case.robot.tree))
+    paths = {name: e.of(case).run(*case.start, case.tau, 1 / 200, 400, "Euler").q for name, e in engines.items()}
     return {name for name, path in paths.items() if not np.array_equal(path, paths[additions.MINIMAL])}
 
 
@@ -92,8 +178,7 @@ def test_additions_are_there_and_only_a_touched_floor_changes_the_motion(mujoco)
     sizes = {name: (d.model.ngeom, d.model.nsensor, d.model.nu) for name, d in models.items()}
     assert sizes[additions.MINIMAL] == (0, 0, 0) and sizes["two capsules"] == (2, 0, 0)
     assert sizes["6 sensors"] == (0, 6, 0) and sizes["a motor"] == (0, 0, 1) and sizes[additions.ON_FLOOR] == (3, 0, 0)
-    assert not models[additions.MINIMAL].enabled("contact") and models["contact stage"].enabled("contact")
-    assert changing(engines, case, 400) == {additions.ON_FLOOR}
+    assert changing(mujoco, case) == {additions.ON_FLOOR}
     run = *case.start, case.tau, 1 / 200, 400, "Euler"
     many, pushed = additions.contacts(models[additions.ON_FLOOR], *run)
     assert many > 0.1 and pushed and additions.contacts(models[additions.CAPSULES], *run) == (0.0, False)
@@ -105,9 +190,7 @@ def test_a_body_that_falls_with_its_centre_of_mass_at_its_base_has_a_size_and_re
     reading = read('<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>')
     radius, near, far = cost.sizes(reading.tree)
     assert radius == pytest.approx(np.sqrt(0.4) * 0.1 / 15, rel=1e-5) and near < 0.0 and far is None
-    engines = additions.with_additions(engine(reading), radius, near, far)
-    assert additions.ON_FLOOR in engines and additions.OFF_FLOOR not in engines
-    assert engines["a capsule"].model.ngeom == 1
+    assert additions.OFF_FLOOR not in additions.with_additions(engine(reading), radius, near, far)
 
 
 def test_what_is_added_takes_nothing_from_the_default_classes_of_the_file():
@@ -117,13 +200,10 @@ def test_what_is_added_takes_nothing_from_the_default_classes_of_the_file():
         '<joint name="j" axis="0 1 0"/><inertial pos="0.2 0 0" mass="1" diaginertia=".01 .01 .01"/></body></worldbody></mujoco>'
     )
     robot = robot_of(reading, "robot.xml")
-    engines = additions.with_additions(engine(reading), *cost.sizes(robot.tree))
-    assert changing(engines, robot.case("let go")) == {additions.ON_FLOOR}
+    assert changing(engine(reading), robot.case("let go")) == {additions.ON_FLOOR}
 
 
 def test_the_fall_is_the_regular_scene_else_a_free_one_else_a_posture():
     others = Scene("weightless", gravity=False), Scene("held", torque="hold"), Scene("locked", locked=("beta",))
-    assert cost.fall_case(ARM).name == "bent, free"
-    assert cost.fall_case(dataclasses.replace(ARM, scenes=(*others, Scene("free")))).name == "free"
-    fall = cost.fall_case(dataclasses.replace(ARM, scenes=others))
-    assert fall.scene.posture == "zero" and fall.is_free and fall.duration == 5.0  # time enough to come to rest
+    robots = (ARM, *(dataclasses.replace(ARM, scenes=scenes) for scenes in ((*others, Scene("free")), others)))
+    assert [cost.fall_case(robot).name for robot in robots] == ["bent, free", "free", "let go"]

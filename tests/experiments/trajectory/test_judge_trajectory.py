@@ -152,13 +152,11 @@ def test_drift_is_measured_where_nothing_takes_energy_and_an_engine_that_does_no
     scenes = tuple(CASES[name].scene for name in ("bent, free", "bent, damped", "bent, held", THROWN.name))
     robot, result = dataclasses.replace(ARM, scenes=scenes), Result("trajectory")
     drift.measure_drift(result, robot, engines | with_gravity("0 0 0"), {1: (32, 64), 4: (32, 64)})
-    found = result.curves["drift"]["drifts"]
-    names = [("bent, free", "energy"), (THROWN.name, "energy"), (THROWN.name, "alpha-momentum")]
-    assert [key[:2] for key in found] == names
-    of = found["bent, free", "energy", "J"][OF_MUJOCO["RK4"]]
-    assert of["mujoco"] == [0.0, 0.0] and min(of["tmt"]) > 0.0
-    checks = (check for check in result.checks if check.scene.startswith("bent, free, RK4, MuJoCo"))
-    assert {check.passed for check in checks} == {False}
+    of_free, *others = result.curves["drift"]["drifts"].items()
+    assert [name for name, _ in others] == [(THROWN.name, "energy", "J"), (THROWN.name, "alpha-momentum", "N m s")]
+    found = of_free[1][OF_MUJOCO["RK4"]]
+    assert found["mujoco"] == [0.0, 0.0] and min(found["tmt"]) > 0.0
+    assert not any(check.passed for check in result.checks if check.scene.startswith("bent, free, RK4, MuJoCo"))
 
 
 def test_momentum_about_the_first_hinge_is_constant_where_nothing_turns_the_arm():
@@ -171,22 +169,12 @@ def test_momentum_about_the_first_hinge_is_constant_where_nothing_turns_the_arm(
 # errors, and how far digits reach
 
 
-def path_of(more=0.0) -> np.ndarray:
-    """Angles of TMT's run with the scene's own steps, its torques so much larger."""
-    return tmt.simulate(*FREE.start, FREE.tau + more, 5 / 64, 64, "rk4", FREE.tree).q
-
-
-def result_of(*runs) -> Result:
-    return Result("trajectory", curves={"runs": {(case.name, "rk4", 64): run for case, run in runs}})
-
-
 def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_one_that_from_many_digits():
-    path = path_of()
-    result = result_of(
-        (HELD, run_of(HELD, 0.25, np.nan)), (FREE, run_of(FREE) | {"tmt": [path], "mujoco": [path + 100.0]})
-    )
-    for finer in ((HELD.name, "rk4", 128), (HELD.name, "implicit", 64)):
-        result.curves["runs"][finer] = run_of(HELD, 9.0, 9.0)
+    path = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
+    runs = {(HELD.name, *of): run_of(HELD, 9.0, 9.0) for of in (("implicit", 64), ("rk4", 128))}
+    runs |= {(HELD.name, "rk4", 64): run_of(HELD, 0.25, np.nan)}
+    runs |= {(FREE.name, "rk4", 64): run_of(FREE) | {"tmt": [path], "mujoco": [path + 100.0]}}
+    result = Result("trajectory", curves={"runs": runs})
     assert errors.errors_when_held(result, ARM) == {HELD.name: (0.25, None)}
     ((name, (ours, theirs)),) = errors.errors_when_free(result, ARM).items()
     assert name == FREE.name and ours == pytest.approx(0.27, rel=0.03) and theirs > 90.0
@@ -210,13 +198,6 @@ def test_a_run_stays_in_the_band_about_many_digits(engine, label, share, passes)
     assert verdicts(result) == {f"{name} to many digits of its own scheme": ok for name, ok in passed.items()}
 
 
-def test_each_engine_is_compared_with_many_digits():
-    path = path_of()
-    result = result_of((FREE, run_of(FREE) | {"tmt": [path], "mujoco": [path_of(1e-6)]}))
-    horizon.many_digits(result, [FREE], [{"rk4": path.astype(object)}])
-    assert [(check.quantity[:6], check.passed) for check in result.checks] == [("TMT to", True), ("MuJoCo", False)]
-
-
 def test_many_digits_are_many_and_those_of_the_own_steps_of_the_scene():
     """The same two steps with 80 digits; 50 are those of the run."""
     case = FREE.changed(duration=0.5, dt=0.125)
@@ -233,8 +214,7 @@ def test_a_horizon_is_where_a_difference_of_the_last_digit_has_grown_to_a_radian
     t = np.linspace(0.0, 60.0, 61)
     assert horizon.reach(t, 0.3 * t, 16) == 54.0 and horizon.reach(t, 0.26 * t, 16) is None
     ends = np.where(t < 51.0, 0.4 * t, np.nan)
-    growth, horizons = horizon.growth_in_words(t, {"calm": 0.1 * t, "wild": ends})
-    assert all(number in growth for number in ("10^0.5", "10^6.0", "10^2.0"))
+    _, horizons = horizon.growth_in_words(t, {"calm": 0.1 * t, "wild": ends})
     assert "calm" not in horizons and all(number in horizons for number in ("wild", "41 s", "50 s"))
 
 

@@ -1,15 +1,28 @@
-"""A scene followed by both engines: each level by its own bound, which rules are applied, what is kept."""
+"""A scene followed by both engines: each level by its own bound, what is kept, and in figures whose number stands where."""
+
+import dataclasses
 
 import numpy as np
 import pytest
 from models import chain, random_tree
-from trajectory_curves import DAMPED, FREE, HELD
+from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
 from compare.engines.mujoco import parse, reading
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
-from compare.experiments.trajectory import derivative, horizon, runs, sentences
+from compare.experiments import trajectory
+from compare.experiments.trajectory import (
+    derivative,
+    drift,
+    figures_drift,
+    figures_lines,
+    figures_runs,
+    horizon,
+    leaving,
+    runs,
+    sentences,
+)
 from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
@@ -90,16 +103,14 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
 
 def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the_scene_itself_has():
     """Of 40 hinges a step has 6400 entries."""
+    long = robot_of(reading.read(chain(40)), "chain.xml")
+    case = long.case("c", duration=1.0, dt=1 / 512)
     assert runs.counts(FREE, (1, 16, 128)) == [64, 1024, 8192] and runs.counts(FREE.changed(dt=5 / 8193), (1,)) == [
         8193
     ]
-    long = robot_of(reading.read(chain(40)), "chain.xml")
-    case = long.case("c", duration=1.0, dt=1 / 512)
-    assert runs.counts(case, (1, 2, 16), 6400 * 1023) == [512] and runs.counts(case, (1, 2), 6400 * 1024) == [512, 1024]
-    left_out = [len(sentences.of_left_out([case], *given)) for given in (((1, 2), 6400 * 511), ((1,), 6400 * 512))]
-    assert left_out == [2, 0]
-    of_steps = {n: runs.recorded(case.changed(duration=n / 64, dt=1 / 64)) for n in (5, 64, 65, 130, 512)}
-    assert of_steps == {5: 5, 64: 64, 65: 65, 130: 65, 512: 64}
+    assert [runs.counts(case, (1, 2), 6400 * steps) for steps in (1023, 1024)] == [[512], [512, 1024]]
+    assert [len(sentences.of_left_out([case], (1, 2), 6400 * steps)) for steps in (511, 512, 1024)] == [2, 1, 0]
+    assert [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)] == [5, 65, 65, 64]
     assert [horizon.growth_run(long, [case], small) for small in (False, True)] == [(416 / 512, 416), (0.25, 128)]
 
 
@@ -107,3 +118,96 @@ def test_the_derivative_of_the_bias_is_that_of_mujoco_for_joints_of_all_kinds():
     read, result = reading.read(random_tree(2, joints=5)), Result("trajectory")
     derivative.compare_derivatives(result, robot_of(read, "kinds.xml"), engines_of(reading.engine(read)))
     assert result.checks[0].passed and result.checks[0].unit == "N m s/rad or N s/m"
+
+
+# figures
+
+
+def result_of(curve, **curves) -> Result:
+    """With this curve of the held scene, for each scheme."""
+    runs = {(HELD.name, scheme, 64): curve for scheme in ("rk4", "implicit", "semi_implicit_euler")}
+    return Result("trajectory", curves={"runs": runs, "errors": {HELD.name: (0.1, 0.2)}} | curves)
+
+
+def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
+    curve = run_of(HELD, 0.1, 0.2, until=2.5, left=(None, 4.0))
+    result = result_of(curve)
+    name, fig, caption = figures_runs.draw_held(result, HELD, 2)
+    lines = [line for line in fig.axes[0].lines if len(line.get_xdata())]
+    for i in range(3):
+        ours, theirs = lines[2 * i : 2 * i + 2]
+        assert np.allclose(ours.get_ydata(), np.degrees(curve["tmt"][0][:, i])) and ours.get_marker() == "None"
+        assert np.allclose(theirs.get_ydata(), np.degrees(curve["mujoco"][0][:, i])) and theirs.get_marker() == "o"
+    assert name == "assignment_figure_2" and "MuJoCo is 0.1 rad away at 4.00 s" in caption
+    at = [caption.index(number) for number in ("1.0e-01 rad", "2.0e-01 rad", "2.50 s", "5.0e-02 rad")]
+    assert at == sorted(at) and caption.count("4.00 s") == 1  # TMT's error, MuJoCo's, how long judged, how far apart
+
+    about = {"scene": HELD.name, "level": "open loop", "engine_integrator": "RK4", "dt_s": 5 / 64}
+    ends = ((None, 0.25), (0.0, None), (None, 0.125))
+    result.rows = [about | {"diverged_at_s": at, "difference_over_band": used} for at, used in ends]
+    name, fig, caption = figures_runs.draw_run(result, HELD)
+    assert name == "trajectory_ball_catch_held"
+    assert all(number in caption for number in ("2.5e-01", "1.0e-01 rad", "2.0e-01 rad", "0.0781 s", "2.50 s"))
+    for ax, k in ((fig.axes[0], 0), (fig.axes[3], 1)):  # angles and rates of the first scheme
+        assert np.array_equal(ax.lines[0].get_ydata(), curve["tmt"][k][:, 0])
+        assert np.array_equal(ax.lines[1].get_ydata(), curve["mujoco"][k][::3, 0]) and ax.lines[1].get_marker() == "o"
+    ours, apart, width = fig.axes[6].lines
+    assert ours.get_label().startswith("TMT, start ") and ours.get_ydata()[-1] == pytest.approx(0.1)
+    assert apart.get_label() == "TMT to MuJoCo" and apart.get_ydata()[-1] == pytest.approx(0.1)
+    assert set(width.get_ydata()) == {1e-9}
+
+
+def test_what_comes_after_a_run_has_diverged_is_not_drawn():
+    curve = run_of(HELD, 1.0, 1e135, ended=(None, 2.5))
+    result = result_of(curve)
+    of_run, of_held = figures_runs.draw_run(result, HELD)[1], figures_runs.draw_held(result, HELD, 2)[1]
+    for ours, theirs in (of_run.axes[0].lines[:2], of_held.axes[0].lines[:2]):
+        assert np.isfinite(ours.get_ydata()).all()
+        assert np.array_equal(np.isfinite(theirs.get_ydata()), np.array(theirs.get_xdata()) < 2.5)
+    assert np.array_equal(np.isfinite(of_run.axes[6].lines[1].get_ydata()), curve["t"][1:] < 2.5)
+
+
+@pytest.mark.parametrize(
+    "rate, of_mujoco, said", [(7.5, 2e-14, "4.77 s"), (1e-4, 2e-14, ""), (7.5, 1.01e-12, "1.0e-12 rad/s2 in MuJoCo")]
+)
+def test_why_one_leaves_a_held_posture_and_the_other_does_not_is_said(rate, of_mujoco, said):
+    found = leaving.Leaving(rate, 1e-12, {"tmt": 0.0, "mujoco": of_mujoco}, {"tmt": None, "mujoco": 4.77})
+    words = leaving.why_in_words(found)
+    assert said in words and ("4.77 s" in words) == (said == "4.77 s")
+
+
+def test_the_figure_of_drift_has_each_engine_in_its_place():
+    steps = {METHODS[name]: drift.DRIFT_STEPS[METHODS[name].order] for name in ("Euler", "implicit", "RK4")}
+    made = {method: {"tmt": [8.0, 4.0, 2.0], "mujoco": [48.0, 12.0, 3.0]} for method in steps}
+    curves = {"drift": {"drifts": {("bent, free", "energy", "J"): made}, "steps": steps}}
+    _, fig, caption = figures_drift.draw_drift(Result("trajectory", curves=curves))
+    assert "TMT 1.00 to 1.00, MuJoCo 2.00 to 2.00" in caption
+    assert "TMT 2.0e+00 J, MuJoCo 3.0e+00 J" in caption and caption.endswith(": 1.5 to 6.")  # MuJoCo's over TMT's
+    for line in fig.axes[0].lines[:-1]:
+        assert line.get_ydata().tolist() == ([8.0, 4.0, 2.0] if line.get_marker() == "None" else [48.0, 12.0, 3.0])
+
+
+def test_which_figures_there_are_follows_what_was_run():
+    t, names = np.linspace(0.0, 60.0, 61), ["assignment_figure_2", "trajectory_bent_free", "trajectory_ball_catch_held"]
+    runs = {(case.name, "rk4", 64): run_of(case) for case in (CASES["bent, free"], HELD)}
+    growth = {"growth": {"t": t, "curves": {"bent, free": 0.1 * t, "diverges": np.where(t < 51.0, 0.4 * t, np.nan)}}}
+    for robot, more, expected in (
+        (ARM, {}, names[:2]),
+        (dataclasses.replace(ARM, claims=None), {}, names[1:]),
+        (ARM, growth, [*names, "trajectory_growth"]),
+    ):
+        result = result_of(None, runs=runs, drift={"drifts": {}}, **more)
+        assert [call()[0] for call in trajectory.figures(result, robot)] == expected
+
+
+def test_a_ball_is_drawn_by_its_turn_from_the_start():
+    """Times the root of 3: on this side of half a turn, and beyond it, where nothing is drawn."""
+    case = robot_of(reading.read(random_tree(2, joints=5)), "kinds.xml").case("c")
+    turns = np.array([0.0, 0.1, 1.75, 1.85])
+    q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
+    values = figures_lines.drawn(case, q)
+    for kind, at, by in case.coordinates.places.joints:
+        if kind == "ball":
+            assert values[:3, by] == pytest.approx(turns[:3, None] * np.ones(3)) and np.isnan(values[3, by]).all()
+        else:
+            assert values[:, by] == pytest.approx(q[:, at])

@@ -2,7 +2,6 @@
 
 import copy
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +10,6 @@ from trajectory_curves import CASES
 
 from compare.case import Case, Scene
 from compare.engines.mujoco import reading
-from compare.engines.own import Own
-from compare.experiments.trajectory import own_runs
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.file import robot_of
@@ -112,22 +109,3 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
     found = failing(case_of(gripper[0]), gripper[1], integrator)
     compiled_runs.clear()
     assert found == {(integrator, level) for level in STEPS}
-
-
-def test_a_gear_that_is_not_squared_and_an_armature_that_is_forgotten_leave_the_band(gripper):
-    robot, known = gripper
-    servo = robot.drive.actuators[0]
-    once = dataclasses.replace(servo, bias=(0.0, servo.bias[1] / 3.0, servo.bias[2] / 3.0))
-    drive = dataclasses.replace(robot.drive, actuators=(once, *robot.drive.actuators[1:]))
-    bare = dataclasses.replace(robot.tree, armature=(0.0, *robot.tree.armature[1:]))
-    for wrong in ({"drive": drive}, {"tree": bare}):
-        found = failing(case_of(dataclasses.replace(robot, **wrong)), known, "Euler")
-        assert found == {("Euler", level) for level in LEVELS}
-
-
-def test_equations_of_ones_own_have_no_servos(gripper):
-    own = Own(SimpleNamespace(has=lambda name: True, times={"acceleration": (1e-6,)}))
-    setup = SimpleNamespace(engines={"own": own}, size="full", finer=(1,))
-    able, _, said = own_runs.within_time(setup, gripper[0].cases, 1_000_000)
-    assert [case.name for case in able] == ["open, held", "open, let go", "open, let go, damped"] and len(said) == 1
-    assert own.methods_in(gripper[0].cases[-1]) == {} and own.methods_in(able[0])
