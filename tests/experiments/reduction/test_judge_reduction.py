@@ -146,20 +146,14 @@ def test_the_table_and_the_figure_of_needs_have_the_times_of_each_engine(engines
         assert drawn == pytest.approx(drawn_times)
 
 
-def test_the_figures_of_known_motions_have_each_engine_in_its_place():
+def test_the_figure_of_a_swing_has_each_engine_in_its_place():
     errors = {(engine, i): [e * 2.0 ** (-o * k) for k in range(6)] for engine, e in (("tmt", 1e-3), ("mujoco", 3e-3))
               for i, o in (("RK4", 4), ("Euler", 1))}  # fmt: skip
     orders = {("tmt", "RK4"): 4.01, ("mujoco", "RK4"): 3.97, ("tmt", "Euler"): 1.02}
-    small = {"amplitude": np.array([0.02, 0.01]), "off": {"tmt": [4e-4, 1e-4], "mujoco": [3e-4, 3e-4]}, "duration": 5.0,
-             "frequencies": np.array([4.0, 5.0, 11.0]), "powers": {"tmt": 2.0, "mujoco": 0.0},
-             "posture": "hanging", "sides": 1}  # fmt: skip
     swing = {"dt": 0.02 / 2.0 ** np.arange(6), "errors": errors, "orders": orders, "stated": {"RK4": 4, "Euler": 1}}
-    result = Result("reduction", curves={"swings": {"elbow swing": swing}, "small": small})
+    result = Result("reduction", curves={"swings": {"elbow swing": swing}})
     _, fig, caption = figures_motion.draw_swing(result, "elbow swing")
     lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].get_lines()}
     assert lines["RK4, TMT"] == 1e-3 and lines["RK4, MuJoCo"] == 3e-3
     found = [caption.index(number) for number in ("4.01", "3.97", "9.5e-10", "2.9e-09", "1.02")]
     assert found == sorted(found)
-    _, fig, caption = figures_motion.draw_small_oscillations(result, ARM)
-    lines = {line.get_label(): line.get_ydata()[-1] for line in fig.axes[0].get_lines()}
-    assert lines["TMT"] == 1e-4 and lines["MuJoCo"] == 3e-4 and "2.000 (TMT)" in caption and "0.000 (MuJoCo)" in caption

@@ -12,17 +12,7 @@ from compare.engines.mujoco import parse, reading
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
-from compare.experiments.trajectory import (
-    derivative,
-    drift,
-    figures_drift,
-    figures_lines,
-    figures_runs,
-    horizon,
-    leaving,
-    runs,
-    sentences,
-)
+from compare.experiments.trajectory import derivative, drift, figures_drift, figures_lines, figures_runs, horizon, runs
 from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
@@ -105,11 +95,9 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
     """Of 40 hinges a step has 6400 entries."""
     long = robot_of(reading.read(chain(40)), "chain.xml")
     case = long.case("c", duration=1.0, dt=1 / 512)
-    assert runs.counts(FREE, (1, 16, 128)) == [64, 1024, 8192] and runs.counts(FREE.changed(dt=5 / 8193), (1,)) == [
-        8193
-    ]
+    coarse, fine = FREE, FREE.changed(dt=5 / 8193)
+    assert runs.counts(coarse, (1, 16, 128)) == [64, 1024, 8192] and runs.counts(fine, (1, 2)) == [8193]
     assert [runs.counts(case, (1, 2), 6400 * steps) for steps in (1023, 1024)] == [[512], [512, 1024]]
-    assert [len(sentences.of_left_out([case], (1, 2), 6400 * steps)) for steps in (511, 512, 1024)] == [2, 1, 0]
     assert [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)] == [5, 65, 65, 64]
     assert [horizon.growth_run(long, [case], small) for small in (False, True)] == [(416 / 512, 416), (0.25, 128)]
 
@@ -165,15 +153,6 @@ def test_what_comes_after_a_run_has_diverged_is_not_drawn():
         assert np.isfinite(ours.get_ydata()).all()
         assert np.array_equal(np.isfinite(theirs.get_ydata()), np.array(theirs.get_xdata()) < 2.5)
     assert np.array_equal(np.isfinite(of_run.axes[6].lines[1].get_ydata()), curve["t"][1:] < 2.5)
-
-
-@pytest.mark.parametrize(
-    "rate, of_mujoco, said", [(7.5, 2e-14, "4.77 s"), (1e-4, 2e-14, ""), (7.5, 1.01e-12, "1.0e-12 rad/s2 in MuJoCo")]
-)
-def test_why_one_leaves_a_held_posture_and_the_other_does_not_is_said(rate, of_mujoco, said):
-    found = leaving.Leaving(rate, 1e-12, {"tmt": 0.0, "mujoco": of_mujoco}, {"tmt": None, "mujoco": 4.77})
-    words = leaving.why_in_words(found)
-    assert said in words and ("4.77 s" in words) == (said == "4.77 s")
 
 
 def test_the_figure_of_drift_has_each_engine_in_its_place():

@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from trajectory_curves import CASES
 
 from compare.case import Case, Scene
 from compare.engines.mujoco import reading
+from compare.engines.own import Own
+from compare.experiments.trajectory.own_runs import within_time
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.file import robot_of
@@ -109,3 +112,10 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
     found = failing(case_of(gripper[0]), gripper[1], integrator)
     compiled_runs.clear()
     assert found == {(integrator, level) for level in STEPS}
+
+
+def test_equations_of_ones_own_have_no_servos(gripper):
+    own, cases = Own(SimpleNamespace(has=lambda name: True, times={"acceleration": (1e-6,)})), gripper[0].cases
+    able, _, said = within_time(SimpleNamespace(engines={"own": own}, size="full", finer=(1,)), cases, 1_000_000)
+    assert [case.name for case in able] == ["open, held", "open, let go", "open, let go, damped"] and len(said) == 1
+    assert own.methods_in(cases[-1]) == {} and own.methods_in(able[0])
