@@ -102,9 +102,6 @@ def test_what_exerts_no_force_leaves_the_bits_and_what_is_pushed_does_not(differ
     assert found[of_floor] == (is_pushed == (FLOOR in differing))
 
 
-# motions that are known exactly
-
-
 def swings(engines, **scene) -> Result:
     """Of one scene, or of all the arm's."""
     result = Result("reduction", curves={"apart": {}, "swings": {}})

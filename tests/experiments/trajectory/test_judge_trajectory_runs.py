@@ -25,12 +25,6 @@ def side(case) -> runs.TmtSide:
     return runs.tmt_side(case, Tmt().of(case), case.steps, "rk4")
 
 
-@pytest.fixture(scope="module")
-def damped():
-    """TMT's side of a scene that is judged to its end."""
-    return side(DAMPED)
-
-
 def judged_with(mujoco, mine, case=DAMPED, result=None) -> dict:
     """The checks of a run whose TMT side may be edited, by quantity."""
     result = result or Result("trajectory")
@@ -41,8 +35,9 @@ def judged_with(mujoco, mine, case=DAMPED, result=None) -> dict:
 @pytest.mark.parametrize(
     "level, field", [("derivative", "derivative_tolerance"), ("one step", "step_tolerance"), ("open loop", "width")]
 )
-def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco, damped):
-    name = f"{level}, TMT to MuJoCo"
+def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
+    """In a scene that is judged to its end."""
+    name, damped = f"{level}, TMT to MuJoCo", side(DAMPED)
     checks = judged_with(mujoco, damped)
     used = checks[name].over_tolerance
     assert all(check.passed for check in checks.values()) and 1e-5 < used < 1.0
@@ -145,8 +140,8 @@ def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
 
 def test_what_comes_after_a_run_has_diverged_is_not_drawn():
     curve = run_of(HELD, 1.0, 1e135, ended=(None, 2.5))
-    result = result_of(curve)
-    of_run, of_held = figures_runs.draw_run(result, HELD)[1], figures_runs.draw_held(result, HELD, 2)[1]
+    of_run = figures_runs.draw_run(result_of(curve), HELD)[1]
+    of_held = figures_runs.draw_held(result_of(curve), HELD, 2)[1]
     for ours, theirs in (of_run.axes[0].lines[:2], of_held.axes[0].lines[:2]):
         assert np.isfinite(ours.get_ydata()).all()
         assert np.array_equal(np.isfinite(theirs.get_ydata()), np.array(theirs.get_xdata()) < 2.5)

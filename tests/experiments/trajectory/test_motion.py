@@ -132,11 +132,10 @@ def test_between_two_states_stands_what_the_method_gives_with_half_a_step_and_no
 
 def test_first_comes_what_is_held_and_left_then_what_is_let_go_from_there(drawn):
     names = ["bent, held", "bent, free", "zero, free", "ball catch, held", "ball catch, free"]
-    stays = [drawn._replace(scene=name) for name in names]
-    leaves = [*stays[:3], stays[3]._replace(left={"tmt": None, "mujoco": 4.0}), stays[4]]
-    expected = ["ball catch, held", "ball catch, free", "bent, held", "bent, free", "zero, free"]
-    assert [one.scene for one in frames.in_order(leaves, ARM)] == expected
-    assert [one.scene for one in frames.in_order(stays, ARM)][:2] == names[:2] and frames.in_order([], ARM) == []
+    scenes = [drawn._replace(scene=name) for name in names]
+    assert [one.scene for one in frames.in_order(scenes, ARM)] == names and frames.in_order([], ARM) == []
+    scenes[3] = scenes[3]._replace(left={"tmt": None, "mujoco": 4.0})
+    assert [one.scene for one in frames.in_order(scenes, ARM)] == [*names[3:], *names[:3]]
 
 
 def test_a_free_body_is_a_cross_that_turns_with_it():

@@ -1,4 +1,4 @@
-"""Curves of runs, as the experiment keeps them, whose numbers a test chooses."""
+"""The scenes by name, and curves of runs whose numbers a test chooses. Used by all tests of this folder."""
 
 import numpy as np
 
