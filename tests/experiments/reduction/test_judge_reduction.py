@@ -163,7 +163,6 @@ DOWN = (0, 0, 0)
     [
         (CHAIN, {"up": (180, 0, 0), "bent": (0, 20, 0), "down": DOWN}, "down"),
         (CROSS, {"flipped": (180, 180, 0), "down": DOWN}, "down"),
-        (CROSS, {"flipped": (180, 180, 0), "up": (180, 0, 0)}, "flipped"),
         (dataclasses.replace(CHAIN, stiffness=(1.0, 0.0, 0.0)), {"down": DOWN}, None),
     ],
 )

@@ -149,6 +149,7 @@ def test_drift_is_measured_where_nothing_takes_energy_and_an_engine_that_does_no
     assert [name for name, _ in others] == [(THROWN.name, "energy", "J"), (THROWN.name, "alpha-momentum", "N m s")]
     found = of_free[1][OF_MUJOCO["RK4"]]
     assert found["mujoco"] == [0.0, 0.0] and min(found["tmt"]) > 0.0
+    assert np.isnan(drift.largest_drift(np.add, ([0.0, np.nan], [0.0, 1.0])))  # of a run that has diverged
     assert not any(check.passed for check in result.checks if check.scene.startswith("bent, free, RK4, MuJoCo"))
 
 
