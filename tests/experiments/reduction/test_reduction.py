@@ -1,193 +1,199 @@
-"""The whole experiment: a small run, one without timings, wrong models, and other robots."""
+"""The whole experiment: a small run, joints that are locked in both engines, what each scene needs, and what additions cost."""
 
 import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
-from shown import blocks
+from edited import XML, setup_of
+from models import PATHS, chain
 from trees import mjcf
 
 import tmt
-from compare import experiment, scene_file
-from compare.case import Scene
-from compare.engines.mujoco import Mujoco, load, parse
-from compare.experiments import reduction, trajectory
+from compare.engines.mujoco import ModelError, Mujoco, additions, engine, parse, read
+from compare.experiments import reduction
+from compare.experiments.reduction import cost, needs, sub_blocks, times
 from compare.judge.check import Result
 from compare.robots import Robot
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.setup import Setup, engines
+from compare.truth.smallest import needed, reduced
 
 
-def setup_of(engine) -> experiment.Setup:
-    return experiment.Setup.small(ARM, experiment.engines(engine))
+def of_file(source) -> Setup:
+    """A robot of a file, its engines, and few states."""
+    reading = read(source)
+    return Setup.small(robot_of(reading, "robot.xml"), engines(engine(reading)))
 
 
-def failed(result) -> list:
-    return [check for check in result.checks if not check.passed]
+def failed(result) -> list[str]:
+    return [str(check) for check in result.checks if not check.passed]
 
 
-def test_a_small_run_takes_every_path(small):
+def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
     result = small("reduction")
     rows = {(r["scene"], r["hinges"], r["engine"], r["integrator"]): r for r in result.rows}
     assert {scene for scene, *_ in rows} == {scene.name for scene in ARM.scenes}
     planar, whole = (rows["zero, free", hinges, "tmt", "RK4"] for hinges in ("alpha gamma", "alpha beta gamma"))
-    assert planar["nv"] == 2 and whole["nv"] == 3 and 0 < planar["operations"] < whole["operations"]
-    assert planar["ns_per_step"] > 0
-    assert planar["max_difference_rad"] is not None and whole["max_difference_rad"] is None
-    stays = rows["bent, held", "none", "mujoco", "RK4"]
-    assert stays["nv"] == 0 and stays["ns_per_step"] is None and 0.0 < stays["max_difference_rad"] < 1e-12
+    assert 0 < planar["operations"] < whole["operations"] and planar["ns_per_step"] > 0
+    assert rows["bent, held", "none", "mujoco", "RK4"]["ns_per_step"] is None
+    assert reduction.claim(ARM) and reduction.tolerance(ARM)
+    drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, ARM))}
+    names = ["reduction_needs", "reduction_elbow_swing", "reduction_modes", "reduction_cost_in_mujoco"]
+    assert list(drawn) == names and not any("nan" in caption for caption in drawn.values())
 
 
-def test_the_scene_that_the_help_shows_runs(engines, tmp_path):
-    (text,) = blocks("toml")
-    (tmp_path / "my.toml").write_text(text)
-    scenes = scene_file.read_scenes(tmp_path / "my.toml", ARM)
-    (case,) = dataclasses.replace(ARM, scenes=scenes).cases
-    assert (case.duration, case.steps) == (2.0, 64)
-    result = reduction.rows(experiment.Setup.small(ARM, engines), [case], timed=False)
-    assert failed(result) == [] and result.curves["needs"]["my swing"]["stays"] == ("beta",)
-    result = trajectory.runs.follow(case, engines, (1, 2))
-    assert failed(result) == []
-    assert {row["dt_s"] for row in result.rows} == {1 / 32, 1 / 64}
-    assert {row["scene"] for row in result.rows} == {"my swing", "my swing, beta locked"}
+def test_a_model_whose_joints_cannot_be_locked_fails():
+    tendon = '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
+    (check,) = reduction.rows(setup_of(XML.replace("</mujoco>", tendon)), timed=False).checks
+    assert check.quantity == "models whose hinges can be locked" and not check.passed
 
 
-@pytest.mark.parametrize(
-    "old, new, fails",
-    [
-        ("-9.81", '-9.81" density="50" viscosity="1', "order of the error against the elliptic function, from 4"),
-        ('axis="1 0 0"', 'axis="1 0 0" armature="0.01"', "Mbar, reduced, TMT to MuJoCo"),
-        (
-            "</mujoco>",
-            '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>',
-            "models whose hinges can be locked",
-        ),
-    ],
-    ids=["air", "armature", "a tendon that cannot go with one joint"],
-)
-def test_a_wrong_model_fails(old, new, fails):
-    text = ARM.mjcf.read_text(encoding="utf-8")
-    assert old in text
-    result = reduction.rows(setup_of(parse(text.replace(old, new), ARM.tree)), timed=False)
-    assert fails in {check.quantity for check in failed(result)}
-
-
-class DampedWhereLocked(Mujoco):
-    """MuJoCo, whose model with locked joints has damping."""
-
-    def changed(self, case):
-        model = super().changed(case)
-        model.dof_damping[:] += 0.1 if case.locked else 0.0
-        return model
-
-
-def test_a_smaller_model_of_one_engine_that_is_wrong_is_seen():
-    wrong = load(ARM.mjcf, ARM.tree)
-    wrong.__class__ = DampedWhereLocked
-    found = failed(reduction.rows(setup_of(wrong), timed=False))
-    where = {check.scene for check in found if check.quantity == "smallest model to whole"}
-    assert "zero, free, MuJoCo, RK4, dt = 5/1024 s" in where and not any("TMT" in scene for scene in where)
-
-
-# another robot
-
-
-LEG = tmt.Tree(
-    hinge_names=("yaw", "hip", "roll", "knee"),
-    parent=(-1, 0, 1, 2),
-    offset=((0.1, 0, 0.5), (0, 0, -0.05), (0, 0, -0.25), (0, 0, -0.2)),
-    axis=((0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 0)),
-    damping=(0, 0, 0, 0),
-    body_names=("base", "thigh", "shank"),
-    body_hinge=(0, 1, 3),
-    mass=(2.0, 1.5, 0.8),
-    com=((0.02, 0, 0), (0, 0, -0.12), (0, 0, -0.1)),
-    inertia=(np.diag([0.01, 0.01, 0.008]), np.diag([0.012, 0.012, 0.002]), np.diag([0.004, 0.004, 0.001])),
-    gravity=(0, 0, -9.81),
-)
-SHORT = {"duration": 0.25, "dt": 1 / 64}
-SCENES = (
-    Scene("drop", "folded", **SHORT),
-    Scene("rest", "sideways", "hold", **SHORT),
-    Scene("knee swing", (0, 0, 0, 60), locked=("yaw", "hip", "roll"), **SHORT),
-    Scene("plane", (0, 50, 0, 20), tags=("fewer joints",), **SHORT),
-    Scene(
-        "own",
-        (10, 20, 0, 40),
-        (0.5, 0, 0, 0.1),
-        (0, 10, 0, 0),
-        damping=0.2,
-        locked=("roll",),
-        judged=0.0,
-        tags=("own",),
-        **SHORT,
-    ),
-)
-
-
-def leg():
-    """The result of a robot of four hinges, captions by the names of its figures, and what is said of it in general."""
-    postures = {"straight": (0, 0, 0, 0), "folded": (20, 40, -10, 80), "sideways": (90, 0, 30, 20)}
-    robot = Robot("leg", Path("leg.xml"), LEG, postures, SCENES)
-    result = reduction.rows(experiment.Setup.small(robot, experiment.engines(parse(mjcf(LEG), LEG))))
-    drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, robot))}
-    result.curves = {}  # which need not be sent
-    return result, drawn, [reduction.claim(robot), reduction.tolerance(robot)]
-
-
-def test_a_robot_of_four_hinges_goes_through_with_figures(shared):
-    result, drawn, general = shared(leg)
-    assert [str(check) for check in failed(result)] == []
-    assert len(result.tables["reduction_subsets"]) == (2**4 - 2) * 6
-    smallest = {row["scene"]: row["hinges"] for row in result.rows}
-    assert list(smallest.values()) == ["yaw hip roll knee", "none", "knee", "hip knee", "yaw hip knee"]
-    assert list(drawn) == ["reduction_needs", "reduction_knee_swing", "reduction_cost_in_mujoco"]  # yaw never swings
-    said = " ".join([*result.notes, *drawn.values(), *general])
-    assert not any(f" {word} " in said for word in ("arm", "alpha", "beta", "gamma", "bent", "nan"))
-
-
-TWO = dataclasses.replace(tmt.ARM.lock({"alpha": 0.3}), hinge_names=("a", "b"))
-ONE = tmt.Tree(
-    hinge_names=("a",),
-    parent=(-1,),
-    offset=((0, 0, 1),),
-    axis=((0, 1, 0),),
-    damping=(0.1,),
-    body_names=("rod",),
-    body_hinge=(0,),
-    mass=(1,),
-    com=((0, 0, -0.3),),
-    inertia=(np.eye(3) / 100,),
-    gravity=(0, 0, -9),
-)
-
-
-@pytest.mark.parametrize("tree", [TWO, ONE], ids=["two hinges", "one"])
-def test_a_robot_of_few_hinges_without_postures_and_scenes_goes_through(tree):
+def test_a_robot_of_two_hinges_without_postures_and_scenes_goes_through():
+    tree = dataclasses.replace(tmt.ARM.lock({"alpha": 0.3}), hinge_names=("a", "b"))
     bare = Robot("bare", Path("bare.xml"), tree, {}, ())
-    result = reduction.rows(experiment.Setup.small(bare, experiment.engines(parse(mjcf(tree), tree))))
-    assert [str(check) for check in failed(result)] == []
-    assert [figure()[0] for figure in reduction.figures(result, bare)] == ["reduction_cost_in_mujoco"]
+    result = reduction.rows(Setup.small(bare, engines(parse(mjcf(tree), tree))))
+    names = [figure()[0] for figure in reduction.figures(result, bare)]
+    assert failed(result) == [] and names == ["reduction_cost_in_mujoco"]
 
 
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
     log = []
-
-    def untimed(setup, *more):
-        log.append("computed")
-        return Result("reduction", notes=["computed"]), []
-
-    monkeypatch.setattr(reduction, "untimed", untimed)
-    monkeypatch.setattr(reduction, "time_models", lambda *given: log.append("timed"))
-    monkeypatch.setattr(reduction, "measure_costs", lambda *given: log.append("measured"))
+    for name, said in (("untimed", "computed"), ("time_models", "timed"), ("measure_costs", "measured")):
+        given = Result("reduction"), []
+        monkeypatch.setattr(reduction, name, lambda *_, said=said, given=given: log.append(said) or given)
     setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"), background={})
-    for ahead in (False, True):
-        log.clear()
-        if ahead:
-            reduction.begin(setup)
-        assert reduction.rows(setup).notes == ["computed"] and setup.background == {}
-        assert log == ["computed", "quiet", "timed", "measured"]
     reduction.begin(setup)
-    log.clear()
-    reduction.rows(setup, timed=False)
-    assert log == ["computed"]  # of another kind than what was begun
+    for k in range(2):  # what was begun, and then all
+        reduction.rows(setup)
+        assert log == ["computed", "quiet", "timed", "measured"] * (k + 1) and setup.background == {}
+
+
+# locked joints
+
+
+def blocks(setup, angles=1) -> Result:
+    result = Result("reduction")
+    sub_blocks.compare_blocks(result, setup, angles)
+    return result
+
+
+def test_every_subset_agrees_and_a_wrong_lock_is_seen(mujoco):
+    class Deleted(Mujoco):
+        """Joints that are only deleted stay at zero."""
+
+        def of(self, case):
+            return mujoco.of(case.changed(posture=()) if case.locked else case)
+
+    wrong = Deleted(mujoco.model, mujoco.joints, mujoco.bodies, mujoco.source)
+    right, deleted = (blocks(Setup.small(ARM, engines(engine)), 2) for engine in (mujoco, wrong))
+    assert len(right.checks) == 6 * 2 * 3 and failed(right) == []
+    expected = {f"{' and '.join(locked)} locked" for locked in sub_blocks.subsets(ARM.joints)}
+    assert {check.scene for check in deleted.checks if not check.passed} == expected
+
+
+@pytest.mark.parametrize("model, joints", [("gripper", 4), ("free_body", 4), ("pendulum_ball", 2)])
+def test_slides_balls_and_each_part_of_a_free_joint_are_locked_alike(model, joints):
+    of_blocks = blocks(of_file(PATHS[model]))
+    assert len(of_blocks.checks) == (2**joints - 2) * 6 and failed(of_blocks) == []
+
+
+def test_subsets_of_many_joints_are_each_alone_and_some_at_random():
+    assert sub_blocks.subsets("abc") == [("a",), ("b",), ("c",), ("a", "b"), ("a", "c"), ("b", "c")]
+    many = sub_blocks.subsets("abcdefghijkl")
+    assert len(set(many)) == len(many) == 12 + 20 and many[:12] == [(name,) for name in "abcdefghijkl"]
+    assert all(2 <= len(names) < 12 for names in many[12:])
+    of_many = blocks(of_file(chain(7)))
+    assert len({check.scene for check in of_many.checks}) == 5 and failed(of_many) == []  # 1 in 6 of 27
+    assert not blocks(of_file(chain(60))).checks
+
+
+def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
+    body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
+    aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
+    result = reduction.rows(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"), timed=False)
+    assert any("aligned" in note for note in result.notes) and failed(result) == []
+
+
+# what a scene needs
+
+
+def test_the_planar_arm_moves_as_the_whole_one(engines):
+    case, setup, result = ARM.cases[0], Setup.small(ARM, engines), Result("reduction", curves={"apart": {}})
+    smaller = reduced(case)
+    assert smaller.joints == ("alpha", "gamma") and times.operations(tmt.ARM) > 2 * times.operations(smaller.tree) > 0
+    needs.compare_smaller(result, case, smaller, setup, "RK4")
+    assert len(result.checks) == 6 and failed(result) == []
+    # a planar arm that starts elsewhere is another motion
+    needs.compare_smaller(result, case, smaller.changed(posture=(0, 0, 1e-6)), setup, "RK4")
+    assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
+
+
+@pytest.mark.parametrize(
+    "posture, scene, smallest",
+    [((30, 20, 60), {"torque": "hold", "locked": ("gamma",)}, [None]), ("hanging", {"speed": (0, 1e-3, 0)}, [])],
+)
+def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines, posture, scene, smallest):
+    """A motion that is small is no failure."""
+    case = ARM.case("own", posture=posture, duration=0.5, dt=1 / 64, judged=0.0, tags=("own",), **scene)
+    result = Result("reduction", curves={"needs": {}, "apart": {}})
+    (_, whole), *smaller = needs.of_case(result, case, Setup.small(ARM, engines))
+    assert failed(result) == [] and "movement" not in {check.quantity for check in result.checks}
+    assert whole.joints == ARM.joints and [model for _, model in smaller] == smallest
+
+
+def test_a_held_posture_with_springs_needs_nothing():
+    held = next(case for case in of_file(PATHS["gripper"]).robot.cases if case.is_held)
+    assert held.tree.has_springs and needed(held).stays == held.joints
+    rigid = held.changed(torque=tuple(tmt.gravity_balance(held.posture, held.whole)))  # without what the springs need
+    assert needed(rigid).stays == ()
+
+
+def test_a_robot_that_falls_does_not_bend():
+    """Its accelerations are 0 with 50 digits of the very numbers of the file: a sum of masses in doubles would bend it."""
+    case = next(case for case in of_file(PATHS["quadruped"]).robot.cases if case.name == "stand, let go")
+    need = needed(case)
+    assert set(need.moves) == {"root z"} and len(need.undecided) == 15
+    assert sum(row["found"] == "not decided" for row in needs.joint_rows(case, need)) == 15
+
+
+# what additions cost
+
+
+def changing(mujoco, case) -> set:
+    """The additions with which the motion of a case has other bits."""
+    engines = additions.with_additions(mujoco, *cost.sizes(case.robot.tree))
+    paths = {name: e.of(case).run(*case.start, case.tau, 1 / 200, 400, "Euler").q for name, e in engines.items()}
+    return {name for name, path in paths.items() if not np.array_equal(path, paths[additions.MINIMAL])}
+
+
+def test_additions_are_there_and_only_a_touched_floor_changes_the_motion(mujoco):
+    engines, case = additions.with_additions(mujoco, *cost.sizes(ARM.tree)), ARM.case("falls", posture="bent")
+    models = {name: engine.of(case) for name, engine in engines.items()}
+    sizes = {name: (d.model.ngeom, d.model.nsensor, d.model.nu) for name, d in models.items()}
+    assert sizes[additions.MINIMAL] == (0, 0, 0) and sizes["two capsules"] == (2, 0, 0)
+    assert sizes["6 sensors"] == (0, 6, 0) and sizes["a motor"] == (0, 0, 1) and sizes[additions.ON_FLOOR] == (3, 0, 0)
+    assert changing(mujoco, case) == {additions.ON_FLOOR}
+    run = *case.start, case.tau, 1 / 200, 400, "Euler"
+    many, pushed = additions.contacts(models[additions.ON_FLOOR], *run)
+    assert many > 0.1 and pushed and additions.contacts(models[additions.CAPSULES], *run) == (0.0, False)
+    with pytest.raises(ModelError, match="beta"):
+        engines[additions.ON_FLOOR].of(ARM.case("locked", locked=("beta",)))
+
+
+def test_a_body_that_falls_with_its_centre_of_mass_at_its_base_has_a_size_and_reaches_any_floor():
+    reading = read('<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>')
+    radius, near, far = cost.sizes(reading.tree)
+    assert radius == pytest.approx(np.sqrt(0.4) * 0.1 / 15, rel=1e-5) and near < 0.0 and far is None
+    assert additions.OFF_FLOOR not in additions.with_additions(engine(reading), radius, near, far)
+
+
+def test_what_is_added_takes_nothing_from_the_default_classes_of_the_file():
+    """A motor that were a servo would push, and geoms that may not touch would never do."""
+    reading = read(
+        '<mujoco><default><position kp="80"/><geom contype="0" conaffinity="0" margin="9"/></default><worldbody><body>'
+        '<joint name="j" axis="0 1 0"/><inertial pos="0.2 0 0" mass="1" diaginertia=".01 .01 .01"/></body></worldbody></mujoco>'
+    )
+    robot = robot_of(reading, "robot.xml")
+    assert changing(engine(reading), robot.case("let go")) == {additions.ON_FLOOR}

@@ -1,48 +1,44 @@
-"""A scene followed by both engines: each level by its own bound, every rule applied, whose number stands where."""
-
-import dataclasses
+"""A scene followed by both engines: each level by its own bound, what is kept, and in figures whose number stands where."""
 
 import numpy as np
 import pytest
-from trajectory_curves import CASES, DAMPED, FREE, HELD
+from models import chain, random_tree
+from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
-from compare.engines.mujoco import Mujoco, load, parse
-from compare.engines.mujoco.dynamics import MujocoDynamics
+from compare.engines.mujoco import parse, reading
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
-from compare.experiments.trajectory import drift, runs
+from compare.experiments import trajectory
+from compare.experiments.trajectory import derivative, drift, figures_drift, figures_lines, figures_runs, horizon, runs
+from compare.experiments.trajectory.sentences import of_left_out
 from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
+from compare.setup import engines as engines_of
 
-XML = ARM.mjcf.read_text()
-TMT = Tmt()
+LEVELS = {f"{level}, TMT to MuJoCo" for level in ("derivative", "one step", "open loop")}
 
 
 def side(case) -> runs.TmtSide:
     """TMT's side of a case by RK4 with its own steps."""
-    return runs.tmt_side(case, TMT.of(case), case.steps, "rk4")
+    return runs.tmt_side(case, Tmt().of(case), case.steps, "rk4")
 
 
-@pytest.fixture(scope="module")
-def damped():
-    """TMT's side of a scene that is judged to its end."""
-    return side(DAMPED)
-
-
-def judged_with(mujoco, mine, case=DAMPED) -> dict:
+def judged_with(mujoco, mine, case=DAMPED, result=None) -> dict:
     """The checks of a run whose TMT side may be edited, by quantity."""
-    result = Result("trajectory")
-    runs.compare_runs(result, case, mujoco.of(case), 64, [METHODS["RK4"]], mine)
+    result = result or Result("trajectory")
+    runs.compare_runs(result, case, mujoco.of(case), case.steps, [METHODS["RK4"]], mine)
     return {check.quantity: check for check in result.checks}
 
 
 @pytest.mark.parametrize(
     "level, field", [("derivative", "derivative_tolerance"), ("one step", "step_tolerance"), ("open loop", "width")]
 )
-def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco, damped):
-    name = f"{level}, TMT to MuJoCo"
+def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
+    """In a scene that is judged to its end."""
+    name, damped = f"{level}, TMT to MuJoCo", side(DAMPED)
     checks = judged_with(mujoco, damped)
     used = checks[name].over_tolerance
     assert all(check.passed for check in checks.values()) and 1e-5 < used < 1.0
@@ -57,10 +53,9 @@ def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
     result, mine = Result("trajectory"), side(case)
-    runs.compare_runs(result, case, mujoco.of(case), 64, [METHODS["RK4"]], mine)
-    one = [check for check in result.checks if check.quantity == "one step, TMT to MuJoCo"]
+    checks = judged_with(mujoco, mine, case, result)
     count, fast = len(mine.states[0]), int((np.abs(mine.states[1]).max(axis=1) / 64 > np.pi).sum())
-    assert all(check.passed for check in one) and len(one) == (fast < count) and bool(fast) == (rate > 201.1)
+    assert ("one step, TMT to MuJoCo" in checks) == (fast < count) and bool(fast) == (rate > 201.1)
     assert [f"{fast} of {count}" in note for note in result.notes] == [True] * bool(fast)
 
 
@@ -71,22 +66,18 @@ def test_the_time_that_is_judged_is_at_least_what_the_scene_asks_for(judged, pas
     assert (checks["time judged"].value, checks["time judged"].passed) == (3.125, passes)
 
 
-def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco, engines):
+def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco):
     case = DAMPED.changed(judged=0.0, damping=0.0, tags=("own",))
-    levels = {f"{level}, TMT to MuJoCo" for level in ("derivative", "one step", "open loop")}
-    assert judged_with(mujoco, side(case), case).keys() == levels
-    assert judged_with(mujoco, side(FREE), FREE).keys() == levels | {"time judged", "movement"}
-    result, robot = Result("trajectory"), dataclasses.replace(ARM, scenes=(case.scene,))
-    drift.measure_drift(result, robot, engines, drift.FEW_DRIFT_STEPS)
-    assert result.checks == []
+    assert judged_with(mujoco, side(case), case).keys() == LEVELS
+    assert judged_with(mujoco, side(FREE), FREE).keys() == LEVELS | {"time judged", "movement"}
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():
-    moon = parse(XML.replace("0 0 -9.81", "0 0 -1.62"), tmt.ARM).of(HELD)
+    moon = parse(ARM.mjcf.read_text().replace("0 0 -9.81", "0 0 -1.62"), tmt.ARM)
     mine, result = side(HELD), Result("trajectory")
-    runs.compare_runs(result, HELD, moon, 64, [METHODS["RK4"]], mine)
+    judged_with(moon, mine, HELD, result)
     (kept,) = result.curves.values()
-    t, *theirs = moon.run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")[:3]
+    t, *theirs = moon.of(HELD).run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")[:3]
     assert all(np.array_equal(a, b) for a, b in zip(kept["tmt"], (mine.q, mine.v)))
     assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(kept["mujoco"], theirs))
     assert kept["left"] == {"tmt": None, "mujoco": 5 / 64} and kept["ended"]["tmt"] is None
@@ -94,67 +85,95 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
     assert {row["diverged_at_s"] for row in result.rows} == {kept["ended"]["mujoco"]}
 
 
-def test_every_rule_of_a_run_is_applied(engines):
-    """The names of the checks that each kind of scene gets, with every integrator."""
-    found = {}
-    for case in (CASES["ball catch, free"], HELD):
-        for check in runs.follow(case, engines, (1,)).checks:
-            assert check.passed, str(check)
-            found.setdefault(check.scene, set()).add(check.quantity)
-    levels = {f"{level}, TMT to MuJoCo" for level in ("derivative", "one step", "open loop")} | {"time judged"}
-    diverges, bits = {"step of divergence, MuJoCo's, is TMT's"}, {"the same bits as Euler"}
-    of = "ball catch, free, {}, dt = 5/64 s"
-    assert found[of.format("RK4")] == levels | {"movement"}
-    assert found[of.format("Euler")] == found[of.format("implicit")] == levels | {"movement"} | diverges
-    assert found[of.format("implicitfast")] == levels | {"movement"} | diverges | bits
-    assert found["ball catch, held, RK4, dt = 5/64 s"] == levels
-    assert found["ball catch, held, implicitfast, dt = 5/64 s"] == levels | bits
+def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the_scene_itself_has():
+    """Of 40 hinges a step has 6400 entries."""
+    long = robot_of(reading.read(chain(40)), "chain.xml")
+    case = long.case("c", duration=1.0, dt=1 / 512)
+    coarse, fine = FREE, FREE.changed(dt=5 / 8193)
+    assert runs.counts(coarse, (1, 16, 128)) == [64, 1024, 8192] and runs.counts(fine, (1, 2)) == [8193]
+    assert [runs.counts(case, (1, 2), 6400 * steps) for steps in (1023, 1024)] == [[512], [512, 1024]]
+    assert [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)] == [5, 65, 65, 64]
+    assert [len(of_left_out([case], (1, 2), 6400 * steps)) for steps in (511, 512, 1024)] == [2, 1, 0]
+    assert horizon.growth_run(long, [case], small=False) == (416 / 512, 416)
 
 
-def test_a_run_is_no_finer_than_8192_steps_unless_the_scene_itself_is():
-    assert runs.counts(FREE, (1, 16, 128)) == [64, 1024, 8192]
-    assert runs.counts(FREE.changed(dt=5 / 65), (1, 16, 128)) == [65, 1040]
-    assert runs.counts(FREE.changed(dt=5 / 8193), (1, 16)) == [8193]
+def test_the_derivative_of_the_bias_is_that_of_mujoco_for_joints_of_all_kinds():
+    read, result = reading.read(random_tree(2, joints=5)), Result("trajectory")
+    derivative.compare_derivatives(result, robot_of(read, "kinds.xml"), engines_of(reading.engine(read)))
+    assert result.checks[0].passed and result.checks[0].unit == "N m s/rad or N s/m"
 
 
-class OtherBits(MujocoDynamics):
-    """MuJoCo, of which one integrator gives other bits."""
-
-    def run(self, q, v, tau, dt, steps, method, tolerance=None):
-        motion = super().run(q, v, tau, dt, steps, method, tolerance)
-        return motion._replace(q=motion.q + 1e-15 * (method == "implicitfast"))
+def result_of(curve, **curves) -> Result:
+    """With this curve of the held scene, for each scheme."""
+    runs = {(HELD.name, scheme, 64): curve for scheme in ("rk4", "implicit", "semi_implicit_euler")}
+    return Result("trajectory", curves={"runs": runs, "errors": {HELD.name: (0.1, 0.2)}} | curves)
 
 
-class Different(Mujoco):
-    """The engine of such dynamics."""
+def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
+    curve = run_of(HELD, 0.1, 0.2, until=2.5, left=(None, 4.0))
+    result = result_of(curve)
+    _, fig, caption = figures_runs.draw_held(result, HELD, 2)
+    lines = [line for line in fig.axes[0].lines if len(line.get_xdata())]
+    for i in range(3):
+        ours, theirs = lines[2 * i : 2 * i + 2]
+        assert np.allclose(ours.get_ydata(), np.degrees(curve["tmt"][0][:, i])) and ours.get_marker() == "None"
+        assert np.allclose(theirs.get_ydata(), np.degrees(curve["mujoco"][0][:, i])) and theirs.get_marker() == "o"
+    assert "MuJoCo is 0.1 rad away at 4.00 s" in caption
+    at = [caption.index(number) for number in ("1.0e-01 rad", "2.0e-01 rad", "2.50 s", "5.0e-02 rad")]
+    assert at == sorted(at) and caption.count("4.00 s") == 1  # TMT's error, MuJoCo's, how long judged, how far apart
 
-    def of(self, case):
-        dynamics = super().of(case)
-        dynamics.__class__ = OtherBits
-        return dynamics
+    about = {"scene": HELD.name, "level": "open loop", "engine_integrator": "RK4", "dt_s": 5 / 64}
+    ends = ((None, 0.25), (0.0, None), (None, 0.125))
+    result.rows = [about | {"diverged_at_s": at, "difference_over_band": used} for at, used in ends]
+    _, fig, caption = figures_runs.draw_run(result, HELD)
+    assert all(number in caption for number in ("2.5e-01", "1.0e-01 rad", "2.0e-01 rad", "0.0781 s", "2.50 s"))
+    for ax, k in ((fig.axes[0], 0), (fig.axes[3], 1)):  # angles and rates of the first scheme
+        assert np.array_equal(ax.lines[0].get_ydata(), curve["tmt"][k][:, 0])
+        assert np.array_equal(ax.lines[1].get_ydata(), curve["mujoco"][k][::3, 0]) and ax.lines[1].get_marker() == "o"
+    ours, apart, width = fig.axes[6].lines
+    assert ours.get_label().startswith("TMT, start ") and ours.get_ydata()[-1] == pytest.approx(0.1)
+    assert apart.get_label() == "TMT to MuJoCo" and apart.get_ydata()[-1] == pytest.approx(0.1)
+    assert set(width.get_ydata()) == {1e-9}
 
 
-def test_an_integrator_of_other_bits_is_seen(engines):
-    different = load(ARM.mjcf, ARM.tree)
-    different.__class__ = Different
-    checks = runs.follow(FREE, engines | {"mujoco": different}, (1,)).checks
-    failed = [check.scene for check in checks if "same bits" in check.quantity and not check.passed]
-    assert failed == ["bent, free, implicitfast, dt = 5/64 s"]
+def test_what_comes_after_a_run_has_diverged_is_not_drawn():
+    curve = run_of(HELD, 1.0, 1e135, ended=(None, 2.5))
+    of_run = figures_runs.draw_run(result_of(curve), HELD)[1]
+    of_held = figures_runs.draw_held(result_of(curve), HELD, 2)[1]
+    for ours, theirs in (of_run.axes[0].lines[:2], of_held.axes[0].lines[:2]):
+        assert np.isfinite(ours.get_ydata()).all()
+        assert np.array_equal(np.isfinite(theirs.get_ydata()), np.array(theirs.get_xdata()) < 2.5)
+    assert np.array_equal(np.isfinite(of_run.axes[6].lines[1].get_ydata()), curve["t"][1:] < 2.5)
 
 
-def test_a_run_of_which_nothing_is_judged_is_said(engines):
-    case = FREE.changed(duration=1 / 64, dt=1 / 512)
-    notes = [runs.follow(case, engines, (1,), entries=entries).notes for entries in (0, 100_000)]
-    assert [any("RK4, 8 steps" in note for note in of_run) for of_run in notes] == [True, False]
+def test_the_figure_of_drift_has_each_engine_in_its_place():
+    steps = {METHODS[name]: drift.DRIFT_STEPS[METHODS[name].order] for name in ("Euler", "implicit", "RK4")}
+    made = {method: {"tmt": [8.0, 4.0, 2.0], "mujoco": [48.0, 12.0, 3.0]} for method in steps}
+    curves = {"drift": {"drifts": {("bent, free", "energy", "J"): made}, "steps": steps}}
+    _, fig, caption = figures_drift.draw_drift(Result("trajectory", curves=curves))
+    assert "TMT 1.00 to 1.00, MuJoCo 2.00 to 2.00" in caption
+    assert "TMT 2.0e+00 J, MuJoCo 3.0e+00 J" in caption and caption.endswith(": 1.5 to 6.")  # MuJoCo's over TMT's
+    for line in fig.axes[0].lines[:-1]:
+        assert line.get_ydata().tolist() == ([8.0, 4.0, 2.0] if line.get_marker() == "None" else [48.0, 12.0, 3.0])
 
 
-def test_an_arm_that_flies_apart_is_reported_as_diverged(engines):
-    """A forearm of nearly no inertia: MuJoCo's run diverges, that of the same scheme does not; no number stands for it."""
-    text = XML.replace("0.001 0.019 0.019", "1e-9 1e-9 1e-9")
-    feather = parse(text.replace('pos="0.15 0 0" mass="1.5"', 'pos="1e-5 0 0" mass="1.5"'), tmt.ARM)
-    part = runs.follow(CASES["zero, free"], engines | {"mujoco": feather}, (1,))
-    failed = {check.quantity for check in part.checks if not check.passed}
-    assert {"derivative, TMT to MuJoCo", "time judged"} <= failed
-    for row in part.rows:
-        assert row["diverged_at_s"] < (row["twin_diverged_at_s"] or 5.1)
-        assert not any(isinstance(value, float) and np.isnan(value) for value in row.values())
+def test_which_figures_there_are_follows_what_was_run():
+    t, names = np.linspace(0.0, 60.0, 61), ["assignment_figure_2", "trajectory_bent_free", "trajectory_ball_catch_held"]
+    runs = {(case.name, "rk4", 64): run_of(case) for case in (CASES["bent, free"], HELD)}
+    result = result_of(None, runs=runs, drift={"drifts": {}})
+    assert [call()[0] for call in trajectory.figures(result, ARM)] == names[:2]
+    result.curves["growth"] = {"t": t, "curves": {"bent, free": np.where(t < 51.0, 0.4 * t, np.nan)}}
+    assert [call()[0] for call in trajectory.figures(result, ARM)] == [*names, "trajectory_growth"]
+
+
+def test_a_ball_is_drawn_by_its_turn_from_the_start():
+    """Times the root of 3: on this side of half a turn, and beyond it, where nothing is drawn."""
+    case = robot_of(reading.read(random_tree(2, joints=5)), "kinds.xml").case("c")
+    turns = np.array([0.0, 0.1, 1.75, 1.85])
+    q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
+    values = figures_lines.drawn(case, q)
+    for kind, at, by in case.coordinates.places.joints:
+        if kind == "ball":
+            assert values[:3, by] == pytest.approx(turns[:3, None] * np.ones(3)) and np.isnan(values[3, by]).all()
+        else:
+            assert values[:, by] == pytest.approx(q[:, at])

@@ -1,97 +1,162 @@
-"""The table of the motion: which rows and columns there are, and that its values are those of the runs."""
+"""The motion of the runs: its table, the pictures of it, who leaves when and where to, and the GIF."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
-from trajectory_curves import CASES, FREE
+from models import PATHS
+from PIL import Image
+from trajectory_curves import CASES, HELD, run_of
 
 from compare.coordinates import Coordinates
-from compare.engines import GRID
+from compare.engines import GRID, compared
+from compare.engines.mujoco import reading
+from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import motion
+from compare.experiments.trajectory import motion_frames as frames
 from compare.experiments.trajectory.runs import follow
 from compare.judge.check import Result
-from compare.report.files import csv
-from compare.robots.arm import ARM
+from compare.robots.arm import ARM, landmarks
+from compare.robots.file import robot_of
+from compare.robots.stick import as_seen, stick_figure
 
-ABOUT = ["scene", "engine", "integrator", "dt_s", "t_s"]
-OF_ARM = [f"q_{name}_rad" for name in ARM.joints] + [f"qd_{name}_rad_per_s" for name in ARM.joints]
-
-
-def table_of(curves, robot=ARM) -> tuple[Result, pd.DataFrame]:
-    """The result, and its table as a reader of the file has it."""
-    result = Result("trajectory", curves={"runs": curves})
-    motion.tabulate_motion(result, robot)
-    return result, pd.DataFrame(result.tables["motion"], columns=ABOUT + motion.motion_columns(robot.coordinates))
+CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
+BLUE, ORANGE = (0, 114, 178), (230, 159, 0)
+METHOD = {"tmt": "rk4", "mujoco": "RK4"}
 
 
 @pytest.fixture(scope="module")
-def curves(engines):
-    """Of two scenes, one in which a method of order 1 diverges, one with locked joints; the first with finer steps too."""
-    found = {}
-    for name, finer in (("ball catch, free", (1, 2)), ("elbow swing", (1,))):
-        found |= follow(CASES[name], engines, finer).curves
-    return found
+def runs(engines):
+    """Of a scene by its own steps and finer ones."""
+    return follow(CATCH, engines, (1, 4)).curves
 
 
-def test_every_run_of_a_scene_has_65_equal_times_its_own_values_and_none_after_it_has_diverged(
-    curves, engines, tmp_path
-):
-    result, table = table_of(curves)
-    assert list(table.columns) == ABOUT + OF_ARM and result.filed == ("motion",) and result.notes == []
-    methods = engines["mujoco"].methods
-    schemes = {method.scheme for method in methods.values()}
-    assert len(table) == 2 * (len(methods) + len(schemes)) * (GRID + 1)
-    for _, run in table.groupby(["scene", "engine", "integrator"]):
-        assert run["dt_s"].unique().tolist() == [5.0 / 64]  # of the two steps that were run the scene's own
-        np.testing.assert_array_equal(run["t_s"], np.arange(GRID + 1) * (5.0 / 64))
+def tabulated(curves, robot=ARM) -> Result:
+    result = Result("trajectory", curves={"runs": curves})
+    motion.tabulate_motion(result, robot)
+    return result
+
+
+def test_every_run_of_a_scene_has_65_equal_times_its_own_values_and_none_after_it_has_diverged(runs):
+    result, columns = tabulated(runs), motion.motion_columns(ARM.coordinates)
+    assert result.filed == ("motion",) and result.notes == []
     for scheme, integrator in (("rk4", "RK4"), ("semi_implicit_euler", "Euler")):
-        curve = curves["ball catch, free", scheme, 64]
-        for engine, name in (("tmt", scheme), ("mujoco", integrator)):
-            run = table[(table.scene == "ball catch, free") & (table.engine == engine) & (table.integrator == name)]
-            alive = curve["t"] < (np.inf if curve["ended"][engine] is None else curve["ended"][engine])
+        curve = runs[CATCH.name, scheme, 64]
+        for of in (("tmt", scheme), ("mujoco", integrator)):
+            run = [row for row in result.tables["motion"] if (row["engine"], row["integrator"]) == of]
+            about = [(row["scene"], row["dt_s"], row["t_s"]) for row in run]
+            assert about == [(CATCH.name, 5 / 64, k * 5 / 64) for k in range(GRID + 1)]  # by the scene's own step
+            alive = curve["t"] < (np.inf if curve["ended"][of[0]] is None else curve["ended"][of[0]])
             assert alive.all() == (scheme == "rk4") and alive[0]
-            expected = np.where(alive[:, None], np.concatenate(curve[engine], axis=1), np.nan)
-            np.testing.assert_array_equal(run[OF_ARM].to_numpy(float), expected)
-    swing = table[table.scene == "elbow swing"]
-    assert (swing[OF_ARM[:2]].to_numpy(float) == CASES["elbow swing"].posture[:2]).all()
-    assert (swing[OF_ARM[3:5]] == 0.0).all(axis=None) and np.ptp(swing[OF_ARM[2]].to_numpy(float)) > 1.0
-    (tmp_path / "motion.csv").write_text(csv(result.tables["motion"]), encoding="utf-8")
-    read = pd.read_csv(tmp_path / "motion.csv")  # which has all digits, and empty cells
-    np.testing.assert_array_equal(read[OF_ARM].to_numpy(float), table[OF_ARM].to_numpy(float))
-    assert read[OF_ARM].isna().any(axis=None) and "nan" not in (tmp_path / "motion.csv").read_text().lower()
+            expected = np.where(alive[:, None], np.concatenate(curve[of[0]], axis=1), np.nan)
+            found = np.array([[row[column] for column in columns] for row in run], dtype=float)
+            np.testing.assert_array_equal(found, expected)
 
 
 def test_a_run_ends_in_the_table_at_the_very_state_at_which_it_has_diverged():
     t, ones = np.linspace(0.0, 5.0, 2 * GRID + 1), np.ones((2 * GRID + 1, 3))
-    for ended, alive in ((None, 65), (5.0, 64), (t[4], 2), (t[3], 2), (t[5], 3)):
-        _, values = motion.at_equal_times(FREE, t, ones, ones, ended)
+    for ended, alive in ((None, 65), (5.0, 64), (t[4], 2), (t[5], 3)):
+        _, values = motion.at_equal_times(CATCH, t, ones, ones, ended)
         assert np.isfinite(values).all(axis=1).sum() == alive and np.isfinite(values[:alive]).all()
-    broken = ones.copy()
-    broken[8, 1] = np.nan  # that is no number though nobody says that it has diverged
-    _, values = motion.at_equal_times(FREE, t, broken, ones, None)
+    ones[8, 1] = np.nan  # that is no number though nobody says that it has diverged
+    _, values = motion.at_equal_times(CATCH, t, ones, ones, None)
     assert np.isnan(values[4]).all() and np.isfinite(values[5]).all()
 
 
 def test_a_scene_whose_steps_do_not_fall_on_the_times_says_which_run_it_shows_or_that_there_is_none(engines):
-    odd = FREE.changed(name="odd", dt=5.0 / 12)
+    odd = CASES["elbow swing"].changed(name="odd", dt=5.0 / 12)
     robot, runs = dataclasses.replace(ARM, scenes=(odd.scene,)), follow(odd, engines, (1, 16)).curves
-    result, table = table_of(runs, robot)
-    assert table["dt_s"].unique().tolist() == [5.0 / 192] and "odd" in result.notes[0] and "192" in result.notes[0]
-    result, table = table_of({key: run for key, run in runs.items() if key[2] == 12}, robot)
-    assert len(table) == 0 and "odd" in result.notes[0]
+    result = tabulated(runs, robot)
+    assert {row["dt_s"] for row in result.tables["motion"]} == {5.0 / 192} and "192" in result.notes[0]
+    assert {(row["q_beta_rad"], row["qd_beta_rad_per_s"]) for row in result.tables["motion"]} == {(odd.posture[1], 0.0)}
+    result = tabulated({key: run for key, run in runs.items() if key[2] == 12}, robot)
+    assert result.tables["motion"] == [] and "odd" in result.notes[0]
 
 
 def test_columns_of_every_kind_of_joint_and_of_names_that_differ_in_signs_alone():
-    names = ("root x", "root y", "root z", "root turn", "hip", "lift", "my knee")
-    of = Coordinates(names, ("slide", "slide", "slide", "ball", "ball", "slide", "hinge"))
+    names = ("root x", "root y", "root z", "root turn", "my knee")
+    of = Coordinates(names, ("slide", "slide", "slide", "ball", "hinge"))
     assert motion.motion_columns(of) == [
-        "q_root_x_m", "q_root_y_m", "q_root_z_m", "q_root_w", "q_root_x", "q_root_y", "q_root_z",
-        "q_hip_w", "q_hip_x", "q_hip_y", "q_hip_z", "q_lift_m", "q_my_knee_rad",
+        "q_root_x_m", "q_root_y_m", "q_root_z_m", "q_root_w", "q_root_x", "q_root_y", "q_root_z", "q_my_knee_rad",
         "qd_root_x_m_per_s", "qd_root_y_m_per_s", "qd_root_z_m_per_s",
-        "qd_root_x_rad_per_s", "qd_root_y_rad_per_s", "qd_root_z_rad_per_s",
-        "qd_hip_x_rad_per_s", "qd_hip_y_rad_per_s", "qd_hip_z_rad_per_s", "qd_lift_m_per_s", "qd_my_knee_rad_per_s",
+        "qd_root_x_rad_per_s", "qd_root_y_rad_per_s", "qd_root_z_rad_per_s", "qd_my_knee_rad_per_s",
     ]  # fmt: skip
-    columns = motion.motion_columns(Coordinates(("a-b", "a b", "a_b", "x turn")))
-    assert len(set(columns)) == 8 and columns[0] == "q_a_b_rad" and columns[3] == "q_x_turn_rad"
+    assert len(set(motion.motion_columns(Coordinates(("a-b", "a b", "a_b", "x turn"))))) == 8
+
+
+def seen(path) -> np.ndarray:
+    return as_seen(np.array([list(landmarks(q).values()) for q in path]))
+
+
+@pytest.fixture(scope="module")
+def drawn(runs, engines):
+    return frames.drawn_motion(CATCH, engines, runs)
+
+
+def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_of_it(drawn, runs):
+    curve = runs[CATCH.name, "rk4", 256]
+    np.testing.assert_array_equal(drawn.t, curve["t"][::2])
+    for name in METHOD:
+        np.testing.assert_allclose(drawn.points[name], seen(curve[name][0][::2]), atol=1e-15)
+    np.testing.assert_array_equal(drawn.apart, np.abs(curve["tmt"][0] - curve["mujoco"][0]).max(axis=1)[::2])
+    assert drawn.left == {"tmt": None, "mujoco": None}  # there is no posture to leave
+
+
+def test_what_is_held_is_followed_until_both_have_left():
+    t = np.arange(129) * 5 / 64
+
+    def leaves(at):
+        q = HELD.q + 0.2 * (t >= at)[:, None]
+        return SimpleNamespace(run=lambda *_: SimpleNamespace(t=t, q=q, v=0.0 * q))
+
+    dynamics, both = {"tmt": leaves(6.25), "mujoco": leaves(3.75)}, {"tmt": 6.25, "mujoco": 3.75}
+    for left, end in (((None, 3.75), 6.75), ((3.75, 3.75), 5.0), ((None, None), 5.0)):
+        seen, paths, _, found = frames.followed_on(HELD, dynamics, METHOD, run_of(HELD, left=left), 64)
+        assert seen[-1] == pytest.approx(end, abs=5 / 64) and len(paths["tmt"][0]) == len(seen)
+        assert found == (both if end > 5.0 else dict(zip(both, left)))
+
+
+def test_between_two_states_stands_what_the_method_gives_with_half_a_step_and_nothing_after_divergence(runs, engines):
+    curve = runs[CATCH.name, "rk4", 64] | {"ended": {"tmt": None, "mujoco": 2.5}}
+    scene = frames.drawn_motion(CATCH, engines, {(CATCH.name, "rk4", 64): curve})
+    assert len(scene.t) == 129
+    for name, of in compared(engines, CATCH).items():
+        half = of.run(curve[name][0][5], curve[name][1][5], CATCH.tau, 5 / 128, 1, METHOD[name]).q[1]
+        np.testing.assert_allclose(scene.points[name][11], seen([half])[0], atol=1e-12)
+    gone = np.isnan(scene.points["mujoco"]).all(axis=(1, 2))
+    np.testing.assert_array_equal(gone, scene.t >= 2.5)
+    assert np.isfinite(scene.points["tmt"]).all() and np.isnan(scene.apart[gone]).all()
+
+
+def test_first_comes_what_is_held_and_left_then_what_is_let_go_from_there(drawn):
+    names = ["bent, held", "bent, free", "zero, free", "ball catch, held", "ball catch, free"]
+    scenes = [drawn._replace(scene=name) for name in names]
+    assert [one.scene for one in frames.in_order(scenes, ARM)] == names and frames.in_order([], ARM) == []
+    scenes[3] = scenes[3]._replace(left={"tmt": None, "mujoco": 4.0})
+    assert [one.scene for one in frames.in_order(scenes, ARM)] == [*names[3:], *names[:3]]
+
+
+def test_a_free_body_is_a_cross_that_turns_with_it():
+    robot, half = robot_of(reading.read(PATHS["free_body"]), "stone.xml"), np.sqrt(0.5)
+    a_quarter_about_z = np.array([[0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, half, 0.0, 0.0, half]])
+    points, links = stick_figure(robot, a_quarter_about_z, crosses=True)
+    before, after = points[:, -3:] - points[:, :1]
+    assert links[-3:] == [(0, 2), (0, 3), (0, 4)] and np.abs(before).max() > 0.1
+    np.testing.assert_allclose(after, before @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], atol=1e-15)
+
+
+def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_path):
+    left, right = np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]]), np.array([[1.0, -1.0], [1.5, -1.0], [2.0, -1.0]])
+    points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
+    scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
+    name, figure, _ = gif.draw_motion(Result("trajectory", curves={"drawn": [scene]}))
+    figure.savefig(tmp_path / f"{name}{figure.suffix}")
+    found = []
+    with Image.open(tmp_path / "motion.gif") as image:
+        for k in range(image.n_frames):
+            image.seek(k)
+            pixels = np.asarray(image.convert("RGB"), int)[gif.TOP : -gif.BOTTOM]  # below the names
+            columns = [np.nonzero(np.abs(pixels - colour).max(axis=2) < 8)[1] for colour in (BLUE, ORANGE)]
+            found.append([of.mean() // (gif.PIXELS[0] / 2) if len(of) > 100 else None for of in columns])
+    assert found == [[0, 1], [0, 0], [0, None]]  # in the left half, in the right one, nowhere

@@ -1,4 +1,4 @@
-"""Curves of runs, as the experiment keeps them, whose numbers a test chooses."""
+"""The scenes by name, and curves of runs whose numbers a test chooses. Used by all tests of this folder."""
 
 import numpy as np
 
@@ -12,9 +12,8 @@ def run_of(case, ours=0.0, theirs=0.0, until=5.0, ended=(None, None), left=(None
     """The curves of a run of 64 steps whose angles end so far from where they started."""
     t = np.linspace(0.0, 5.0, 65)
     ramp = np.linspace(0.0, 1.0, 65)[:, None] * np.ones(len(case.joints))
-    start = case.q
     return {
-        "integrator": "RK4", "t": t, "every": 1, "tmt": [start + ours * ramp, 10.0 + ours * ramp],
-        "mujoco": [start + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9), "nudged": start + 0.0 * ramp,
+        "integrator": "RK4", "t": t, "every": 1, "tmt": [case.q + ours * ramp, 10.0 + ours * ramp],
+        "mujoco": [case.q + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9), "nudged": case.q + 0.0 * ramp,
         "judged_until_s": until, "ended": dict(zip(("tmt", "mujoco"), ended)), "left": dict(zip(("tmt", "mujoco"), left)),
     }  # fmt: skip
