@@ -1,6 +1,6 @@
 """Small runs that several tests look at, which the fixture `shared` computes once.
 
-Used by conftest.py (`small`), test_agreement, test_checks, test_command_line, test_drawn_figures, test_second_robot,
+Used by conftest.py (`small`), test_agreement, test_own_reference, test_drawn_figures, test_second_robot,
 report/test_terminal and experiments/stability/test_stability_small.
 """
 
@@ -87,12 +87,6 @@ def flaws_of_arm():
     """What is wrong with each figure of matplotlib of all experiments on the arm, as it is drawn: {its name: in words}."""
     calls = (call for name in EXPERIMENTS for call in module(name).figures(of_arm(name), ARM))
     return {name: flaws(figure) for name, figure, _ in (call() for call in calls) if hasattr(figure, "axes")}
-
-
-def quick_run(folder):
-    """A quick run of everything, on a terminal, from a folder that is not the project's."""
-    folder.mkdir()
-    return on_terminal(["all", "--quick"], 80, "xterm", folder)
 
 
 def runs_on_terminals(plain, umlauts):
