@@ -15,11 +15,11 @@ from crane import crane
 from drawn_flaws import flaws
 from runs import in_shell, on_terminal
 
-from compare import drawing, experiment
+from compare import experiment
 from compare.engines.mujoco import load, parse
 from compare.experiments import EXPERIMENTS, module, skipped
 from compare.fleet.file_pieces import Here
-from compare.report import files, overview, verdict
+from compare.report import files, verdict
 from compare.robots.arm import ARM
 
 
@@ -61,26 +61,6 @@ def of_crane():
     for section in sections:
         section.result.curves = {}  # which need not be sent
     return SimpleNamespace(sections=sections, reasons=reasons, lines=lines, texts=texts, sizes=sizes)
-
-
-def report_of_arm():
-    """Of all experiments on the arm: lines of the verdict, captions, report.md, names of figures, what could not be drawn."""
-    with TemporaryDirectory() as place:
-        folder, sections, lost = Path(place), [], []
-        (folder / "figures").mkdir()
-        for name in EXPERIMENTS:
-            of = module(name)
-            section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
-            sections.append(section)
-            others = overview.results_needed(name, list(EXPERIMENTS), sections)
-            section.figures, failed = drawing.draw(name, section.result, ARM, folder / "figures", others)
-            lost += failed
-        words = verdict.verdict(sections, len(EXPERIMENTS))
-        files.write(folder, verdict.Report(sections, ARM, {"command": "a small run"}, words))
-        text = (folder / "report.md").read_text(encoding="utf-8")
-        drawn = {path.stem for path in (folder / "figures").iterdir()}
-    captions = [caption for section in sections for _, caption in section.figures]
-    return SimpleNamespace(words=words, captions=captions, text=text, drawn=drawn, lost=lost)
 
 
 def flaws_of_arm():

@@ -1,12 +1,10 @@
 """Every experiment agrees with MuJoCo, and so does the method on random trees."""
 
 import dataclasses
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from small_runs import report_of_arm
 from trees import mjcf, random_tree
 
 import tmt
@@ -15,11 +13,8 @@ from compare.engines.mujoco.parameters import parameters
 from compare.experiments import EXPERIMENTS
 from compare.experiments.parameters import stated
 from compare.judge.scale import EPS, FACTOR, bias_scale, reaches
-from compare.report import overview
 from compare.robots import Robot
 from compare.robots.arm import ARM
-
-ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
@@ -34,19 +29,6 @@ def test_a_run_that_diverges_is_no_movement(small):
     moved = [check.value for check in small("trajectory").checks if check.quantity == "movement"]
     ended = [row["diverged_at_s"] for row in small("trajectory").rows]
     assert any(at is not None for at in ended) and max(moved) < 100.0
-
-
-@pytest.mark.slow
-def test_a_report_of_all_experiments_has_every_figure(small, shared):
-    made = shared(report_of_arm)
-    assert made.lost == []
-    assert f" {sum(len(small(name).checks) for name in EXPERIMENTS)} " in made.words
-    of_more_scenes = {"speed_ball_catch_free", "speed_bent_damped"}
-    pictures = {overview.BEGINNING + name for name in overview.PICTURES} | {"motion"}
-    of_example = {path.stem for path in (ROOT / "reports/example/figures").iterdir()}
-    assert made.drawn >= pictures and made.drawn | of_more_scenes == pictures | of_example
-    assert len(made.captions) == len(made.drawn) and all(made.captions)
-    assert not {"nan", "None", "inf"} & set(re.findall(r"[A-Za-z]+", "\n".join(made.captions) + made.text))
 
 
 def test_the_two_sets_of_numbers_are_one(mujoco):

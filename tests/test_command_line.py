@@ -199,9 +199,10 @@ WRONG = {  # arguments, each with what is in its line
     "all --mjcf still.xml": "joint", "gravity --mjcf light.xml": "mass", "gravity --mjcf heavy.xml": "finite",
 }  # fmt: skip
 BODY = '<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}</body></worldbody></mujoco>'
+MESH = '<asset><mesh name="m" file="none.stl"/></asset>'
 FILES = {
     "cut.xml": "<mujoco><worldbody>", "empty.xml": "", "light.xml": BODY.format(""),
-    "mesh.xml": BODY.replace("<world", '<asset><mesh name="m" file="none.stl"/></asset><world', 1),
+    "mesh.xml": BODY.format('<geom type="mesh" mesh="m"/>').replace("<worldbody>", f"{MESH}<worldbody>"),
     "still.xml": '<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>',
     "heavy.xml": BODY.format('<inertial pos="0 0 0" mass="inf" diaginertia="1 1 1"/>'),
     "wrong.toml": '[[scene]]\nname = "mine"\nq = [1.0]',

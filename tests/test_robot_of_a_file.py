@@ -1,7 +1,6 @@
 """A robot that is read from a file: postures, scenes, and the damping and steps that are chosen for it."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -64,12 +63,6 @@ def test_quaternions_of_one_turn_are_one_posture():
     near = reading.qpos0.copy()
     near[:4] = [np.cos(1e-8), np.sin(1e-8), 0.0, 0.0]
     assert list(robot_of(replace(reading, keyframes={"near": near}), "p.xml").poses) == ["near", "qpos0"]
-
-
-def test_its_name_is_the_models_or_the_files():
-    assert robot_of(reading_of(tmt.ARM), "folder/my arm.xml").name == "my arm"
-    named = robot_of(reading_of(tmt.ARM, name="lift"), "folder/my arm.xml")
-    assert (named.name, named.described, named.mjcf) == ("lift", "my arm.xml", Path("folder/my arm.xml"))
 
 
 @pytest.mark.parametrize("name", [*PATHS, 0, 1])

@@ -47,9 +47,9 @@ def asked(own, name, state):
     return getattr(own, NAMES.get(name, name))(*state[: ARGUMENTS[name]])
 
 
-def of_one(name, function):
+def of_one(name, function, coordinates=COORDINATES):
     """Own equations that have nothing but this function."""
-    return OwnEquations({name: function}, COORDINATES, required=())
+    return OwnEquations({name: function}, coordinates, required=())
 
 
 # what they may be
@@ -77,14 +77,10 @@ def test_a_batch_is_not_taken_where_its_values_or_its_components_are_others(rng)
     right = np.sin(q) / (1.0 + np.linalg.norm(v, axis=1, keepdims=True))
     assert np.allclose(own.bias(q, v), right, rtol=1e-14, atol=0.0) and own.takes_batches == {"bias": False}
 
-    def mass_matrix(q):
-        c = np.cos(q[1])
-        return np.array([[3.0 + 2.0 * c, 1.0 + c], [1.0 + c, 1.0]])
-
-    own = OwnEquations({"mass_matrix": mass_matrix}, TWO, required=())
+    own = of_one("mass_matrix", lambda q: np.array([[3.0 + q[1], q[1]], [q[1], 1.0]]), TWO)
     for count in (2, 3, 5):
         q = rng.uniform(-2, 2, (count, 2))
-        assert np.array_equal(own.mass_matrix(q), [mass_matrix(one) for one in q])
+        assert np.array_equal(own.mass_matrix(q)[:, 0, 1], q[:, 1])
     assert own.takes_batches == {"mass_matrix": False}
 
 
@@ -178,15 +174,13 @@ def test_states_at_which_it_raises_or_is_not_finite_are_noted(function, said, rn
 
 @pytest.mark.parametrize("way", [single, lambda f: f])
 def test_one_that_changes_its_argument_is_handed_copies(way, rng):
-    q = states(rng)[0]
-    before = q.copy()
-
     def bias(q, v):
         h = tmt.bias(q, v)
         v *= 2.0
         return h
 
-    own = of_one("bias", way(bias))
+    q, own = states(rng)[0], of_one("bias", way(bias))
+    before = q.copy()
     assert np.array_equal(own.bias(q, q), tmt.bias(before, before)) and np.array_equal(q, before)
     assert [problem.quantity for problem in own.problems] == ["bias"] and "argument qd" in own.problems[0].text
 
