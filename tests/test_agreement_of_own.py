@@ -12,9 +12,8 @@ from models import PATHS
 
 import compare
 import tmt
-from compare.engines.mujoco import ModelError, engine, read
-from compare.engines.own import OwnError
-from compare.joint_map import JointsError, joint_map
+from compare.engines.mujoco import engine, read
+from compare.joint_map import joint_map
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from compare.robots.file import robot_of
@@ -74,14 +73,11 @@ def message_of(**brought):
 # what may be brought
 
 
-@pytest.mark.parametrize("names", [RIGHT, ["bias"], ["gravity", "bias"]])
-def test_the_right_equations_agree(names):
-    brought = {name: RIGHT[name] for name in names}
-    assert compare.assert_agrees(PENDULUM, **brought) is None
-    found = compare.differences(PENDULUM, **brought)
+def test_the_right_equations_agree():
+    assert compare.assert_agrees(PENDULUM, **RIGHT) is None
+    found = compare.differences(PENDULUM, **RIGHT)
     assert all(one.ratio <= 1.0 and one.cause == "" for one in found)
-    entries = sum(4 if name == "mass_matrix" else 2 for name in names)
-    assert len(found) == 100 * entries and {one.quantity for one in found} == set(names)
+    assert len(found) == 100 * (4 + 3 * 2) and {one.quantity for one in found} == RIGHT.keys()
 
 
 def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_path, monkeypatch):
@@ -140,8 +136,7 @@ def test_just_inside_and_just_outside_of_the_tolerance(name, rtol, given, monkey
         assert worst.tolerance == pytest.approx(allowed, rel=1e-9)
         if share < 1.0:
             compare.assert_agrees(PENDULUM, **{name: changed}, **states, rtol=rtol)
-    if name == "acceleration":  # whose cause is not sought
-        assert f"{name}: mismatched entries 1 / " in message_of(**{name: changed}, **states, rtol=rtol)
+    assert f"{name}: mismatched entries 1 / " in message_of(**{name: changed}, **states, rtol=rtol)
 
 
 def test_differences_are_every_entry_with_the_largest_ratio_first(given):
@@ -277,7 +272,6 @@ def test_what_cannot_be_compared_is_one_line(brought, word):
         with pytest.raises(ValueError, match=word) as error:
             function(**{"mjcf": PENDULUM} | brought)
         assert "\n" not in str(error.value)
-    assert all(issubclass(kind, ValueError) for kind in (ModelError, OwnError, JointsError))
 
 
 # states and time

@@ -152,7 +152,7 @@ def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, fo
     assert out == "" and "speed cannot serve double" in err.splitlines()[-1]
     assert main(["gravity", "--joints", "-hip,knee", *asked]) == 1
     out, err = capsys.readouterr()
-    assert out.startswith("reference: own; double.xml ") and err == ""
+    assert out.startswith("reference: own; double.xml ") and err == "a user's file may print\n"
     results = json.loads((folder / "out" / "results.json").read_text(encoding="utf-8"))
     assert results["reference"] == {"kind": "own", "name": "mine.py:Object"} and not results["passed"]
     assert {path.name for path in folder.iterdir()} == {"double.xml", "mine.py", "numbers_beside.py", "out"}

@@ -5,26 +5,17 @@ import json
 import os
 import re
 import shlex
-import tomllib
 import traceback
 from pathlib import Path
 
 import numpy as np
 import pytest
 from in_process import runs_in_this_process as runs_in_this_process
-from models import PATHS
 from shown import BLOCKS, README, ROOT, blocks, command_lines
 
 from compare.__main__ import main
-from compare.engines.mujoco import reading
-from compare.engines.mujoco.flags import INTEGRATORS
-from compare.experiments.stability.servos import full_at
-from compare.experiments.stability.servos.circumstances import circumstances
-from compare.experiments.stability.servos.predicted import limit_rows, predicted_at
-from compare.experiments.stability.servos.sentences import at_the_top
 from compare.reference import compared_with
 from compare.robots.arm import ARM
-from compare.robots.file import robot_of
 from compare.scene_file import read_scenes
 
 EXAMPLE = ROOT / "reports" / "example"
@@ -91,11 +82,9 @@ def test_its_figures_are_those_of_the_example():
 def cheapest(row):
     """A row of what_should_i_use.csv as the README has it."""
     mujoco, by_tmt = row["mujoco"].removeprefix("mujoco "), row["tmt"].removeprefix("tmt ")
-    slow, fast = (
-        f"{time:.0f}" if time >= 100.0 else f"{time:.2g}" for time in map(float, (row["mujoco_ms"], row["tmt_ms"]))
-    )
-    ratio = f"{float(row['ratio']):.0f}"
-    return f"{mujoco} (dt {float(row['mujoco_dt_s']):.2g} s) | {slow} | {by_tmt} | {fast} | {ratio}"
+    times = map(float, (row["mujoco_ms"], row["tmt_ms"]))
+    slow, fast = (f"{time:.0f}" if time >= 100.0 else f"{time:.2g}" for time in times)
+    return f"{mujoco} (dt {float(row['mujoco_dt_s']):.2g} s) | {slow} | {by_tmt} | {fast} | {float(row['ratio']):.0f}"
 
 
 @pytest.mark.parametrize("text", blocks("python"), ids=lambda text: text.splitlines()[0])
@@ -132,21 +121,10 @@ def same(printed, shown):
     return words[0] == words[1] and len(numbers[0]) == len(numbers[1]) and np.allclose(*numbers, rtol=1e-9)
 
 
-def test_the_answer_for_a_step_is_the_one_that_is_shown():
-    (shown,) = (text.strip() for text in blocks("text") if text.startswith("Stable at its own"))
-    found = reading.read(PATHS["arm7"])
-    robot = robot_of(found, "arm7.xml")
-    predicted = [predicted_at(robot, name, found) for name in robot.positions]
-    full = [row for one in predicted for row in full_at(one, list(INTEGRATORS), found)]
-    rows = limit_rows(predicted, found.dt, found.integrator)
-    assert at_the_top(rows, full, True, circumstances(predicted)) == shown
-
-
 @pytest.mark.parametrize("text", blocks("toml"))
 def test_scenes_are_read(text, tmp_path):
-    path = tmp_path / "my.toml"
-    path.write_text(text)
-    assert tomllib.loads(text)["scene"][0]["name"] == read_scenes(path, ARM)[0].name
+    (tmp_path / "my.toml").write_text(text)
+    assert read_scenes(tmp_path / "my.toml", ARM)[0].name in text
 
 
 def test_own_equations_on_the_command_line_run_as_the_readme_has_them(inside, tmp_path, monkeypatch):

@@ -34,11 +34,6 @@ def single(function):
     return of_one
 
 
-def as_lists(function):
-    """The same with lists and plain numbers for arrays."""
-    return single(lambda *state: np.array(function(*state)).tolist())
-
-
 def states(rng, count=6, n=3):
     return rng.uniform(-2.0, 2.0, (3, count, n))
 
@@ -58,8 +53,7 @@ def of_one(name, function, coordinates=COORDINATES):
 @pytest.mark.parametrize("source, is_batched", [
     (tmt.ARM, True), (tmt, True), (types.SimpleNamespace(**OF_TMT), True),
     ({name: single(function) for name, function in OF_TMT.items()}, False),
-    ({name: as_lists(function) for name, function in OF_TMT.items()}, False),
-], ids=["tree", "module", "object", "mapping", "lists"])  # fmt: skip
+], ids=["tree", "module", "object", "mapping"])  # fmt: skip
 def test_every_form_gives_the_same_in_any_batch(source, is_batched, rng):
     for batch in ((), (1,), (7,), (2, 3)):
         own = OwnEquations(source, COORDINATES, tree=ARM.tree)
