@@ -1,51 +1,60 @@
-"""A double pendulum as MJCF and its equations as a user writes them, right and wrong, for test_own_reference and test_help."""
+"""A double pendulum as MJCF and its equations as a user writes them, right and wrong: what test_agreement_of_own imports, and a
+user's file in test_own_reference and test_help."""
 
-XML = """<mujoco model="double"><worldbody>
-  <body name="upper"><joint name="hip" axis="0 -1 0"/><inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.1"/>
-    <body name="lower" pos="0 0 -1"><joint name="knee" axis="0 -1 0"/>
-      <inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.1"/></body></body>
-</worldbody></mujoco>"""
-
-MINE = '''
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
-from numbers_beside import g, half, inertia, length, m
+XML = """<mujoco model="double"><worldbody>
+  <body><joint name="hip" axis="0 1 0" damping="0.3"/><inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.02"/>
+    <body pos="0 0 -1"><joint name="knee" axis="0 1 0"/>
+      <inertial pos="0 0 -0.5" mass="2" diaginertia="0.2 0.2 0.02"/></body></body></worldbody></mujoco>"""
+G = 9.81
 
 
 def mass_matrix(q):
     c = np.cos(q[1])
-    second = inertia + m * half**2
-    first = 2 * inertia + m * (2 * half**2 + length**2 + 2 * length * half * c)
-    between = second + m * length * half * c
-    return np.array([[first, between], [between, second]])
+    return np.array([[3.05 + 2 * c, 0.7 + c], [0.7 + c, 0.7]])
 
 
-def bias(q, qd):
-    turning = m * length * half * np.sin(q[1])
-    weight = m * g * half * np.sin(q[0] + q[1])
-    return np.array([
-        -turning * (2 * qd[0] + qd[1]) * qd[1] + m * g * (half + length) * np.sin(q[0]) + weight,
-        turning * qd[0] ** 2 + weight,
-    ])
+def bias(q, qd, of_square=1.0):
+    s, lower = np.sin(q[1]), G * np.sin(q[0] + q[1])
+    turning = s * np.array([-2 * qd[0] * qd[1] - of_square * qd[1] ** 2, qd[0] ** 2])
+    return turning + [2.5 * G * np.sin(q[0]) + lower, lower]
+
+
+def wrong_bias(q, qd):
+    return bias(q, qd, of_square=-1.0)
+
+
+def gravity(q):
+    return bias(q, np.zeros(2))
+
+
+def acceleration(q, qd, tau, bias=bias, damping=0.3):
+    return np.linalg.solve(mass_matrix(q), tau - bias(q, qd) - np.array([damping, 0.0]) * qd)
 
 
 def energy(q, qd):
-    height = -(half + length) * np.cos(q[0]) - half * np.cos(q[0] + q[1])
-    return m * g * height + qd @ mass_matrix(q) @ qd / 2
+    return qd @ mass_matrix(q) @ qd / 2 - G * (2.5 * np.cos(q[0]) + np.cos(q[0] + q[1]))
 
 
 class Object:
     """An object, with an energy."""
 
-    joint_names = ["hip", "knee"]
+    joint_names = ("hip", "knee")
     mass_matrix, bias, energy = map(staticmethod, (mass_matrix, bias, energy))
 
 
 class inside:
     also = Object
+
+
+class Needing:
+    def __init__(self, mass):
+        pass
 
 
 def changed(**more):
@@ -67,27 +76,23 @@ def slow(q):
     return mass_matrix(q)
 
 
-sign = changed(bias=lambda q, qd: 2.0 * bias(q, 0.0 * qd) - bias(q, qd))
-slow_sign = changed(mass_matrix=slow, bias=sign.bias)
+sign = changed(bias=wrong_bias)
+slow_sign = changed(mass_matrix=slow, bias=wrong_bias)
 nan = changed(bias=nan_bias)
 late = changed(bias=late_bias)
 infinite = changed(bias=lambda q, qd: bias(q, qd) + np.inf)
-doubled = changed(gravity=lambda q: 2.0 * bias(q, 0.0 * q))
-swapped = changed(mass_matrix=lambda q: mass_matrix(q[::-1])[::-1, ::-1], bias=lambda q, qd: bias(q[::-1], qd[::-1])[::-1])
+doubled = changed(gravity=lambda q: 2.0 * gravity(q))
+swapped = changed(
+    mass_matrix=lambda q: mass_matrix(q[::-1])[::-1, ::-1], bias=lambda q, qd: bias(q[::-1], qd[::-1])[::-1]
+)
 named = changed(mass_matrix=swapped.mass_matrix, bias=swapped.bias, joint_names=["knee", "hip"])
-
-
-class Needing:
-    def __init__(self, mass):
-        pass
-
-
-print("a user's file may print")
-'''
-BESIDE = "g, m, length, half, inertia = 9.81, 1.0, 1.0, 0.5, 0.1\n"
 
 
 def write(folder):
     """The files of a user's folder."""
-    for name, text in (("double.xml", XML), ("mine.py", MINE), ("numbers_beside.py", BESIDE)):
+    mine = (
+        Path(__file__).read_text(encoding="utf-8")
+        + 'from numbers_beside import g\n\nprint("a user\'s file may print")\n'
+    )
+    for name, text in (("double.xml", XML), ("mine.py", mine), ("numbers_beside.py", "g = 9.81\n")):
         (folder / name).write_text(text, encoding="utf-8")

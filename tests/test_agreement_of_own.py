@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 from models import PATHS
+from own_equations import XML as PENDULUM
+from own_equations import acceleration, bias, gravity, mass_matrix, wrong_bias
 
 import compare
 import tmt
@@ -18,38 +20,9 @@ from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from compare.robots.file import robot_of
 
-PENDULUM = """<mujoco><worldbody>
-  <body><joint name="hip" axis="0 1 0" damping="0.3"/><inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.02"/>
-    <body pos="0 0 -1"><joint name="knee" axis="0 1 0"/>
-      <inertial pos="0 0 -0.5" mass="2" diaginertia="0.2 0.2 0.02"/></body></body></worldbody></mujoco>"""
 READING = read(PENDULUM)
 TREE, ROBOT = READING.tree, robot_of(READING, "a pendulum")
 SIGN = "h[hip], coefficient of knee'^2: yours is -1 times"
-
-
-def mass_matrix(q):
-    """Of the pendulum, of one state."""
-    c = np.cos(q[1])
-    return np.array([[3.05 + 2 * c, 0.7 + c], [0.7 + c, 0.7]])
-
-
-def bias(q, qd, of_square=1.0):
-    s, g = np.sin(q[1]), 9.81
-    lower = g * np.sin(q[0] + q[1])
-    turning = s * np.array([-2 * qd[0] * qd[1] - of_square * qd[1] ** 2, qd[0] ** 2])
-    return turning + [2.5 * g * np.sin(q[0]) + lower, lower]
-
-
-def wrong_bias(q, qd):
-    return bias(q, qd, of_square=-1.0)
-
-
-def gravity(q):
-    return bias(q, np.zeros(2))
-
-
-def acceleration(q, qd, tau, bias=bias, damping=0.3):
-    return np.linalg.solve(mass_matrix(q), tau - bias(q, qd) - np.array([damping, 0.0]) * qd)
 
 
 RIGHT = {"mass_matrix": mass_matrix, "bias": bias, "gravity": gravity, "acceleration": acceleration}

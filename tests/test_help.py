@@ -109,7 +109,7 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     own_equations.write(tmp_path)
     servo = '<actuator><position joint="hip" kp="20" kv="1"/></actuator></mujoco>'
     Path("robot.xml").write_text(own_equations.XML.replace("</mujoco>", servo), encoding="utf-8")
-    Path("my_equations.py").write_text(own_equations.MINE, encoding="utf-8")
+    Path("mine.py").rename("my_equations.py")
     Path("my.toml").write_text(blocks("toml")[0], encoding="utf-8")
     text = ARM.mjcf.read_text(encoding="utf-8")
     for folder in ("models", "class", "submissions"):
