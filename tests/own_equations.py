@@ -12,6 +12,7 @@ XML = """<mujoco model="double"><worldbody>
     <body pos="0 0 -1"><joint name="knee" axis="0 1 0"/>
       <inertial pos="0 0 -0.5" mass="2" diaginertia="0.2 0.2 0.02"/></body></body></worldbody></mujoco>"""
 G = 9.81
+PRINTS = 'from numbers_beside import g\n\nprint("a user\'s file may print")\n'
 
 
 def mass_matrix(q):
@@ -83,16 +84,13 @@ late = changed(bias=late_bias)
 infinite = changed(bias=lambda q, qd: bias(q, qd) + np.inf)
 doubled = changed(gravity=lambda q: 2.0 * gravity(q))
 swapped = changed(
-    mass_matrix=lambda q: mass_matrix(q[::-1])[::-1, ::-1], bias=lambda q, qd: bias(q[::-1], qd[::-1])[::-1]
+    mass_matrix=lambda q: mass_matrix(q[::-1])[::-1, ::-1], bias=lambda q, v: bias(q[::-1], v[::-1])[::-1]
 )
 named = changed(mass_matrix=swapped.mass_matrix, bias=swapped.bias, joint_names=["knee", "hip"])
 
 
 def write(folder):
     """The files of a user's folder."""
-    mine = (
-        Path(__file__).read_text(encoding="utf-8")
-        + 'from numbers_beside import g\n\nprint("a user\'s file may print")\n'
-    )
+    mine = Path(__file__).read_text(encoding="utf-8") + PRINTS
     for name, text in (("double.xml", XML), ("mine.py", mine), ("numbers_beside.py", "g = 9.81\n")):
         (folder / name).write_text(text, encoding="utf-8")

@@ -13,7 +13,6 @@ from own_equations import XML as PENDULUM
 from own_equations import acceleration, bias, gravity, mass_matrix, wrong_bias
 
 import compare
-import tmt
 from compare.engines.mujoco import engine, read
 from compare.joint_map import joint_map
 from compare.judge.entries import Entries
@@ -64,14 +63,6 @@ def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_pa
     assert {one.state for one in found}.isdisjoint(one.state for one in compare.differences(model, bias=bias, states=5))
     assert (model.opt.disableflags, model.opt.integrator, model.dof_damping.tolist()) == before
     assert os.listdir() == ["pendulum.xml"]  # no log, no cache
-
-
-@pytest.mark.parametrize("name", ["mixed", "loop"])
-def test_contacts_limits_and_the_like_of_a_compiled_model_are_off(name):
-    tree = read(PATHS[name]).tree
-    functions = tmt.mass_matrix, tmt.bias, tmt.gravity_balance, tmt.acceleration
-    brought = {name: lambda *state, f=f: f(*state, tree) for name, f in zip(RIGHT, functions)}
-    compare.assert_agrees(mujoco.MjModel.from_xml_path(str(PATHS[name])), **brought, states=10)
 
 
 def test_values_as_arrays_at_the_given_states(given):

@@ -45,20 +45,13 @@ def raises(*_):
     raise ValueError("two\nlines")
 
 
-def in_background(setup):
-    return list(setup.map(divmod, [1], [0]))
-
-
-def with_a_curve_that_cannot_be_sent(setup):
-    return Result("sending", shown=[], curves={"locked": lambda: None})
-
-
 BROKEN = {  # functions of the experiment; the check that fails, and the error that it names
     "begin": ({"begin": raises}, "runs to its end", "ValueError: two lines"),
     "rows": ({"rows": raises}, "runs to its end", "ValueError: two lines"),
-    "background": ({"rows": in_background}, "runs to its end", "ZeroDivisionError"),
-    "sending": ({"rows": with_a_curve_that_cannot_be_sent}, "figure number 1 is drawn", "pickle"),
-}
+    "background": ({"rows": lambda setup: list(setup.map(divmod, [1], [0]))}, "runs to its end", "ZeroDivisionError"),
+    "sending": ({"rows": lambda setup: Result("sending", shown=[], curves={"locked": lambda: None})},
+                "figure number 1 is drawn", "pickle"),
+}  # fmt: skip
 
 
 def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeypatch):
@@ -71,11 +64,10 @@ def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeyp
     assert status == 1 and [check["experiment"] for check in failed] == list(BROKEN)
     out, err = capsys.readouterr()
     assert "published     ok" in out and err == ""
-    page = (tmp_path / "out/report.md").read_text(encoding="utf-8")
     for check, (name, (_, quantity, error)) in zip(failed, BROKEN.items()):
         assert (check["quantity"], check["value"], check["rule"]) == (quantity, None, "equal")
         assert error in check["note"]
-        assert f"FAIL {name}: {quantity}" in out and f"## {name}" in page
+        assert f"FAIL {name}: {quantity}" in out
 
 
 def test_an_experiment_that_cannot_say_its_claim_keeps_its_numbers(inside, tmp_path, monkeypatch):
@@ -97,7 +89,7 @@ def test_a_report_of_which_a_part_breaks_is_kept_and_not_complete(inside, tmp_pa
     only(monkeypatch, "odd", "published")
     status, results = ran(tmp_path, "all")
     out, err = capsys.readouterr()
-    assert status == 1 and "odd           ok" in out and "published     ok" in out
+    assert status == 1 and "odd           ok" in out
     for line, name in zip(err.splitlines(), ("report.md", "index.html"), strict=True):
         assert f"odd in {name}" in line and "KeyError: " in line
     assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
@@ -173,24 +165,22 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
         ("rows", "reduction"), *[("figures", name, part) for name in ("speed", "reduction") for part in drawing.HALVES],
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
-    for one in sections:
-        assert sorted(file for file, _ in one.figures) == [f"{one.name}_{k}" for k in ("first", "other", "second")]
+    of_each = [sorted(file for file, _ in one.figures) for one in sections]
+    assert of_each == [[f"{name}_first", f"{name}_other", f"{name}_second"] for name in names]
 
 
 def half(result, name):
     return name, SimpleNamespace(savefig=lambda path: path.write_bytes(b"a half") / 0), "A caption."
 
 
-def figures_of_which_some_raise(result, robot):
-    yield partial(plot, result, "first")
-    yield partial(plot, None)  # one argument too few
-    yield partial(half, result, "third")
+def some_raise(result, robot):
+    yield from (partial(plot, result, "first"), partial(plot, None), partial(half, result, "third"))
     yield partial(plot, result, "First")
     raise ValueError("no more")
 
 
 def test_a_figure_that_raises_leaves_the_others_alone(tmp_path, monkeypatch):
-    made(monkeypatch, "broken", figures=figures_of_which_some_raise)
+    made(monkeypatch, "broken", figures=some_raise)
     drawn, failed = drawing.draw("broken", None, None, tmp_path)
     assert [name for name, _ in drawn] == ["first", "First_"]  # one file where capitals do not count
     assert [name for name, _ in failed] == ["plot", "half third", "number 5"]

@@ -32,17 +32,14 @@ def answered(arguments, capsys):
     return stop.value.code, *capsys.readouterr()
 
 
-def test_without_words_it_prints_ten_lines_with_all_experiments(capsys):
-    status, text, err = answered([], capsys)
-    assert (status, err) == (0, "") and all(name in text for name in EXPERIMENTS)
-    assert len(text.splitlines()) == 10 and max(map(len, text.splitlines())) <= LINE_WIDTH
-
-
-def test_help_has_every_experiment_and_option(capsys, monkeypatch):
+@pytest.mark.parametrize("arguments, expected", [
+    ([], EXPERIMENTS), (["all", "--help"], [f"  {name} " for name in (*EXPERIMENTS, *OPTIONS_OF_ALL, "--version")]),
+])  # fmt: skip
+def test_help_has_every_experiment_and_option(arguments, expected, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    status, text, err = answered(["all", "--help"], capsys)
-    assert (status, err) == (0, "") and max(map(len, text.splitlines())) <= LINE_WIDTH
-    assert all(f"  {name} " in text for name in (*EXPERIMENTS, *OPTIONS_OF_ALL, "--version"))
+    status, text, err = answered(arguments, capsys)
+    assert (status, err) == (0, "") and all(part in text for part in expected)
+    assert max(map(len, text.splitlines())) <= LINE_WIDTH
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
@@ -61,20 +58,15 @@ def test_the_version_is_that_of_a_report(capsys):
     assert re.fullmatch(r"\d+(\.\d+)+", version.own_version())
 
 
-def test_import_and_help_load_nothing_heavy(tmp_path):
-    text = (
-        "import sys; from compare import assert_agrees, differences\n"
-        "print({'mujoco', 'llvmlite', 'scipy', 'pandas', 'matplotlib'} & set(sys.modules))"
-    )
-    of_help = (
-        "import sys; from compare.__main__ import main\n"
-        "try: main(['speed', '--help'])\n"
-        "except SystemExit: print({'numpy', 'mujoco', 'tmt', 'rich', 'compare.experiments.speed'} & set(sys.modules))"
-    )
-    for program in (text, of_help):
-        command = [sys.executable, "-c", program]
-        run = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
-        assert run.stdout.splitlines()[-1] == "set()", run.stderr
+@pytest.mark.parametrize("program, modules", [
+    ("from compare import assert_agrees, differences", {"mujoco", "llvmlite", "scipy", "pandas", "matplotlib"}),
+    ("from compare.__main__ import main\ntry: main(['speed', '--help'])\nexcept SystemExit: pass",
+     {"numpy", "mujoco", "tmt", "rich", "compare.experiments.speed"}),
+])  # fmt: skip
+def test_import_and_help_load_nothing_heavy(program, modules, tmp_path):
+    command = [sys.executable, "-c", f"import sys\n{program}\nprint({modules} & set(sys.modules))"]
+    run = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
+    assert run.stdout.splitlines()[-1] == "set()", run.stderr
 
 
 @pytest.mark.parametrize("line", command_lines())
@@ -96,10 +88,9 @@ TAKES_SECONDS = ("mass --out /tmp/mass", "parameters --mjcf my_arm.xml --referen
 def lines_to_run():
     """Those that no cluster and no earlier fleet is needed for; most of them take long."""
     elsewhere = {"", "all", "all --quick", "all --out reports/example"}  # test_command_line runs these
-    lines = [
-        one for one in command_lines() if one not in elsewhere and not {"--dask", "--since", "--help"} & {*one.split()}
-    ]
-    return [pytest.param(line, marks=[] if line in TAKES_SECONDS else pytest.mark.slow) for line in lines]
+    for line in command_lines():
+        if line not in elsewhere and not {"--dask", "--since", "--help"} & {*line.split()}:
+            yield pytest.param(line, marks=[] if line in TAKES_SECONDS else pytest.mark.slow)
 
 
 @pytest.mark.parametrize("line", lines_to_run())

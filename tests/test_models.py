@@ -46,15 +46,14 @@ def after_100_steps(m, d) -> mujoco.MjData:
     return d
 
 
-def of_one_number(m) -> np.ndarray:
-    """Which joints are hinges or slides."""
-    return np.isin(m.jnt_type, (HINGE, SLIDE))
-
-
 def springs_away(m) -> bool:
     """Whether a hinge or slide has a spring that rests away from qpos0."""
     at = m.jnt_qposadr
-    return (of_one_number(m) & (np.ravel(m.jnt_stiffness)[: m.njnt] > 0) & (m.qpos_spring[at] != m.qpos0[at])).any()
+    return (straight(m) & (np.ravel(m.jnt_stiffness)[: m.njnt] > 0) & (m.qpos_spring[at] != m.qpos0[at])).any()
+
+
+def straight(m) -> np.ndarray:
+    return np.isin(m.jnt_type, (HINGE, SLIDE))
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -71,13 +70,9 @@ def test_every_file_has_its_joints_moves_from_each_posture_and_servos_hold_it(na
             assert np.abs(d.qpos - m.key_qpos[key]).max() < 0.1
 
 
-@pytest.mark.parametrize("n", [1, 7, 30])
-def test_chain_has_n_tilted_hinges(n):
-    text = chain(n, 0)
-    m = mujoco.MjModel.from_xml_string(text)
-    assert kinds(m) == {"hinge": n} and m.body_parentid.tolist() == [0, *range(n)]
-    assert (np.abs(m.jnt_axis) < 0.95).all() and np.linalg.cond(mass_matrix(m, mujoco.MjData(m))) < 10 * n**3
-    assert text == chain(n, 0) != chain(n, 1)
+def test_a_chain_has_tilted_hinges():
+    m = mujoco.MjModel.from_xml_string(chain(7, 0))
+    assert kinds(m) == {"hinge": 7} and m.body_parentid.tolist() == [0, *range(7)] and (np.abs(m.jnt_axis) < 0.95).all()
 
 
 def test_random_trees_have_every_kind_of_joint_each_feature_and_move(rng):
@@ -100,7 +95,7 @@ def test_random_trees_have_every_kind_of_joint_each_feature_and_move(rng):
         "damping": lambda m: np.any(m.dof_damping),
         "spring away from qpos0": springs_away,
         "spring on a ball": lambda m: np.ravel(m.jnt_stiffness)[: m.njnt][m.jnt_type == BALL].any(),
-        "qpos0 away from zero": lambda m: m.qpos0[m.jnt_qposadr[of_one_number(m)]].any(),
+        "qpos0 away from zero": lambda m: m.qpos0[m.jnt_qposadr[straight(m)]].any(),
         "fixed to a body": lambda m: ((m.body_jntnum == 0) & (m.body_weldid > 0)).any(),
         "fixed to the world": lambda m: ((m.body_jntnum == 0) & (m.body_weldid == 0))[1:].any(),
         "free base with joints on it": lambda m: (m.body_rootid == m.jnt_bodyid[m.jnt_type == FREE][0]).sum() > 2,

@@ -4,16 +4,12 @@ import csv
 import json
 import os
 import re
-import shlex
 import traceback
-from pathlib import Path
 
 import numpy as np
 import pytest
-from in_process import runs_in_this_process as runs_in_this_process
-from shown import BLOCKS, README, ROOT, blocks, command_lines
+from shown import BLOCKS, README, ROOT, blocks
 
-from compare.__main__ import main
 from compare.reference import compared_with
 from compare.robots.arm import ARM
 from compare.scene_file import read_scenes
@@ -125,15 +121,3 @@ def same(printed, shown):
 def test_scenes_are_read(text, tmp_path):
     (tmp_path / "my.toml").write_text(text)
     assert read_scenes(tmp_path / "my.toml", ARM)[0].name in text
-
-
-def test_own_equations_on_the_command_line_run_as_the_readme_has_them(inside, tmp_path, monkeypatch):
-    text = blocks("python")[0].rsplit("\n\n", 1)[0]
-    assert "assert_agrees" not in text
-    (tmp_path / "my_equations.py").write_text(text + "\n")
-    names = run(text, tmp_path, monkeypatch)
-    (tmp_path / "robot.xml").write_text(names["mjcf"])
-    (line,) = [line for line in command_lines() if line.startswith("diagnosis ") and "my_equations.py:" in line]
-    assert main([*shlex.split(line), "--quick", "--out", "out"]) == 1
-    assert "coefficient of knee'^2" in Path("out/report.md").read_text(encoding="utf-8")
-    assert Path("out/figures/diagnosis_nearest.png").stat().st_size > 5000  # the picture beside it
