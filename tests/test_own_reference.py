@@ -37,25 +37,17 @@ def folder(tmp_path, monkeypatch):
     assert not list(tmp_path.rglob("__pycache__"))
 
 
-class Idle:
-    """Workers that draw nothing."""
-
-    def submit(self, function, *arguments):
-        return SimpleNamespace(result=lambda: ([], []))
+IDLE = SimpleNamespace(submit=lambda *_: SimpleNamespace(result=lambda: ([], [])))  # workers that draw nothing
 
 
-def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, workers=None):
+def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, workers=IDLE):
     """Experiments with equations of one's own, in this process: sections, causes, the robot, the checks that fail."""
     reference, robot, mujoco, reading = compared_with(asked, str(mjcf), joints)
     of = {"states": states, "exact_states": 1, "finer": (1,), "size": "quick", "reading": reading}
     setup = Setup(robot, engines(mujoco, reference.own), **of)
-    sections, causes, _ = experiment.examine(names, setup, Path(mkdtemp(dir=folder)), Lines(), workers or Idle())
+    sections, causes, _ = experiment.examine(names, setup, Path(mkdtemp(dir=folder)), Lines(), workers)
     failed = [check for section in sections for check in section.result.checks if not check.passed]
     return SimpleNamespace(sections=sections, causes=causes, robot=robot, failed=failed)
-
-
-def rows_of(run):
-    return [row for section in run.sections for row in section.result.rows]
 
 
 # what is compared
@@ -67,8 +59,12 @@ def rows_of(run):
 def test_right_equations_agree_in_whatever_form(folder, asked, joints):
     run = examined(folder, asked, STATIC, joints=joints)
     assert not run.failed and all(section.result.checks for section in run.sections)
-    has_energy, quantities = "energy" in run.robot.own, {row["quantity"] for row in rows_of(run)}
-    assert ("yours: torque - dV/dq" in quantities) == ("energy above the zero position's" in quantities) == has_energy
+    quantities = {row["quantity"] for section in run.sections for row in section.result.rows}
+    assert (
+        ("yours: torque - dV/dq" in quantities)
+        == ("energy above the zero position's" in quantities)
+        == ("energy" in run.robot.own)
+    )
 
 
 def test_the_tree_of_another_robot_agrees(folder):
@@ -101,8 +97,8 @@ def test_what_is_wrong_is_seen_where_it_acts(folder, asked, names, where, quanti
 def test_trajectories_are_those_of_rk4(folder):
     run = examined(folder, "mine.py:Object", ["trajectory"])
     assert run.sections[0].result.checks and not run.failed
-    levels = ("derivative", "one step", "open loop")
-    assert {(row["engine_integrator"], row["level"]) for row in rows_of(run)} == {("RK4", level) for level in levels}
+    found = {(row["engine_integrator"], row["level"]) for row in run.sections[0].result.rows}
+    assert found == {("RK4", level) for level in ("derivative", "one step", "open loop")}
 
 
 def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):

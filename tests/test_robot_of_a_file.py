@@ -31,8 +31,8 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     assert list(robot.poses) == ["home", "key middle", "middle"]
     np.testing.assert_array_equal(robot.posture("middle"), [0.5, 0.0, 0.5])
     assert {scene.posture for scene in robot.scenes} == {"home"}
-    assert list(robot_of(reading_of(arm, ranges=ranges), "my.xml").poses) == ["qpos0", "middle"]
-    assert robot_of(reading_of(arm, ranges=ranges), "my.xml").scenes[0].posture == "middle"
+    ranged = robot_of(reading_of(arm, ranges=ranges), "my.xml")
+    assert list(ranged.poses) == ["qpos0", "middle"] and ranged.scenes[0].posture == "middle"
     alone = robot_of(reading_of(arm), "my.xml")
     assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0" and alone.is_read
     keys = {name: np.full(3, 0.1 * k) for k, name in enumerate(["qpos0", "key qpos0"], start=1)}
@@ -70,12 +70,11 @@ def test_what_rests_where_it_is_let_go_is_set_going():
     still = replace(tmt.ARM, gravity=(0.0, 0.0, 0.0))
     names = [scene.name for scene in robot_of(reading_of(still), "my.xml").scenes]
     assert names == ["qpos0, set going", "qpos0, set going, damped"]
-    fastest = np.abs(
-        tmt.acceleration(np.zeros(3), np.zeros(3), np.zeros(3), replace(still, gravity=(0.0, 0.0, -1.0)))
-    ).max()
+    zero = np.zeros(3)
+    fastest = np.abs(tmt.acceleration(zero, zero, zero, replace(still, gravity=(0.0, 0.0, -1.0)))).max()
     for share, found in ((0.99, "set going"), (1.01, "let go")):  # of what is seen to move
         tree = replace(still, gravity=(0.0, 0.0, -share * 1e-6 / fastest))
-        assert scenes_from(tree, "qpos0", np.zeros(3), 0.002)[-1].name == f"qpos0, {found}, damped"
+        assert scenes_from(tree, "qpos0", zero, 0.002)[-1].name == f"qpos0, {found}, damped"
 
 
 def test_added_damping_lets_every_joint_decay_at_one_rate():
