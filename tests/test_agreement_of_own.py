@@ -43,13 +43,6 @@ def message_of(**brought):
 # what may be brought
 
 
-def test_the_right_equations_agree():
-    assert compare.assert_agrees(PENDULUM, **RIGHT) is None
-    found = compare.differences(PENDULUM, **RIGHT)
-    assert all(one.ratio <= 1.0 and one.cause == "" for one in found)
-    assert len(found) == 100 * (4 + 3 * 2) and {one.quantity for one in found} == RIGHT.keys()
-
-
 def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("pendulum.xml").write_text(PENDULUM)
@@ -66,6 +59,7 @@ def test_a_path_text_and_a_compiled_model_are_compared_at_the_same_states(tmp_pa
 def test_values_as_arrays_at_the_given_states(given):
     states, values = given
     compare.assert_agrees(PENDULUM, **values, **states)
+    assert all(one.ratio <= 1.0 and one.cause == "" for one in compare.differences(PENDULUM, **values, **states))
     compare.assert_agrees(
         PENDULUM, mass_matrix=values["mass_matrix"].tolist(), bias=bias, q=states["q"].tolist(), qd=0.0
     )
@@ -217,15 +211,12 @@ THREE = np.zeros((3, 2))
 
 @pytest.mark.parametrize("brought, word", [
     ({}, "acceleration"), ({"bias": bias, "rtol": -1.0}, "rtol is -1.0"), ({"bias": bias, "states": 2.5}, "states is 2.5"),
-    ({"bias": bias, "seed": -1}, "seed is -1"), ({"bias": THREE}, "bias .* not q"), ({"bias": bias, "qd": 0.0}, "qd .* not q"),
-    ({"acceleration": acceleration, "q": THREE, "qd": 0.0}, "depends on tau"), ({"bias": "h"}, "bias is 'h'"),
-    ({"bias": bias, "q": np.eye(3), "qd": 0.0}, r"q has shape \(3, 3\); \(states, 2\)"),
+    ({"bias": THREE}, "bias .* not q"), ({"bias": bias, "qd": 0.0}, "qd .* not q"), ({"bias": "h"}, "bias is 'h'"),
+    ({"acceleration": acceleration, "q": THREE, "qd": 0.0}, "depends on tau"), ({"mjcf": 3, "bias": bias}, "int"),
     ({"bias": bias, "q": THREE, "qd": np.eye(2)}, r"qd has shape \(2, 2\); \(3, 2\)"),
     ({"bias": bias, "q": [[0, np.nan]], "qd": 0.0}, "finite"), ({"bias": bias, "q": [["a", "b"]], "qd": 0.0}, "q is "),
     ({"bias": np.eye(3), "q": THREE, "qd": 0.0}, r"bias has shape \(3, 3\); \(3, 2\)"),
-    ({"mjcf": "nowhere.xml", "bias": bias}, "nowhere.xml"), ({"mjcf": 3, "bias": bias}, "int"),
-    ({"mjcf": "<mujoco/>", "bias": bias}, "no joint"), ({"bias": bias, "joints": ["hip", "foot"]}, "'foot'"),
-    ({"bias": lambda q, v: np.eye(2)}, r"\(2, 2\); \(2,\) .* at q = \["),
+    ({"mjcf": "nowhere.xml", "bias": bias}, "nowhere.xml"), ({"bias": bias, "joints": ["hip", "foot"]}, "'foot'"),
     ({"mjcf": PATHS["pendulum_ball"], "mass_matrix": lambda q: np.eye(6), "q": TURNED}, "length 1"),
 ])  # fmt: skip
 def test_what_cannot_be_compared_is_one_line(brought, word):

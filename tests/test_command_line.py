@@ -124,25 +124,6 @@ def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(insid
         assert len(said) == status and all(0 < line.index("-9.81 ") < line.index("-9.8 ") for line in said)
 
 
-def test_a_robot_is_compared_and_its_inventory_has_all_that_is_off(inside, tmp_path, capsys):
-    assert main(["parameters", "--quick", "--mjcf", str(PATHS["gripper"]), "--out", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.splitlines()[1].endswith("1 equalities off: mimic")
-    rows = pd.read_csv(tmp_path / "tables" / "inventory.csv").set_index("feature")
-    assert rows.loc["equality", ["count", "names", "treatment"]].tolist() == [1, "mimic", "open_tree"]
-    found = rows.loc["actuator", ["count", "names", "treatment"]].tolist()
-    assert found == [3, "shoulder;wrist;fingers", "switched_off"]
-
-
-def test_joints_are_matched_by_place_but_not_where_their_type_differs(inside, tmp_path, capsys):
-    named, model = XML.replace('name="gamma"', 'name="wrist"'), tmp_path / "named.xml"
-    for text, status in ((named.replace('type="hinge"', 'type="slide"'), 2), (named, 0)):
-        model.write_text(text)
-        asked = ["--reference", "arm", "--mjcf", str(model), "--out", str(tmp_path / "out")]
-        assert main(["parameters", "--quick", *asked]) == status
-        printed = capsys.readouterr()
-        assert "wrist" in (printed.err if status else printed.out) and (tmp_path / "out").exists() == (status == 0)
-
-
 SERVO = """<mujoco model="tail"><option timestep="0.002"/><worldbody><body><joint name="swing" axis="0 1 0" damping="0.01"/>
   <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody>
   <actuator><position joint="swing" kp="50" kv="800"/></actuator></mujoco>"""

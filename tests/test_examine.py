@@ -70,14 +70,6 @@ def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeyp
         assert f"FAIL {name}: {quantity}" in out
 
 
-def test_an_experiment_that_cannot_say_its_claim_keeps_its_numbers(inside, tmp_path, monkeypatch):
-    made(monkeypatch, "mute", rows=lambda setup: Result("mute", rows=[{"a": 1.5}]), claim=lambda robot: robot.wings)
-    only(monkeypatch, "mute")
-    status, results = ran(tmp_path, "mute")
-    assert status == 1 and "wings" in results["checks"][0]["note"]
-    assert pd.read_csv(tmp_path / "out/tables/mute.csv")["a"].tolist() == [1.5]
-
-
 def test_a_report_of_which_a_part_breaks_is_kept_and_not_complete(inside, tmp_path, capsys, monkeypatch):
     def rows(setup):
         result = Result("odd", shown=["a", "b"], rows=[{"a": 1.5}])
@@ -93,17 +85,6 @@ def test_a_report_of_which_a_part_breaks_is_kept_and_not_complete(inside, tmp_pa
         assert f"odd in {name}" in line and "KeyError: " in line
     assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
     assert not results["passed"] and results["checks"][0]["passed"]
-
-
-def test_an_experiment_that_cannot_serve_a_robot_is_skipped_or_refused(inside, tmp_path, capsys, monkeypatch):
-    made(monkeypatch, "never", rows=raises, skipped=lambda robot: f"{robot.name} has no wings")
-    only(monkeypatch, "never", "published")
-    assert ran(tmp_path / "alone", "never") == (2, None)
-    assert "arm has no wings" in capsys.readouterr().err and not (tmp_path / "alone").exists()
-    status, results = ran(tmp_path, "all")
-    assert status == 0 and results["skipped"] == [{"experiment": "never", "reason": "arm has no wings"}]
-    assert {check["experiment"] for check in results["checks"]} == {"published"}
-    assert "arm has no wings" in capsys.readouterr().out
 
 
 def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):

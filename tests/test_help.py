@@ -87,7 +87,7 @@ def lines_to_run():
             yield pytest.param(line, marks=[] if line in TAKES_SECONDS else pytest.mark.slow)
 
 
-@pytest.mark.parametrize("line", lines_to_run())
+@pytest.mark.parametrize("line", list(lines_to_run()))
 def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, capsys):
     """With few states, on a small robot with a servo; a fleet has the arm's file and a wrong one."""
     monkeypatch.chdir(tmp_path)

@@ -75,13 +75,6 @@ def test_the_tree_of_another_robot_agrees(folder):
     assert not run.failed and {row["quantity"] for row in run.sections[0].result.rows} == {"x_b", "T_b", "B_b"}
 
 
-def test_without_a_file_it_is_the_arms_own(folder):
-    (folder / "arm.py").write_text("from tmt import ARM\n")
-    reference, robot, _, reading = compared_with("arm.py:ARM", None)
-    assert reference.kind == "own" and "mjcf/arm.xml" in reference.lines[0] and "arm.py:ARM" in reference.lines[0]
-    assert robot.joints == ("alpha", "beta", "gamma") and robot.is_read and reading is not None
-
-
 @pytest.mark.parametrize("asked, names, where, quantity", [
     ("sign", STATIC, "acceleration", "bias"), ("doubled", STATIC, "gravity", "yours: gravity - bias at rest"),
     ("nan", ["diagnosis"], "diagnosis", "bias gives what it should"),

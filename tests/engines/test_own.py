@@ -142,7 +142,6 @@ def infinite_beyond_1(q):
 
 @pytest.mark.parametrize("function, said", [
     (raises_beyond_1, "ValueError: too far (test_own.py, line "), (infinite_beyond_1, "is not finite"),
-    (single(infinite_beyond_1), "is not finite"),
 ])  # fmt: skip
 def test_states_at_which_it_raises_or_is_not_finite_are_noted(function, said, rng):
     q = states(rng)[0]
@@ -167,12 +166,9 @@ def test_one_that_changes_its_argument_is_handed_copies(rng):
 
 @pytest.mark.parametrize("skew, found", [(0.9e-9, 0), (1.1e-9, 1)])
 def test_a_mass_matrix_that_is_not_symmetric(skew, found, rng):
-    def mass_matrix(q):
-        M = tmt.mass_matrix(q)
-        M[..., 0, 1] += skew * np.abs(M).max(axis=(-1, -2))
-        return M
-
-    own = of_one("mass_matrix", mass_matrix)
+    M = tmt.mass_matrix(np.ones(3))
+    M[0, 1] += skew * np.abs(M).max()
+    own = of_one("mass_matrix", lambda q: M)
     own.mass_matrix(states(rng)[0])
     assert len(own.problems) == found and all("symmetric" in problem.text for problem in own.problems)
 
