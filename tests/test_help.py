@@ -18,6 +18,7 @@ from compare.command_line import LINE_WIDTH, OPTIONS_OF_ALL, help_of, request
 from compare.experiments import EXPERIMENTS
 from compare.fleet.command import experiments_of, fleet_parser
 from compare.robots.arm import ARM
+from compare.scene_file import read_scenes
 
 PARTS = ["Asks", "Compares", "Tables", "Figures", "Tolerance", "Examples"]
 
@@ -96,6 +97,7 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     Path("robot.xml").write_text(own_equations.XML.replace("</mujoco>", servo), encoding="utf-8")
     Path("mine.py").rename("my_equations.py")
     Path("my.toml").write_text(blocks("toml")[0], encoding="utf-8")
+    assert read_scenes("my.toml", ARM)[0].name in blocks("toml")[0]
     text = ARM.mjcf.read_text(encoding="utf-8")
     for folder in ("models", "class", "submissions"):
         Path(folder).mkdir()

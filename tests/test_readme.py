@@ -11,8 +11,6 @@ import pytest
 from shown import BLOCKS, README, ROOT, blocks
 
 from compare.reference import compared_with
-from compare.robots.arm import ARM
-from compare.scene_file import read_scenes
 
 EXAMPLE = ROOT / "reports" / "example"
 PENDULUM = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/>
@@ -115,9 +113,3 @@ def same(printed, shown):
     numbers = [list(map(float, NUMBER.findall("\n".join(lines)))) for lines in (one, other)]
     words = [NUMBER.sub("#", "\n".join(lines)) for lines in (one, other)]
     return words[0] == words[1] and len(numbers[0]) == len(numbers[1]) and np.allclose(*numbers, rtol=1e-9)
-
-
-@pytest.mark.parametrize("text", blocks("toml"))
-def test_scenes_are_read(text, tmp_path):
-    (tmp_path / "my.toml").write_text(text)
-    assert read_scenes(tmp_path / "my.toml", ARM)[0].name in text

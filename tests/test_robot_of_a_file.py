@@ -37,12 +37,8 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0" and alone.is_read
     keys = {name: np.full(3, 0.1 * k) for k, name in enumerate(["qpos0", "key qpos0"], start=1)}
     assert list(robot_of(reading_of(arm, keyframes=keys), "my.xml").poses) == ["key key qpos0", "key qpos0", "qpos0"]
-
-
-def test_quaternions_of_one_turn_are_one_posture():
-    reading = read(PATHS["pendulum_ball"])
-    keys = {"turned": -np.array(reading.qpos0)}
-    assert list(robot_of(replace(reading, keyframes=keys), "p.xml").poses) == ["turned"]
+    reading = read(PATHS["pendulum_ball"])  # quaternions of one turn are one posture
+    assert list(robot_of(replace(reading, keyframes={"turned": -reading.qpos0}), "p.xml").poses) == ["turned"]
 
 
 @pytest.mark.parametrize("name", [*PATHS, 0, 1])
