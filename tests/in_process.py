@@ -1,5 +1,5 @@
 """A run of the command line without its two further processes, which take 2.5 s to start: for test_command_line, test_examine,
-test_help, test_own_reference, test_readme and test_random_mjcf."""
+test_help and test_own_reference."""
 
 from contextlib import contextmanager
 
@@ -24,15 +24,10 @@ class Inside(Here):
 
 
 @contextmanager
-def start_inside():
-    yield Inside()
-
-
-@contextmanager
 def without_workers():
     """In this block runs start no further processes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(workers, "start_workers", start_inside)
+        patch.setattr(workers, "start_workers", contextmanager(lambda: iter([Inside()])))
         yield
 
 

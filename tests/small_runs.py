@@ -1,6 +1,6 @@
 """Small runs that several tests look at, which the fixture `shared` computes once.
 
-Used by conftest.py (`small`), test_agreement, test_checks, test_command_line, test_drawn_figures, test_second_robot,
+Used by conftest.py (`small`), test_agreement, test_own_reference, test_drawn_figures, test_second_robot,
 report/test_terminal and experiments/stability/test_stability_small.
 """
 
@@ -15,11 +15,11 @@ from crane import crane
 from drawn_flaws import flaws
 from runs import in_shell, on_terminal
 
-from compare import drawing, experiment
+from compare import experiment
 from compare.engines.mujoco import load, parse
 from compare.experiments import EXPERIMENTS, module, skipped
 from compare.fleet.file_pieces import Here
-from compare.report import files, overview, verdict
+from compare.report import files, verdict
 from compare.robots.arm import ARM
 
 
@@ -63,36 +63,10 @@ def of_crane():
     return SimpleNamespace(sections=sections, reasons=reasons, lines=lines, texts=texts, sizes=sizes)
 
 
-def report_of_arm():
-    """Of all experiments on the arm: lines of the verdict, captions, report.md, names of figures, what could not be drawn."""
-    with TemporaryDirectory() as place:
-        folder, sections, lost = Path(place), [], []
-        (folder / "figures").mkdir()
-        for name in EXPERIMENTS:
-            of = module(name)
-            section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), of_arm(name))
-            sections.append(section)
-            others = overview.results_needed(name, list(EXPERIMENTS), sections)
-            section.figures, failed = drawing.draw(name, section.result, ARM, folder / "figures", others)
-            lost += failed
-        words = verdict.verdict(sections, len(EXPERIMENTS))
-        files.write(folder, verdict.Report(sections, ARM, {"command": "a small run"}, words))
-        text = (folder / "report.md").read_text(encoding="utf-8")
-        drawn = {path.stem for path in (folder / "figures").iterdir()}
-    captions = [caption for section in sections for _, caption in section.figures]
-    return SimpleNamespace(words=words, captions=captions, text=text, drawn=drawn, lost=lost)
-
-
 def flaws_of_arm():
     """What is wrong with each figure of matplotlib of all experiments on the arm, as it is drawn: {its name: in words}."""
     calls = (call for name in EXPERIMENTS for call in module(name).figures(of_arm(name), ARM))
     return {name: flaws(figure) for name, figure, _ in (call() for call in calls) if hasattr(figure, "axes")}
-
-
-def quick_run(folder):
-    """A quick run of everything, on a terminal, from a folder that is not the project's."""
-    folder.mkdir()
-    return on_terminal(["all", "--quick"], 80, "xterm", folder)
 
 
 def runs_on_terminals(plain, umlauts):

@@ -25,9 +25,8 @@ def named(result) -> set[str]:
 def test_every_check_that_is_listed_is_made_and_no_other(experiment, small, mujoco):
     missing = {"discrete"} - set(mujoco.methods)  # older than MuJoCo 3.13
     lines = LISTED.read_text(encoding="utf-8").splitlines()
-    listed = {line for line in lines if line.startswith(f"{experiment} |")}
-    listed = {line for line in listed if not any(name in line for name in missing)}
-    assert named(small(experiment)) == listed
+    of_it = {line for line in lines if line.startswith(f"{experiment} |")}
+    assert named(small(experiment)) == {line for line in of_it if not any(name in line for name in missing)}
 
 
 if __name__ == "__main__":
