@@ -25,9 +25,12 @@ FRAMES = """<frame pos="0.1 0.2 0.3" euler="10 20 30"><body name="b" pos="1 2 3"
 <inertial pos="0.2 0 0.1" mass="1" diaginertia="0.02 0.03 0.04" euler="10 20 30"/>
 <frame pos="0.3 0 0" euler="0 90 0"><joint name="j" axis="1 2 0" pos="0.1 0.2 0.3" damping="2" stiffness="3"/></frame>
 </body></frame>"""
+INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame pos="0.3 0 0" euler="0 90 0">
+<joint name="j" damping="2" stiffness="3"/>
+<inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
 
 
-@pytest.mark.parametrize("source", [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf()])
+@pytest.mark.parametrize("source", [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf()])
 def test_a_file_that_asks_for_no_change_states_what_is_compiled(source):
     rows = rows_of(source)
     known = {"pos", "mass", "com", "inertia", "axis", "armature", "damping", "stiffness"}

@@ -51,7 +51,7 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
     """The rows of one body: where it is, and its mass, centre of mass and tensor."""
     place, options = own_name(body.name, "body", number), body.compiler
     aligned = "alignfree" if any(aligns(joint) for joint in body.joints) else ""
-    pos, _ = in_frames(body.pos, None, body)
+    pos, _ = in_frames(body.pos, None, body.frame)
     rows = [Stated(place, "pos", pos, model.body_pos[number].copy(), aligned)]
     compiled = {
         "mass": float(model.body_mass[number]),
@@ -69,11 +69,11 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body, number: int) -> li
         more = "inertia from geoms"
         return rows + [Stated(place, name, None, compiled[name], more) for name in ("com", "inertia")]
     from_geoms = "inertiafromgeom" if mujoco.mjtInertiaFromGeom(options.inertiafromgeom) == TRUE and body.geoms else ""
-    inertia = stated_tensor(body)
+    com, inertia = stated_inertial(spec, body, compiled["com"], compiled["inertia"])
     rows.append(
         Stated(place, "mass", float(body.mass), compiled["mass"], from_geoms or changed_mass(spec, options, body.mass))
     )
-    rows.append(Stated(place, "com", np.array(body.ipos), compiled["com"], from_geoms or aligned))
+    rows.append(Stated(place, "com", com, compiled["com"], from_geoms or aligned))
     why = from_geoms or aligned or changed_inertia(spec, options, inertia)
     precision = TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
     return [*rows, Stated(place, "inertia", inertia, compiled["inertia"], why, precision)]
@@ -84,7 +84,7 @@ def of_joint(model: mujoco.MjModel, joint, number: int) -> list[Stated]:
     kind = kind_of(model, number)
     name, rows, dof = joint_name(model, number), [], int(model.jnt_dofadr[number])
     if kind != "free":
-        pos, turn = in_frames(joint.pos, joint.axis, joint)
+        pos, turn = in_frames(joint.pos, joint.axis, joint.frame)
         if kind != "slide":
             rows.append(Stated(name, "anchor", pos, model.jnt_pos[number].copy(), ""))
         if kind != "ball":
@@ -103,10 +103,9 @@ def first(values) -> float:
     return float(np.atleast_1d(values)[0])
 
 
-def in_frames(pos, axis, element) -> tuple[np.ndarray, np.ndarray | None]:
-    """A position and a direction of an element, through the frames of the file around it."""
+def in_frames(pos, axis, frame) -> tuple[np.ndarray, np.ndarray | None]:
+    """A position and a direction, (3,), through a frame of the file and those around it."""
     pos, axis = np.array(pos, float), None if axis is None else np.array(axis, float)
-    frame = element.frame
     while frame is not None:
         turn = orientation(frame.quat, frame.alt, frame.compiler)
         pos, axis = placed(np.array(frame.pos), turn, pos), None if axis is None else turned(axis, turn)
@@ -123,13 +122,20 @@ def orientation(quat, other, options) -> np.ndarray:
     return quat / np.linalg.norm(quat)
 
 
-def stated_tensor(body) -> np.ndarray:
-    """The tensor that a body's inertial states, (3, 3) kg m2, in the axes of the body."""
+def stated_inertial(spec, body, com: np.ndarray, inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Centre of mass, (3,) m, and tensor, (3, 3) kg m2, that a body's inertial states, in the axes of the body.
+
+    In which of the body's frames the inertial stands, a spec does not tell: in the one that comes closest to what was compiled.
+    """
     a, b, c, d, e, f = body.fullinertia
     turn = orientation(body.iquat, body.ialt, body.compiler)
-    if np.isfinite(a):
-        return np.array([[a, d, e], [d, b, f], [e, f, c]])
-    return tensor(turn, np.array(body.inertia))
+    own = np.array([[a, d, e], [d, b, f], [e, f, c]]) if np.isfinite(a) else tensor(turn, np.array(body.inertia))
+    candidates = []
+    for frame in (None, *(frame for frame in spec.frames if frame.parent == body)):
+        R = np.array([in_frames(np.zeros(3), axis, frame)[1] for axis in np.eye(3)]).T
+        candidates.append((in_frames(body.ipos, None, frame)[0], R @ own @ R.T))
+    scale = np.abs(inertia).max() or 1.0
+    return min(candidates, key=lambda one: np.abs(one[0] - com).max() + np.abs(one[1] - inertia).max() / scale)
 
 
 def tensor(quat: np.ndarray, moments: np.ndarray) -> np.ndarray:
