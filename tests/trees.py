@@ -93,6 +93,15 @@ def large_tree() -> Tree:
     return replace(tree, stiffness=[0.0] * 4 + list(tree.stiffness[4:]))
 
 
+def wrist() -> Tree:
+    """Three hinges through one point, z y z: Mbar is singular where the second is at zero."""
+    return Tree(
+        hinge_names=("a", "b", "c"), parent=(-1, 0, 1), offset=np.zeros((3, 3)), axis=((0, 0, 1), (0, 1, 0), (0, 0, 1)),
+        damping=(0.0,) * 3, body_names=["hand"], body_hinge=[2], mass=[1.0], com=[(0.1, 0.0, 0.2)],
+        inertia=[np.diag([0.01, 0.02, 0.025])], gravity=(0, 0, -9.81),
+    )  # fmt: skip
+
+
 def possible_tensor(rng) -> np.ndarray:
     """A tensor that a body can have: that of six point masses."""
     return sum(np.dot(r, r) * np.eye(3) - np.outer(r, r) for r in rng.uniform(-0.1, 0.1, (6, 3)))
