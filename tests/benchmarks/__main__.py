@@ -2,7 +2,6 @@
 
 start   processor time of a process that simulates 4096 steps of RK4, with an empty store and with what that has left there
 rates   time of one acceleration beside MuJoCo's: one state after the other, several side by side, and by a call from Python
-growth  the same, and compiling, for chains of more and more hinges
 truth   processor time of the true motion of 5 s, in pairs of doubles
 """
 
@@ -27,7 +26,7 @@ from compare.robots.file import robot_of
 from tmt.compiled import evaluator
 from tmt.exact.motion import trajectory
 
-from ..models.chain import chain
+from ..models.made import chain
 
 MODELS = Path(__file__).parents[1] / "models"
 ROUNDS, STATES, TAKEN = 15, 8192, 6e-4  # of what is timed in turns; side by side; s of one turn
@@ -65,10 +64,9 @@ def processor_time(command: list[str], store: str) -> float:
 
 def rates() -> Iterator[dict]:
     """Nanoseconds of one acceleration, the least of turns; microseconds of a call from Python."""
-    sources = {"arm": Path("mjcf/arm.xml")} | {
-        name: MODELS / f"{name}.xml" for name in ("arm7", "quadruped", "humanoid29")
-    }
-    for name, source in (sources | {"chain of 64": chain(64)}).items():
+    sources = {"arm": Path("mjcf/arm.xml")} | {f"chain of {n}": chain(n) for n in (1, 16, 64)}
+    sources |= {name: MODELS / f"{name}.xml" for name in ("arm7", "quadruped", "humanoid29")}
+    for name, source in sources.items():
         tree, functions, states = functions_of(source)
         one = [np.ascontiguousarray(part[0]) for part in states]
         many = [np.resize(part, (100_000, part.shape[1])) for part in states] if tree.coordinates.nv < 20 else states
@@ -93,16 +91,13 @@ def functions_of(source) -> tuple[tmt.Tree, dict, list[np.ndarray]]:
     columns, out_columns = [np.ascontiguousarray(part.T) for part in states], np.ascontiguousarray(out.T)
     dynamics = engine(reading).of(robot.case())
     loops, single = MinimalCalls(dynamics).loops(*(part[0] for part in states)), 64
-    return (
-        tree,
-        {
-            "one_state": (lambda: compiled.each(*states, out), STATES),
-            "side_by_side": (lambda: compiled.lanes(*columns, out_columns), STATES),
-            "mj_forward": (lambda: loops["MuJoCo, mj_forward"][1](single), single),
-            "equal_work": (lambda: loops["MuJoCo, equal work"][1](single), single),
-        },
-        states,
-    )
+    functions = {
+        "one_state": (lambda: compiled.each(*states, out), STATES),
+        "side_by_side": (lambda: compiled.lanes(*columns, out_columns), STATES),
+        "mj_forward": (lambda: loops["MuJoCo, mj_forward"][1](single), single),
+        "equal_work": (lambda: loops["MuJoCo, equal work"][1](single), single),
+    }
+    return tree, functions, states
 
 
 def in_turns(functions: dict[str, tuple[Callable, float]]) -> dict[str, float]:
@@ -114,29 +109,6 @@ def in_turns(functions: dict[str, tuple[Callable, float]]) -> dict[str, float]:
         calls[name] = (lambda call=call, repeats=repeats: [call() for _ in range(repeats)]), repeats * states
     times = timing.in_turns([call for call, _ in calls.values()], ROUNDS)
     return {name: 1e9 * min(taken) / states for (name, (_, states)), taken in zip(calls.items(), times)}
-
-
-def growth() -> Iterator[dict]:
-    """What a chain of n hinges costs; compile_s: processor time of the first call, with an empty store."""
-    names = {
-        "one_state": "each",
-        "side_by_side": "lanes",
-        "mj_forward": "mj_forward",
-        "equal_work": "mujoco_equal_work",
-    }
-    for n in (1, 3, 7, 16, 29, 64):
-        tree, functions, _ = functions_of(chain(n))
-        seconds = {}
-        for name in ("one_state", "side_by_side"):
-            with tempfile.TemporaryDirectory() as folder:
-                os.environ["TMT_CACHE"] = folder
-                began = time.process_time()
-                functions[name][0]()
-                seconds[name] = time.process_time() - began
-        operations = evaluator(tree, "acceleration").operations
-        for name, value in in_turns(functions).items():
-            compiled = {"compile_s": seconds.get(name), "operations": operations if name in seconds else None}
-            yield {"n": n, "implementation": names[name], "ns_per_state": value} | compiled
 
 
 def truth() -> Iterator[dict]:
@@ -151,7 +123,7 @@ def truth() -> Iterator[dict]:
         yield {"model": name, "truth_s": min(times)}
 
 
-COMMANDS = {"start": start, "rates": rates, "growth": growth, "truth": truth}
+COMMANDS = {"start": start, "rates": rates, "truth": truth}
 
 
 def main() -> None:
@@ -164,11 +136,7 @@ def main() -> None:
     rows, console = [], Console(stderr=True)
     for row in COMMANDS[asked.what]():
         rows.append(row)
-        console.print(
-            ", ".join(
-                f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()
-            )
-        )
+        console.print(row)
     table = pd.DataFrame(rows)
     print(table.to_string(index=False, float_format="{:.4g}".format, na_rep=""))
     if asked.csv:
