@@ -8,7 +8,7 @@ import pytest
 from trees import random_states, small_tree
 
 import tmt
-from tmt.compiled import forms, prepared, runner, runs
+from tmt.compiled import forms, prepared, runner, runs, straight
 from tmt.compiled.runner import Runner, known
 from tmt.methods import METHODS, one_step
 
@@ -64,9 +64,14 @@ def test_runs_together_have_the_bits_of_each_alone(name, counts):
 
 @pytest.mark.parametrize("name", ["implicit", "implicit_midpoint"])
 def test_the_code_of_larger_trees_does_the_same(name, folder, monkeypatch):
-    """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call."""
-    for module, field in ((forms, "DENSE"), (forms, "FEW"), (runs, "INLINED")):
-        monkeypatch.setattr(module, field, 0)
+    """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call, lines cut into parts."""
+    for module, field, size in (
+        (forms, "DENSE", 0),
+        (forms, "FEW", 0),
+        (runs, "INLINED", 0),
+        (straight, "LONGEST", 50),
+    ):
+        monkeypatch.setattr(module, field, size)
     q, qd, tau = starts(9)
     (q, qd), other = paths_from(q, qd, 3), paths_from(q[4:5], qd[4:5], 3)
     for paths, torque in (((q, qd), tau), (other, tau[4:5])):
@@ -88,21 +93,15 @@ def test_several_cores_give_the_bits_of_one(monkeypatch):
         assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended) and one.ended[40]
 
 
-def test_threads_ask_at_once_for_what_is_not_compiled(folder):
+def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
+    monkeypatch.setattr(MODULE, "MOST", 1)  # of trees and methods the last ones are held
     tree = tmt.ARM.lock({"alpha": 0.1, "gamma": 0.25})
     q = np.random.default_rng(0).uniform(-1, 1, (9, 1))
     with ThreadPoolExecutor(4) as pool:
         asked = [pool.submit(tmt.simulate, q[k % 2 :], q[k % 2 :], q[k % 2 :], 0.01, 3, model=tree) for k in range(8)]
         found = [one.result().q for one in asked]
     assert all(np.array_equal(one, found[k % 2]) for k, one in enumerate(found))
-    assert np.array_equal(found[0][1:], found[1])
-
-
-def test_of_trees_and_methods_the_last_ones_are_held(monkeypatch):
-    monkeypatch.setattr(MODULE, "MOST", 1)
-    for gamma in (0.1, 0.2):
-        tree = tmt.ARM.lock({"alpha": 0.0, "gamma": gamma})
-        assert np.isfinite(tmt.simulate([0.1], [0.2], [0.3], 0.01, 2, model=tree).q).all() and len(known) == 1
+    assert np.array_equal(found[0][1:], found[1]) and len(known) == 1
 
 
 def test_a_runner_and_a_prepared_run_fill_paths():

@@ -7,13 +7,11 @@ import numpy as np
 from engines.drawn_trees import drawn_trees
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from trees import unit_quaternion
 
 import tmt
 from tmt.equations import articulated, composite, method
 from tmt.equations.dual import jacobian
 from tmt.exact.values import distance
-from tmt.model.coordinates import coordinates_of
 
 EPS = np.finfo(float).eps
 STEP = 1e-5  # of central differences, which are right to about 1e-8 of what is differenced
@@ -141,17 +139,6 @@ def test_a_body_fixed_to_the_world_does_not_count():
     q = np.array([0.3, 0.2, 0.5])
     assert np.array_equal(tmt.mass_matrix(q, fixed), tmt.mass_matrix(q, light))
     assert np.array_equal(tmt.com_positions(q, fixed)[0], [0, 0, -0.15])
-
-
-def test_movements_of_balls(rng):
-    coordinates = coordinates_of(("ball", "slide", "ball"))
-    q = np.concatenate([unit_quaternion(rng), [0.3], unit_quaternion(rng)])
-    for size in (0.0, 1e-200, 1e-9, 1.0, 3.0):
-        u = rng.uniform(-1.0, 1.0, 7)
-        u *= size / np.linalg.norm(u)
-        assert np.allclose(coordinates.difference(coordinates.move(q, u), q), u, rtol=1e-12, atol=1e-15)
-    same = q * ([-1.0] * 4 + [1.0] + [-1.0] * 4)  # p and -p are one turn
-    assert np.abs(coordinates.difference(same, q)).max() < 1e-15
 
 
 def test_nested_dual_numbers_are_not_confused():
