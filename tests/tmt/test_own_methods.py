@@ -1,4 +1,4 @@
-"""Methods of integration of a user's own, and what methods say of themselves."""
+"""Methods of integration of a user's own."""
 
 import dataclasses
 
@@ -13,17 +13,6 @@ from tmt.methods.stepping import FIELDS, Method
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
-
-
-def said(stepping) -> dict:
-    return {name: getattr(stepping, name) for name in FIELDS}
-
-
-@pytest.mark.parametrize("name", METHODS)
-def test_whether_a_method_damps_implicitly_is_so(name):
-    stepping, damped = METHODS[name], dataclasses.replace(tmt.ARM, damping=(1.0, 2.0, 3.0))
-    slopes = [stepping.slope(damped, BENT.tolist(), [1.0] * 3, [0.0] * 3, dt) for dt in (0.0, 0.1)]
-    assert (slopes[0] != slopes[1]) == stepping.damps_implicitly
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,36 +42,18 @@ class Plain:
         return Midpoint().step(slope, q, qd, dt)
 
 
-class Talking:
-    """A method of tmt's as an object of no known kind that says all of itself."""
-
-    def __init__(self, name, *lacking):
-        known = METHODS[name]
-        for part in {"slope", "step", "attempt", "stage_states", "finish", *FIELDS} - {*lacking}:
-            if hasattr(known, part):
-                setattr(self, part, getattr(known, part))
-
-
 @pytest.mark.parametrize("own, order", [(Midpoint(), 2), (Plain(), 1)], ids=["made from Method", "of no known kind"])
 def test_a_method_of_ones_own(own, order, rng, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", own)
     monkeypatch.setitem(METHODS, "tableau", RungeKutta(2, ((), (0.5,)), (0.0, 1.0), (0.0, 0.5)))
-    assert said(method_named("mine")) == dict.fromkeys(FIELDS, False) | {"order": order, "stages": 2, "lanes": True}
+    fields = {name: getattr(method_named("mine"), name) for name in FIELDS}
+    assert fields == dict.fromkeys(FIELDS, False) | {"order": order, "stages": 2, "lanes": True}
     q, qd, tau = rng.uniform(-1, 1, (3, 9, 3))
     mine, same = (tmt.simulate(q, qd, tau, 0.01, 20, name) for name in ("mine", "tableau"))
     assert mine.evaluations == same.evaluations == 9 * 20 * 2
     assert all(np.allclose(a, b, rtol=0, atol=1e-12) for a, b in zip(mine, same))
     with pytest.raises(ValueError, match="tolerance"):
         tmt.simulate(BENT, REST, REST, 0.1, 1, "mine", tolerance=1e-6)
-
-
-@pytest.mark.parametrize("name", ["implicit", "implicit_midpoint", "dopri8_adaptive"])
-def test_what_an_object_of_no_known_kind_says_counts(name, monkeypatch):
-    monkeypatch.setitem(METHODS, "mine", Talking(name))
-    assert said(method_named("mine")) == said(METHODS[name])
-    start = [BENT, np.ones(3), REST, 0.01, 5]
-    found, wanted = (tmt.simulate(*start, one) for one in ("mine", name))
-    assert np.allclose(found.q, wanted.q, rtol=0, atol=1e-13) and found.evaluations == wanted.evaluations
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,8 +118,8 @@ class Failing(Midpoint):
         (Plain(order=0), "order is 0"),
         (Plain(order=True), "order is True"),
         (Plain(adaptive=True), "attempt"),
-        (Talking("implicit_midpoint", "finish"), "finish"),
-        (Talking("implicit_midpoint", "stages"), "how many"),
+        (Plain(solves_stages=True), "how many"),
+        (Plain(solves_stages=True, stages=2), "stage_states"),
         (Failing(), "RuntimeError"),
     ],
 )
