@@ -1,4 +1,4 @@
-"""python -m tests.benchmarks: what tmt costs on this machine, as a table (--csv FILE: in a file too).
+"""python -m tests.benchmarks: what tmt costs on this machine, as a table.
 
 start   processor time of a process that simulates 4096 steps of RK4, with an empty store and with what that has left there
 rates   time of one acceleration beside MuJoCo's: one state after the other, several side by side, and by a call from Python
@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from rich.console import Console
 
 import tmt
 from compare.engines.mujoco import engine, read
@@ -76,8 +75,7 @@ def rates() -> Iterator[dict]:
         functions["call_of_many"] = lambda: tmt.acceleration(*many, tree), len(many[0])  # noqa: B023
         found = in_turns(functions)
         for width in ("one_state", "side_by_side"):
-            found |= {f"mj_forward/{width}": found["mj_forward"] / found[width]}
-            found |= {f"equal_work/{width}": found["equal_work"] / found[width]}
+            found |= {f"{call}/{width}": found[call] / found[width] for call in ("mj_forward", "equal_work")}
         yield {"model": name, "n": tree.coordinates.nv} | found
 
 
@@ -102,13 +100,14 @@ def functions_of(source) -> tuple[tmt.Tree, dict, list[np.ndarray]]:
 
 def in_turns(functions: dict[str, tuple[Callable, float]]) -> dict[str, float]:
     """ns of each, the least of turns: {name: (call, states in it)}."""
-    calls = {}
-    for name, (call, states) in functions.items():
+    calls, counts = [], []
+    for call, states in functions.values():
         (taken,) = timing.in_turns([call], 2)
         repeats = max(1, int(TAKEN / min(taken)))
-        calls[name] = (lambda call=call, repeats=repeats: [call() for _ in range(repeats)]), repeats * states
-    times = timing.in_turns([call for call, _ in calls.values()], ROUNDS)
-    return {name: 1e9 * min(taken) / states for (name, (_, states)), taken in zip(calls.items(), times)}
+        calls.append(lambda call=call, repeats=repeats: [call() for _ in range(repeats)])
+        counts.append(repeats * states)
+    times = timing.in_turns(calls, ROUNDS)
+    return {name: 1e9 * min(taken) / count for name, taken, count in zip(functions, times, counts)}
 
 
 def truth() -> Iterator[dict]:
@@ -131,16 +130,11 @@ def main() -> None:
         "python -m tests.benchmarks", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("what", choices=COMMANDS)
-    parser.add_argument("--csv", help="a file for the table, in full digits")
-    asked = parser.parse_args()
-    rows, console = [], Console(stderr=True)
-    for row in COMMANDS[asked.what]():
+    rows = []
+    for row in COMMANDS[parser.parse_args().what]():
         rows.append(row)
-        console.print(row)
-    table = pd.DataFrame(rows)
-    print(table.to_string(index=False, float_format="{:.4g}".format, na_rep=""))
-    if asked.csv:
-        table.to_csv(asked.csv, index=False)
+        print(row, file=sys.stderr)
+    print(pd.DataFrame(rows).to_string(index=False, float_format="{:.4g}".format, na_rep=""))
 
 
 if __name__ == "__main__":
