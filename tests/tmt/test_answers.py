@@ -1,10 +1,11 @@
 """The public functions: NumPy answers few states and machine code all others, with what the literal form returns and raises."""
 
+import dataclasses
+import doctest
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-from inspect import signature
+from inspect import isfunction, signature
 
 import numpy as np
 import pytest
@@ -66,7 +67,7 @@ def test_machine_code_answers_what_the_literal_form_returns(quantity, compiled, 
 def test_few_states_are_answered_by_the_literal_form(rng, monkeypatch):
     monkeypatch.setattr(answers, "MOST", 1)  # of models the last ones are held
     tmt.mass_matrix(np.zeros(3))
-    tree = replace(tmt.ARM, mass=(1.75, 1.5))
+    tree = dataclasses.replace(tmt.ARM, mass=(1.75, 1.5))
     q, qd, tau = rng.uniform(-2, 2, (3, 400, 3))
     known = answers.answers_of(tree)
     few = q[:90], qd[:90], tau[:90]
@@ -154,7 +155,7 @@ def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one(compiled):
 @pytest.mark.filterwarnings("error")
 def test_numbers_beyond_the_largest_double(compiled):
     compiled(tmt.ARM, "mass_matrix", "energy")
-    slide = replace(BALL, axis=[(0, 0, 1)], damping=(0,), kind=("slide",), rest=(), armature=())
+    slide = dataclasses.replace(BALL, axis=[(0, 0, 1)], damping=(0,), kind=("slide",), rest=(), armature=())
     compiled(slide, "potential_energy")
     for q in (np.array([1.7e308]), np.full((2, 1), 1.7e308)):  # its energy is infinite, and nothing is NaN
         with pytest.raises(ValueError, match="largest double"):
@@ -177,3 +178,10 @@ def test_who_cannot_wait_has_it_prepared(monkeypatch):
 def test_a_short_question_never_waits_for_a_compiler():
     program = "import sys, tmt; tmt.acceleration([0.1] * 3, [0.0] * 3, [0.0] * 3); print('llvmlite' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "False\n"
+
+
+@pytest.mark.parametrize("name", [name for name in tmt.__all__ if isfunction(getattr(tmt, name))])
+def test_the_example_in_the_docstring_of_a_public_function_is_right(name):
+    names = {"tmt": tmt, "np": np, "dataclasses": dataclasses}
+    (found,) = doctest.DocTestFinder(recurse=False).find(getattr(tmt, name), name, globs=names)
+    assert found.examples and doctest.DocTestRunner().run(found).failed == 0
