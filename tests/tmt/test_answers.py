@@ -69,8 +69,7 @@ def test_few_states_are_answered_by_the_literal_form(rng, monkeypatch):
     tmt.mass_matrix(np.zeros(3))
     tree = dataclasses.replace(tmt.ARM, mass=(1.75, 1.5))
     q, qd, tau = rng.uniform(-2, 2, (3, 400, 3))
-    known = answers.answers_of(tree)
-    few = q[:90], qd[:90], tau[:90]
+    known, few = answers.answers_of(tree), (q[:90], qd[:90], tau[:90])
     assert np.array_equal(tmt.acceleration(*few, tree), literal.acceleration(*few, tree))
     assert known.asked["acceleration"] == 90 and not known.ready and len(answers.known) == 1
     late = tmt.acceleration(np.tile(q, (2, 1)), np.tile(qd, (2, 1)), np.tile(tau, (2, 1)), tree)
@@ -119,9 +118,7 @@ Z = np.zeros(3)
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0]] * 10)
 WRONG = {
     "no numbers": (tmt.ARM, (["a"] * 3, Z, Z)),
-    "no speeds": (tmt.ARM, (Z, None, Z)),
     "too few": (tmt.ARM, (np.zeros(2), Z, Z)),
-    "a number": (tmt.ARM, (0.0, Z, Z)),
     "not finite": (tmt.ARM, (np.array([0.0, np.nan, 0.0]), Z, Z)),
     "a torque among many": (tmt.ARM, (np.zeros((40, 3)), Z, np.full((40, 3), np.inf))),
     "batches that do not fit": (tmt.ARM, (np.zeros((4, 3)), np.zeros((5, 3)), Z)),
@@ -160,8 +157,6 @@ def test_numbers_beyond_the_largest_double(compiled):
     for q in (np.array([1.7e308]), np.full((2, 1), 1.7e308)):  # its energy is infinite, and nothing is NaN
         with pytest.raises(ValueError, match="largest double"):
             tmt.potential_energy(q, slide)
-    with pytest.raises(ValueError, match="q has values that are not finite"):
-        tmt.mass_matrix(np.full((2, 3), 1e300, np.longdouble) ** 10)
     for qd in (np.full(3, 1e200), np.full((2, 3), 1e200)):
         assert np.array_equal(tmt.energy(Z, qd), literal.energy(Z, qd)) and np.isinf(tmt.energy(Z, qd)).all()
     far = np.array([0.0, 1e17, 0.0])  # beyond 2^49 rad

@@ -110,13 +110,11 @@ class Failing(Midpoint):
 @pytest.mark.parametrize(
     "own, word",
     [
-        ("no method", "'no method'"),
         (Unhashable(), "hashable"),
         (Method(), "step"),
         (Midpoint, "True or False"),
         (Plain(adaptive="yes"), "adaptive is 'yes'"),
         (Plain(order=0), "order is 0"),
-        (Plain(order=True), "order is True"),
         (Plain(adaptive=True), "attempt"),
         (Plain(solves_stages=True), "how many"),
         (Plain(solves_stages=True, stages=2), "stage_states"),
