@@ -88,7 +88,6 @@ def modules_imported(path) -> set[str]:
 
 
 def part(module) -> str:
-    """The part of compare that a module belongs to."""
     return (module.split(".") + [""])[1]
 
 

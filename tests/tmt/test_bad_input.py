@@ -43,11 +43,9 @@ SAID = [  # calls that are refused, and a word of what is said
     (lambda: moved(1e308, 100), "largest double"),
     *((lambda n=n: moved(1e-30, n, every=n), "steps is") for n in (0, 2**63, 10**400)),
     (lambda: moved(method="rk5"), "rk4, rk4_mean_speed, dopri8"),
-    (lambda: moved(tolerance=1e-6), "tolerance"),
     (lambda: moved(method="dopri8_adaptive", tolerance=0.0), "tolerance"),
-    *((lambda every=every: moved(every=every), "every is") for every in (3, 20, 0)),
+    *((lambda every=every: moved(every=every), "every is") for every in (3, 0)),
     (lambda: moved(1e-3, 10**12), "4.8e+04 GB"),
-    # 8 PB: beyond any address
     (lambda: tmt.acceleration(np.zeros((10**5, 1, 1, 3)), np.zeros((10**5, 1, 3)), np.zeros((10**5, 3))), "memory"),
 ]  # fmt: skip
 

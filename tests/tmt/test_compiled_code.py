@@ -79,16 +79,6 @@ def compiled(traced):
     return call
 
 
-def test_zeros_and_ones_disappear():
-    def function(given):
-        x, y = given
-        return [(x * 1.0 + 0.0 * y) - (y - y) + (x + y) * (y + x) / 1.0, 2.0 * 3.0]
-
-    traced = trace("few", [2], function)
-    assert traced.operations == 3  # x + y once, its square, the sum
-    assert compiled(traced)([2.0, 3.0]).tolist() == [27.0, 6.0]
-
-
 @pytest.mark.parametrize("name, few", [("rk4", 0), ("implicit", 99)])
 def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_form(name, few, rng, monkeypatch):
     """In articulated bodies, where that can be, and by Mbar and h."""

@@ -127,14 +127,6 @@ def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
         assert_close(found, whole, digits=1e-12)
 
 
-def test_a_body_fixed_to_the_world_does_not_count():
-    fixed = dataclasses.replace(tmt.ARM, body_hinge=(-1, 2))
-    light = dataclasses.replace(tmt.ARM, mass=(0.0, 1.5), inertia=(np.zeros((3, 3)), tmt.ARM.inertia[1]))
-    q = np.array([0.3, 0.2, 0.5])
-    assert np.array_equal(tmt.mass_matrix(q, fixed), tmt.mass_matrix(q, light))
-    assert np.array_equal(tmt.com_positions(q, fixed)[0], [0, 0, -0.15])
-
-
 def test_the_distance_from_many_digits_is_that_of_all_digits():
     with mpmath.workdps(50):
         off = distance(np.array([3.0]), np.array([mpmath.mpf("3.0000000000000000001")]))
@@ -155,15 +147,13 @@ def unit(vector):
 class Lagrange:
     """Mbar and h of a Tree, and the force of its springs, from energies alone; balls have one armature about all their axes.
 
-    Energies are functions of coordinates q and rates qd, where a ball has the four components of its quaternion; the speeds u are
-    in qd = N(q) u, for a ball pd = p o (0, omega) / 2. Lagrange's equations along the motions that keep the quaternion's length,
-    the columns of N:
+    They are functions of q and its rates qd, where a ball has the four components of its quaternion; the speeds u are in
+    qd = N(q) u, for a ball pd = p o (0, omega) / 2. Along the motions that keep the quaternion's length, the columns of N:
 
         Mbar_ij = n_i' (d2T / dqd dqd) n_j,   h_i = n_i' (d/dt dT/dqd - d(T - V)/dq) with u constant.
 
-    No Jacobian, no rule for velocities and no convective term: rates of positions and of rotation matrices, like all
-    derivatives, are central differences of TINY in numbers of DIGITS digits, right to more than 50; T is a quadratic form in
-    the rates, so that differences in them are exact.
+    No Jacobian, no rule for velocities, no convective term: all derivatives are central differences of TINY in numbers of
+    DIGITS digits, right to more than 50; T is a quadratic form in the rates, so that differences in them are exact.
     """
 
     def __init__(self, tree):

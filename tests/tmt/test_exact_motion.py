@@ -107,17 +107,16 @@ def test_trees_of_every_kind_beside_a_short_run_in_many_digits(tree, rng):
         assert off(trajectory(tree, *start, 2.0**-9, 1, form=form), expected) < 1e-28, form
 
 
-def test_two_runs_of_other_forms_and_orders_agree():
+def test_two_runs_of_other_forms_and_orders_agree_and_a_seeded_error_sets_them_apart(monkeypatch):
     rng = np.random.default_rng(10)
     tree = tree_of_kinds(rng, bodies=3)
-    path, apart = truth(tree, *random_state(rng, tree), 0.0625, 4)
+    start = random_state(rng, tree)
+    path, apart = truth(tree, *start, 0.0625, 4)
     assert 0.0 < apart < 1e-28 and np.abs(path.low).max() > 0.0
     assert np.all(np.abs(path.low) <= np.spacing(np.abs(path.high)) / 2)
 
-
-def test_a_seeded_error_in_one_form_sets_the_two_runs_apart(monkeypatch):
     def wrong(tree, q, qd):
         return composite.mass_matrix_and_bias(tree, q, [v * (1 + mpmath.mpf(2) ** -60) for v in qd], mpmath.mpf)
 
     monkeypatch.setitem(reference_run.FORMS, "literal", wrong)
-    assert truth(tmt.ARM, (0.5, 0.3, 1.0), [1.0] * 3, [0.0] * 3, 0.25, 2)[1] > 1e-20
+    assert truth(tree, *start, 0.0625, 4)[1] > 1e-20

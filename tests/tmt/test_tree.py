@@ -28,7 +28,6 @@ REFUSED = [  # changes of the arm, and a word of what is said
     ({"mass": ("1.9", "1.5")}, "numbers"),
     ({"axis": (Y, 0 * X, Y)}, r"axis\[1\]"),
     ({"parent": (-1, 2, 1)}, r"parent\[1\]"),
-    ({"parent": (-1, 0.5, 1)}, r"parent\[1\]"),
     ({"body_hinge": (1, 1)}, "'gamma'"),
     ({"damping": (0, -1, 0)}, "damping"),
     ({"inertia": (np.diag([1, 1, 2 + 1e-9]), np.eye(3))}, "larger"),
@@ -36,7 +35,6 @@ REFUSED = [  # changes of the arm, and a word of what is said
     ({"mass": (1.9, 0), "inertia": (np.eye(3), np.zeros((3, 3)))}, "'gamma'"),
     ({"mass": (1e-320, 1e-320), "inertia": np.zeros((2, 3, 3))}, "doubles"),
     ({"hinge_names": ("a", "b", "a")}, "names"),
-    ({"hinge_names": ("a", "b", "c\nd")}, "names"),
     ({"colour": 3}, "'colour'"),
     ({"position_gain": np.zeros((2, 3))}, "position_gain"),
 ]
