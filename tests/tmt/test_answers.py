@@ -114,7 +114,7 @@ BALL = tmt.Tree(
     hinge_names=("ball",), parent=(-1,), offset=((0, 0, 0),), axis=np.eye(3), damping=(0, 0, 0), body_names=("body",),
     body_hinge=(0,), mass=(1,), com=((0, 0, 0.1),), inertia=(np.eye(3),), gravity=(0, 0, -9.81), kind=("ball",),
 )  # fmt: skip
-Z = np.zeros(3)
+WRIST, Z = dataclasses.replace(wrist(), inertia=[np.eye(3)]), np.zeros(3)
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0]] * 10)
 WRONG = {
     "no numbers": (tmt.ARM, (["a"] * 3, Z, Z)),
@@ -124,9 +124,9 @@ WRONG = {
     "beyond the largest double": (tmt.ARM, (Z, np.full(3, 1e200), Z)),
     "no unit quaternion": (BALL, (1.0 * TURNS[0] + [1.01e-6, 0, 0, 0], Z, Z)),
     "one of many is short": (BALL, (TURNS - np.eye(10)[:, :4] * [1.01e-6, 0, 0, 0], Z, Z)),
-    "singular": (wrist(), (Z, Z, Z)),
-    "singular but for rounding": (wrist(), (np.array([0.3, np.pi, 0.7]), Z, Z)),
-    "one of many singular": (wrist(), (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z)),
+    "singular": (WRIST, (Z, Z, Z)),
+    "singular but for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), Z, Z)),
+    "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z)),
     "no model": ("arm", (Z, Z, Z)),
 }
 

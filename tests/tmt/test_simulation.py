@@ -19,6 +19,7 @@ ENDS = {
     "overflow": ("rk4", (BENT, REST, [1e308] * 3), {}, "diverges"),
     "diverged": ("rk4", (BENT, [1e3] * 3, REST), {"dt": 10.0}, "diverges"),
     "turned": ("rk4", ([FAST, 0, 0], [50, 0, 0], REST), {}, "2^49"),
+    "adaptive, turned": ("dopri8_adaptive", ([FAST, 0, 0], [50, 0, 0], REST), {}, "2^49"),
     "too small a tolerance": ("dopri8_adaptive", (BENT, REST, REST), {"tolerance": 1e-300}, "1e-300"),
     "no stages": ("implicit_midpoint", (BENT, REST, REST), {"dt": 0.5}, "Newton"),
     "singular": ("rk4", ([0.5, 0, 1], [1, 0, 0], REST), {"model": wrist()}, "'a', 'c'"),
