@@ -59,6 +59,10 @@ def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Positions x_b of the centres of mass in the inertial frame, m, shape (..., m, 3).
 
     q: joint positions (..., nq), rad. Assignment, part b, equation (1).
+
+    >>> print(tmt.com_positions([0.0, 0.0, 0.0]))  # the upper arm hangs, the forearm points ahead
+    [[ 0.    0.   -0.15]
+     [ 0.15  0.   -0.3 ]]
     """
     return _answered("com_positions", model, q)
 
@@ -67,6 +71,10 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
     """Angular velocities omega_b = B_b qd in body axes, rad/s, shape (..., m, 3).
 
     q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Assignment, part d.
+
+    >>> print(tmt.angular_velocities([0.0, 0.0, 0.0], [1.0, 0.0, 2.0]))  # alpha and gamma both turn about y
+    [[0. 1. 0.]
+     [0. 3. 0.]]
     """
     return _answered("angular_velocities", model, q, qd)
 
@@ -75,6 +83,10 @@ def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
     """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
 
     q: joint positions (..., nq), rad. Assignment, parts d and e.
+
+    >>> T, B = tmt.jacobians([0.0, 0.0, 0.0])
+    >>> print(T[1, :, 2], B[1, :, 2])  # gamma lowers the forearm, 0.15 m ahead of the elbow
+    [ 0.    0.   -0.15] [0. 1. 0.]
     """
     return _answered("jacobians", model, q)
 
@@ -84,6 +96,10 @@ def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np
 
     q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Both results are (..., m, 3).
     h_b and g_b in the assignment, part e.
+
+    >>> v_conv, w_conv = tmt.convective_terms([0.0, 0.0, 0.0], [0.0, 0.0, 2.0])
+    >>> print(v_conv[1])  # towards the elbow: 0.15 m times (2 rad/s)^2
+    [-0.6  0.   0. ]
     """
     return _answered("convective_terms", model, q, qd)
 
@@ -92,6 +108,9 @@ def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, shape (..., nv, nv), symmetric positive definite.
 
     q: joint positions (..., nq), rad. Assignment, part e.
+
+    >>> print(tmt.mass_matrix([0.0, 0.0, 0.0])[2, 2].round(9))  # of the elbow: 0.019 + 1.5 kg (0.15 m)^2
+    0.05275
     """
     return _answered("mass_matrix", model, q)
 
@@ -101,6 +120,9 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. It is -Qbar at tau = 0 (assignment, part e)
     without the joint damping D, and MuJoCo's qfrc_bias.
+
+    >>> print(tmt.bias([0.0, 0.0, np.pi / 2], [0.0, 0.0, 5.0]).round(9) + 0.0)  # the arm hangs, the elbow turns
+    [0. 0. 0.]
     """
     return _answered("bias", model, q, qd)
 
@@ -109,6 +131,9 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque +dV/dq that holds the model at rest, N m, shape (..., nv).
 
     q: joint positions (..., nq), rad. Assignment, parts c and h; MuJoCo's qfrc_bias at rest.
+
+    >>> print(tmt.gravity_balance([0.0, 0.0, np.pi / 2]).round(9) + 0.0)  # the arm hangs
+    [0. 0. 0.]
     """
     return _answered("gravity_balance", model, q)
 
@@ -117,6 +142,10 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque k (q - rest) that holds the springs of the joints, N m, shape (..., nv): of a ball k times the turn from its rest.
 
     q: joint positions (..., nq), rad. With `gravity_balance` it is the torque that holds the model at rest.
+
+    >>> sprung = dataclasses.replace(tmt.ARM, stiffness=(0.0, 0.0, 4.0))
+    >>> print(tmt.spring_torque([0.0, 0.0, 0.5], sprung))
+    [0. 0. 2.]
     """
     return _answered("spring_torque", model, q)
 
@@ -126,6 +155,10 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 
     q, qd, tau: joint positions (..., nq), speeds and torques (..., nv), rad, rad/s, N m. P and S: the model's position_gain and
     speed_gain. Assignment, parts e and f.
+
+    >>> q, rest = np.array([0.5, 0.3, 1.0]), np.zeros(3)
+    >>> print(tmt.acceleration(q, rest, tmt.gravity_balance(q)).round(9) + 0.0)  # it is held
+    [0. 0. 0.]
     """
     return _answered("acceleration", model, q, qd, tau)
 
@@ -134,6 +167,9 @@ def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin, and springs at rest.
 
     q: joint positions (..., nq), rad.
+
+    >>> print(tmt.potential_energy([0.0, 0.0, np.pi / 2]).round(9))  # -9.81 (1.9 0.15 + 1.5 (0.3 + 0.15))
+    -9.4176
     """
     return _answered("potential_energy", model, q)
 
@@ -143,5 +179,8 @@ def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
     q, qd: joint positions (..., nq) and speeds (..., nv), rad and rad/s. Its zero is that of `potential_energy`; the model's
     position_gain adds nothing to it.
+
+    >>> print(tmt.energy([0.0, 0.0, np.pi / 2], [0.0, 0.0, 2.0]).round(9))  # -9.4176 + 0.05275 2^2 / 2
+    -9.3121
     """
     return _answered("energy", model, q, qd)

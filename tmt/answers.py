@@ -49,6 +49,11 @@ def prepare(model: Tree = ARM) -> None:
     """Have machine code answer for a model from now on, so that no call of up to some hundred states waits: in a controller.
 
     The first time on a machine it takes about a second for an arm and several for a humanoid. ValueError if it is no Tree.
+
+    >>> forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
+    >>> tmt.prepare(forearm)
+    >>> print(tmt.gravity_balance([0.0], forearm).round(9))  # -1.5 9.81 0.15
+    [-2.20725]
     """
     checked_model(model)
     for quantity in QUANTITIES:

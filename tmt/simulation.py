@@ -60,6 +60,11 @@ def simulate(
     A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar is singular,
     Newton's method does not find the stages of an implicit method, an adaptive method would need steps below 1e-9 dt, or series
     take too many: `ended` of the result says which. Assignment, part i.
+
+    >>> start = np.array([0.5, 0.3, 1.0])
+    >>> t, q, qd = tmt.simulate(start, [0.0] * 3, tmt.gravity_balance(start), dt=0.01, steps=100)
+    >>> print(t[-1], q.shape, abs(q - start).max() < 1e-12)  # it is held
+    1.0 (101, 3) True
     """
     taylor = isinstance(method, str) and method == "taylor"
     runner = runner_of(model, "dopri8_adaptive" if taylor else method)

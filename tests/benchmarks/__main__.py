@@ -1,8 +1,7 @@
-"""python -m tests.benchmarks: what tmt costs on this machine, as a table (--csv FILE: in a file too).
+"""python -m tests.benchmarks: what tmt costs on this machine, as a table.
 
 start   processor time of a process that simulates 4096 steps of RK4, with an empty store and with what that has left there
 rates   time of one acceleration beside MuJoCo's: one state after the other, several side by side, and by a call from Python
-growth  the same, and compiling, for chains of more and more hinges
 truth   processor time of the true motion of 5 s, in pairs of doubles
 """
 
@@ -17,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from rich.console import Console
 
 import tmt
 from compare.engines.mujoco import engine, read
@@ -27,7 +25,7 @@ from compare.robots.file import robot_of
 from tmt.compiled import evaluator
 from tmt.exact.motion import trajectory
 
-from ..models.chain import chain
+from ..models.made import chain
 
 MODELS = Path(__file__).parents[1] / "models"
 ROUNDS, STATES, TAKEN = 15, 8192, 6e-4  # of what is timed in turns; side by side; s of one turn
@@ -57,29 +55,25 @@ def start() -> Iterator[dict]:
 
 def processor_time(command: list[str], store: str) -> float:
     """s of a process and its children, its own and the system's."""
-    before = os.times()
+    before = sum(os.times()[2:4])
     subprocess.run(command, env=os.environ | {"TMT_CACHE": store}, check=True)
-    after = os.times()
-    return after.children_user - before.children_user + after.children_system - before.children_system
+    return sum(os.times()[2:4]) - before
 
 
 def rates() -> Iterator[dict]:
     """Nanoseconds of one acceleration, the least of turns; microseconds of a call from Python."""
-    sources = {"arm": Path("mjcf/arm.xml")} | {
-        name: MODELS / f"{name}.xml" for name in ("arm7", "quadruped", "humanoid29")
-    }
-    for name, source in (sources | {"chain of 64": chain(64)}).items():
+    sources = {"arm": Path("mjcf/arm.xml")} | {f"chain of {n}": chain(n) for n in (1, 16, 64)}
+    sources |= {name: MODELS / f"{name}.xml" for name in ("arm7", "quadruped", "humanoid29")}
+    for name, source in sources.items():
         tree, functions, states = functions_of(source)
         one = [np.ascontiguousarray(part[0]) for part in states]
-        many = [np.resize(part, (100_000, part.shape[1])) for part in states] if tree.coordinates.nv < 20 else states
         tmt.prepare(tree)
-        tmt.acceleration(*many, tree)
+        tmt.acceleration(*states, tree)
         functions["call_us"] = lambda: tmt.acceleration(*one, tree), 1e3  # noqa: B023
-        functions["call_of_many"] = lambda: tmt.acceleration(*many, tree), len(many[0])  # noqa: B023
+        functions["call_of_many"] = lambda: tmt.acceleration(*states, tree), STATES  # noqa: B023
         found = in_turns(functions)
         for width in ("one_state", "side_by_side"):
-            found |= {f"mj_forward/{width}": found["mj_forward"] / found[width]}
-            found |= {f"equal_work/{width}": found["equal_work"] / found[width]}
+            found |= {f"{call}/{width}": found[call] / found[width] for call in ("mj_forward", "equal_work")}
         yield {"model": name, "n": tree.coordinates.nv} | found
 
 
@@ -93,50 +87,25 @@ def functions_of(source) -> tuple[tmt.Tree, dict, list[np.ndarray]]:
     columns, out_columns = [np.ascontiguousarray(part.T) for part in states], np.ascontiguousarray(out.T)
     dynamics = engine(reading).of(robot.case())
     loops, single = MinimalCalls(dynamics).loops(*(part[0] for part in states)), 64
-    return (
-        tree,
-        {
-            "one_state": (lambda: compiled.each(*states, out), STATES),
-            "side_by_side": (lambda: compiled.lanes(*columns, out_columns), STATES),
-            "mj_forward": (lambda: loops["MuJoCo, mj_forward"][1](single), single),
-            "equal_work": (lambda: loops["MuJoCo, equal work"][1](single), single),
-        },
-        states,
-    )
+    functions = {
+        "one_state": (lambda: compiled.each(*states, out), STATES),
+        "side_by_side": (lambda: compiled.lanes(*columns, out_columns), STATES),
+        "mj_forward": (lambda: loops["MuJoCo, mj_forward"][1](single), single),
+        "equal_work": (lambda: loops["MuJoCo, equal work"][1](single), single),
+    }
+    return tree, functions, states
 
 
 def in_turns(functions: dict[str, tuple[Callable, float]]) -> dict[str, float]:
     """ns of each, the least of turns: {name: (call, states in it)}."""
-    calls = {}
-    for name, (call, states) in functions.items():
+    calls, counts = [], []
+    for call, states in functions.values():
         (taken,) = timing.in_turns([call], 2)
         repeats = max(1, int(TAKEN / min(taken)))
-        calls[name] = (lambda call=call, repeats=repeats: [call() for _ in range(repeats)]), repeats * states
-    times = timing.in_turns([call for call, _ in calls.values()], ROUNDS)
-    return {name: 1e9 * min(taken) / states for (name, (_, states)), taken in zip(calls.items(), times)}
-
-
-def growth() -> Iterator[dict]:
-    """What a chain of n hinges costs; compile_s: processor time of the first call, with an empty store."""
-    names = {
-        "one_state": "each",
-        "side_by_side": "lanes",
-        "mj_forward": "mj_forward",
-        "equal_work": "mujoco_equal_work",
-    }
-    for n in (1, 3, 7, 16, 29, 64):
-        tree, functions, _ = functions_of(chain(n))
-        seconds = {}
-        for name in ("one_state", "side_by_side"):
-            with tempfile.TemporaryDirectory() as folder:
-                os.environ["TMT_CACHE"] = folder
-                began = time.process_time()
-                functions[name][0]()
-                seconds[name] = time.process_time() - began
-        operations = evaluator(tree, "acceleration").operations
-        for name, value in in_turns(functions).items():
-            compiled = {"compile_s": seconds.get(name), "operations": operations if name in seconds else None}
-            yield {"n": n, "implementation": names[name], "ns_per_state": value} | compiled
+        calls.append(lambda call=call, repeats=repeats: [call() for _ in range(repeats)])
+        counts.append(repeats * states)
+    times = timing.in_turns(calls, ROUNDS)
+    return {name: 1e9 * min(taken) / count for name, taken, count in zip(functions, times, counts)}
 
 
 def truth() -> Iterator[dict]:
@@ -151,7 +120,7 @@ def truth() -> Iterator[dict]:
         yield {"model": name, "truth_s": min(times)}
 
 
-COMMANDS = {"start": start, "rates": rates, "growth": growth, "truth": truth}
+COMMANDS = {"start": start, "rates": rates, "truth": truth}
 
 
 def main() -> None:
@@ -159,20 +128,11 @@ def main() -> None:
         "python -m tests.benchmarks", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("what", choices=COMMANDS)
-    parser.add_argument("--csv", help="a file for the table, in full digits")
-    asked = parser.parse_args()
-    rows, console = [], Console(stderr=True)
-    for row in COMMANDS[asked.what]():
+    rows = []
+    for row in COMMANDS[parser.parse_args().what]():
         rows.append(row)
-        console.print(
-            ", ".join(
-                f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items()
-            )
-        )
-    table = pd.DataFrame(rows)
-    print(table.to_string(index=False, float_format="{:.4g}".format, na_rep=""))
-    if asked.csv:
-        table.to_csv(asked.csv, index=False)
+        print(row, file=sys.stderr)
+    print(pd.DataFrame(rows).to_string(index=False, float_format="{:.4g}".format, na_rep=""))
 
 
 if __name__ == "__main__":

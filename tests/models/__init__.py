@@ -3,8 +3,7 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from .chain import chain
-from .seeded import KINDS, random_tree
+from .made import KINDS, chain, random_tree
 
 __all__ = ["KINDS", "PATHS", "chain", "gymnasium_files", "random_tree"]
 
@@ -15,6 +14,4 @@ PATHS = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.xml"))
 def gymnasium_files() -> list[Path]:
     """The MJCF files in the installed gymnasium, by name; none if it is not installed. Nothing of it is imported."""
     found = find_spec("gymnasium")
-    if found is None or found.origin is None:
-        return []
-    return sorted(Path(found.origin).parent.glob("envs/mujoco/assets/*.xml"))
+    return sorted(Path(found.origin).parent.glob("envs/mujoco/assets/*.xml")) if found and found.origin else []

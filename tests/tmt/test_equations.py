@@ -1,197 +1,255 @@
-"""The equations of motion beside Lagrange's, beside closed forms and in 50 digits; for any tree see test_properties."""
+"""The equations of any tree of hinges, slides and balls: what holds at any state, and Lagrange's equations."""
 
 import dataclasses
 
 import mpmath
 import numpy as np
 import pytest
-from lagrange import Body, Joint, equations, free_body, spherical_pendulum
-from trees import possible_tensor, random_state, small_tree, tree_of_kinds, unit_quaternion
+from engines.drawn_trees import drawn_trees
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from trees import random_state, small_tree, tree_of_kinds
 
 import tmt
-from compare.judge.scale import acceleration_scale, bias_scale, gravity_scale
 from tmt.equations import articulated, composite, method
-from tmt.equations.dual import jacobian
-from tmt.exact.tree import exact_tree
 from tmt.exact.values import distance, exact
-from tmt.model.coordinates import coordinates_of
 
 EPS = np.finfo(float).eps
-ALLOWED = 64 * EPS  # times the scale of each quantity, as in the experiments
+STEP = 1e-5  # of central differences, which are right to about 1e-8 of what is differenced
+of_trees = given(drawn_trees())
+few = settings(max_examples=20)
 
 
-def test_fifty_digits_contain_the_floats(rng):
-    q, qd, tau = rng.uniform(-3, 3, (3, 3))
-    truth = exact(tmt.ARM, q, qd, tau)
-    force = bias_scale(tmt.ARM, q[None], qd[None]) + np.abs(tau).max()
-    of_acceleration = acceleration_scale(tmt.ARM, q[None], force)
-    assert distance(tmt.mass_matrix(q), truth.mass_matrix).max() < ALLOWED * tmt.mass_matrix(q).max()
-    assert distance(tmt.bias(q, qd), truth.bias).max() < ALLOWED * force
-    assert distance(tmt.acceleration(q, qd, tau), truth.acceleration).max() < ALLOWED * of_acceleration
-    assert distance(tmt.potential_energy(q), truth.potential_energy) < ALLOWED * gravity_scale(tmt.ARM)
-    assert distance(truth.mass_matrix.astype(float), truth.mass_matrix).max() > 0.0  # the truth has more digits
+def along(tree, function, q, u):
+    """The rate of a function of q along the movement u."""
+    ahead, behind = (np.array(tree.coordinates.move(list(q), list(h * u))) for h in (STEP, -STEP))
+    return (function(ahead) - function(behind)) / (2.0 * STEP)
+
+
+def by_each(tree, function, q):
+    """The derivative of a function of q by each movement, in the last axis."""
+    return np.stack([along(tree, function, q, u) for u in np.eye(len(tree.axis))], axis=-1)
+
+
+def assert_close(found, expected, scale=1.0, digits=1e-7):
+    assert np.abs(found - expected).max() <= digits * (scale + np.abs(expected).max())
+
+
+@few
+@of_trees
+def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_changes_it(drawn):
+    """By the power of the torque less what dampers take."""
+    tree, q, qd, tau, _ = drawn
+    M, qdd = tmt.mass_matrix(q, tree), tmt.acceleration(q, qd, tau, tree)
+    assert np.abs(M - M.T).max() <= 64 * EPS * np.abs(M).max() and np.linalg.eigvalsh(M)[0] > 0.0
+    kinetic = tmt.energy(q, qd, tree) - tmt.potential_energy(q, tree)
+    assert_close(kinetic, qd @ M @ qd / 2, abs(tmt.potential_energy(q, tree)), 64 * EPS)
+    right = tau - tree.damping * qd - tmt.spring_torque(q, tree) - tmt.bias(q, qd, tree)
+    assert_close(M @ qdd, right, np.abs(M).max() * np.abs(qdd).max(), 256 * EPS)
+    there = [np.array(tree.coordinates.move(list(q), list(h * qd))) for h in (STEP, -STEP)]
+    ends = [tmt.energy(q, qd + h * qdd, tree) for q, h in zip(there, (STEP, -STEP))]
+    power = tau @ qd - tree.damping @ qd**2
+    assert_close((ends[0] - ends[1]) / (2.0 * STEP), power, np.abs(ends).max() + np.abs(qdd).max() ** 2)
+
+
+@few
+@of_trees
+def test_gravity_and_springs_are_the_slope_of_the_potential_energy(drawn):
+    tree, q, *_ = drawn
+    held = tmt.gravity_balance(q, tree) + tmt.spring_torque(q, tree)
+    slope = by_each(tree, lambda q: tmt.potential_energy(q, tree), q)
+    assert_close(slope, held, 1.0 + abs(tmt.potential_energy(q, tree)))
+    assert_close(tmt.bias(q, 0.0 * drawn.qd, tree), tmt.gravity_balance(q, tree), 100.0, 64 * EPS)
+
+
+@few
+@of_trees
+def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
+    tree, q, qd, *_ = drawn
+
+    def turns(q):
+        return np.array([[list(row) for row in method.joint_frames(tree, list(q))[h].turn] for h in tree.body_hinge])
+
+    T, B = tmt.jacobians(q, tree)
+    assert_close(T, by_each(tree, lambda q: tmt.com_positions(q, tree), q))
+    spin = np.einsum("bji,bjkn->bikn", turns(q), by_each(tree, turns, q))  # R' dR = [omega]x in body axes
+    assert_close(B, np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1))
+    assert_close(tmt.angular_velocities(q, qd, tree), B @ qd, 10.0, 64 * EPS)
+    rates = [along(tree, lambda q, part=part: tmt.jacobians(q, tree)[part] @ qd, q, qd) for part in (0, 1)]
+    for found, expected in zip(tmt.convective_terms(q, qd, tree), rates):
+        assert_close(found, expected, np.abs(qd).sum() ** 2)
+
+
+@few
+@of_trees
+def test_composite_and_articulated_bodies_give_the_numbers_of_the_literal_sums(drawn):
+    tree, *state, _ = drawn
+    q, qd, tau = (part.tolist() for part in state)
+    M, h = map(np.array, method.mass_matrix_and_bias(tree, q, qd))
+    for form in (composite, articulated):
+        for found, expected in zip(form.mass_matrix_and_bias(tree, q, qd), (M, h)):
+            assert_close(np.array(found), expected, digits=1e-12)
+    assert_close(np.array(articulated.bias(tree, q, qd)), h, digits=1e-12)
+    qdd = np.array(articulated.forward_dynamics(tree, q, qd, tau))
+    assert_close(M @ qdd, method.reduced_force(tree, h, q, qd, tau), np.abs(M).max() * np.abs(qdd).max(), 1e-12)
+
+
+@few
+@of_trees
+def test_the_rates_of_the_bias_are_its_derivatives_by_the_speeds(drawn):
+    """The bias has squares of the speeds, of which central differences of any step are exact."""
+    tree, q, qd, *_ = drawn
+    ends = [tmt.bias(q, qd + sign * np.eye(len(qd)), tree) for sign in (1.0, -1.0)]
+    expected = np.subtract(*ends).T / 2.0
+    assert_close(method.bias_rates(tree, q.tolist(), qd.tolist()), expected, np.abs(ends).max(), 256 * EPS)
+
+
+@few
+@given(drawn_trees(), st.data())
+def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
+    tree, q, qd, *_ = drawn
+    joints = tree.coordinates.joints
+    locked = data.draw(st.sets(st.integers(0, len(joints) - 1), max_size=len(joints) - 1))
+    held = {tree.hinge_names[i]: q[joints[i].q] if tree.kind[i] == "ball" else float(q[joints[i].q][0]) for i in locked}
+    free = [joint for i, joint in enumerate(joints) if i not in locked]
+    at = [k for joint in free for k in range(joint.q.start, joint.q.stop)]
+    by = [k for joint in free for k in range(joint.qd.start, joint.qd.stop)]
+    qd[[k for k in range(len(qd)) if k not in by]] = 0.0
+    smaller, state = tree.lock(held), (q[at], qd[by])
+    assert smaller.hinge_names == tuple(name for i, name in enumerate(tree.hinge_names) if i not in locked)
+    assert smaller.damping == tuple(tree.damping[k] for k in by)
+    for found, whole in (
+        (tmt.mass_matrix(q[at], smaller), tmt.mass_matrix(q, tree)[np.ix_(by, by)]),
+        (tmt.bias(*state, smaller), tmt.bias(q, qd, tree)[by]),
+        (tmt.spring_torque(q[at], smaller), tmt.spring_torque(q, tree)[by]),
+        (tmt.com_positions(q[at], smaller), tmt.com_positions(q, tree)),
+    ):
+        assert_close(found, whole, digits=1e-12)
 
 
 def test_the_distance_from_many_digits_is_that_of_all_digits():
     with mpmath.workdps(50):
-        assert distance(np.array([3.0]), np.array([mpmath.mpf("3.0000000000000000001")]))[0] == pytest.approx(
-            1e-19, rel=1e-9, abs=0.0
-        )
+        off = distance(np.array([3.0]), np.array([mpmath.mpf("3.0000000000000000001")]))
+    assert abs(off[0] - 1e-19) < 1e-28
 
 
-def test_nested_dual_numbers_are_not_confused():
-    """d/dx (x d/dy (x y)) = 2 x at any y: the inner derivative is a constant of the outer one and the reverse."""
-    (outer,) = jacobian(lambda x: [x[0] * jacobian(lambda y: [x[0] * y[0]], [3.0])[0][0]], [5.0])
-    assert outer[0] == 10.0
+DIGITS = 150
+TINY = mpmath.mpf(10) ** -35  # errors: of order TINY^2, and 10^-DIGITS / TINY^2
+NUMBERS = ("offset", "axis", "mass", "com", "inertia", "gravity", "armature", "stiffness", "rest", "reference")
+mp = np.vectorize(mpmath.mpf, otypes=[object])
+IDENTITY = mp(np.eye(3))
 
 
-def test_a_body_fixed_to_the_world_does_not_count():
-    fixed = dataclasses.replace(tmt.ARM, body_hinge=(-1, 2))
-    light = dataclasses.replace(tmt.ARM, mass=(0.0, 1.5), inertia=(np.zeros((3, 3)), tmt.ARM.inertia[1]))
-    q = np.array([0.3, 0.2, 0.5])
-    assert np.array_equal(tmt.mass_matrix(q, fixed), tmt.mass_matrix(q, light))
-    assert np.array_equal(tmt.com_positions(q, fixed)[0], [0, 0, -0.15])
+def unit(vector):
+    return vector / mpmath.norm(vector)
 
 
-# Lagrange's equations: energies alone
+class Lagrange:
+    """Mbar and h of a Tree, and the force of its springs, from energies alone; balls have one armature about all their axes.
+
+    They are functions of q and its rates qd, where a ball has the four components of its quaternion; the speeds u are in
+    qd = N(q) u, for a ball pd = p o (0, omega) / 2. Along the motions that keep the quaternion's length, the columns of N:
+
+        Mbar_ij = n_i' (d2T / dqd dqd) n_j,   h_i = n_i' (d/dt dT/dqd - d(T - V)/dq) with u constant.
+
+    No Jacobian, no rule for velocities, no convective term: all derivatives are central differences of TINY in numbers of
+    DIGITS digits, right to more than 50; T is a quadratic form in the rates, so that differences in them are exact.
+    """
+
+    def __init__(self, tree):
+        self.tree, self.joints = tree, tree.coordinates.joints
+        vars(self).update({name: mp(getattr(tree, name)) for name in NUMBERS})
+
+    def equations(self, q, u):
+        q, u = mp(q), mp(u)
+
+        def along(function, direction, step=TINY):
+            return (function(step * direction) - function(-step * direction)) / (2 * step)
+
+        n = self.tangents(q)
+        energies = [self.kinetic(q, one) for one in n]
+        M = np.array([[self.kinetic(q, a + b) - x - y for b, y in zip(n, energies)] for a, x in zip(n, energies)])
+
+        def momentum(moved, one):
+            now = u @ self.tangents(q + moved)
+            return along(lambda change: self.kinetic(q + moved, now + change), one, step=1)
+
+        def lagrangian(moved):
+            return self.kinetic(q + moved, u @ n) - self.potential(q + moved)
+
+        h = [along(lambda moved, one=one: momentum(moved, one), u @ n) - along(lagrangian, one) for one in n]
+        return M, np.array(h), np.array([along(lambda moved: self.of_springs(q + moved), one) for one in n])
+
+    def kinetic(self, q, qd):
+        """Of the bodies, m xd^2 / 2 + tr(Rd J Rd') / 2 with J = tr(I) / 2 - I, and of the armatures."""
+        before, after = (self.places(q + step * qd) for step in (-TINY, TINY))
+        T = 0
+        for mass, inertia, (x0, R0), (x1, R1) in zip(self.mass, self.inertia, before, after):
+            xd, Rd = (x1 - x0) / (2 * TINY), (R1 - R0) / (2 * TINY)
+            J = np.trace(inertia) / 2 * IDENTITY - inertia
+            T += mass * (xd @ xd) / 2 + np.sum((Rd @ J) * Rd) / 2
+        for kind, at, by in self.joints:  # of a ball omega = 2 |pd|
+            T += self.armature[by.start] * (qd[at] @ qd[at]) * (2 if kind == "ball" else mpmath.mpf(1) / 2)
+        return T
+
+    def potential(self, q):
+        return -sum(mass * (self.gravity @ x) for mass, (x, _) in zip(self.mass, self.places(q)))
+
+    def of_springs(self, q):
+        """Energy by how far each joint is from the rest of its spring: of a ball the angle of one turn."""
+        energy = 0
+        for k, (kind, at, _) in zip(self.stiffness, self.joints):
+            off = q[at.start] - self.rest[at.start]
+            if kind == "ball":
+                off = 2 * mpmath.acos(abs(unit(q[at]) @ unit(self.rest[at])))
+            energy += k * off**2 / 2
+        return energy
+
+    def places(self, q) -> list:
+        """Of each body: its CoM in the world, and its rotation matrix."""
+        frames = {-1: (0 * IDENTITY[0], IDENTITY)}
+        for i, (kind, at, by) in enumerate(self.joints):
+            x, R = frames[self.tree.parent[i]]
+            x, axis = x + R @ self.offset[i], unit(self.axis[by.start])
+            if kind == "ball":
+                third = unit(np.cross(axis, self.axis[by][1]))
+                frame = np.array([axis, np.cross(third, axis), third])  # its rows are the axes
+                R = R @ frame.T @ turn(*q[at]) @ frame
+            elif kind == "slide":
+                x = x + R @ axis * (q[at.start] - self.reference[i])
+            else:
+                half = (q[at.start] - self.reference[i]) / 2
+                R = R @ turn(mpmath.cos(half), *(axis * mpmath.sin(half)))
+            frames[i] = x, R
+        carriers = [frames[joint] for joint in self.tree.body_hinge]
+        return [(x + R @ com, R) for (x, R), com in zip(carriers, self.com)]
+
+    def tangents(self, q) -> np.ndarray:
+        """N', (nv, nq): qd = N u."""
+        N = mp(np.zeros((len(q), len(self.axis))))
+        for kind, at, by in self.joints:
+            w, x, y, z = q[at] / 2 if kind == "ball" else 4 * [mpmath.mpf(1)]
+            N[at, by] = [[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]] if kind == "ball" else w
+        return N.T
 
 
-def test_lagranges_equations_of_a_spherical_pendulum_and_a_free_body_are_those_of_newton_and_euler(rng):
-    """Mbar = J, h = omega x J omega - r x m R'g to 50 digits; a free body has m r crossed with both beside."""
-    m, r, inertia = 1.25, np.array([0.5, -0.25, 0.75]), possible_tensor(rng)
-    with mpmath.workdps(50):
-        exactly = np.vectorize(mpmath.mpf, otypes=[object])
-        p, w, r, inertia, gravity = map(exactly, (rng.normal(size=4), rng.normal(size=3), r, inertia, (1, -2, -9)))
-        R = rotation_matrix(p / mpmath.norm(p))
-        J = inertia + m * (np.dot(r, r) * exactly(np.eye(3)) - np.outer(r, r))
-        turning = np.cross(w, J @ w) - m * np.cross(r, R.T @ gravity)
-        found = spherical_pendulum(p, w, m, r, inertia, gravity)
-        assert abs(found.mass_matrix - J).max() < 1e-49 and abs(found.bias - turning).max() < 1e-48
-
-        r_cross = np.array([[0, -r[2], r[1]], [r[2], 0, -r[0]], [-r[1], r[0], 0]])
-        M = np.block([[m * exactly(np.eye(3)), -m * R @ r_cross], [m * r_cross @ R.T, J]])
-        h = [*(R @ (m * np.cross(w, np.cross(w, r))) - m * gravity), *turning]
-        found = free_body((1, 2, 3), p, (3, 2, 1), w, m, r, inertia, gravity)
-        assert abs(found.mass_matrix - M).max() < 1e-49 and abs(found.bias - h).max() < 1e-48
+def turn(w, x, y, z):
+    """The rotation matrix of a quaternion of length 1."""
+    v, cross = np.array([x, y, z]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return (w * w - v @ v) * IDENTITY + 2 * np.outer(v, v) + 2 * w * cross
 
 
-def rotation_matrix(p):
-    w, v = p[0], p[1:]
-    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
-    return np.eye(3, dtype=int) + 2 * w * cross + 2 * cross @ cross
-
-
-def lagrange(tree, q, qd):
-    """Mbar, h and the force of the springs from energies alone, with 50 digits."""
-    at = tree.coordinates.joints
-    joints = [
-        Joint(
-            kind, parent, offset, tree.axis[by] if kind == "ball" else tree.axis[by.start], tree.armature[by.start], k,
-            tree.rest[place] if kind == "ball" else tree.rest[place.start] - tree.reference[i],
-        )
-        for i, ((kind, place, by), parent, offset, k) in enumerate(zip(at, tree.parent, tree.offset, tree.stiffness))
-    ]  # fmt: skip
-    bodies = list(map(Body, tree.body_hinge, tree.mass, tree.com, tree.inertia))
-    q = [
-        float(x) - (tree.reference[i] if kind != "ball" else 0.0)
-        for i, (kind, place, _) in enumerate(at)
-        for x in q[place]
-    ]
-    return equations(joints, bodies, tree.gravity, q, qd)
-
-
-def plain_balls(tree):
-    """Those of Lagrange's equations: armature is the same about their three axes, which are the coordinate axes."""
-    armature, axis = list(tree.armature), list(tree.axis)
+@pytest.mark.parametrize("make", [small_tree, lambda: tree_of_kinds(np.random.default_rng(7), bodies=1)])
+def test_the_method_is_lagranges_equations_for_every_kind_of_joint(make, rng):
+    tree = make()
+    armature, (q, qd, tau) = np.array(tree.armature), random_state(rng, tree)
     for joint in tree.coordinates.balls:
-        armature[joint.qd] = [armature[joint.qd.start]] * 3
-        axis[joint.qd] = np.eye(3)
-    return dataclasses.replace(tree, armature=armature, axis=axis)
-
-
-def test_the_method_is_lagranges_equations_for_every_kind_of_joint(rng):
-    tree = plain_balls(dataclasses.replace(small_tree(), position_gain=(), speed_gain=()))
-    q, qd, _ = random_state(rng, tree)
-    M, h, spring = (np.array(values, dtype=float) for values in lagrange(tree, q, qd))
-    # axes are of length 1 but for an eps, which each side reads in its own way
-    force = np.abs(M).max() * np.square(qd).sum() + np.abs(h).max()
-    assert np.abs(tmt.mass_matrix(q, tree) - M).max() < ALLOWED * np.abs(M).max()
-    assert np.abs(tmt.bias(q, qd, tree) - h).max() < ALLOWED * force
-    assert np.abs(tmt.spring_torque(q, tree) + spring).max() < ALLOWED * 10.0
-
-
-def test_fifty_digits_of_lagrange_and_of_the_method_meet_along_coordinate_axes(rng):
-    tree = plain_balls(tree_of_kinds(rng, bodies=1, along_axes=True))
-    tree = dataclasses.replace(tree, reference=())
-    q, qd, tau = random_state(rng, tree)
-    for joint in tree.coordinates.balls:
+        armature[joint.qd] = 0.25
         q[joint.q] = rng.choice([-0.5, 0.5], 4)  # of length 1 exactly
-    truth, found = exact(tree, q, qd, tau), lagrange(tree, q, qd)
-    with mpmath.workdps(50):
-        assert abs(truth.mass_matrix - np.array(found.mass_matrix)).max() < mpmath.mpf(10) ** -44
-        assert abs(truth.bias - np.array(found.bias)).max() < mpmath.mpf(10) ** -43
-
-
-# composite and articulated bodies: the sums of the method regrouped
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_every_form_in_50_digits(seed, monkeypatch):
-    rng = np.random.default_rng(seed)
-    tree = tree_of_kinds(rng, bodies=3, along_axes=True)
+    tree = dataclasses.replace(tree, armature=armature)
+    truth = exact(tree, q, qd, tau)
+    with mpmath.workdps(DIGITS):
+        M, h, springs = Lagrange(tree).equations(q, qd)
+        for found, expected in ((truth.mass_matrix, M), (truth.bias, h), (truth.spring_torque, springs)):
+            assert abs(found - expected).max() < 1e-35 and abs(expected).max() > 0.1
     assert set(tree.kind) >= {"slide", "ball"}
-    # the articulated form has what joints carry in doubles alone: for an exact tree, in numbers of mpmath
-    rounded = composite.rounded_once
-    monkeypatch.setattr(articulated, "rounded_once", lambda tree, _: rounded(tree.plain, mpmath.mpf))
-    with mpmath.workdps(50):
-        truth = exact_tree(tree, mpmath.mpf)
-        truth.plain = tree
-        q, qd, tau = ([mpmath.mpf(v) for v in values.tolist()] for values in random_state(rng, tree))
-        M, h = map(np.array, method.mass_matrix_and_bias(truth, q, qd))
-        regrouped = composite.mass_matrix_and_bias(tree, q, qd, mpmath.mpf)
-        for form in (regrouped, articulated.mass_matrix_and_bias(truth, q, qd)):
-            assert abs(np.array(form[0]) - M).max() < 1e-43 and abs(np.array(form[1]) - h).max() < 1e-43
-        assert abs(np.array(articulated.bias(truth, q, qd)) - h).max() < 1e-43
-        force = method.reduced_force(truth, list(h), q, qd, tau)
-        assert abs(M @ np.array(articulated.forward_dynamics(truth, q, qd, tau)) - force).max() < 1e-43
-        assert abs(M).max() > 0.1 and abs(h).max() > 0.1
-
-
-# balls
-
-
-def test_a_ball_in_a_turned_frame_is_a_ball_in_other_coordinates(rng):
-    """With axes E, quaternion p and speeds omega it does what one along the coordinate axes does at E' p E and E' omega."""
-    tree = tree_of_kinds(np.random.default_rng(1), bodies=3)
-    tree = dataclasses.replace(tree, armature=())
-    q, qd, _ = random_state(rng, tree)
-    plain, to_plain = plain_balls(tree), np.eye(len(tree.axis))
-    other = q.copy()
-    for joint in tree.coordinates.balls:
-        frame = np.array(tree.axis[joint.qd])  # its rows are the axes
-        to_plain[joint.qd, joint.qd] = frame.T
-        other[joint.q][1:] = frame.T @ q[joint.q][1:]
-    M, h = tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree)
-    M1, h1 = tmt.mass_matrix(other, plain), tmt.bias(other, to_plain @ qd, plain)
-    assert np.abs(to_plain.T @ M1 @ to_plain - M).max() < 1e-13 and np.abs(to_plain.T @ h1 - h).max() < 1e-12
-    assert np.abs(tmt.com_positions(other, plain) - tmt.com_positions(q, tree)).max() < 1e-13
-    assert any(np.abs(np.array(tree.axis[joint.qd]) - np.eye(3)).max() > 0.1 for joint in tree.coordinates.balls)
-
-
-def test_movements_of_balls(rng):
-    coordinates = coordinates_of(("ball", "slide", "ball"))
-    q = np.concatenate([unit_quaternion(rng), [0.3], unit_quaternion(rng)])
-    for size in (0.0, 1e-200, 1e-9, 1.0, 3.0):
-        u = rng.uniform(-1.0, 1.0, 7)
-        u *= size / np.linalg.norm(u)
-        assert np.allclose(coordinates.difference(coordinates.move(q, u), q), u, rtol=1e-12, atol=1e-15)
-    same = -q
-    same[4] = q[4]  # p and -p are one turn
-    assert np.abs(coordinates.difference(same, q)).max() < 1e-15
-    # along a motion with constant speed in space of the body the rates of the movement are exact: a series in dt
-    omega = rng.uniform(-1.0, 1.0, 7)
-    u, n = np.zeros(7), 500
-    for _ in range(n):  # the midpoint rule
-        half = u + 0.5 / n * np.array(coordinates.rates(u, omega))
-        u = u + np.array(coordinates.rates(half, omega)) / n
-    assert np.allclose(u, omega, rtol=0, atol=1e-12)

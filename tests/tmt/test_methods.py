@@ -1,16 +1,18 @@
-"""Methods of integration: their tableaus, their orders, their steps."""
+"""Methods of integration: their tableaus, their orders, the derivatives of their steps, what they take implicitly."""
+
+import dataclasses
 
 import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
-from trees import random_state, tree_of_kinds
+from trees import random_state, random_states, small_tree, tree_of_kinds
 
 import tmt
 from tmt.compiled import runner
+from tmt.equations import method
 from tmt.exact.motion import trajectory
-from tmt.methods import METHODS, RungeKutta, amplification, dop853, one_step
-from tmt.methods.implicit import ImplicitRungeKutta
+from tmt.methods import METHODS, amplification, derivatives, dop853, one_step
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
@@ -18,29 +20,21 @@ EPS = np.finfo(float).eps
 FIXED = [name for name, stepping in METHODS.items() if not stepping.adaptive]
 ORDERS = {name: METHODS[name].order for name in FIXED} | {"rk4_mean_speed": 4}  # of hinges; with balls see below
 IMPLICIT = [name for name, stepping in METHODS.items() if stepping.solves_stages]
-
-
-MIDPOINT = {"order": 2, "A": ((), (0.5,)), "b": (0.0, 1.0), "c": (0.0, 0.5)}
-IMPLICIT_MIDPOINT = {"order": 2, "A": ((0.5,),), "b": (1.0,), "c": (0.5,)}
+SMALL = small_tree()
 
 
 @pytest.mark.parametrize(
-    "kind, right, changes, word",
+    "name, changes, word",
     [
-        (RungeKutta, MIDPOINT, {"b": (1.0, 0.5)}, "1.5"),
-        (RungeKutta, MIDPOINT, {"c": (0.0, 0.4)}, "row 1 of A"),
-        (RungeKutta, MIDPOINT, {"A": ((), (0.5, 0.5))}, "row 1 of A"),
-        (RungeKutta, MIDPOINT, {"A": ((),)}, "stage"),
-        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"b": (1.0, 0.5)}, "square"),
-        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"b": (0.9,)}, "0.9"),
-        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"c": (0.4,)}, "row 0 of A"),
-        (ImplicitRungeKutta, IMPLICIT_MIDPOINT, {"A": ((),)}, "square"),
+        ("rk4", {"b": (1.0, 0.5, 0.0, 0.0)}, "1.5"),
+        ("rk4", {"c": (0.0, 0.5, 0.4, 1.0)}, "row 2 of A"),
+        ("rk4", {"A": ((), (0.5, 0.5), (0.0, 0.5), (0.0, 0.0, 1.0))}, "entries"),
+        ("implicit_midpoint", {"A": ((),)}, "square"),
     ],
 )
-def test_a_wrong_tableau_cannot_be_built(kind, right, changes, word):
-    kind(**right)
+def test_a_wrong_tableau_cannot_be_built(name, changes, word):
     with pytest.raises(ValueError, match=word):
-        kind(**right | changes)
+        dataclasses.replace(METHODS[name], **changes)
 
 
 def test_the_coefficients_of_dop853_are_those_of_scipy():
@@ -69,25 +63,34 @@ def test_order(name):
         assert float(mpmath.log(coarse / fine, 2)) - 1 == pytest.approx(ORDERS[name], abs=0.3 if implicit else 0.15)
 
 
+def test_methods_keep_their_order_with_balls():
+    tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball",))
+    q, qd, tau = random_state(np.random.default_rng(6), tree)
+    truth = trajectory(tree, q, qd, tau, 0.25, 1).high[-1]
+
+    def error(name, steps):
+        state = q.tolist(), qd.tolist()
+        for _ in range(steps):
+            state = one_step(METHODS[name], tree, *state, tau.tolist(), 0.25 / steps)
+        assert abs(np.linalg.norm(np.array(state[0])[tree.coordinates.balls[0].q]) - 1.0) < 4 * EPS
+        return np.abs(np.concatenate(state) - truth).max()
+
+    for name, order in (("rk4", 4), ("rk4_mean_speed", 2), ("implicit_midpoint", 2), ("dopri8", 8)):
+        assert abs(np.log2(error(name, 8) / error(name, 16)) - order) < 0.4
+
+
 def test_an_adaptive_method_keeps_to_its_tolerance():
     _, *exact = tmt.simulate(BENT, REST, REST, 1 / 4096, 4096, "dopri8")
     errors = []
-    for tolerance in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12):
+    for tolerance in (1e-4, 1e-8, 1e-12):
         _, *path = tmt.simulate(BENT, REST, REST, 0.25, 4, "dopri8_adaptive", tolerance=tolerance)
         errors.append(max(np.abs(a[-1] - b[-1]).max() for a, b in zip(path, exact)))
         assert 0.0 < errors[-1] < 100 * tolerance
     assert errors[0] > 1e6 * errors[-1]
 
 
-@pytest.mark.parametrize("name", IMPLICIT)
-def test_newton_finds_the_stages_of_a_held_arm_at_large_steps(name, dt=10.0):
-    q, qd = (path[-1] for path in tmt.simulate(BENT + 0.1, REST, tmt.gravity_balance(BENT), dt, 500, name)[1:])
-    assert np.isfinite([q, qd]).all() and np.abs(q - BENT).max() < 2.0
-
-
-@pytest.mark.parametrize("name", IMPLICIT)
-def test_every_evaluation_of_an_implicit_method_is_counted(name):
-    counted, stepping, state = 0, METHODS[name], (BENT.tolist(), [1.0, 2.0, 3.0])
+def test_every_evaluation_of_an_implicit_method_is_counted():
+    counted, stepping, state = 0, METHODS["implicit_midpoint"], (BENT.tolist(), [1.0, 2.0, 3.0])
 
     def slope(q, qd):
         nonlocal counted
@@ -98,46 +101,86 @@ def test_every_evaluation_of_an_implicit_method_is_counted(name):
         state = stepping.step(slope, *state, 0.1)
     path = np.full((2, 1, 5, 3), np.nan)
     path[:, 0, 0] = BENT, [1.0, 2.0, 3.0]
-    evaluations = runner(tmt.ARM, name)(*path, np.zeros((1, 3)), 0.1)
+    evaluations = runner(tmt.ARM, "implicit_midpoint")(*path, np.zeros((1, 3)), 0.1)
     assert np.allclose(path[:, 0, -1], state, rtol=0, atol=1e-12)
-    # over any scalar the stages are found once more, for the sake of their derivatives; compiled code counts the
-    # linear equations that it starts from, which are made of dual numbers: as many in each step
+    # over any scalar the stages are found once more; compiled code counts the linear equations that it starts from
     assert evaluations == counted
 
 
-# balls
+# the Jacobian of a step
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if name != "gauss_legendre_4"])  # which takes long
+def test_the_jacobian_of_a_step_is_that_of_small_movements(name, monkeypatch):
+    """By the derivatives of its linear system, in parts, and by dual numbers through the solution."""
+    (q, later), (qd, faster), (tau, _) = random_states(np.random.default_rng(3), SMALL, 2)
+    stepping, dt, nv, move, h = METHODS[name], 0.05, len(SMALL.axis), SMALL.coordinates.move, 1e-6
+    J = amplification(stepping, SMALL, q, qd, tau, dt)
+    u = h * np.concatenate([np.eye(2 * nv), -np.eye(2 * nv)]).T  # a column each, all at once
+    state = [np.full(4 * nv, x) for x in q], [x + y for x, y in zip(qd, u[nv:])]
+    ends = one_step(stepping, SMALL, move(state[0], list(u[:nv])), state[1], tau.tolist(), dt)
+    (q1, q0), (qd1, qd0) = (np.split(np.array(part), 2, axis=1) for part in ends)
+    change = np.concatenate([SMALL.coordinates.difference(q1, q0), qd1 - qd0]) / (2 * h)
+    assert np.abs(change - J).max() < 1e-6 * np.abs(J).max()
+    monkeypatch.setattr(derivatives, "PART", nv)
+    both = amplification(stepping, SMALL, [later, q], [faster, qd], tau, np.array([0.02, dt]))
+    assert both[1] == pytest.approx(J, rel=1e-11, abs=1e-12)
+    monkeypatch.setattr(derivatives, "FEW_SPEEDS", nv)
+    assert amplification(stepping, SMALL, q, qd, tau, dt) == pytest.approx(J, rel=1e-10, abs=1e-10)
+
+
+# the gains of a linear controller
+
+FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own
+    tmt.ARM, parent=(-1, 0, 0), damping=(0.1, 0.0, 0.2), stiffness=(0.0, 3.0, 0.0), armature=(0.0, 0.1, 0.0),
+    reference=(0.2, 0.0, -0.3),
+)  # fmt: skip
+P = np.array([[40.0, 0.0, 0.0], [0.0, 30.0, 12.0], [0.0, 12.0, 20.0]])
+S = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, 2.0], [0.0, 2.0, 5.0]])
+ON_ONE_PATH = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1]])
+DRIVEN = dataclasses.replace(FORK, position_gain=P, speed_gain=S)
+q, qd, tau = np.array([0.4, -0.7, 1.1]), np.array([1.2, -0.5, 2.0]), np.array([3.0, -1.0, 0.5])
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "gauss_legendre_4")) for name in METHODS]
+    "name, speed, position",
+    [
+        ("semi_implicit_euler", 0.0 * S, 0.0 * P),
+        ("implicitfast", S * ON_ONE_PATH, 0.0 * P),
+        ("implicit", S * ON_ONE_PATH, 0.0 * P),
+        ("discrete", S, P),
+    ],
 )
-def test_the_jacobian_of_a_step_is_that_of_small_movements(name):
-    """One ball on a slide."""
-    rng = np.random.default_rng(3)
-    tree = tree_of_kinds(rng, bodies=1, kinds=("ball", "slide"))
-    while "ball" not in tree.kind:
-        tree = tree_of_kinds(rng, bodies=1, kinds=("ball", "slide"))
-    q, qd, tau = random_state(rng, tree)
-    stepping, dt, nv = METHODS[name], 0.05, len(tree.axis)
-    J, move, h = amplification(stepping, tree, q, qd, tau, dt), tree.coordinates.move, 1e-6
-    u = h * np.concatenate([np.eye(2 * nv), -np.eye(2 * nv)]).T  # a column each, all at once
-    state = [np.full(4 * nv, x) for x in q], [x + y for x, y in zip(qd, u[nv:])]
-    ends = one_step(stepping, tree, move(state[0], list(u[:nv])), state[1], tau.tolist(), dt)
-    (q1, q0), (qd1, qd0) = (np.split(np.array(part), 2, axis=1) for part in ends)
-    change = np.concatenate([tree.coordinates.difference(q1, q0), qd1 - qd0]) / (2 * h)
-    assert np.abs(change - J).max() < 1e-6 * np.abs(J).max()
+def test_which_gains_are_implicit(name, speed, position):
+    """The matrix and the force of the linear system, written out."""
+    stepping, dt, k = METHODS[name], 0.01, np.diag(FORK.stiffness) * (name == "discrete")
+    bias = np.array(method.bias_rates(FORK, q, qd)) * (name == "implicit")
+    matrix = tmt.mass_matrix(q, FORK) + dt * (np.diag(FORK.damping) + bias + speed) + dt**2 * (k + position)
+    force = tau - P @ q - S @ qd - tmt.bias(q, qd, FORK) - FORK.damping * qd - tmt.spring_torque(q, FORK)
+    force -= dt * (k + position) @ qd
+    found = derivatives.linear_system(stepping, DRIVEN, list(q[:, None]), list(qd[:, None]), list(tau), dt)
+    assert np.allclose(found[0][0], matrix, atol=1e-13) and np.allclose(found[1][0], force, atol=1e-13)
+    assert np.allclose(stepping.matrix(DRIVEN, list(q), list(qd), dt), matrix, atol=1e-13)
+    slope = stepping.slope(DRIVEN, list(q), list(qd), list(tau), dt)
+    assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
 
 
-def test_methods_keep_their_order_with_balls():
-    tree = tree_of_kinds(np.random.default_rng(5), bodies=1, kinds=("ball",))
-    q, qd, tau = random_state(np.random.default_rng(6), tree)
-    truth = trajectory(tree, q, qd, tau, 0.25, 1).high[-1]
+def test_a_controller_adds_to_the_torque(rng):
+    """Of hinges and slides beside a ball too; of no gains a Tree says nothing."""
+    place, speed, torque = random_state(rng, SMALL)
+    values = [place[at.start] for at, by in SMALL.coordinates.places for _ in range(by.start, by.stop)]
+    wanted = torque - np.array(SMALL.position_gain) @ values - np.array(SMALL.speed_gain) @ speed
+    plain = dataclasses.replace(SMALL, position_gain=(), speed_gain=())
+    found, expected = tmt.acceleration(place, speed, torque, SMALL), tmt.acceleration(place, speed, wanted, plain)
+    assert np.allclose(found, expected, rtol=1e-10, atol=1e-10)
+    zeros = dataclasses.replace(tmt.ARM, position_gain=np.zeros((3, 3)), speed_gain=np.zeros((3, 3)))
+    assert zeros == tmt.ARM and not zeros.has_gains and "gain" not in repr(tmt.ARM)
+    assert eval(repr(DRIVEN), {"Tree": tmt.Tree}) == DRIVEN != FORK
 
-    def error(name, steps):
-        motion = tmt.simulate(q, qd, tau, 0.25 / steps, steps, name, tree)
-        assert abs(np.linalg.norm(motion.q[-1][tree.coordinates.balls[0].q]) - 1.0) < 4 * EPS
-        return np.abs(np.concatenate([motion.q[-1], motion.qd[-1]]) - truth).max()
 
-    for name, order in (("rk4", 4), ("rk4_mean_speed", 2), ("implicit_midpoint", 2)):
-        assert abs(np.log2(error(name, 16) / error(name, 32)) - order) < 0.3
-    assert error("dopri8", 64) < 1e-13
+def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
+    left = DRIVEN.lock({"alpha": 0.3})
+    assert left.position_gain == tuple(map(tuple, P[1:, 1:])) and left.speed_gain == tuple(map(tuple, S[1:, 1:]))
+    assert DRIVEN.lock({"beta": 0.0}).position_gain == ((40.0, 0.0), (0.0, 20.0))
+    with pytest.raises(ValueError, match=r"'beta' cannot be locked at 0\.3"):
+        DRIVEN.lock({"beta": 0.3})

@@ -4,9 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from trees import random_tree
+from trees import random_tree, wrist
 
 import tmt
 from tmt.arm import points
@@ -14,90 +12,68 @@ from tmt.arm import points
 
 def test_arm_lies_as_the_assignment_says():
     shoulder, elbow, hand = (np.array(list(p), dtype=float) for p in points([0.0, 0.0, 0.0]))
-    assert np.array_equal(shoulder, [0, 0, 0])
-    assert np.array_equal(elbow, [0, 0, -0.3])
-    assert np.array_equal(hand, [0.375, 0, -0.3])
+    assert np.array_equal([shoulder, elbow, hand], [[0, 0, 0], [0, 0, -0.3], [0.375, 0, -0.3]])
 
 
 def test_tree_converts_arrays_and_scales_axes():
     tree = dataclasses.replace(tmt.ARM, axis=np.array([[0, 2, 0], [3, 0, 0], [0, 1, 0]]), mass=[1, 2])
-    assert tree.axis == tmt.ARM.axis
-    assert tree.mass == (1.0, 2.0)
-    assert tmt.Tree(**vars(tree)) == tree and tree.never_singular
-    assert hash(tree) != hash(tmt.ARM)
+    assert tree.axis == tmt.ARM.axis and tree.mass == (1.0, 2.0)
+    assert tmt.Tree(**vars(tree)) == tree and tree.never_singular and hash(tree) != hash(tmt.ARM)
 
 
+X, Y, Z = np.eye(3)
 REFUSED = [  # changes of the arm, and a word of what is said
-    ({"mass": (1.9,)}, "shape"),
     ({"mass": (1.9, np.nan)}, "finite"),
     ({"mass": (1.9, -1.0)}, "at least 0"),
-    ({"mass": "heavy"}, "numbers"),
     ({"mass": ("1.9", "1.5")}, "numbers"),
-    ({"mass": np.ma.array([1.9, 1.5], mask=[False, True])}, "numbers"),
-    ({"axis": ((0, 1, 0), (0, 0, 0), (0, 1, 0))}, r"axis\[1\]"),
+    ({"axis": (Y, 0 * X, Y)}, r"axis\[1\]"),
     ({"parent": (-1, 2, 1)}, r"parent\[1\]"),
-    ({"parent": (-1, 0.5, 1)}, r"parent\[1\]"),
-    ({"body_hinge": (1, 3)}, r"body_hinge\[1\]"),
     ({"body_hinge": (1, 1)}, "'gamma'"),
     ({"damping": (0, -1, 0)}, "damping"),
-    ({"gravity": (0, 0)}, "gravity"),
-    ({"inertia": (np.diag([1, 1, 3]), np.eye(3))}, "larger"),
-    ({"inertia": ([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]], np.eye(3))}, "symmetric"),
+    ({"inertia": (np.diag([1, 1, 2 + 1e-9]), np.eye(3))}, "larger"),
+    ({"inertia": ([[1, 1e-9, 0], [0, 1, 0], [0, 0, 1]], np.eye(3))}, "symmetric"),
     ({"mass": (1.9, 0), "inertia": (np.eye(3), np.zeros((3, 3)))}, "'gamma'"),
     ({"mass": (1e-320, 1e-320), "inertia": np.zeros((2, 3, 3))}, "doubles"),
-    ({"com": ((0, 0, 1e200), (0, 0, 1e200))}, "doubles"),
-    ({"hinge_names": 3}, "names"),
     ({"hinge_names": ("a", "b", "a")}, "names"),
-    ({"hinge_names": {"a", "b", "c"}}, "names"),
-    ({"hinge_names": ("a", "b", "c\nd")}, "names"),
     ({"colour": 3}, "'colour'"),
     ({"position_gain": np.zeros((2, 3))}, "position_gain"),
-    ({"speed_gain": np.full((3, 3), np.nan)}, "speed_gain"),
 ]
 OF_KINDS = [  # changes of a slide on a ball
     ({"kind": ("hinge", "screw")}, "kind"),
-    ({"axis": [[1, 0, 0], [1, 0, 0], [0, 0, 1], [0, 1, 0]]}, "right-handed"),
+    ({"axis": [X, X, Z, Y]}, "right-handed"),
     ({"reference": [1.0, 0.0]}, "ball"),
     ({"rest": [1.0, 1.0, 0.0, 0.0, 0.0]}, "quaternion"),
-    ({"armature": [-1.0, 0.0, 0.0, 0.0]}, "at least 0"),
     ({"stiffness": [0.0, -1.0]}, "at least 0"),
-    ({"speed_gain": np.eye(4)}, "ball"),
     ({"position_gain": np.eye(4)[[3, 1, 2, 0]]}, "ball"),
 ]
-
-
-def slide_on_a_ball():
-    return tmt.Tree(
-        ("b", "s"), (-1, 0), ((0, 0, 0), (0, 0, 1)), np.eye(3)[[0, 1, 2, 1]], (0,) * 4, ("body",), (1,), (1.0,), ((0, 0, 1),),
-        (np.eye(3),), (0, 0, -9.81), kind=("ball", "slide"),
-    )  # fmt: skip
+SLIDE_ON_A_BALL = tmt.Tree(
+    ("b", "s"), (-1, 0), ((0, 0, 0), (0, 0, 1)), (X, Y, Z, Y), (0,) * 4, ("body",), (1,), (1.0,), ((0, 0, 1),),
+    (np.eye(3),), (0, 0, -9.81), kind=("ball", "slide"),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    "make, changes, word",
-    [*((lambda: tmt.ARM, *row) for row in REFUSED), *((slide_on_a_ball, *row) for row in OF_KINDS)],
+    "tree, changes, word", [*((tmt.ARM, *row) for row in REFUSED), *((SLIDE_ON_A_BALL, *row) for row in OF_KINDS)]
 )
-def test_what_cannot_be_is_refused_in_one_line(make, changes, word):
+def test_what_cannot_be_is_refused_in_one_line(tree, changes, word):
     with pytest.raises(ValueError, match=word) as error:
-        dataclasses.replace(make(), **changes)
+        dataclasses.replace(tree, **changes)
     assert "\n" not in str(error.value)
 
 
-def test_a_tree_needs_a_hinge_and_a_body():
-    nothing = np.zeros((0, 3))
-    with pytest.raises(ValueError, match="joint"):
-        tmt.Tree((), (), nothing, nothing, (), (), (), (), nothing, np.zeros((0, 3, 3)), [0] * 3)
+def test_what_rounding_leaves_of_an_inertia_is_accepted():
+    tensor = [[1, 1e-13, 0], [0, 1, 0], [0, 0, 2 + 1e-13]]
+    assert dataclasses.replace(tmt.ARM, inertia=(tensor, np.eye(3))).inertia[0][0] == (1.0, 1e-13, 0.0)
 
 
 def test_a_state_of_a_ball_is_refused_by_its_name():
-    tree = slide_on_a_ball()
     with pytest.raises(ValueError, match=r"'b'.*quaternion"):
-        tmt.mass_matrix([1.1, 0.0, 0.0, 0.0, 0.0], tree)
+        tmt.mass_matrix([1.1, 0.0, 0.0, 0.0, 0.0], SLIDE_ON_A_BALL)
     with pytest.raises(ValueError, match=r"5.*slide.*ball"):
-        tmt.mass_matrix(np.zeros(4), tree)
+        tmt.mass_matrix(np.zeros(4), SLIDE_ON_A_BALL)
 
 
-@pytest.mark.parametrize("size", [5e-324, 1e-310, 1e-200, 1.0, 1e200, 1.7e308])
+@pytest.mark.parametrize("size", [5e-324, 1.7e308])
 def test_an_axis_of_any_length_is_a_direction(size):
     tree = dataclasses.replace(tmt.ARM, axis=((0, 1, 0), (size, size, 0), (0, 0, -size)))
     assert np.allclose(tree.axis[1], (0.5**0.5, 0.5**0.5, 0.0), rtol=0, atol=2e-16) and tree.axis[2] == (0.0, 0.0, -1.0)
@@ -113,32 +89,19 @@ def chain(axes, com=(0.3, 0.1, 0.2), inertia=None, offsets=None):
     )  # fmt: skip
 
 
-X, Y, Z = np.eye(3)
-
-
 @pytest.mark.parametrize(
-    "model, says",
+    "given, says",
     [
-        (lambda: chain([Z], (0, 0, 0.3)), "'h0'"),
-        (lambda: chain([Z], (0, 0, 0)), "'h0'"),
-        (lambda: chain([X, Z], (0, 0, 0.3)), "'h1'"),
-        (lambda: chain([Z, Z, Z], inertia=np.eye(3)), "'h0', 'h1', 'h2'"),
-        (lambda: chain([Z, -Z]), "'h0', 'h1'"),
-        (lambda: chain([Z, Z], offsets=[(0, 0, 0), (0, 0, 1)]), "'h0', 'h1'"),
-        (lambda: chain([X, Y, Z, X], inertia=np.eye(3)), "singular|together"),
-        (lambda: chain([X, Y, Z]), "singular|together"),  # a point about a point has two ways to move
+        (([Z], (0, 0, 0.3)), "'h0'"),
+        (([X, Z], (0, 0, 0.3)), "'h1'"),
+        (([Z, Z, Z], (0.3, 0.1, 0.2), np.eye(3)), "'h0', 'h1', 'h2'"),
+        (([Z, -Z],), "'h0', 'h1'"),
+        (([X, Y, Z],), "singular|together"),  # a point about a point has two ways to move
     ],
 )
-def test_a_model_that_is_singular_everywhere_is_refused(model, says):
+def test_a_model_that_is_singular_everywhere_is_refused(given, says):
     with pytest.raises(ValueError, match=says):
-        model()
-
-
-@pytest.mark.parametrize(
-    "model", [lambda: chain([X, Y, Z], inertia=np.eye(3)), lambda: chain([Z, Z], offsets=[(0, 0, 0), (0.1, 0, 0)])]
-)
-def test_a_model_that_is_singular_somewhere_is_a_model(model):
-    assert not model().never_singular
+        chain(*given)
 
 
 def test_what_is_singular_is_what_rounding_hides():
@@ -150,7 +113,7 @@ def test_what_is_singular_is_what_rounding_hides():
 
 
 def test_a_body_with_inertia_for_every_hinge_is_never_singular(rng):
-    assert tmt.ARM.never_singular
+    assert not wrist().never_singular and not chain([Z, Z], offsets=[(0, 0, 0), (0.1, 0, 0)]).never_singular
     assert chain([X, X + 2e-3 * Y], inertia=np.eye(3)).never_singular
     assert not chain([X, X + 5e-4 * Y], inertia=np.eye(3)).never_singular  # unknown: too nearly parallel
     assert chain([X], inertia=1.2e-6 * np.eye(3), com=(1 / np.sqrt(2), 0, 0)).never_singular
@@ -161,41 +124,16 @@ def test_a_body_with_inertia_for_every_hinge_is_never_singular(rng):
         assert np.linalg.cond(tmt.mass_matrix(rng.uniform(-3, 3, (50, len(tree.parent))), tree)).max() < 1e9
 
 
-# locked joints
-
-
-@given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
-def test_hinges_locked_one_after_the_other_are_hinges_locked_together(one, other):
-    together = tmt.ARM.lock({"alpha": one, "beta": other})
-    after = tmt.ARM.lock({"beta": other}).lock({"alpha": one})
-    assert together.hinge_names == after.hinge_names == ("gamma",)
-    for field in ("offset", "axis", "com", "inertia"):
-        assert np.allclose(getattr(together, field), getattr(after, field), atol=1e-15)
-
-
 def test_a_hinge_locked_at_zero_rounds_nothing():
-    planar = tmt.ARM.lock({"beta": 0.0})
-    for name in ("offset", "axis"):
-        assert getattr(planar, name) == (getattr(tmt.ARM, name)[0], getattr(tmt.ARM, name)[2])
+    planar, arm = tmt.ARM.lock({"beta": 0.0}), tmt.ARM
+    assert (planar.offset, planar.axis) == (arm.offset[::2], arm.axis[::2])
     assert (planar.parent, planar.body_hinge) == ((-1, 0), (0, 1))
-    assert (planar.com, planar.inertia, planar.mass) == (tmt.ARM.com, tmt.ARM.inertia, tmt.ARM.mass)
-    assert tmt.ARM.lock({}) == tmt.ARM
+    assert (planar.com, planar.inertia, planar.mass) == (arm.com, arm.inertia, arm.mass) and arm.lock({}) == arm
 
 
 @pytest.mark.parametrize(
-    "angles, word",
-    [
-        ({"wrist": 0.0}, "'wrist'.*alpha, beta, gamma"),
-        ({"beta": np.nan}, "finite"),
-        ({"beta": "bent"}, "numbers"),
-        ({"beta": True}, "numbers"),
-        (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "one must be free"),
-        (None, "None"),
-        (("beta",), "dict"),
-        ({3: 0.0}, "3"),
-    ],
+    "angles, word", [({"wrist": 0.0}, "'wrist'"), (dict.fromkeys(tmt.ARM.hinge_names, 0.0), "one must be free")]
 )
 def test_what_cannot_be_locked(angles, word):
-    with pytest.raises(ValueError, match=word) as error:
+    with pytest.raises(ValueError, match=word):
         tmt.ARM.lock(angles)
-    assert "\n" not in str(error.value)

@@ -1,0 +1,109 @@
+"""Compiled quantities: the same bits side by side as one at a time, derivatives, sines. Their numbers see test_answers."""
+
+import ctypes
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from trees import random_state, random_states, small_tree
+
+import tmt
+from tmt import literal
+from tmt.compiled import Library, evaluator, forms
+from tmt.compiled.evaluator import TERMS
+from tmt.compiled.ir import POINTER, Code, module
+from tmt.compiled.sine import LIMIT
+from tmt.compiled.straight import functions, trace
+from tmt.equations import composite, method
+from tmt.equations.dual import jacobian
+from tmt.equations.vectors import cos, sin
+from tmt.methods import METHODS
+
+EPS = np.finfo(float).eps
+SMALL = small_tree()
+COUNT = 19  # two blocks and a rest, in any register
+
+
+def rows_of(compiled, states):
+    out = np.full((len(states[0]), compiled.size), np.nan)
+    compiled.each(*states, out)
+    return out
+
+
+def in_columns(compiled, states):
+    out = np.full((compiled.size, len(states[0])), np.nan)
+    compiled.lanes(*(np.ascontiguousarray(x.T) for x in states), out)
+    return out.T
+
+
+def test_states_side_by_side_have_the_bits_of_each_alone(rng):
+    states, compiled = random_states(rng, SMALL, COUNT), evaluator(SMALL, TERMS)
+    M, h = (literal.mass_matrix(states[0], SMALL), literal.bias(*states[:2], SMALL))
+    wanted, found = np.hstack([M[:, *np.triu_indices(len(SMALL.axis))], h]), rows_of(compiled, states)
+    assert np.abs(found - wanted).max() <= 64 * EPS * np.abs(wanted).max() and compiled.operations > 0
+    for count in (*range(10), 17, COUNT):
+        assert np.array_equal(in_columns(compiled, [rows[:count] for rows in states]), found[:count])
+        if count:
+            assert np.array_equal(compiled.of_rows(*(rows[:count] for rows in states)), found[:count])
+    assert compiled.chain(*(rows[0] for rows in states), 3) == pytest.approx(found[0].sum(), rel=1e-9)
+
+
+def test_another_form_of_mbar_and_h_is_traced_and_not_kept(folder, rng):
+    def own(tree, q, qd):
+        M, h = composite.mass_matrix_and_bias(tree, q, qd)
+        return [[2.0 * x for x in row] for row in M], [2.0 * x for x in h]
+
+    states = list(rng.uniform(-2, 2, (3, 5, 3)))
+    doubled = evaluator(tmt.ARM, "acceleration", own)
+    wanted = literal.acceleration(states[0], states[1], states[2] / 2.0)
+    assert rows_of(doubled, states) == pytest.approx(wanted, rel=1e-10, abs=1e-10) and not list(folder.glob("*"))
+    literally = evaluator(tmt.ARM, TERMS, method.mass_matrix_and_bias)
+    assert literally.operations > 2 * evaluator(tmt.ARM, TERMS).operations
+
+
+def compiled(traced):
+    """The traced function of some numbers, as a function in Python."""
+    code = Code("f", {"in": POINTER, "out": POINTER})
+    code.call(traced.name, code["in"], code["out"])
+    code.give_back()
+    function = Library(module([*functions(traced, 1), code])).function("f", None, ctypes.c_void_p, ctypes.c_void_p)
+
+    def call(given):
+        given, out = np.array(given, dtype=float), np.full(len(traced.outputs), np.nan)
+        function(given.ctypes.data, out.ctypes.data)
+        return out
+
+    return call
+
+
+@pytest.mark.parametrize("name, few", [("rk4", 0), ("implicit", 99)])
+def test_the_derivative_of_a_slope_is_that_of_dual_numbers_through_the_literal_form(name, few, rng, monkeypatch):
+    """In articulated bodies, where that can be, and by Mbar and h."""
+    monkeypatch.setattr(forms, "FEW", few)
+    stepping, (q, qd, tau), dt = METHODS[name], random_state(rng, SMALL), 0.05
+    start, direction = [*q.tolist(), *qd.tolist()], rng.uniform(-1, 1, len(q) + len(qd))
+    found = compiled(forms.directional(SMALL, stepping))([*start, *tau, dt, *direction])
+
+    def slope(x):
+        return stepping.slope(SMALL, x[: len(q)], x[len(q) :], tau.tolist(), dt)
+
+    wanted = [*slope(start), *(row[0] for row in jacobian(slope, start, [direction]))]
+    assert found == pytest.approx(np.array(wanted), rel=1e-10, abs=1e-10)
+
+
+sincos = compiled(trace("both", [1], lambda x: [sin(x[0]), cos(x[0])]))
+
+
+@given(st.floats(LIMIT / 2, LIMIT) | st.floats(-10.0, 10.0) | st.integers(-1000, 1000).map(lambda n: n * np.pi / 4))
+def test_sine_and_cosine_to_the_last_digit(x):
+    with mpmath.workdps(60):
+        for value, truth in zip(sincos([x]), (mpmath.sin(x), mpmath.cos(x))):
+            assert abs(mpmath.mpf(float(value)) - truth) <= 1.2 * EPS
+
+
+@pytest.mark.parametrize("x", [math.nextafter(LIMIT, math.inf), -1e300, -np.inf, np.nan])
+def test_no_sine_beyond_the_limit(x):
+    assert np.isnan(sincos([x])).all() and np.isfinite(sincos([math.copysign(LIMIT, x)])).all()
