@@ -120,15 +120,18 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
 
 
 def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_is_said(folder, monkeypatch, capsys):
+    said = []
+
     def carry_out(self, progress):
         for task in self.tasks:
-            self.ended(task, verdict, "no reason")
+            self.ended(task, said[-1], "no reason")
 
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
     for verdict, status in statuses.items():
+        said.append(verdict)
         assert main(["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]) == status
-    verdict = "agree"
+    said.append("agree")
     assert "changed" not in capsys.readouterr().out
     assert main(["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1", "--since", "out"]) == 0
     assert re.search(rf"changed: m/x/{NAME}: .*differ.*agree", capsys.readouterr().out)

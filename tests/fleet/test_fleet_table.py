@@ -1,0 +1,231 @@
+"""The row of a file, the order of rows, the table as CSV and as a page, and what has changed since an earlier fleet."""
+
+import csv
+import html
+import random
+import re
+from collections import Counter
+from types import SimpleNamespace
+from urllib.parse import unquote
+
+import pytest
+
+from compare.fleet.figures_fleet import draw_steps
+from compare.fleet.models import place_of_report
+from compare.fleet.page import fleet_page
+from compare.fleet.piece import FleetError
+from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, order, row_of_file
+from compare.fleet.since import changes, earlier
+from compare.fleet.table import csv_of_fleet, picture_of_steps, sentences_of, write_table
+from compare.fleet.times import time_of_workers
+from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
+from compare.reference import Reference
+from compare.report.verdict import Section
+
+CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
+BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
+OFF = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
+OWN = AT_OWN_STEP, 0.002, 0.001, "with Euler", "at most", About.STEP
+
+
+def good(share=0.5):
+    return "M", share, 1.0, "", "at most", About.MODELS
+
+
+def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
+    """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
+    result = Result("stability", tables={"step_limits": list(limits)})
+    for quantity, value, tolerance, note, rule, about in checks:
+        result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
+    kind, *renamed = reference
+    section = Section("stability", "", "", "", result)
+    return row_of_file([section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+
+
+@pytest.mark.parametrize("verdict, checks, more, named", [
+    (AGREE, [good(1.0)], {}, ""),
+    (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
+    (AGREE, [good()], {"reference": ("solution", "wrist as hand")}, "wrist as hand"),
+    (ITSELF, [good()], {"reference": ("model",)}, ""),
+    (DIFFER, [good(2.0)], {"reference": ("model",)}, "2 s"),
+    (DIFFER, [good(1.0 + 1e-9), BROKEN, OWN, OFF], {"causes": CAUSES}, "mass of upper"),
+    (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
+    (BROKE, [good()], {"lost": ["the table"]}, "the table"),
+    (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"),
+    (REFUSED, [], {}, "nothing"),
+])  # fmt: skip
+def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
+    row = row_of(*checks, **more)
+    assert row["verdict"] == verdict and named in row["reason"] and bool(named) == bool(row["reason"])
+
+
+def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
+    assert row_of(good(0.2), good(3.0), OWN)["worst_ratio"] == 3.0
+    diverged = row_of(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
+    assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
+    assert row_of(BROKEN)["worst_ratio"] is None
+
+
+def limit(dt, stable, integrator="Euler", base="fixed", kind="finite"):
+    return {"integrator": integrator, "file_integrator": "Euler", "base": base, "limit": kind, "predicted_dt_s": dt,
+            "stable_at_file_dt": stable}  # fmt: skip
+
+
+@pytest.mark.parametrize("limits, stable, least", [
+    ([], None, None),
+    ([limit(0.004, True), limit(0.003, True)], True, 0.003),
+    ([limit(0.004, True), limit(0.001, False)], False, 0.001),
+    ([limit(0.004, True), limit(0.001, None)], True, 0.001),  # at one posture it is not known
+    ([limit(0.004, True), limit(0.001, False, integrator="RK4")], True, 0.004),  # another integrator
+    ([limit(0.004, True, base="free"), limit(0.001, False, base="locked")], True, 0.004),  # that is no base of its own
+    ([limit(None, True, kind="always stable"), limit(None, None, kind="saddle")], True, None),
+])  # fmt: skip
+def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stable, least):
+    row = row_of(good(), limits=limits)
+    assert (row["stable_at_file_dt"], row["limit_s"]) == (stable, least)
+
+
+def test_what_needs_a_look_comes_first():
+    right = [
+        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (UNCONFIRMED, None, 0.5, "a"),
+        (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
+        (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
+    ]  # fmt: skip
+    rows = [dict(zip(("verdict", "stable_at_file_dt", "worst_ratio", "file"), row)) for row in right]
+    for seed in range(20):
+        assert sorted(random.Random(seed).sample(rows, len(rows)), key=order) == rows
+
+
+# what has changed since an earlier fleet
+
+ROW = {
+    "file": "a b.xml", "sha256": "1", "verdict": AGREE, "reason": "", "joints": 3, "worst_ratio": 0.123456,
+    "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.26,
+    "has_report": True, "report_of": "a b.xml", "reference": "arm", "why_itself": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("before, now, named", [
+    ({}, {"seconds": 99.0, "worst_ratio": 0.9, "sha256": "2", "reason": "other"}, None),
+    ({}, {"verdict": DIFFER, "reason": "mass of x"}, ["agree", "differ", "mass of x"]),
+    ({"stable_at_file_dt": None}, {"stable_at_file_dt": False}, [""]),
+    ({}, {"limit_s": 0.010099}, None),
+    ({}, {"limit_s": 0.009901}, None),
+    ({}, {"limit_s": 0.010101}, ["10 ms", "10.1 ms"]),
+    ({}, {"limit_s": 0.009899}, ["10 ms", "9.899 ms"]),
+    ({"limit_s": None}, {}, ["none", "10 ms"]),
+    ({"limit_s": None}, {"limit_s": None}, None),
+    ({"limit_s": 0.0}, {}, [" 0 ms", "10 ms"]),
+    ({}, {"file": "new.xml", "verdict": REFUSED}, ["new.xml", "refused", "a b.xml", "agree"]),  # and one is gone
+])  # fmt: skip
+def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named, tmp_path):
+    (tmp_path / "fleet.csv").write_text(csv_of_fleet([ROW | before]), encoding="utf-8")
+    found = changes(earlier(tmp_path), [ROW | now])
+    places = [" ".join(found).index(name) for name in named or ()]
+    assert bool(found) == bool(named) and places == sorted(places)
+
+
+@pytest.mark.parametrize("content", [
+    b"a,b\n1,2\n", b"\xff\xfe\x00", (",".join(FLEET_COLUMNS) + "\na,1,agree,,1,1,Euler,1,true,soon,1\n").encode(),
+])  # fmt: skip
+def test_what_is_no_earlier_fleet_is_refused_in_one_line(content, tmp_path):
+    (tmp_path / "fleet.csv").write_bytes(content)
+    with pytest.raises(FleetError, match=r"fleet\.csv") as refused:
+        earlier(tmp_path)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+# the page
+
+
+def page_of(rows, changed=None):
+    return fleet_page("A fleet", ["1 file."], rows, (), changed, {"command": "x"}, None)
+
+
+def test_every_name_leads_to_its_report():
+    names = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "q?x=1.xml",
+             "by\\xff.xml", "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
+    text = page_of([ROW | {"file": name, "report_of": name} for name in names])
+    links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
+    assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == names
+    for (address, _), name in zip(links, names, strict=True):
+        address = html.unescape(address)
+        assert not set(address) & set("#?\"'<> ") and ":" not in address  # no fragment, no scheme
+        assert unquote(address) == f"{place_of_report(name)}/index.html"
+
+
+def test_a_row_is_marked_by_its_verdict_has_short_numbers_and_is_empty_where_nothing_is_known():
+    empty = dict.fromkeys(("joints", "worst_ratio", "file_dt_s", "stable_at_file_dt", "limit_s"))
+    rows = [ROW, ROW | {"stable_at_file_dt": False}, ROW | empty | {"verdict": REFUSED, "has_report": False}]
+    text = page_of([*rows, ROW | {"verdict": ITSELF}])
+    for name, shown in (("file_dt_s", "2"), ("limit_s", "10"), ("worst_ratio", "0.12")):
+        assert re.findall(rf'<td class="\w+ {name}"[^>]*>(.*?)</td>', text) == [shown, shown, "", shown]
+    assert re.findall(r'<tr class="(\w+)">', text) == ["good", "bad", "none", "none"]
+    assert '<th scope="row">a b.xml</th>' in text and '<div class="verdict good">' in text
+    for verdict in (DIFFER, BROKE, UNCONFIRMED):
+        text = page_of([ROW | {"verdict": verdict}])
+        assert '<div class="verdict bad">' in text and '<tr class="bad">' in text
+
+
+def test_nothing_that_is_said_is_taken_for_html_and_lists_stand_where_they_are_asked_for():
+    title, said, name, value, caption, why, reason, change = words = [f'<w{k}>&"' for k in range(8)]
+    rows, picture = [ROW | {"reason": reason}], (b"", caption, (2, 2))
+    text = fleet_page(title, [said], rows, [("a", why)], [change], {name: value}, picture)
+    for k in range(len(words)):
+        assert f"<w{k}>" not in text and f"&lt;w{k}&gt;&amp;&quot;" in text
+    assert [page_of([ROW], changed=changed).count("<li>") for changed in (None, [], ["a.xml: new"] * 2)] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("count, is_named", [(2, True), (41, False)])
+def test_the_picture_has_a_point_for_each_file_with_a_limit(count, is_named):
+    rows = [ROW | {"file": f"{'long/' * 20}${k}.xml", "limit_s": 1.5e-3 + 1e-3 * k} for k in range(count)]
+    _, figure, caption = draw_steps([*rows, ROW | {"limit_s": None}])
+    ax = figure.axes[0]
+    points = [line.get_xdata() for line in ax.lines if line.get_marker() != "None"]
+    shares = sorted(float(share) for line in points for share in line)
+    assert shares == pytest.approx(sorted(row["file_dt_s"] / row["limit_s"] for row in rows))
+    assert any(max(line) <= 1.0 for line in points) and any(min(line) > 1.0 for line in points)
+    assert (len(ax.get_yticks()) == count) == is_named and f"{count} of {count + 1}" in caption
+    assert picture_of_steps([ROW]) is None
+
+
+def run_of(rows, **more):
+    given = {"rows": rows, "parts": [], "took": {"mass": [(3, 5.0)]}, "workers": 2, "machines": {"b", "a"}, "no_timing": None,
+             "done_before": 0, "pieces_before": 0, "door": SimpleNamespace(times_alone=True)}  # fmt: skip
+    return SimpleNamespace(**given | {"verdicts": lambda: Counter(row["verdict"] for row in rows)} | more)
+
+
+def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
+    rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False}]
+    run = run_of(rows, parts=[("late.xml", "why")])
+    said = write_table(tmp_path, run, [("early.xml", "because")], None, "the command", 10.0)
+    with (tmp_path / "fleet.csv").open(newline="") as file:
+        found = list(csv.DictReader(file))
+    assert [row["file"] for row in found] == ["b.xml", "c.xml", "a b.xml"]
+    assert [row["stable_at_file_dt"] for row in found] == ["true", "false", "true"]
+    assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
+    text = (tmp_path / "index.html").read_text()
+    assert all(part in text for part in ("late.xml", "early.xml", "a, b", "the command", "data:image/png"))
+    assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")
+    assert re.findall(r"\d+ %", said[-1]) == ["25 %", "75 %"]
+
+
+def test_the_sentences_count_verdicts_and_name_whose_own_step_is_not_stable():
+    verdicts = (DIFFER, BROKE, BROKE, REFUSED, UNCONFIRMED, AGREE, AGREE, AGREE)
+    said = sentences_of([], [], run_of([ROW | {"verdict": verdict} for verdict in verdicts]))
+    assert re.findall(r"\d+", said[0])[1:] == ["1", "2", "1", "1", "3"]  # in the order of the verdicts
+    rows = [ROW | {"file": f"{k}.xml", "stable_at_file_dt": k < 0} for k in range(-1, 5)]
+    more = {"no_timing": "nobody may", "done_before": 7, "pieces_before": 5}
+    said = sentences_of(rows, [("p.xml", "why")] * 3, run_of(rows, **more))
+    assert re.findall(r"\d\.xml|\d more", said[1]) == ["0.xml", "1.xml", "2.xml", "2 more"] and len(said) == 5
+    assert "3 files" in said[2] and "nobody may" in said[3] and "7 files and 5 pieces" in said[4]
+
+
+@pytest.mark.parametrize("took, workers, whole, alone, shares", [
+    ({"mass": [(2, 10.0), (3, 20.0)], "speed": [(2, 6.0)], "reduction": [(2, 4.0)]}, 2, 32.0, True, (40 / 64, 10 / 64)),
+    ({"mass": [(2, 10.0), (3, 20.0)], "speed": [(2, 6.0)], "reduction": [(2, 4.0)]}, 2, 32.0, False, (40 / 64, 0.0)),
+    ({"speed": [(1, 9.0)]}, 1, 10.0, True, (0.9, 0.0)),  # one worker waits for nobody
+    ({"mass": [(1, 50.0)]}, 2, 10.0, True, (1.0, 0.0)),  # nothing is more than all
+])  # fmt: skip
+def test_the_time_of_the_workers_is_computing_waiting_for_timings_or_neither(took, workers, whole, alone, shares):
+    assert time_of_workers(took, workers, whole, alone) == pytest.approx((*shares, 1.0 - sum(shares)))
