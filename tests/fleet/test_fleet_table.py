@@ -13,10 +13,9 @@ import pytest
 from compare.fleet.figures_fleet import draw_steps
 from compare.fleet.models import place_of_report
 from compare.fleet.page import fleet_page
-from compare.fleet.piece import FleetError
 from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, order, row_of_file
 from compare.fleet.since import changes, earlier
-from compare.fleet.table import csv_of_fleet, picture_of_steps, sentences_of, write_table
+from compare.fleet.table import csv_of_fleet, picture_of_steps, write_table
 from compare.fleet.times import time_of_workers
 from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
 from compare.reference import Reference
@@ -125,16 +124,6 @@ def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named,
     assert bool(found) == bool(named) and places == sorted(places)
 
 
-@pytest.mark.parametrize("content", [
-    b"a,b\n1,2\n", b"\xff\xfe\x00", (",".join(FLEET_COLUMNS) + "\na,1,agree,,1,1,Euler,1,true,soon,1\n").encode(),
-])  # fmt: skip
-def test_what_is_no_earlier_fleet_is_refused_in_one_line(content, tmp_path):
-    (tmp_path / "fleet.csv").write_bytes(content)
-    with pytest.raises(FleetError, match=r"fleet\.csv") as refused:
-        earlier(tmp_path)
-    assert len(str(refused.value).splitlines()) == 1
-
-
 # the page
 
 
@@ -208,17 +197,6 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     assert all(part in text for part in ("late.xml", "early.xml", "a, b", "the command", "data:image/png"))
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")
     assert re.findall(r"\d+ %", said[-1]) == ["25 %", "75 %"]
-
-
-def test_the_sentences_count_verdicts_and_name_whose_own_step_is_not_stable():
-    verdicts = (DIFFER, BROKE, BROKE, REFUSED, UNCONFIRMED, AGREE, AGREE, AGREE)
-    said = sentences_of([], [], run_of([ROW | {"verdict": verdict} for verdict in verdicts]))
-    assert re.findall(r"\d+", said[0])[1:] == ["1", "2", "1", "1", "3"]  # in the order of the verdicts
-    rows = [ROW | {"file": f"{k}.xml", "stable_at_file_dt": k < 0} for k in range(-1, 5)]
-    more = {"no_timing": "nobody may", "done_before": 7, "pieces_before": 5}
-    said = sentences_of(rows, [("p.xml", "why")] * 3, run_of(rows, **more))
-    assert re.findall(r"\d\.xml|\d more", said[1]) == ["0.xml", "1.xml", "2.xml", "2 more"] and len(said) == 5
-    assert "3 files" in said[2] and "nobody may" in said[3] and "7 files and 5 pieces" in said[4]
 
 
 @pytest.mark.parametrize("took, workers, whole, alone, shares", [
