@@ -26,7 +26,10 @@ def test_nothing_runs_beside_what_is_timed(tmp_path):
     places = {timed: tmp_path / str(timed) for timed in (True, False)}
     for folder in places.values():
         folder.mkdir()
-    asked = [Piece("", toy.in_time, (str(places[k % 3 == 0]),), timed=k % 3 == 0, rank=k % 2) for k in range(12)]
+    asked = [
+        Piece("", toy.in_time, (str(places[k % 3 == 0]), 0.02 * (1 + k % 4)), timed=k % 3 == 0, rank=k % 2)
+        for k in range(12)
+    ]
     with closing(Pool(2, 60.0)) as pool:
         assert not any(found.broke for found in outcomes(pool, asked))
     timed, others = ([tuple(map(int, note)) for note in toy.notes(places[kind])] for kind in (True, False))

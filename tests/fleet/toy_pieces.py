@@ -52,10 +52,10 @@ def prints():
     return sys.stdin.read()
 
 
-def in_time(folder):
+def in_time(folder, seconds):
     """Says when it began and when it ended."""
     began = time.time_ns()
-    time.sleep(0.05)
+    time.sleep(seconds)
     noted(folder, f"{began} {time.time_ns()}")
 
 
