@@ -1,4 +1,4 @@
-"""A small report, and what is in a folder: for tests of what takes its place."""
+"""A small report, and what is in a folder: for report/test_folder and process/test_interrupt."""
 
 import json
 
