@@ -44,15 +44,3 @@ def test_spread_labels_keep_their_order_their_distance_and_their_ends(values):
     places = style.spread(values, 1.0, 0.0, 10.0)
     assert (np.diff(np.sort(places)) > 1.0 - 1e-9).all() and ((places > -1e-9) & (places < 10.0 + 1e-9)).all()
     assert np.array_equal(np.argsort(places, kind="stable"), np.argsort(values, kind="stable"))
-
-
-def test_a_name_stands_beside_its_point_and_on_no_line():
-    ax = Figure(figsize=(style.WIDTH, 3.0)).subplots()
-    wall = ax.plot(np.linspace(0.5, 0.6, 400), np.tile([0.3, 0.9], 200))  # right of the second point
-    ax.set(xlim=(0, 1), ylim=(0, 1))
-    style.name_ends(ax, [(0.2, 0.2, "free", "black"), (0.48, 0.6, "hindered", "black")])
-    boxes = {text.get_text(): text.get_window_extent() for text in ax.texts}
-    x, y = ax.transData.transform((0.2, 0.2))
-    assert 0.0 < boxes["free"].x0 - x < 15.0 and boxes["free"].y0 < y < boxes["free"].y1
-    hindered = np.array([boxes["hindered"].extents])
-    assert not style.points_in(hindered, ax.transData.transform(wall[0].get_xydata())).any()

@@ -79,13 +79,6 @@ def test_the_pictures_are_those_that_were_computed(apart, ended):
     assert found[1][scene["still"]] is not None and (scene["still"] == 128) == (ended is None)
 
 
-def test_what_does_not_move_takes_no_place():
-    still = drawn()
-    still = still._replace(points={name: path[:1] + 0.0 * path for name, path in still.points.items()})
-    scene = data_of(page_of(still))["scenes"][0]
-    assert scene["paths"][0][1:] == [0] * 128 and scene["paths"][1] == [1] + [0] * 128
-
-
 def test_it_fetches_nothing_is_there_without_script_and_no_name_can_break_it():
     text = page_of(drawn("</script><b>&amp;\u2028", apart=0.3), drawn("let go"), label="yours")
     data = data_of(text)

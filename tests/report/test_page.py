@@ -11,7 +11,6 @@ from sections import BAD, GOOD, section
 
 from compare.report import images, page
 from compare.report.files import write
-from compare.report.first_screen import LONG_SENTENCE, in_two
 from compare.report.overview import BEGINNING
 from compare.report.parts import Parts
 from compare.report.verdict import Report, verdict
@@ -88,19 +87,9 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
             f'<li class="{kind}">{marked}<div><a href="#{name}">' in top
             and f'<p class="outcome {kind}">{marked}' in rest
         )
-    sections = [with_figures(section("kinematics", BAD), "kinematics_distances"), section("mass", GOOD)]
-    top, _ = page_of(folder, sections)  # no picture shows what fails: a figure does
-    assert re.search(r'<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">', top)
-    assert re.search(r"<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>", top)
-
-
-def test_four_causes_or_failing_checks_stand_on_the_first_screen_and_all_below_it(folder):
-    for count in (4, 5):
-        causes = [CAUSE | {"place": f"place {k}"} for k in range(count)]
-        top, rest = page_of(folder, [section("mass", *[BAD] * count)], causes=causes)
-        assert top.count("<td>place ") == 4 and ('<a href="#causes">' in top) == (count == 5)
-        assert rest.count("<td>place ") == count
-        assert page_of(folder, [section("mass", GOOD, *[BAD] * count)])[0].count("<td>Mbar</td>") == 4
+    top, _ = page_of(folder, [with_figures(section("kinematics", *[BAD] * 5), "kinematics_distances")])
+    assert '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top  # not a picture
+    assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4  # no cause is known
 
 
 def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
@@ -113,14 +102,6 @@ def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
     assert "<table" not in text[:fold] and text.count("<tr><td>other</td>") == 40
     assert '<a href="tables/mass.csv">' in text and '<a href="tables/extra.csv">' in text and "<td>1.5</td>" not in text
     assert [text.index(f'id="figure-{name}"') < fold for name in names] == [True, True, False, False, True]
-
-
-def test_the_large_sentence_is_short():
-    names = ["parameters", "kinematics", "gravity", "acceleration"]
-    for checks in ((GOOD,), (BAD,)):
-        big, small = in_two(verdict([section(name, *checks) for name in names], 9))
-        assert len(big) <= LONG_SENTENCE and not any(name in big for name in names)
-        assert all(name in small for name in names)
 
 
 def text_of(path):
@@ -136,9 +117,6 @@ def test_results_have_every_check_cause_and_digit(folder):
     results = json.loads(text_of(folder / "results.json"))
     assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
     assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
-    assert set(results["checks"][0]) == {
-        "experiment", "scene", "quantity", "rule", "value", "tolerance", "unit", "passed", "note",
-    }  # fmt: skip
     fields = ("rank", "place", "stated", "found", "text")
     assert results["causes"] == [{name: cause[name] for name in fields} for cause in (CAUSE, second)]
     lines = text_of(folder / "tables" / "mass.csv").splitlines()

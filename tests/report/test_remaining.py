@@ -8,8 +8,8 @@ from runs import ROOT
 
 from compare.experiments import EXPERIMENTS
 from compare.process.clock import Clock
-from compare.report.provenance import durations, provenance
-from compare.report.remaining import AFTER_FULL, AFTER_QUICK, END, START, Remaining, in_words, plan
+from compare.report.provenance import provenance
+from compare.report.remaining import AFTER_FULL, AFTER_QUICK, END, START, Remaining, plan
 from compare.robots.arm import ARM
 from compare.version import OURS, installed, of_checkout
 
@@ -22,12 +22,6 @@ class Stopped(Clock):
     elapsed = 0.0
 
 
-def remaining(elapsed, under_way="", **ended):
-    clock = Stopped()
-    clock.elapsed, clock.ended, clock.under_way = elapsed, ended, under_way
-    return Remaining(clock, ["a", "b"], PLAN)
-
-
 @pytest.mark.parametrize("elapsed, ended, seconds", [
     (7.0, {}, 93.0), (25.0, {START: 10.0, "a": 20.0}, 75.0),
     (120.0, {START: 20.0, "a": 40.0, "b": 120.0}, 40.0 * 130.0 / 70.0),  # a slow machine: almost twice of the planned 40
@@ -36,15 +30,10 @@ def remaining(elapsed, under_way="", **ended):
     (500.0, {START: 10.0, "a": 20.0, "b": 60.0}, None),  # nothing is known of the last
 ])  # fmt: skip
 def test_an_estimate_is_what_is_left_of_the_plan_scaled_by_what_was_seen(elapsed, ended, seconds):
-    assert remaining(elapsed, **ended).seconds == pytest.approx(seconds)
-
-
-def test_how_far_names_the_experiment_under_way_and_a_rough_duration():
-    number, name, left = remaining(10.0, "a", start=10.0).words()
-    assert (number.split()[::2], name) == (["1", "2"], "a") and "90 s" in left
-    assert remaining(500.0, start=10.0, a=20.0, b=60.0).words() == []
-    rough = [in_words(seconds) for seconds in (0.2, 7.6, 9.9, 12.0, 33.0, 117.0, 118.0, 200.0)]
-    assert rough == ["1 s", "8 s", "10 s", "10 s", "35 s", "115 s", "2 min", "3 min"]
+    clock = Stopped()
+    clock.elapsed, clock.ended, clock.under_way = elapsed, ended, "a"
+    left = Remaining(clock, ["a", "b"], PLAN)
+    assert left.seconds == pytest.approx(seconds) and len(left.words()) == (3 if seconds else 2)
 
 
 @pytest.mark.parametrize("last, command, ended, is_used", [
@@ -68,10 +57,3 @@ def test_the_version_is_that_of_the_checkout_that_runs(tmp_path):
     assert of_checkout(tmp_path) is None and installed("no-such-package") is None
     (tmp_path / "pyproject.toml").write_text('[project]\nname = "other"\nversion = "1"')  # around the package
     assert of_checkout(tmp_path) is None
-
-
-def test_what_each_task_took_itself_is_written():
-    clock = Clock()
-    clock.taken, clock.ended = [("a", 0.251), ("b", 1.0), ("a", 0.25)], {"start": 0.5, "a": 1.501, "b": 9.0}
-    found = durations(clock)
-    assert found == {"seconds_of": {"a": 0.5, "b": 1.0}, "ended_after_s": {"start": 0.5, "a": 1.5, "b": 9.0}}

@@ -36,18 +36,6 @@ def test_a_terminal_shows_how_far_it_is_and_then_what_was_found(runs, columns, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns, term", [(80, "xterm"), (40, "dumb")])
-def test_a_model_that_fails(runs, columns, term):
-    run = runs["heavy", columns, term]
-    assert run.status == 1, run.output
-    lines = readable_lines(run)
-    failed = [check for check in results_in(runs["plain"] / f"heavy{columns, term}")["checks"] if not check["passed"]]
-    shown = [line for line in lines if line.startswith(("  CAUSE mass of forearm: stated 1.5 kg", "  FAIL mass: "))]
-    assert len(shown) == 5 and shown[0].startswith("  CAUSE")
-    assert any(f" {len(failed) - 4} more" in line for line in lines)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name, model, out, heard", [
     ("ascii, head", "Käfer.xml", "Öl", 1), ("C", "Käfer.xml", "Öl im C", 5), ("bytes, full", "\\xff.xml", b"\xfe", 0),
 ])  # fmt: skip
