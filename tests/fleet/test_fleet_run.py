@@ -2,16 +2,14 @@
 
 import os
 import pickle
-import platform
-import zlib
 from types import SimpleNamespace
 
 import pytest
 
 from compare.fleet.command import with_reference
-from compare.fleet.file_pieces import Asked, Known, findings, untimed_part
+from compare.fleet.file_pieces import Asked, Known
 from compare.fleet.kept import Kept
-from compare.fleet.models import bundle, found_models, place_of_report
+from compare.fleet.models import found_models, place_of_report
 from compare.fleet.piece import Outcome
 from compare.fleet.row import AGREE, BROKE, DIFFER, ITSELF, REFUSED
 from compare.fleet.run import AHEAD_FOR_ALL, AHEAD_FOR_EACH, Run
@@ -173,19 +171,6 @@ def test_timed_pieces_of_a_pool_come_after_all_others_and_those_of_a_cluster_at_
         assert done[-4:] == ["speed"] * 2 + ["report"] * 2
     else:  # each at once after what of it is no timing
         assert [done[k + 1] for k, step in enumerate(done) if step == "speed, untimed"] == ["speed"] * 2
-
-
-@pytest.mark.slow
-def test_a_timed_experiment_in_two_pieces_finds_what_it_finds_in_one(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "a.xml").write_text(ONE["a.xml"])
-    about = "a.xml", Asked(("reduction",), True), pickle.dumps(bundle(found_models(["a.xml"]).models[0]))
-    whole, parted = (
-        pickle.loads(zlib.decompress(findings("reduction", work, *about)[0]))[0]
-        for work in (None, untimed_part("reduction", *about))
-    )
-    assert parted.checks == whole.checks and len(parted.checks) > 10
-    assert [any(platform.node() in note for note in of.notes) for of in (whole, parted)] == [False, True]
 
 
 def test_a_file_that_changes_or_goes_while_the_fleet_runs_breaks_off_alone(fleet, tmp_path):

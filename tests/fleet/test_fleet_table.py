@@ -10,13 +10,11 @@ from urllib.parse import unquote
 
 import pytest
 
-from compare.fleet.figures_fleet import draw_steps
 from compare.fleet.models import place_of_report
 from compare.fleet.page import fleet_page
 from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, order, row_of_file
 from compare.fleet.since import changes, earlier
-from compare.fleet.table import csv_of_fleet, picture_of_steps, write_table
-from compare.fleet.times import time_of_workers
+from compare.fleet.table import csv_of_fleet, write_table
 from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
 from compare.reference import Reference
 from compare.report.verdict import Section
@@ -124,16 +122,14 @@ def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named,
     assert bool(found) == bool(named) and places == sorted(places)
 
 
-# the page
-
-
-def page_of(rows, changed=None):
-    return fleet_page("A fleet", ["1 file."], rows, (), changed, {"command": "x"}, None)
+def page_of(rows, **more):
+    given = {"title": "A fleet", "said": [], "left_out": (), "changed": None, "origin": {}, "picture": None}
+    return fleet_page(rows=rows, **given | more)
 
 
 def test_every_name_leads_to_its_report():
     names = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "q?x=1.xml",
-             "by\\xff.xml", "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
+             "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
     text = page_of([ROW | {"file": name, "report_of": name} for name in names])
     links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
     assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == names
@@ -143,7 +139,7 @@ def test_every_name_leads_to_its_report():
         assert unquote(address) == f"{place_of_report(name)}/index.html"
 
 
-def test_a_row_is_marked_by_its_verdict_has_short_numbers_and_is_empty_where_nothing_is_known():
+def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_html():
     empty = dict.fromkeys(("joints", "worst_ratio", "file_dt_s", "stable_at_file_dt", "limit_s"))
     rows = [ROW, ROW | {"stable_at_file_dt": False}, ROW | empty | {"verdict": REFUSED, "has_report": False}]
     text = page_of([*rows, ROW | {"verdict": ITSELF}])
@@ -154,39 +150,20 @@ def test_a_row_is_marked_by_its_verdict_has_short_numbers_and_is_empty_where_not
     for verdict in (DIFFER, BROKE, UNCONFIRMED):
         text = page_of([ROW | {"verdict": verdict}])
         assert '<div class="verdict bad">' in text and '<tr class="bad">' in text
-
-
-def test_nothing_that_is_said_is_taken_for_html_and_lists_stand_where_they_are_asked_for():
-    title, said, name, value, caption, why, reason, change = words = [f'<w{k}>&"' for k in range(8)]
-    rows, picture = [ROW | {"reason": reason}], (b"", caption, (2, 2))
-    text = fleet_page(title, [said], rows, [("a", why)], [change], {name: value}, picture)
+    title, said, name, value, why, reason, change = words = [f'<w{k}>&"' for k in range(7)]
+    more = {"left_out": [("a", why)], "changed": [change], "origin": {name: value}}
+    text = page_of([ROW | {"reason": reason}], title=title, said=[said], **more)
     for k in range(len(words)):
         assert f"<w{k}>" not in text and f"&lt;w{k}&gt;&amp;&quot;" in text
-    assert [page_of([ROW], changed=changed).count("<li>") for changed in (None, [], ["a.xml: new"] * 2)] == [0, 1, 2]
 
 
-@pytest.mark.parametrize("count, is_named", [(2, True), (41, False)])
-def test_the_picture_has_a_point_for_each_file_with_a_limit(count, is_named):
-    rows = [ROW | {"file": f"{'long/' * 20}${k}.xml", "limit_s": 1.5e-3 + 1e-3 * k} for k in range(count)]
-    _, figure, caption = draw_steps([*rows, ROW | {"limit_s": None}])
-    ax = figure.axes[0]
-    points = [line.get_xdata() for line in ax.lines if line.get_marker() != "None"]
-    shares = sorted(float(share) for line in points for share in line)
-    assert shares == pytest.approx(sorted(row["file_dt_s"] / row["limit_s"] for row in rows))
-    assert any(max(line) <= 1.0 for line in points) and any(min(line) > 1.0 for line in points)
-    assert (len(ax.get_yticks()) == count) == is_named and f"{count} of {count + 1}" in caption
-    assert picture_of_steps([ROW]) is None
-
-
-def run_of(rows, **more):
-    given = {"rows": rows, "parts": [], "took": {"mass": [(3, 5.0)]}, "workers": 2, "machines": {"b", "a"}, "no_timing": None,
-             "done_before": 0, "pieces_before": 0, "door": SimpleNamespace(times_alone=True)}  # fmt: skip
-    return SimpleNamespace(**given | {"verdicts": lambda: Counter(row["verdict"] for row in rows)} | more)
-
-
-def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
+def test_rows_are_in_their_order_in_the_csv_and_in_the_page_which_says_where_the_time_went(tmp_path):
     rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False}]
-    run = run_of(rows, parts=[("late.xml", "why")])
+    took = {"mass": [(2, 1.0), (3, 2.0)], "speed": [(2, 2.0)]}  # of 2 x 10 s
+    run = SimpleNamespace(
+        rows=rows, parts=[("late.xml", "why")], took=took, workers=2, machines={"b", "a"}, no_timing=None, done_before=0,
+        pieces_before=0, door=SimpleNamespace(times_alone=True), verdicts=lambda: Counter(row["verdict"] for row in rows),
+    )  # fmt: skip
     said = write_table(tmp_path, run, [("early.xml", "because")], None, "the command", 10.0)
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))
@@ -194,16 +171,8 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     assert [row["stable_at_file_dt"] for row in found] == ["true", "false", "true"]
     assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     text = (tmp_path / "index.html").read_text()
-    assert all(part in text for part in ("late.xml", "early.xml", "a, b", "the command", "data:image/png"))
+    assert all(
+        part in text for part in ("late.xml", "early.xml", "a, b", "the command", "data:image/png", "3 of 3 files")
+    )
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")
-    assert re.findall(r"\d+ %", said[-1]) == ["25 %", "75 %"]
-
-
-@pytest.mark.parametrize("took, workers, whole, alone, shares", [
-    ({"mass": [(2, 10.0), (3, 20.0)], "speed": [(2, 6.0)], "reduction": [(2, 4.0)]}, 2, 32.0, True, (40 / 64, 10 / 64)),
-    ({"mass": [(2, 10.0), (3, 20.0)], "speed": [(2, 6.0)], "reduction": [(2, 4.0)]}, 2, 32.0, False, (40 / 64, 0.0)),
-    ({"speed": [(1, 9.0)]}, 1, 10.0, True, (0.9, 0.0)),  # one worker waits for nobody
-    ({"mass": [(1, 50.0)]}, 2, 10.0, True, (1.0, 0.0)),  # nothing is more than all
-])  # fmt: skip
-def test_the_time_of_the_workers_is_computing_waiting_for_timings_or_neither(took, workers, whole, alone, shares):
-    assert time_of_workers(took, workers, whole, alone) == pytest.approx((*shares, 1.0 - sum(shares)))
+    assert re.findall(r"\d+ %", said[-1]) == ["25 %", "10 %", "65 %"]

@@ -59,13 +59,6 @@ def in_time(folder, seconds):
     noted(folder, f"{began} {time.time_ns()}")
 
 
-def takes_worker_down(folder):
-    """Ends the process that started its own, a worker of a cluster."""
-    noted(folder)
-    os.kill(os.getppid(), signal.SIGKILL)
-    time.sleep(60)
-
-
 def waits(folder, opened, shared=b""):
     """Waits until a file is there; who waits is noted."""
     noted(folder, f"{os.getpid()} {os.getppid()}")
@@ -100,7 +93,6 @@ SOME = {
 ALL = SOME | {
     "exits": Fault(exits, (3,), words=("status 3", "no hope", "4 times")),
     "leaves": Fault(sys.exit, (3,), words=("SystemExit: 3",)),
-    "unsendable": Fault(threading.Lock, words=("TypeError", "lock")),
     "asked of nobody": Fault(GONE.nowhere, words=("ModuleNotFoundError", "gone")),
 }
 
