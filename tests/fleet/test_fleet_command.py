@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import signal
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,6 @@ import runs
 from toy_pieces import soon
 
 from compare.__main__ import main
-from compare.fleet.command import FLEET_OPTIONS
-from compare.fleet.kept import Kept
 from compare.fleet.piece import FleetError
 from compare.fleet.row import FLEET_COLUMNS
 
@@ -68,57 +67,6 @@ def test_a_file_has_the_report_that_it_has_alone(folder):
     assert of_fleet["provenance"]["command"] == f"python -m compare fleet 'm/x/{NAME}' --only mass"
 
 
-@pytest.mark.parametrize("arguments, word", [
-    (["fleet"], "fleet models"), (["fleet", ""], "empty"), (["fleet", "m", "--onyl=mass"], "did you mean --only?"),
-    (["fleet", "m", "--xyz"], " ".join(FLEET_OPTIONS)), (["fleet", "m", "--only", "mas"], "did you mean mass?"),
-    (["fleet", "m", "--only", ","], "--only"), (["fleet", "m", "--workers", "0"], "--workers: '0'"),
-    (["fleet", "m", "--reference", "my.py:"], "FILE.xml"), (["fleet", "m", "--limit", "nan"], "--limit: 'nan'"),
-    (["fleet", "m", "--dask", "tcp://x:1", "--workers", "2"], "--workers"),
-    (["--quick", "fleet", "m"], "fleet is the first word"),
-])  # fmt: skip
-def test_what_is_mistyped_gets_status_2_and_one_line(arguments, word, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    out, err = capsys.readouterr()
-    assert (stop.value.code, out, len(err.splitlines())) == (2, "", 1) and word in err
-
-
-@pytest.mark.parametrize("arguments, word", [
-    (["nowhere"], "nowhere"), (["m", "--reference", "no.xml"], "no.xml"),
-    (["m", "--since", "nowhere"], "nowhere/fleet.csv"), (["m", "--out", "m/part.xml"], "m/part.xml"),
-])  # fmt: skip
-def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
-    assert main(["fleet", *arguments]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and word in err and len(err.splitlines()) == 1 and not (folder / "reports").exists()
-
-
-@pytest.mark.parametrize("words, asked", [
-    (["--workers", "3", "--limit", "7"], ("pool", 3, 7.0, True)),
-    (["--dask", "tcp://x:1", "--full"], ("cluster", "tcp://x:1", 600.0, False)),
-])  # fmt: skip
-def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
-    seen = []
-
-    class Door:
-        def __init__(self, where, limit):
-            seen.extend((self.kind, where, limit))
-
-        def close(self):
-            pass
-
-    def run(models, given, *_):
-        seen.append(given.is_quick)
-        assert given.names == ("mass", "gravity")
-        raise FleetError("seen")
-
-    monkeypatch.setattr("compare.fleet.pool.Pool", type("Pool", (Door,), {"kind": "pool"}))
-    monkeypatch.setattr("compare.fleet.cluster.Cluster", type("Cluster", (Door,), {"kind": "cluster"}))
-    monkeypatch.setattr("compare.fleet.run.Run", run)
-    assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words]) == 2
-    assert tuple(seen) == asked and "seen" in capsys.readouterr().err
-
-
 def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_is_said(folder, monkeypatch, capsys):
     said = []
 
@@ -137,60 +85,85 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
     assert re.search(rf"changed: m/x/{NAME}: .*differ.*agree", capsys.readouterr().out)
 
 
+@pytest.mark.parametrize("arguments, word", [
+    (["fleet"], "fleet models"), (["fleet", "m", "--onyl=mass"], "did you mean --only?"),
+    (["fleet", "m", "--only", "mas"], "did you mean mass?"), (["fleet", "m", "--reference", "my.py:"], "FILE.xml"),
+    (["fleet", "m", "--limit", "nan"], "--limit: 'nan'"), (["fleet", "m", "--dask", "x", "--workers", "2"], "--workers"),
+    (["fleet", "nowhere"], "nowhere"), (["fleet", "m", "--reference", "no.xml"], "no.xml"),
+    (["fleet", "m", "--since", "nowhere"], "nowhere/fleet.csv"), (["fleet", "m", "--out", "m/part.xml"], "m/part.xml"),
+])  # fmt: skip
+def test_what_is_mistyped_or_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
+    try:
+        status = main(arguments)
+    except SystemExit as stop:
+        status = stop.code
+    out, err = capsys.readouterr()
+    assert (status, out, len(err.splitlines())) == (2, "", 1) and word in err and not (folder / "reports").exists()
+
+
+@pytest.mark.parametrize("words, asked", [
+    (["--workers", "3", "--limit", "7"], ("Pool", 3, 7.0, True)),
+    (["--dask", "tcp://x:1", "--full"], ("Cluster", "tcp://x:1", 600.0, False)),
+])  # fmt: skip
+def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
+    seen = []
+
+    def run(models, given, *_):
+        seen.append(given.is_quick)
+        assert given.names == ("mass", "gravity")
+        raise FleetError("seen")
+
+    for name in ("Pool", "Cluster"):
+        made = {"__init__": lambda self, *given: seen.extend((type(self).__name__, *given)), "close": lambda self: None}
+        monkeypatch.setattr(f"compare.fleet.{name.lower()}.{name}", type(name, (), made))
+    monkeypatch.setattr("compare.fleet.run.Run", run)
+    assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words]) == 2
+    assert tuple(seen) == asked and "seen" in capsys.readouterr().err
+
+
 # ended in the middle: a line, nothing left behind, and the same command goes on from there
 
 FILES = [str(MODELS / f"{name}.xml") for name in ("pendulum_ball", "free_body")]
 WORDS = ("fleet", *FILES, "--only", "parameters", "--out", "out", "--workers", "1")  # one file after the other
-WHOLE = 6  # of each file: what was read, an experiment, the report
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
-    """Where a fleet is run; its temporary files are in a folder of their own."""
+def temporary(tmp_path, monkeypatch):
+    """A folder for the temporary files of a fleet."""
     (tmp_path / "temporary").mkdir()
     monkeypatch.setitem(runs.ENVIRONMENT, "TMPDIR", str(tmp_path / "temporary"))
-    return tmp_path
+    return tmp_path / "temporary"
 
 
-def kept(place):
-    """What is kept, with the times at which it was written."""
-    return {path: path.stat().st_mtime_ns for path in (place / "out" / "kept").glob("*/[!.]*")}
-
-
-def at_work(place):
-    """Processes in a folder of the temporary files."""
-    found = []
+def is_left_at_work(temporary):
+    """Whether a process is in a folder of the temporary files."""
     for cwd in Path("/proc").glob("[0-9]*/cwd"):
-        try:
-            found += [cwd] if str(place / "temporary") in os.readlink(cwd) else []
-        except OSError:  # it has ended meanwhile
-            continue
-    return found
+        with suppress(OSError):  # it has ended meanwhile
+            if str(temporary) in os.readlink(cwd):
+                return True
+    return False
 
 
-def nothing_left(place):
-    return soon(lambda: not at_work(place) and not list((place / "temporary").iterdir()))
-
-
-def test_the_key_ctrl_c(place):
-    run = runs.on_terminal(WORDS, 100, "xterm", place, interrupt_at=b"self-consistent")
+def test_the_key_ctrl_c(temporary, tmp_path):
+    run = runs.on_terminal(WORDS, 100, "xterm", tmp_path, interrupt_at=b"self-consistent")
     lines = [line for line in runs.readable_lines(run) if line]
-    assert run.status == 2 and "interrupted" in lines[-1] and nothing_left(place) and "of 2 files, " in run.output
+    assert run.status == 2 and "interrupted" in lines[-1] and "of 2 files, " in run.output
+    assert soon(lambda: not is_left_at_work(temporary) and not list(temporary.iterdir()))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_a_signal_and_the_same_command_again(place, number):
-    run = runs.started(*runs.command(*WORDS), cwd=place)
-    assert soon(lambda: kept(place))
+def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
+    def kept():
+        return {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "kept").glob("*/[!.]*")}
+
+    run = runs.started(*runs.command(*WORDS), cwd=tmp_path)
+    assert soon(kept)
     end = runs.ended(run, number)
-    if number == signal.SIGTERM:
-        assert end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0]
-        assert nothing_left(place)
-    assert soon(lambda: not at_work(place))  # a folder may be left of a worker that begins when its owner is killed
-    Kept(place / "out").close()  # nobody has its lock
-    known = kept(place)
-    run = runs.compare(*WORDS, cwd=place)
+    assert number == signal.SIGKILL or (end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0])
+    assert soon(lambda: not is_left_at_work(temporary))
+    known = kept()
+    run = runs.compare(*WORDS, cwd=tmp_path)  # nobody has the lock
     assert (run.returncode, run.stderr) == (0, ""), run.stdout
-    assert {path: when for path, when in kept(place).items() if path in known} == known  # not computed again
-    assert len(kept(place)) == WHOLE > len(known)
+    assert {path: when for path, when in kept().items() if path in known} == known  # not computed again
+    assert len(kept()) == 6 > len(known)  # of each file: what was read, an experiment, the report

@@ -1,13 +1,13 @@
 """Which files a fleet has: folders, patterns, files and lists, what is left out, and what a file needs beside itself."""
 
+import io
 import os
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mujoco import MjModel
+from PIL import Image
 
 from compare.engines.mujoco import ModelError, read
 from compare.fleet.models import bundle, found_models, place_of_report, unpacked
@@ -120,45 +120,34 @@ def test_reports_of_two_files_are_never_in_one_folder(tmp_path):
 # what a file needs beside itself: it is sent along, and its change changes the hash
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+GEOM, MESH = "<geom type='mesh' mesh='m'/>", "<mesh name='m' file='{}'/>"
 
 
-def png():
-    """Four by four pixels."""
-
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = struct.pack(">IIBBBBB", 4, 4, 8, 0, 0, 0, 0)
-    rows = zlib.compress(b"\0\x20\x09\xc8\x1e" * 4)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
-
-
-def robot(assets, geoms, more=""):
+def robot(assets, geoms=GEOM, more=""):
     return (f"<mujoco>{more}<asset>{assets}</asset><worldbody><body name='b'><joint name='j' axis='0 1 0'/>{geoms}</body>"
             "</worldbody></mujoco>")  # fmt: skip
 
 
 @pytest.fixture
 def collection(here):
-    """A model with everything, below and above its folder."""
-    files = {
-        "shared/meshes/above.obj": TETRAHEDRON.format(1), "robots/r/assets/inside.obj": TETRAHEDRON.format(2),
-        "robots/r/assets/ground.png": png(), "robots/r/pictures/wood.png": png(), "robots/r/pictures/up.png": png(),
-        "robots/r/parts/defaults.xml": "<mujocoinclude><default><geom density='500'/></default>"
-                                       "<include file='deeper/settings.xml'/></mujocoinclude>",
-        "robots/r/deeper/settings.xml": "<mujocoinclude><option timestep='0.003'/></mujocoinclude>",
-        "robots/r/hand/hand.xml": robot("<mesh name='m' file='finger.obj'/>", "<geom type='mesh' mesh='m'/>",
-                                        "<compiler meshdir='shapes'/>"),
-        "robots/r/hand/shapes/finger.obj": TETRAHEDRON.format(4),
-    }  # fmt: skip
-    assets = (
-        "<mesh name='a' file='../../../shared/meshes/above.obj'/><mesh name='i' file='inside.obj'/>"
-        "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/><texture name='t' type='2d' file='wood.png'/>"
-        "<texture name='c' type='cube' fileup='up.png'/><model name='hand' file='hand/hand.xml'/>"
-    )
-    geoms = "<geom type='mesh' mesh='a'/><geom type='mesh' mesh='i'/><attach model='hand' body='b' prefix='h_'/>"
+    """A model with parts below and above its folder."""
+    image = io.BytesIO()
+    Image.linear_gradient("L").save(image, "PNG")
+    hand = robot(MESH.format("finger.obj"), more="<compiler meshdir='shapes'/>")
+    defaults = "<default><geom density='500'/></default><include file='deeper/settings.xml'/>"
+    assets = MESH.format("../../../shared/meshes/above.obj") + "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/>"
+    assets += "<model name='hand' file='hand/hand.xml'/>"
+    assets += "<texture name='c' type='cube' fileup='up.png'/>"
     more = "<compiler meshdir='assets' texturedir='pictures'/><include file='parts/defaults.xml'/>"
-    for name, content in (files | {"robots/r/r.xml": robot(assets, geoms, more)}).items():
+    files = {
+        "shared/meshes/above.obj": TETRAHEDRON.format(1), "robots/r/assets/ground.png": image.getvalue(),
+        "robots/r/pictures/up.png": image.getvalue(),
+        "robots/r/parts/defaults.xml": f"<mujocoinclude>{defaults}</mujocoinclude>",
+        "robots/r/deeper/settings.xml": "<mujocoinclude><option timestep='0.003'/></mujocoinclude>",
+        "robots/r/hand/hand.xml": hand, "robots/r/hand/shapes/finger.obj": TETRAHEDRON.format(4),
+        "robots/r/r.xml": robot(assets, f"{GEOM}<attach model='hand' body='b' prefix='h_'/>", more),
+    }  # fmt: skip
+    for name, content in files.items():
         here(name, content)
     here("robots/r/assets/unused.obj", TETRAHEDRON.format(9))
     return files
@@ -171,7 +160,7 @@ def test_a_change_of_a_part_changes_the_hash_and_everything_is_sent_and_compiles
     known = found()
     here("robots/r/assets/unused.obj", "")
     assert found().hash == known.hash
-    for name in (*collection, "robots/r/r.xml"):
+    for name in collection:
         here(name, Path(name).read_bytes() + b"\n")
         before, known = known, found()
         assert known.hash != before.hash and (known.sha256 != before.sha256) == name.endswith("r/r.xml"), name
@@ -179,23 +168,22 @@ def test_a_change_of_a_part_changes_the_hash_and_everything_is_sent_and_compiles
     os.rename("robots", "gone")
     os.rename("shared", "gone_too")
     after = MjModel.from_xml_path(str(unpacked(files, tmp_path / "elsewhere")))
-    assert (after.opt.timestep, after.nmesh, after.nhfield, after.ntex) == (0.003, 3, 1, 2)
-    for name in ("body_mass", "body_inertia", "mesh_vert", "hfield_data"):
+    assert (after.opt.timestep, after.nmesh, after.nhfield, after.ntex) == (0.003, 2, 1, 1)
+    for name in ("body_mass", "body_inertia", "mesh_vert", "hfield_data", "tex_data"):
         assert np.array_equal(getattr(before, name), getattr(after, name)), name
 
 
 def test_paths_that_are_absolute_stripped_missing_or_in_a_circle(here, tmp_path):
-    geom = "<geom type='mesh' mesh='s'/>"
     here(["assets/s.obj", "far/s.obj"], TETRAHEDRON.format(1))
     strip = "<compiler assetdir='assets' strippath='true'/>"
-    here("stripped.xml", robot("<mesh name='s' file='C:\\far\\away/s.obj'/>", geom, strip))
+    here("stripped.xml", robot(MESH.format("C:\\far\\away/s.obj"), more=strip))
     (model,) = found_models(["stripped.xml"]).models
     assert MjModel.from_xml_path(str(unpacked(bundle(model), tmp_path / "elsewhere"))).nmesh == 1
-    here("absolute.xml", robot(f"<mesh name='s' file='{tmp_path}/far/s.obj'/>", geom))
+    here("absolute.xml", robot(MESH.format(f"{tmp_path}/far/s.obj")))
     before = found_models(["absolute.xml"]).models[0].hash
     here("far/s.obj", TETRAHEDRON.format(2))
     assert found_models(["absolute.xml"]).models[0].hash != before
-    here("missing.xml", robot(f"<mesh name='s' file='{'x' * 5000}'/><mesh file='/dev/zero'/>", geom))
+    here("missing.xml", robot(MESH.format("x" * 5000) + "<mesh file='/dev/zero'/>"))
     (model,) = found_models(["missing.xml"]).models
     assert list(model.parts) == [Path("missing.xml")]
     with pytest.raises(ModelError):
