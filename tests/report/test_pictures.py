@@ -1,5 +1,7 @@
-"""The motion in the page: small, whole, with nothing to fetch, and what is drawn is what was computed."""
+"""The motion in the page: small, whole, with nothing to fetch, and what was computed; figures: small, as they were drawn."""
 
+import base64
+import io
 import json
 import re
 import shutil
@@ -8,11 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from PIL import Image
 from sections import section
 
 from compare.experiments.trajectory.motion_frames import Drawn
 from compare.judge.check import About
-from compare.report import motion
+from compare.report import images, motion, style
 from compare.robots.arm import ARM
 
 
@@ -50,8 +54,9 @@ def pictures_of(scene) -> list:
 
 
 def test_it_opens_on_the_scene_that_differs():
-    differs, drifts = ("open loop", 2.0, 1.0), ("drift", 2.0, 1.0, "at most", False, About.PREDICTION)
-    of = section("trajectory", (*differs, "at most", True), drifts)
+    of = section(
+        "trajectory", ("open loop", 2.0, 1.0, "at most", True), ("drift", 2.0, 1.0, "at most", False, About.PREDICTION)
+    )
     scenes = zip(of.result.checks, ("let go", "held"))
     of.result.checks = [replace(check, scene=f"{scene}, RK4") for check, scene in scenes]
     of.result.curves = {"drawn": [drawn("held"), drawn("let"), drawn("let go")]}
@@ -95,16 +100,13 @@ def test_it_fetches_nothing_is_there_without_script_and_no_name_can_break_it():
     assert (scene["name"], engines) == ("</script><b>&amp;\u2028", ["Yours", "MuJoCo"])
 
 
-@pytest.mark.parametrize("points, pictures, scenes", [
-    (3, 129, 6), (40, 65, 6), pytest.param(400, 17, None, marks=pytest.mark.slow),
-])  # fmt: skip
-def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng, points, pictures, scenes):
+@pytest.mark.parametrize("points, pictures", [(3, 129), (40, 65), pytest.param(400, 17, marks=pytest.mark.slow)])
+def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng, points, pictures):
     text = page_of(*(drawn(f"scene {k}", points=points, rng=rng) for k in range(6)))
     found = data_of(text)["scenes"]
-    assert len(text.encode()) <= 300_000 and 1 <= len(found) <= 6 and scenes in (None, len(found))
-    left = len(found[0]["paths"][0])
-    assert left == len(found[0]["apart"]) and left == pictures
-    assert found[0]["dt"] == pytest.approx(5.0 / (left - 1), rel=0.2)
+    assert len(text.encode()) <= 300_000 and (len(found) == 6) == (points < 400)
+    assert len(found[0]["paths"][0]) == len(found[0]["apart"]) == pictures
+    assert found[0]["dt"] == pytest.approx(5.0 / (pictures - 1), rel=0.2)
     assert all(f"scene {k}" in text for k in range(6))  # also those that are not shown
 
 
@@ -121,3 +123,41 @@ def test_the_script_draws_each_engine_where_it_is(tmp_path):
     for name, pictures in zip(("ours", "theirs"), pictures_of(data_of(text)["scenes"][0])):
         assert f'class="{name}" d="{motion.outline(pictures[-1], [(0, 1), (1, 2)])}"' in run.stdout, name
     assert all(part in run.stdout for part in ("5.00 s", "0.3 rad", '<div class="controls">'))
+
+
+# figures
+
+
+def pixels(source):
+    with Image.open(source) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)
+
+
+def test_a_figure_is_small_and_its_colours_are_not_visibly_changed(tmp_path):
+    chart = Figure(figsize=(4, 3), dpi=100)
+    axes = chart.subplots()
+    axes.set_facecolor("#f9f9f9")  # nearly as white as the paper
+    for k in range(9):
+        axes.plot(np.sin(np.linspace(0, 9, 400) + k), color=(style.BLUE, style.RED)[k % 2], linewidth=3)
+    chart.savefig(tmp_path / "whole.png")
+    images.save_figure(chart, tmp_path / "few.png")
+    whole, few = pixels(tmp_path / "whole.png"), pixels(tmp_path / "few.png")
+    off = np.abs(whole - few).max(axis=2)
+    assert whole.shape == few.shape and off.mean() < 3 and np.mean(off > 24) < 0.005
+    paper = (whole == 255).all(axis=2)
+    assert paper.sum() > 9999 and (few[paper] == 255).all()
+    sizes = [(tmp_path / name).stat().st_size for name in ("few.webp", "few.png", "whole.png")]
+    assert sizes == sorted(sizes)
+    address, width, height = images.embedded(tmp_path / "few.png")  # in the page, without loss
+    kind, data = address.split(",", 1)
+    found = pixels(io.BytesIO(base64.b64decode(data)))
+    assert kind == "data:image/webp;base64" and found.shape == (height, width, 3) and (found == few).all()
+    (tmp_path / "few.webp").write_bytes((tmp_path / "few.webp").read_bytes() + bytes(100_000))
+    assert images.embedded(tmp_path / "few.png")[0].startswith("data:image/png;base64,")
+
+
+@pytest.mark.parametrize("values", [[], [5.0], [-2.0, -2.0, 3.0], [4.0, 4.1, 4.2, 12.0, 9.9], [5.0] * 11, [*range(11)]])
+def test_spread_labels_keep_their_order_their_distance_and_their_ends(values):
+    places = style.spread(values, 1.0, 0.0, 10.0)
+    assert (np.diff(np.sort(places)) > 1.0 - 1e-9).all() and ((places > -1e-9) & (places < 10.0 + 1e-9)).all()
+    assert np.array_equal(np.argsort(places, kind="stable"), np.argsort(values, kind="stable"))
