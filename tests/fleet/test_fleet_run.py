@@ -197,17 +197,13 @@ def test_an_experiment_that_breaks_off_is_in_the_report_and_tried_again(fleet, t
     text = (report(tmp_path, "a.xml") / "report.md").read_text()
     assert "SIGKILL" in text and "fleet m/a.xml --only parameters" in text and not found.of.is_good
     again = fleet(ONE, ["parameters"])
-    assert steps(again) == ["parameters", "report"] and again.of.is_good
-
-
-@pytest.mark.parametrize("step", ["read", "report"])
-def test_a_file_of_which_nothing_comes_back_breaks_off_with_the_reason(step, fleet):
-    assert fleet(ONE, **answers()).rows["a.xml"]["has_report"]
+    assert steps(again) == ["parameters", "report"] and again.of.is_good and again.rows["a.xml"]["has_report"]
     late = Outcome(ended="took longer than 1 s", is_late=True)
-    door = Inside(before=lambda piece: late if step_of(piece.name) == step else answered(piece))
-    row = fleet({"a.xml": PENDULUM.format(0.2)}, door=door).rows["a.xml"]
-    assert row["verdict"] == BROKE and step in row["reason"] and late.ended in row["reason"]
-    assert not row["has_report"]  # the one in the folder is an earlier one
+    for step in ("read", "report"):
+        door = Inside(before=lambda piece, step=step: late if step_of(piece.name) == step else answered(piece))
+        row = fleet({"a.xml": PENDULUM.format(0.2)}, door=door).rows["a.xml"]
+        assert row["verdict"] == BROKE and step in row["reason"] and late.ended in row["reason"]
+        assert not row["has_report"]  # the one in the folder is an earlier one
 
 
 def test_few_pieces_and_their_models_are_in_memory_at_a_time_and_reports_do_not_wait_for_other_files(fleet):

@@ -3,7 +3,6 @@
 import math
 import os
 import platform
-import tempfile
 from contextlib import closing
 from itertools import pairwise
 
@@ -13,7 +12,6 @@ import toy_pieces as toy
 from compare.fleet.calls import door_opened
 from compare.fleet.piece import Piece, outcomes
 from compare.fleet.pool import Pool
-from compare.process import interrupt
 
 
 @pytest.mark.parametrize("faults", [toy.SOME, pytest.param(toy.ALL, marks=pytest.mark.slow)], ids=["some", "all"])
@@ -37,19 +35,6 @@ def test_nothing_runs_beside_what_is_timed(tmp_path):
     assert all(end <= begin for (_, end), (begin, _) in pairwise(timed))
     for begin, end in timed:
         assert not any(other < end and begin < other_end for other, other_end in others)
-
-
-def test_nothing_is_left_of_a_pool_that_is_closed(tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    for name in ("temporary", "notes"):
-        (tmp_path / name).mkdir()
-    before = list(interrupt.undo)
-    with closing(Pool(2, limit=60.0)) as pool:
-        for _ in range(3):
-            pool.submit(Piece("", toy.for_ever, (str(tmp_path / "notes"),)))
-        pids = [pid for note in toy.notes(tmp_path / "notes", 2) for pid in note]
-    assert len(pids) == 4 and toy.gone_soon(*pids)
-    assert not list((tmp_path / "temporary").iterdir()) and interrupt.undo == before
 
 
 def test_calls_have_their_outcomes_in_order_and_none_is_lost_with_another():

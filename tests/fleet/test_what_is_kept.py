@@ -51,15 +51,6 @@ def test_what_is_damaged_is_not_there(kept, damaged):
     assert kept.get(key) == "anew"
 
 
-@pytest.mark.parametrize("name", ["file", "file/below", "link"])
-def test_a_folder_that_cannot_be_one_is_named(tmp_path, name):
-    (tmp_path / "file").write_text("mine")
-    (tmp_path / "link").symlink_to(tmp_path / "nowhere" / "deeper")
-    with pytest.raises(FleetError, match=f"{tmp_path / name}"):
-        Kept(tmp_path / name)
-    assert (tmp_path / "file").read_text() == "mine"
-
-
 def test_a_full_disk_leaves_what_was_there(kept, monkeypatch):
     kept.put("a", "old")
     write_report(kept.out / "report", {"index.html": b"old"})

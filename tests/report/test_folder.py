@@ -1,6 +1,6 @@
 """A report takes the old one's place when it is complete, and nothing else is touched."""
 
-import os
+import json
 import resource
 import signal
 import subprocess
@@ -9,11 +9,31 @@ from types import SimpleNamespace
 
 import pytest
 from matplotlib.figure import Figure
-from runs import ENVIRONMENT, ROOT
-from small_report import OLD, files, fill, old_report
+from runs import ENVIRONMENT
 
 from compare.drawing import draw
 from compare.report.folder import FolderError, new_report, save
+
+OLD = {"tables/mass.csv": "old", "results.json": "old"}
+
+
+def fill(work, text):
+    """A small report that lists its files."""
+    (work / "tables").mkdir()
+    (work / "tables" / "mass.csv").write_text(text)
+    listed = ["report.md", "results.json", "tables/mass.csv"]
+    (work / "results.json").write_text(json.dumps({"provenance": {"files": listed}, "text": text}))
+
+
+def files(folder):
+    """What is in a folder; of results.json only the text of `fill`."""
+    found = {str(p.relative_to(folder)): p.read_text() for p in folder.rglob("*") if p.is_file()}
+    return {name: json.loads(text)["text"] if name == "results.json" else text for name, text in found.items()}
+
+
+def old_report(out):
+    with new_report(out) as work:
+        fill(work, "old")
 
 
 def names_in(folder):
@@ -32,22 +52,12 @@ def test_a_new_report_replaces_the_old_one_and_keeps_other_files(tmp_path):
     assert names_in(out) == {"my notes.txt", "results.json", "tables"}
 
 
-def test_an_interrupted_report_leaves_the_old_one_whole_and_a_first_one_nothing(tmp_path):
-    old_report(tmp_path / "report")
-    for name in ("report", "new"):
-        with pytest.raises(KeyboardInterrupt), new_report(tmp_path / name) as work:
-            fill(work, "half")
-            raise KeyboardInterrupt
-    assert files(tmp_path / "report") == OLD and names_in(tmp_path) == {"report"}
-
-
 # a run that is killed, or asked to end, at each moment of the exchange
 
 RUN = """
-import os, sys
+import json, os, sys
 from compare.process import interrupt
 from compare.report.folder import new_report
-from small_report import fill
 
 out, number, at = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 renamed = 0
@@ -63,8 +73,11 @@ def hook(event, _):
 
 interrupt.listen()
 with new_report(out) as work:
-    fill(work, "new")
+    (work / "tables").mkdir()
+    (work / "tables" / "mass.csv").write_text("new")
     (work / "report.md").write_text("new")
+    listed = ["report.md", "results.json", "tables/mass.csv"]
+    (work / "results.json").write_text(json.dumps({"provenance": {"files": listed}, "text": "new"}))
     sys.addaudithook(hook)
 print(renamed)
 """
@@ -73,8 +86,7 @@ NEW = {"tables/mass.csv": "new", "results.json": "new", "report.md": "new"}
 
 def run(out, number=0, at=-1):
     command = [sys.executable, "-c", RUN, str(out), str(int(number)), str(at)]
-    environment = ENVIRONMENT | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests'}"}
-    return subprocess.run(command, env=environment, capture_output=True, text=True)
+    return subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
 
 
 @pytest.mark.parametrize("before", [{}, OLD])

@@ -154,10 +154,3 @@ def test_a_figure_is_small_and_its_colours_are_not_visibly_changed(tmp_path):
     assert kind == "data:image/webp;base64" and found.shape == (height, width, 3) and (found == few).all()
     (tmp_path / "few.webp").write_bytes((tmp_path / "few.webp").read_bytes() + bytes(100_000))
     assert images.embedded(tmp_path / "few.png")[0].startswith("data:image/png;base64,")
-
-
-@pytest.mark.parametrize("values", [[], [5.0], [-2.0, -2.0, 3.0], [4.0, 4.1, 4.2, 12.0, 9.9], [5.0] * 11, [*range(11)]])
-def test_spread_labels_keep_their_order_their_distance_and_their_ends(values):
-    places = style.spread(values, 1.0, 0.0, 10.0)
-    assert (np.diff(np.sort(places)) > 1.0 - 1e-9).all() and ((places > -1e-9) & (places < 10.0 + 1e-9)).all()
-    assert np.array_equal(np.argsort(places, kind="stable"), np.argsort(values, kind="stable"))

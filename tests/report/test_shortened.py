@@ -1,6 +1,5 @@
 """Which rows of a long table are shown, and how long report.md becomes."""
 
-import numpy as np
 import pytest
 from sections import BAD, GOOD, section
 
@@ -30,17 +29,6 @@ def test_of_runs_the_worst_of_each_scene_and_integrator_is_shown():
     assert found == [(f"s{i}", f"e{j}", 4) for i in range(3) for j in range(4)] and "12 of 60" in which
     kept, _ = shortened(runs(4, 4, 5), most=6, most_of_runs=12)  # one scene too many: of each scene
     assert [row["scene"] for row in kept] == ["s0", "s1", "s2", "s3"]
-
-
-def test_a_row_without_a_number_is_the_worst_if_it_fails_and_not_where_nothing_was_measured():
-    rows = [{"quantity": name, "difference_over_bar": 0.5, "passed": True} for name in "abcd" for _ in range(3)]
-    rows[4] = {"quantity": "b", "difference_over_bar": None, "passed": False}
-    kept, _ = shortened(rows, 4)
-    assert rows[4] in kept and len(kept) == 4
-    rows = [{"quantity": name, "difference_over_band": value} for name in "abcd" for value in (None, 0.1)]
-    assert [row["difference_over_band"] for row in shortened(rows, 4)[0]] == [0.1] * 4
-    rows += [{"quantity": name, "difference_over_band": np.nan} for name in "abcd"]
-    assert all(np.isnan(row["difference_over_band"]) for row in shortened(rows, 4)[0])
 
 
 def test_of_numbers_that_are_stated_those_that_differ_are_shown_and_without_groups_the_worst():

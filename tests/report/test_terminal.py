@@ -1,4 +1,4 @@
-"""What a user sees on a terminal, wide or narrow, clever or dumb, and with any name and any place for the output."""
+"""What a user sees on a terminal, wide or narrow, clever or dumb, with any name of a file; how long a run takes still."""
 
 import json
 import os
@@ -8,6 +8,9 @@ import pytest
 from runs import ROOT, compare, in_shell, readable_lines, words
 from small_runs import runs_on_terminals, terminal_folders
 
+from compare.experiments import EXPERIMENTS
+from compare.process.clock import Clock
+from compare.report.remaining import AFTER_FULL, AFTER_QUICK, END, START, Remaining, plan
 from compare.report.terminal import Terminal
 
 
@@ -92,3 +95,35 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     (line,) = run.stderr.splitlines()
     assert run.returncode == 2 and re.search(r"RuntimeError: two lines \(compare/report/terminal.py:\d+\)$", line)
     assert ROOT.as_posix() not in run.stderr
+
+
+# how long a run takes still: from the last run of its kind, corrected by what is seen
+
+PLAN = {START: 10.0, "a": 20.0, "b": 60.0, END: 100.0}
+
+
+@pytest.mark.parametrize("elapsed, ended, seconds", [
+    (7.0, {}, 93.0), (25.0, {START: 10.0, "a": 20.0}, 75.0),
+    (120.0, {START: 20.0, "a": 40.0, "b": 120.0}, 40.0 * 130.0 / 70.0),  # a slow machine: almost twice of the planned 40
+    (30.0, {START: 5.0, "a": 10.0, "b": 30.0}, 40.0 * 40.0 / 70.0),
+    (500.0, {START: 10.0, "a": 20.0}, 40.0),  # b is late; what comes after it is left
+    (500.0, {START: 10.0, "a": 20.0, "b": 60.0}, None),  # nothing is known of the last
+])  # fmt: skip
+def test_an_estimate_is_what_is_left_of_the_plan_scaled_by_what_was_seen(elapsed, ended, seconds):
+    clock = type("Stopped", (Clock,), {"elapsed": elapsed})()
+    clock.ended, clock.under_way = ended, "a"
+    left = Remaining(clock, ["a", "b"], PLAN)
+    assert left.seconds == pytest.approx(seconds) and len(left.words()) == (3 if seconds else 2)
+
+
+@pytest.mark.parametrize("last, command, ended, is_used", [
+    ("compare all", "compare all --out here", PLAN, True),
+    ("compare all --out=there --quick", "compare --quick all --out 'a b'", PLAN, True),
+    ("compare all", "compare all --quick", PLAN, False),
+    ("compare all", "compare all", None, False), ("compare all", "compare all", {"a": 2.0, END: 1.0}, False),
+])  # fmt: skip
+def test_the_last_run_of_the_same_kind_is_what_is_planned(tmp_path, last, command, ended, is_used):
+    (tmp_path / "results.json").write_text(json.dumps({"provenance": {"command": last, "ended_after_s": ended}}))
+    quick = "--quick" in command
+    expected = ended if is_used else AFTER_QUICK if quick else AFTER_FULL
+    assert plan([*EXPERIMENTS], quick, command, tmp_path) == expected
