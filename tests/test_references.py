@@ -95,6 +95,7 @@ def test_a_file_of_any_name_stays_in_one_line_and_is_no_markup(tmp_path, monkeyp
     Path(name).write_bytes(PATHS["gripper"].read_bytes())
     reference, robot, mujoco, _ = compared_with(None, name)
     assert reference.lines[0].startswith(f"reference: model; {said} ")
+    assert reference.lines[1].endswith("1 equalities off: mimic") and len(reference.lines) == 2
     assert robot.mjcf == mujoco.source == Path(name)
 
     (tmp_path / "out" / "figures").mkdir(parents=True)

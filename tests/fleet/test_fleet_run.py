@@ -241,12 +241,7 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
 
 def test_another_solution_is_another_fleet_and_the_same_computes_nothing(fleet, tmp_path):
     computed = []
-    for text, reference in (
-        (SOLUTION, "solution.xml"),
-        (SOLUTION, "solution.xml"),
-        (HEAVY, "solution.xml"),
-        (HEAVY, None),
-    ):
+    for text, reference in [(SOLUTION, "solution.xml")] * 2 + [(HEAVY, "solution.xml"), (HEAVY, None)]:
         (tmp_path / "solution.xml").write_text(text)
         computed.append(len(fleet(ONE, reference=reference, **answers()).door.names))
     assert computed == [5, 0, 5, 5]

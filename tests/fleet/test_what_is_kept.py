@@ -51,7 +51,7 @@ def test_what_is_damaged_is_not_there(kept, damaged):
     assert kept.get(key) == "anew"
 
 
-def test_a_full_disk_leaves_what_was_there(kept, monkeypatch):
+def test_a_full_disk_leaves_what_was_there(kept):
     kept.put("a", "old")
     write_report(kept.out / "report", {"index.html": b"old"})
     before = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -5,7 +5,7 @@ import os
 import re
 
 import pytest
-from runs import ROOT, compare, in_shell, readable_lines, words
+from runs import ROOT, compare, in_shell
 from small_runs import runs_on_terminals, terminal_folders
 
 from compare.experiments import EXPERIMENTS
@@ -16,26 +16,13 @@ from compare.report.terminal import Terminal
 
 @pytest.fixture(scope="module")
 def runs(shared, common):
-    """Runs of the arm and of a heavy one, on terminals and in a shell, and their two folders."""
+    """Runs of the arm and of a heavy one in a shell, and their two folders."""
     plain, umlauts = terminal_folders(common)
     return shared(runs_on_terminals, plain, umlauts) | {"plain": plain, "umlauts": umlauts}
 
 
 def results_in(folder):
     return json.loads((folder / "results.json").read_text(encoding="utf-8"))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("columns, term", [(40, "xterm"), (80, "dumb")])
-def test_a_terminal_shows_how_far_it_is_and_then_what_was_found(runs, columns, term):
-    run = runs["arm", columns, term]
-    assert run.status == 0, run.output
-    text = words(readable_lines(run))
-    assert re.search(r" mass ok \d+ checks .*\b1 of 11 ", text) and f"arm({columns}, '{term}')/index.html (" in text
-    plain = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", run.output)
-    is_shown = re.search(r"1 of 1, (?:mass, )?about \d+ s left", plain)
-    assert bool(is_shown) == ("\x1b" in run.output) == (term == "xterm"), plain
-    assert all(len(part.rstrip()) <= columns for part in re.split(r"[\r\n]+", plain))
 
 
 @pytest.mark.slow
