@@ -104,6 +104,7 @@ def test_files_agree_or_are_refused_with_the_reason_and_parts_are_left_out(fleet
     assert str(tmp_path) not in found.rows["broken.xml"]["reason"]  # where it was unpacked
     assert found.rows["good.xml"]["joints"] == 1 and found.rows["good.xml"]["seconds"] > 2.0 and found.of.is_good
     assert (report(tmp_path, "good.xml") / "index.html").is_file() and not report(tmp_path, "none.xml").exists()
+    assert fleet(ONE, ["published"]).rows["a.xml"]["verdict"] == REFUSED  # which serves the arm alone
 
 
 def answered(piece):

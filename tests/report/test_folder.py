@@ -52,6 +52,22 @@ def test_a_new_report_replaces_the_old_one_and_keeps_other_files(tmp_path):
     assert names_in(out) == {"my notes.txt", "results.json", "tables"}
 
 
+def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
+    old_report(tmp_path)
+    rename = type(tmp_path).rename
+
+    def stubborn(source, target):
+        if source.parent.name == "moving" and source.name == "tables":
+            raise PermissionError(13, "Permission denied")
+        return rename(source, target)
+
+    with pytest.raises(FolderError), new_report(tmp_path) as work:
+        fill(work, "new")
+        monkeypatch.setattr(type(tmp_path), "rename", stubborn)
+    monkeypatch.undo()
+    assert files(tmp_path) == OLD and names_in(tmp_path) == {"results.json", "tables"}
+
+
 # a run that is killed, or asked to end, at each moment of the exchange
 
 RUN = """

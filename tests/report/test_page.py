@@ -77,7 +77,8 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
         section("speed"),
     ]
     top, rest = page_of(folder, sections, causes=[CAUSE])
-    assert re.search(r"<td>mass of forearm</td><td>1\.5</td><td>1\.6</td>", top) and 'class="verdict bad"' in top
+    assert re.search(r"<td>mass of forearm</td><td>1\.5</td><td>1\.6</td>", top)
+    assert 'class="verdict bad"' in top and '<main id="main" class="bad">' in top
     assert re.findall(r'<figure class="(\w+)"><a href="#([^"]+)"', top) == [
         ("bad", "trajectory"), ("good", "figure-mass_distances"),
     ]  # fmt: skip

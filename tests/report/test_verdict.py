@@ -253,6 +253,7 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
     for said in (methods_compared.times_in_words(result), one_number(Section("speed", "", "", "", result))):
         assert "MuJoCo RK4, 2048 steps (dt 0.0024 s), 3 ms" in said and "tmt dopri8, 4 ms" in said
+    assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
 
 
 def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
