@@ -10,7 +10,6 @@ from matplotlib.text import Text
 
 SLACK = 1.0  # pixels
 SMALLEST = 7.0  # points: letters that are still read where a page is 950 pixels wide
-MOST_ON_A_POINT = 4  # marks of different lines
 
 
 def flaws(figure) -> list[str]:
@@ -25,10 +24,6 @@ def flaws(figure) -> list[str]:
     for k, (text, box) in enumerate(written):
         found += [f"on each other: {text!r} and {other!r}" for other, its_box in written[:k] if overlap(box, its_box)]
     for ax in flat:
-        if len(flat) > 1 and beside(ax.title.get_window_extent().extents, ax.bbox.extents):
-            found.append(f"wider than its panel: {ax.get_title()!r}")
-        if (most := on_one_point(ax)) > MOST_ON_A_POINT:
-            found.append(f"{most} marks on a point of {ax.get_title()!r}")
         offsets = (axis.get_offset_text().get_text() for axis in (ax.xaxis, ax.yaxis))
         found += [f"a factor at the end of an axis: {text}" for text in offsets if text]
         for legend in [*figure.findobj(Legend)]:
@@ -59,18 +54,6 @@ def cut(box, page) -> bool:
 
 def overlap(box, other) -> bool:
     return bool((box[:2] + SLACK < other[2:] - SLACK).all() and (other[:2] + SLACK < box[2:] - SLACK).all())
-
-
-def beside(box, panel) -> bool:
-    """Whether a text, (left, lower, right, upper), reaches to the left or to the right of its panel."""
-    return bool(box[2] > box[0] and (box[0] < panel[0] - SLACK or box[2] > panel[2] + SLACK))
-
-
-def on_one_point(ax) -> int:
-    """The most lines of a panel that have a mark on one point of the paper."""
-    points = [np.unique(np.round(on_paper(line, ax) / 2.0), axis=0) for line in ax.lines if line.get_marker() != "None"]
-    _, counts = np.unique(np.concatenate([np.empty((0, 2)), *points]), axis=0, return_counts=True)
-    return int(counts.max(initial=0))
 
 
 def on_paper(line, ax) -> np.ndarray:

@@ -1,4 +1,7 @@
-"""Runs of the command line as a user starts them: in a pipe, on a terminal, and ended by a signal."""
+"""Runs of the command line as a user starts them: in a pipe, on a terminal, and ended by a signal.
+
+For test_command_line, test_help, small_runs, and the tests of fleet, process and report.
+"""
 
 import fcntl
 import os
@@ -68,42 +71,17 @@ def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
     return SimpleNamespace(status=status, output=output.decode(), seconds=seconds, columns=columns)
 
 
-def screen(output, columns) -> tuple[list[str], bool]:
-    """The lines that a terminal of this width shows in the end, and whether its cursor is visible; other codes are an error."""
-    lines, row, column, visible = [""], 0, 0, True
-    for code, move, plain in re.findall(r"(\x1b\[(?:\?25[lh]|2K|[\d;]*m|1A))|([\r\n])|([^\x1b\r\n]+|\x1b)", output):
-        assert plain != "\x1b", "a code that this terminal does not know"
-        if code.endswith("2K"):
-            lines[row] = ""
-        elif code.endswith("1A"):
-            row -= 1
-        elif "?25" in code:
-            visible = code.endswith("h")
-        elif move == "\r":
-            column = 0
-        elif move == "\n":
-            row += 1
-        for letter in plain:
-            if column == columns:
-                row, column = row + 1, 0
-            lines += [""] * (row + 1 - len(lines))
-            lines[row] = lines[row].ljust(column)[:column] + letter + lines[row][column + 1 :]
-            column += 1
-        lines += [""] * (row + 1 - len(lines))
-    return lines, visible
-
-
 def words(lines) -> str:
     return " ".join(" ".join(lines).split())
 
 
 def readable_lines(run) -> list[str]:
-    """The screen in the end: nothing of the progress is left, the cursor is back, nothing is over anything else."""
-    lines, visible = screen(run.output, run.columns)
-    assert visible
-    assert all(len(line) <= run.columns for line in lines)
-    assert "Traceback" not in run.output
-    for left in ("imports", "(1 of 1)", "figures"):
+    """The screen in the end: nothing of the progress, which is in a line that is emptied, is left, and the cursor is back."""
+    assert re.findall(r"\x1b\[\?25[lh]", run.output)[-1:] in ([], ["\x1b[?25h"])
+    shown = re.sub(r"\x1b\[(\?25[lh]|[\d;]*m)", "", run.output.replace("\r\n", "\n"))
+    lines = re.sub(r"[^\n]*(\n\r\x1b\[1A|\r)\x1b\[2K\r?", "", shown).split("\n")
+    assert all(len(line) <= run.columns for line in lines) and not re.search("[\x1b\r]", "".join(lines))
+    for left in ("Traceback", "imports", "(1 of 1)", "figures"):
         assert left not in words(lines)
     return lines
 

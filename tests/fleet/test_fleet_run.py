@@ -1,20 +1,87 @@
 """A fleet is run in the process of the test: rows, reports, what is computed again, and what becomes of files that break."""
 
+import os
 import pickle
-import platform
-import zlib
+from types import SimpleNamespace
 
 import pytest
-from inside import PENDULUM, Inside, report, step_of
 
-from compare.fleet.file_pieces import Asked, Known, findings, untimed_part
-from compare.fleet.models import bundle, found_models
+from compare.fleet.command import with_reference
+from compare.fleet.file_pieces import Asked, Known
+from compare.fleet.kept import Kept
+from compare.fleet.models import found_models, place_of_report
 from compare.fleet.piece import Outcome
 from compare.fleet.row import AGREE, BROKE, DIFFER, ITSELF, REFUSED
-from compare.fleet.run import AHEAD_FOR_ALL, AHEAD_FOR_EACH
+from compare.fleet.run import AHEAD_FOR_ALL, AHEAD_FOR_EACH, Run
+from compare.process.crash import described
 
+PENDULUM = ("<mujoco><worldbody><body name='b'><joint name='j' axis='0 1 0'/><inertial pos='0 0 {}' mass='1' "
+            "diaginertia='1 1 1'/></body></worldbody></mujoco>")  # fmt: skip
 ONE, TWO = {"a.xml": PENDULUM.format(0.1)}, {"a.xml": PENDULUM.format(0.1), "b.xml": PENDULUM.format(0.2)}
 NONE = Outcome(error="none")
+
+
+class Inside:
+    """A door to this process: pieces are carried out one after the other, those of the lowest rank first."""
+
+    count = 1
+
+    def __init__(self, before=lambda piece: None, times_alone=True, no_timing=None):
+        self.before, self.times_alone, self.no_timing = before, times_alone, lambda: no_timing
+        self.pieces, self.most, self.names, self.done = [], 0, [], []
+
+    @property
+    def under_way(self):
+        return len(self.pieces)
+
+    def submit(self, piece):
+        self.pieces.append(piece)
+        self.names.append(piece.name)
+        self.most = max(self.most, self.under_way)
+
+    def next(self):
+        piece = min(self.pieces, key=lambda piece: piece.rank)
+        self.pieces.remove(piece)
+        self.done.append(piece.name)
+        if outcome := self.before(piece):
+            return piece, outcome
+        try:
+            value = piece.function(*piece.arguments, *([piece.shared] if piece.shared else []))
+            return piece, Outcome(pickle.dumps(value), seconds=1.0, wall=1.0, machine="here")
+        except Exception as error:
+            return piece, Outcome(error=described(error))
+
+    def workers(self):
+        return 1
+
+
+@pytest.fixture
+def fleet(tmp_path, monkeypatch):
+    """fleet(files, names of experiments): a fleet of files in a folder, run to its end."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(files, names=("mass",), door=None, found=None, is_quick=True, reference=None):
+        for name, text in files.items():
+            (tmp_path / "m" / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / "m" / name).write_text(text)
+        kept, door = Kept(tmp_path / "out"), door or Inside()
+        try:
+            asked, sent = with_reference(Asked(tuple(names), is_quick), reference)
+            of = Run((found or found_models(["m"])).models, asked, door, kept, tmp_path / "out", sent)
+            of.carry_out(lambda: None)
+        finally:
+            kept.close()
+        return SimpleNamespace(of=of, door=door, rows={os.path.basename(row["file"]): row for row in of.rows})
+
+    return run
+
+
+def report(tmp_path, name):
+    return tmp_path / "out" / place_of_report(f"m/{name}")
+
+
+def step_of(name):
+    return name.rsplit(" of ", 1)[0]
 
 
 def verdicts(found):
@@ -35,8 +102,7 @@ def test_files_agree_or_are_refused_with_the_reason_and_parts_are_left_out(fleet
     ((part, why),) = found.of.parts
     assert part == "m/part.xml" and "m/scene.xml" in why and "joint" in found.rows["none.xml"]["reason"]
     assert str(tmp_path) not in found.rows["broken.xml"]["reason"]  # where it was unpacked
-    assert found.rows["good.xml"]["joints"] == 1 and found.rows["good.xml"]["seconds"] > 2.0
-    assert found.of.is_good and found.of.files_done == len(found.of.tasks) == 5 and found.of.still() == []
+    assert found.rows["good.xml"]["joints"] == 1 and found.rows["good.xml"]["seconds"] > 2.0 and found.of.is_good
     assert (report(tmp_path, "good.xml") / "index.html").is_file() and not report(tmp_path, "none.xml").exists()
     assert fleet(ONE, ["published"]).rows["a.xml"]["verdict"] == REFUSED  # which serves the arm alone
 
@@ -58,24 +124,20 @@ def answers(names=("mass", "speed"), **more):
     return {"names": names, "door": Inside(before=answered)} | more
 
 
-def test_a_second_run_computes_nothing_and_what_has_changed_is_computed_anew(fleet):
+def test_what_has_changed_is_computed_anew_and_nothing_else(fleet):
+    every = ["read", "mass", "speed, untimed", "speed", "report"]
     first, second = fleet(TWO, **answers()), fleet(TWO, **answers())
     assert len(first.door.names) == 10 and second.door.names == [] and second.of.done_before == 2
     assert second.rows == first.rows
-    third = fleet({"b.xml": PENDULUM.format(0.3)}, **answers())
-    assert len(third.door.names) == 5 and all(name.endswith("of m/b.xml") for name in third.door.names)
-    for names, computed in ((["gravity"], ["read", "gravity", "report"]), (["mass", "speed"], ["report"])):
-        assert steps(fleet(ONE, found=found_models(["m/a.xml"]), **answers(names))) == computed
-
-
-def test_nothing_of_a_quick_fleet_is_used_for_a_full_one_nor_of_another_folder(fleet, tmp_path):
-    every = ["read", "mass", "speed, untimed", "speed", "report"]
-    for is_quick, computed in ((True, every), (True, []), (False, every), (True, ["report"])):
-        assert steps(fleet(ONE, is_quick=is_quick, **answers())) == computed
-    again = fleet({"b/a.xml": ONE["a.xml"], "a.xml": PENDULUM.format(0.2)}, **answers())
-    assert [name for name in again.door.names if "/b/" in name] == [f"{step} of m/b/a.xml" for step in every]
-    for name in ("a.xml", "b/a.xml"):
-        assert (report(tmp_path, name) / "index.html").read_text() == f"report of m/{name}"
+    third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, **answers())
+    assert set(third.door.names) == {f"{step} of m/{name}" for name in ("b.xml", "b/a.xml") for step in every}
+    for is_quick, names, computed in (
+        (False, ("mass", "speed"), every),
+        (True, ("mass", "speed"), ["report"]),
+        (True, ("gravity",), ["read", "gravity", "report"]),
+    ):
+        found = fleet({}, found=found_models(["m/a.xml"]), is_quick=is_quick, **answers(names))
+        assert steps(found) == computed
 
 
 def test_each_file_is_timed_and_reported_with_what_was_found_of_itself(fleet):
@@ -93,8 +155,7 @@ def test_each_file_is_timed_and_reported_with_what_was_found_of_itself(fleet):
         assert (left_out, seconds) == ([("gravity", "no reason")], 4.0)
     assert {name for name, piece in asked.items() if piece.timed} == {"speed of m/a.xml", "speed of m/b.xml"}
     assert found.of.machines == {"far"} and set(found.of.took["mass"]) == {(1, 2.0)}
-    door = Inside(before=before)
-    door.no_timing = lambda: "nobody may"
+    door = Inside(before, no_timing="nobody may")
     fleet(ONE, **answers(door=door))
     name, why = asked["report of m/a.xml"].arguments[1][-1]
     assert name == "speed" and "nobody may" in why and "speed of m/a.xml" not in door.names
@@ -113,19 +174,6 @@ def test_timed_pieces_of_a_pool_come_after_all_others_and_those_of_a_cluster_at_
         assert [done[k + 1] for k, step in enumerate(done) if step == "speed, untimed"] == ["speed"] * 2
 
 
-@pytest.mark.slow
-def test_a_timed_experiment_in_two_pieces_finds_what_it_finds_in_one(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "a.xml").write_text(ONE["a.xml"])
-    about = "a.xml", Asked(("reduction",), True), pickle.dumps(bundle(found_models(["a.xml"]).models[0]))
-    whole, parted = (
-        pickle.loads(zlib.decompress(findings("reduction", work, *about)[0]))[0]
-        for work in (None, untimed_part("reduction", *about))
-    )
-    assert parted.checks == whole.checks and len(parted.checks) > 10
-    assert [any(platform.node() in note for note in of.notes) for of in (whole, parted)] == [False, True]
-
-
 def test_a_file_that_changes_or_goes_while_the_fleet_runs_breaks_off_alone(fleet, tmp_path):
     def before(piece):
         if piece.name == "read of m/a.xml":
@@ -142,24 +190,21 @@ def test_a_file_that_changes_or_goes_while_the_fleet_runs_breaks_off_alone(fleet
 
 
 def test_an_experiment_that_breaks_off_is_in_the_report_and_tried_again(fleet, tmp_path):
-    door = Inside(before=lambda piece: Outcome(ended="ended by SIGKILL") if step_of(piece.name) == "mass" else None)
-    found = fleet(ONE, ["parameters", "mass"], door)
-    row = found.rows["a.xml"]
-    assert row["verdict"] == BROKE and "mass" in row["reason"] and "SIGKILL" in row["reason"] and not found.of.is_good
+    killed = Outcome(ended="ended by SIGKILL")
+    door = Inside(before=lambda piece: killed if step_of(piece.name) == "parameters" else None)
+    found = fleet(ONE, ["parameters"], door)
+    reason = found.rows["a.xml"]["reason"]
+    assert verdicts(found) == {"a.xml": BROKE} and "parameters" in reason and "SIGKILL" in reason
     text = (report(tmp_path, "a.xml") / "report.md").read_text()
-    assert "SIGKILL" in text and "fleet m/a.xml --only parameters,mass" in text
-    again = fleet(ONE, ["parameters", "mass"])
-    assert steps(again) == ["mass", "report"] and again.of.is_good
-
-
-@pytest.mark.parametrize("step", ["read", "report"])
-def test_a_file_of_which_nothing_comes_back_breaks_off_with_the_reason(step, fleet):
-    assert fleet(ONE, **answers()).rows["a.xml"]["has_report"]
+    assert "SIGKILL" in text and "fleet m/a.xml --only parameters" in text and not found.of.is_good
+    again = fleet(ONE, ["parameters"])
+    assert steps(again) == ["parameters", "report"] and again.of.is_good and again.rows["a.xml"]["has_report"]
     late = Outcome(ended="took longer than 1 s", is_late=True)
-    door = Inside(before=lambda piece: late if step_of(piece.name) == step else answered(piece))
-    row = fleet({"a.xml": PENDULUM.format(0.2)}, door=door).rows["a.xml"]
-    assert row["verdict"] == BROKE and step in row["reason"] and late.ended in row["reason"]
-    assert not row["has_report"]  # the one in the folder is an earlier one
+    for step in ("read", "report"):
+        door = Inside(before=lambda piece, step=step: late if step_of(piece.name) == step else answered(piece))
+        row = fleet({"a.xml": PENDULUM.format(0.2)}, door=door).rows["a.xml"]
+        assert row["verdict"] == BROKE and step in row["reason"] and late.ended in row["reason"]
+        assert not row["has_report"]  # the one in the folder is an earlier one
 
 
 def test_few_pieces_and_their_models_are_in_memory_at_a_time_and_reports_do_not_wait_for_other_files(fleet):
@@ -196,13 +241,11 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
 
 
 def test_another_solution_is_another_fleet_and_the_same_computes_nothing(fleet, tmp_path):
-    def verdict(text, reference="solution.xml"):
+    computed = []
+    for text, reference in [(SOLUTION, "solution.xml")] * 2 + [(HEAVY, "solution.xml"), (HEAVY, None)]:
         (tmp_path / "solution.xml").write_text(text)
-        found = fleet(ONE, ["parameters"], reference=reference)
-        return found.rows["a.xml"]["verdict"], len(found.door.names)
-
-    assert [verdict(SOLUTION), verdict(SOLUTION), verdict(HEAVY)] == [(AGREE, 3), (AGREE, 0), (DIFFER, 3)]
-    assert verdict(SOLUTION, None) == (ITSELF, 3) and verdict(SOLUTION)[0] == AGREE
+        computed.append(len(fleet(ONE, reference=reference, **answers()).door.names))
+    assert computed == [5, 0, 5, 5]
 
 
 def test_files_of_one_content_are_computed_once_if_what_they_load_is_the_same(fleet):

@@ -1,5 +1,6 @@
-"""Pieces that do what a piece can do, in a module that any process can import; for test_pool.py and test_cluster.py."""
+"""Pieces that do what a piece can do, and what is to become of each; for test_pool, test_cluster and test_interrupted."""
 
+import math
 import os
 import signal
 import subprocess
@@ -7,20 +8,14 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
 
-from compare.fleet.piece import Outcome
+from compare.fleet.piece import Piece, outcomes
 
-
-def twice(x):
-    return 2 * x
-
-
-def length(*arguments):
-    return len(arguments[-1])
-
-
-def raises(text):
-    return Outcome(error=text).returned  # an error of this project
+LIMIT = 3.0  # s that a piece may take here
+MEMORY = 10**9  # bytes that it may have
+SOON = 60.0  # s, far more than anything here takes
 
 
 def noted(folder, what=""):
@@ -30,10 +25,10 @@ def noted(folder, what=""):
     return len(list(place.iterdir()))
 
 
-def killed(number, times, folder):
+def killed(times, folder):
     """Ends by a signal, the first times."""
     if noted(folder) <= times:
-        os.kill(os.getpid(), number)
+        os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(60)
     return "at last"
 
@@ -43,19 +38,11 @@ def exits(status):
     os._exit(status)
 
 
-def leaves():
-    sys.exit(3)
-
-
 def for_ever(folder):
     """Starts a process that would live long, says which they are, and never returns."""
     started = subprocess.Popen(["sleep", "600"])
     noted(folder, f"{os.getpid()} {started.pid}")
     time.sleep(600)
-
-
-def eats(size):
-    return len(bytearray(size))
 
 
 def prints():
@@ -65,26 +52,11 @@ def prints():
     return sys.stdin.read()
 
 
-def unsendable():
-    return threading.Lock()
-
-
 def in_time(folder, seconds):
     """Says when it began and when it ended."""
     began = time.time_ns()
     time.sleep(seconds)
     noted(folder, f"{began} {time.time_ns()}")
-
-
-def own_process():
-    return os.getpid()
-
-
-def takes_worker_down(folder):
-    """Ends the process that started its own, a worker of a cluster."""
-    noted(folder)
-    os.kill(os.getppid(), signal.SIGKILL)
-    time.sleep(60)
 
 
 def waits(folder, opened, shared=b""):
@@ -93,3 +65,78 @@ def waits(folder, opened, shared=b""):
     while not Path(opened).exists():
         time.sleep(0.02)
     return len(shared)
+
+
+class Fault(NamedTuple):
+    """A piece, and what becomes of it."""
+
+    function: object
+    arguments: tuple = ()
+    value: object = None  # what it returns; None: it breaks
+    words: tuple = ()  # of the reason why it breaks
+    tries: int = 0  # how many times it begins, where it takes notes of that: its last argument is a folder
+    shared: bytes = b""
+
+
+GONE = ModuleType("gone")  # a module that no other process has
+exec("def nowhere():\n    return 0\n", GONE.__dict__)
+SOME = {
+    "for ever": Fault(for_ever, words=("3 s",), tries=1),
+    "raises": Fault(math.sqrt, (-1.0,), words=("ValueError",)),
+    "killed": Fault(killed, (9,), words=("SIGKILL", "4 times"), tries=4),
+    "killed once": Fault(killed, (1,), "at last", tries=2),
+    "eats": Fault(bytearray, (4 * MEMORY,), words=("memory", "1 GB")),
+    "prints": Fault(prints, value=""),
+    "asked with a lock": Fault(abs, (threading.Lock(),), words=("TypeError", "lock")),
+    "shares": Fault(len, value=3 * 10**7, shared=b"x" * 3 * 10**7),
+}
+ALL = SOME | {
+    "exits": Fault(exits, (3,), words=("status 3", "no hope", "4 times")),
+    "leaves": Fault(sys.exit, (3,), words=("SystemExit: 3",)),
+    "asked of nobody": Fault(GONE.nowhere, words=("ModuleNotFoundError", "gone")),
+}
+
+
+def check_all(door, folder, faults):
+    """Whether through a door what is to become of each piece does. folder: where they take notes of when they begin."""
+    sys.modules["gone"] = GONE
+    asked = []
+    for name, fault in faults.items():
+        (folder / name).mkdir()
+        arguments = (*fault.arguments, str(folder / name)) if fault.tries else fault.arguments
+        asked.append(Piece(name, fault.function, arguments, shared=fault.shared))
+    for (name, fault), found in zip(faults.items(), outcomes(door, asked), strict=True):
+        if fault.value is None:
+            assert all(word in found.broke for word in fault.words), f"{name}: {found.broke}"
+        else:
+            assert (found.broke, found.returned) == ("", fault.value), name
+        assert (len(list((folder / name).iterdir())), found.is_late) == (fault.tries, name == "for ever"), name
+    (pids,) = notes(folder / "for ever")
+    assert len(pids) == 2 and gone_soon(*pids)  # with all that it has started
+
+
+def is_there(pid):
+    """Whether a process lives, or a thread of it: only without any can its parent know that it ended."""
+    try:
+        ended = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        return not ended or len(list(Path(f"/proc/{pid}/task").iterdir())) > 1
+    except OSError:
+        return False
+
+
+def soon(question):
+    """Whether something holds before long."""
+    until = time.monotonic() + SOON
+    while not (answer := question()) and time.monotonic() < until:
+        time.sleep(0.01)
+    return answer
+
+
+def gone_soon(*pids):
+    return soon(lambda: not any(map(is_there, pids)))
+
+
+def notes(folder, count=1):
+    """What pieces have noted, as soon as this number of them have."""
+    assert soon(lambda: sum(bool(note.read_text()) for note in Path(folder).iterdir()) >= count)
+    return [note.read_text().split() for note in sorted(Path(folder).iterdir())]

@@ -1,0 +1,178 @@
+"""The row of a file, the order of rows, the table as CSV and as a page, and what has changed since an earlier fleet."""
+
+import csv
+import html
+import random
+import re
+from collections import Counter
+from types import SimpleNamespace
+from urllib.parse import unquote
+
+import pytest
+
+from compare.fleet.models import place_of_report
+from compare.fleet.page import fleet_page
+from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, order, row_of_file
+from compare.fleet.since import changes, earlier
+from compare.fleet.table import csv_of_fleet, write_table
+from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
+from compare.reference import Reference
+from compare.report.verdict import Section
+
+CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
+BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
+OFF = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
+OWN = AT_OWN_STEP, 0.002, 0.001, "with Euler", "at most", About.STEP
+
+
+def good(share=0.5):
+    return "M", share, 1.0, "", "at most", About.MODELS
+
+
+def row_of(*checks, limits=(), causes=(), lost=(), reference=("arm",)):
+    """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
+    result = Result("stability", tables={"step_limits": list(limits)})
+    for quantity, value, tolerance, note, rule, about in checks:
+        result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
+    kind, *renamed = reference
+    section = Section("stability", "", "", "", result)
+    return row_of_file([section], causes, lost, Reference(kind, "a.xml", renamed=tuple(renamed)))
+
+
+@pytest.mark.parametrize("verdict, checks, more, named", [
+    (AGREE, [good(1.0)], {}, ""),
+    (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
+    (AGREE, [good()], {"reference": ("solution", "wrist as hand")}, "wrist as hand"),
+    (ITSELF, [good()], {"reference": ("model",)}, ""),
+    (DIFFER, [good(2.0)], {"reference": ("model",)}, "2 s"),
+    (DIFFER, [good(1.0 + 1e-9), BROKEN, OWN, OFF], {"causes": CAUSES}, "mass of upper"),
+    (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
+    (BROKE, [good()], {"lost": ["the table"]}, "the table"),
+    (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"),
+    (REFUSED, [], {}, "nothing"),
+])  # fmt: skip
+def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
+    row = row_of(*checks, **more)
+    assert row["verdict"] == verdict and named in row["reason"] and bool(named) == bool(row["reason"])
+
+
+def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
+    assert row_of(good(0.2), good(3.0), OWN)["worst_ratio"] == 3.0
+    diverged = row_of(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
+    assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
+    assert row_of(BROKEN)["worst_ratio"] is None
+
+
+def limit(dt, stable, integrator="Euler", base="fixed", kind="finite"):
+    return {"integrator": integrator, "file_integrator": "Euler", "base": base, "limit": kind, "predicted_dt_s": dt,
+            "stable_at_file_dt": stable}  # fmt: skip
+
+
+@pytest.mark.parametrize("limits, stable, least", [
+    ([], None, None),
+    ([limit(0.004, True), limit(0.003, True)], True, 0.003),
+    ([limit(0.004, True), limit(0.001, False)], False, 0.001),
+    ([limit(0.004, True), limit(0.001, None)], True, 0.001),  # at one posture it is not known
+    ([limit(0.004, True), limit(0.001, False, integrator="RK4")], True, 0.004),  # another integrator
+    ([limit(0.004, True, base="free"), limit(0.001, False, base="locked")], True, 0.004),  # that is no base of its own
+    ([limit(None, True, kind="always stable"), limit(None, None, kind="saddle")], True, None),
+])  # fmt: skip
+def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stable, least):
+    row = row_of(good(), limits=limits)
+    assert (row["stable_at_file_dt"], row["limit_s"]) == (stable, least)
+
+
+def test_what_needs_a_look_comes_first():
+    right = [
+        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (UNCONFIRMED, None, 0.5, "a"),
+        (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
+        (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
+    ]  # fmt: skip
+    rows = [dict(zip(("verdict", "stable_at_file_dt", "worst_ratio", "file"), row)) for row in right]
+    for seed in range(20):
+        assert sorted(random.Random(seed).sample(rows, len(rows)), key=order) == rows
+
+
+# what has changed since an earlier fleet
+
+ROW = {
+    "file": "a b.xml", "sha256": "1", "verdict": AGREE, "reason": "", "joints": 3, "worst_ratio": 0.123456,
+    "file_integrator": "Euler", "file_dt_s": 0.002, "stable_at_file_dt": True, "limit_s": 0.01, "seconds": 1.26,
+    "has_report": True, "report_of": "a b.xml", "reference": "arm", "why_itself": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("before, now, named", [
+    ({}, {"seconds": 99.0, "worst_ratio": 0.9, "sha256": "2", "reason": "other"}, None),
+    ({}, {"verdict": DIFFER, "reason": "mass of x"}, ["agree", "differ", "mass of x"]),
+    ({"stable_at_file_dt": None}, {"stable_at_file_dt": False}, [""]),
+    ({}, {"limit_s": 0.010099}, None),
+    ({}, {"limit_s": 0.009901}, None),
+    ({}, {"limit_s": 0.010101}, ["10 ms", "10.1 ms"]),
+    ({}, {"limit_s": 0.009899}, ["10 ms", "9.899 ms"]),
+    ({"limit_s": None}, {}, ["none", "10 ms"]),
+    ({"limit_s": None}, {"limit_s": None}, None),
+    ({"limit_s": 0.0}, {}, [" 0 ms", "10 ms"]),
+    ({}, {"file": "new.xml", "verdict": REFUSED}, ["new.xml", "refused", "a b.xml", "agree"]),  # and one is gone
+])  # fmt: skip
+def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named, tmp_path):
+    (tmp_path / "fleet.csv").write_text(csv_of_fleet([ROW | before]), encoding="utf-8")
+    found = changes(earlier(tmp_path), [ROW | now])
+    places = [" ".join(found).index(name) for name in named or ()]
+    assert bool(found) == bool(named) and places == sorted(places)
+
+
+def page_of(rows, **more):
+    given = {"title": "A fleet", "said": [], "left_out": (), "changed": None, "origin": {}, "picture": None}
+    return fleet_page(rows=rows, **given | more)
+
+
+def test_every_name_leads_to_its_report():
+    names = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "q?x=1.xml",
+             "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
+    text = page_of([ROW | {"file": name, "report_of": name} for name in names])
+    links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
+    assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == names
+    for (address, _), name in zip(links, names, strict=True):
+        address = html.unescape(address)
+        assert not set(address) & set("#?\"'<> ") and ":" not in address  # no fragment, no scheme
+        assert unquote(address) == f"{place_of_report(name)}/index.html"
+
+
+def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_html():
+    empty = dict.fromkeys(("joints", "worst_ratio", "file_dt_s", "stable_at_file_dt", "limit_s"))
+    rows = [ROW, ROW | {"stable_at_file_dt": False}, ROW | empty | {"verdict": REFUSED, "has_report": False}]
+    text = page_of([*rows, ROW | {"verdict": ITSELF}])
+    for name, shown in (("file_dt_s", "2"), ("limit_s", "10"), ("worst_ratio", "0.12")):
+        assert re.findall(rf'<td class="\w+ {name}"[^>]*>(.*?)</td>', text) == [shown, shown, "", shown]
+    assert re.findall(r'<tr class="(\w+)">', text) == ["good", "bad", "none", "none"]
+    assert '<th scope="row">a b.xml</th>' in text and '<div class="verdict good">' in text
+    for verdict in (DIFFER, BROKE, UNCONFIRMED):
+        text = page_of([ROW | {"verdict": verdict}])
+        assert '<div class="verdict bad">' in text and '<tr class="bad">' in text
+    title, said, name, value, why, reason, change = words = [f'<w{k}>&"' for k in range(7)]
+    more = {"left_out": [("a", why)], "changed": [change], "origin": {name: value}}
+    text = page_of([ROW | {"reason": reason}], title=title, said=[said], **more)
+    for k in range(len(words)):
+        assert f"<w{k}>" not in text and f"&lt;w{k}&gt;&amp;&quot;" in text
+
+
+def test_rows_are_in_their_order_in_the_csv_and_in_the_page_which_says_where_the_time_went(tmp_path):
+    rows = [ROW, ROW | {"file": "b.xml", "verdict": DIFFER}, ROW | {"file": "c.xml", "stable_at_file_dt": False}]
+    took = {"mass": [(2, 1.0), (3, 2.0)], "speed": [(2, 2.0)]}  # of 2 x 10 s
+    run = SimpleNamespace(
+        rows=rows, parts=[("late.xml", "why")], took=took, workers=2, machines={"b", "a"}, no_timing=None, done_before=0,
+        pieces_before=0, door=SimpleNamespace(times_alone=True), verdicts=lambda: Counter(row["verdict"] for row in rows),
+    )  # fmt: skip
+    said = write_table(tmp_path, run, [("early.xml", "because")], None, "the command", 10.0)
+    with (tmp_path / "fleet.csv").open(newline="") as file:
+        found = list(csv.DictReader(file))
+    assert [row["file"] for row in found] == ["b.xml", "c.xml", "a b.xml"]
+    assert [row["stable_at_file_dt"] for row in found] == ["true", "false", "true"]
+    assert tuple(found[0]) == FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
+    text = (tmp_path / "index.html").read_text()
+    assert all(
+        part in text for part in ("late.xml", "early.xml", "a, b", "the command", "data:image/png", "3 of 3 files")
+    )
+    assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")
+    assert re.findall(r"\d+ %", said[-1]) == ["25 %", "10 %", "65 %"]

@@ -1,0 +1,157 @@
+"""The files of a report: what stands on the first screen of the page and how it is marked, what all files have, what breaks."""
+
+import json
+import re
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from sections import BAD, GOOD, section
+
+from compare.report import images, page
+from compare.report.files import write
+from compare.report.overview import BEGINNING
+from compare.report.parts import Parts
+from compare.report.verdict import Report, verdict
+from compare.robots import Question
+from compare.robots.arm import ARM
+
+CAUSE = {
+    "rank": 2,
+    "place": "mass of forearm",
+    "stated": 1.5,
+    "found": 1.6,
+    "text": "mass of forearm: 1.6 kg",
+    "size": 9.0,
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "figures").mkdir()
+    return tmp_path
+
+
+def with_figures(of, *files):
+    of.figures = [(file, f"Caption of {file}.") for file in files]
+    return of
+
+
+def report_of(folder, sections, causes=(), skipped=(), robot=ARM):
+    for file in (file for one in sections for file, _ in one.figures):
+        images.save_figure(Figure(figsize=(1, 1)), folder / "figures" / f"{file}.png")
+    return Report(sections, robot, {"command": "c"}, verdict(sections, len(sections), causes), causes, skipped)
+
+
+def page_of(folder, sections, causes=(), skipped=()):
+    """The first screen of a page of these sections, and what comes below it."""
+    report, parts = report_of(folder, sections, causes, skipped), Parts()
+    html = page.page(report, page.page_body(folder, report, parts), parts)
+    at = html.index("<section")
+    return html[:at], html[at:]
+
+
+def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all_sections(folder):
+    names = ("parameters", "mass", "acceleration", "trajectory")
+    sections = [section(name, GOOD) for name in names]
+    with_figures(sections[1], "mass_distances")
+    with_figures(sections[2], "acceleration_distances", f"{BEGINNING}agreement")
+    with_figures(sections[3], "trajectory_a", f"{BEGINNING}scenes")
+    top, rest = page_of(folder, sections, skipped=[("speed", "<too slow>")])
+    assert top.index('class="verdict good"') < top.index('class="experiments"') < top.index('class="pictures"')
+    assert 'class="causes"' not in top and '<main id="main" class="good">' in top
+    for name in names:
+        assert re.search(rf'<li class="good">.*?<a href="#{name}">', top) and f'<section id="{name}"' in rest
+    assert '<li class="skipped">' in top and "&lt;too slow&gt;" in top
+    pictures = re.findall(r'<figure class="good"><a href="#([^"]+)"><img alt="[^"]+"', top)
+    assert pictures == ["figure-mass_distances", "figure-trajectory_a"]
+    assert all(f'<figure id="{link}">' in rest for link in pictures)
+
+
+def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_shows_it(folder):
+    sections = [
+        with_figures(section("mass", GOOD), "mass_distances"),
+        with_figures(section("acceleration", GOOD), f"{BEGINNING}agreement"),
+        with_figures(section("trajectory", GOOD, BAD), f"{BEGINNING}scenes"),
+        section("speed"),
+    ]
+    top, rest = page_of(folder, sections, causes=[CAUSE])
+    assert re.search(r"<td>mass of forearm</td><td>1\.5</td><td>1\.6</td>", top)
+    assert 'class="verdict bad"' in top and '<main id="main" class="bad">' in top
+    assert re.findall(r'<figure class="(\w+)"><a href="#([^"]+)"', top) == [
+        ("bad", "trajectory"), ("good", "figure-mass_distances"),
+    ]  # fmt: skip
+    for name, kind, sign in (("mass", "good", "✓"), ("trajectory", "bad", "✗"), ("speed", "none", "–")):
+        marked = f'<span class="mark {kind}" aria-hidden="true">{sign}</span>'
+        assert (
+            f'<li class="{kind}">{marked}<div><a href="#{name}">' in top
+            and f'<p class="outcome {kind}">{marked}' in rest
+        )
+    top, _ = page_of(folder, [with_figures(section("kinematics", *[BAD] * 5), "kinematics_distances")])
+    assert '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top  # not a picture
+    assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4  # no cause is known
+
+
+def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
+    of = section("mass", GOOD, rows=[{"quantity": "other", "a": k} for k in range(50)], extra=[{"b": 1.5}])
+    of.result.notes, of.result.filed = [f"Note {k} < 9." for k in range(5)], ("extra",)
+    names = [f"mass_{k}" for k in range(4)] + ["mass_distances"]  # to the last one the first screen leads
+    text = page_of(folder, [with_figures(of, *names)])[1].partition('<section id="mass"')[2]
+    fold = text.index("<details>")
+    assert text.index("Note 2 &lt; 9.") < fold < text.index("Note 3")
+    assert "<table" not in text[:fold] and text.count("<tr><td>other</td>") == 40
+    assert '<a href="tables/mass.csv">' in text and '<a href="tables/extra.csv">' in text and "<td>1.5</td>" not in text
+    assert [text.index(f'id="figure-{name}"') < fold for name in names] == [True, True, False, False, True]
+
+
+def text_of(path):
+    return path.read_text(encoding="utf-8")
+
+
+def test_results_have_every_check_cause_and_digit(folder):
+    rows = [{"a": 0.12345678901234568, "b": k, "engine": "tmt", "ok": True} for k in range(3)]
+    names = ("joint;" * 20)[:81]
+    of = section("mass", GOOD, BAD, rows=rows, extra=[{"b": 1 / 3, "names": names}])
+    second = CAUSE | {"text": "com x of forearm: stated 3"}
+    write(folder, report_of(folder, [with_figures(of, "mass_distances")], [CAUSE, second]))
+    results = json.loads(text_of(folder / "results.json"))
+    assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
+    assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
+    fields = ("rank", "place", "stated", "found", "text")
+    assert results["causes"] == [{name: cause[name] for name in fields} for cause in (CAUSE, second)]
+    lines = text_of(folder / "tables" / "mass.csv").splitlines()
+    assert lines == ["a,b,engine,ok", *(f"{row['a']!r},{row['b']},tmt,true" for row in rows)]
+    assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
+    html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
+    assert names not in text and all(cause["text"] in html and cause["text"] in text for cause in (CAUSE, second))
+    assert html.count("<td>0.123</td>") == 3 and "**Checks that fail:**" in text
+    assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]  # WebP is in the page alone
+
+
+def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
+    """A report of which the questions, a table, a cause and sections cannot be made."""
+    asks = replace(ARM, questions=(Question("a", "what", "mass", ("largest", "mass", "Mbar", None)),))
+    other = {"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": "far"}
+    sections = [
+        section(name, GOOD, rows=[row]) for name, row in (("mass", other), ("gravity", {"a": 1.5}), ("speed", {}))
+    ]
+    report = report_of(folder, sections, [CAUSE | {"found": float("nan")}, CAUSE], robot=asks)
+    sections[1].figures = [("nowhere", "A caption.")]
+    sections[2].result.rows = 3
+    parts = write(folder, report)
+    whys = {
+        "tables/speed.csv": "ValueError", "cause 1 in results.json": "ValueError", "the questions": "ValueError",
+        "speed in report.md": "TypeError", "gravity in index.html": "FileNotFoundError", "speed in index.html": "TypeError",
+    }  # fmt: skip
+    assert {name: why.split(":")[0] for name, why in parts.broken.items()} == whys
+    text, html = text_of(folder / "report.md"), text_of(folder / "index.html")
+    assert all(name in text and name in html for name in whys)
+    assert "## Gravity\n" in text and "![nowhere]" in text and "A caption." not in html
+    assert '<main id="main" class="bad">' in html and '<div class="verdict bad">' in html
+    assert sorted(path.name for path in (folder / "tables").iterdir()) == ["gravity.csv", "mass.csv"]
+    results = json.loads(text_of(folder / "results.json"))
+    failed = [check for check in results["checks"] if not check["passed"]]
+    assert results["passed"] is False and {check["experiment"] for check in failed} == {"report"}
+    assert all(check["quantity"].startswith(name) for check, name in zip(failed, whys, strict=True))
+    assert len(results["causes"]) == 1
