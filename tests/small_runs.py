@@ -1,7 +1,7 @@
 """Small runs that several tests look at, which the fixture `shared` computes once.
 
-Used by conftest.py (`small`), test_agreement, test_own_reference, test_drawn_figures, test_second_robot,
-report/test_terminal and experiments/stability/test_stability_small.
+Used by conftest.py (`small`), test_own_reference, test_drawn_figures, test_second_robot, report/test_terminal and
+experiments/diagnosis/test_judge_diagnosis.
 """
 
 import os
@@ -16,7 +16,7 @@ from drawn_flaws import flaws
 from runs import in_shell, on_terminal
 
 from compare import experiment
-from compare.engines.mujoco import load, parse
+from compare.engines.mujoco import load
 from compare.experiments import EXPERIMENTS, module, skipped
 from compare.fleet.file_pieces import Here
 from compare.report import files, verdict
@@ -27,13 +27,6 @@ from compare.robots.arm import ARM
 def of_arm(name):
     """The result of an experiment on the arm, every path with few states and steps."""
     return module(name).rows(experiment.Setup.small(ARM, experiment.engines(load(ARM.mjcf, ARM.tree))))
-
-
-def on_the_moon(name):
-    """The same, with gravity 1.62 in the file; and the captions of its figures."""
-    text = ARM.mjcf.read_text(encoding="utf-8").replace("0 0 -9.81", "0 0 -1.62")
-    result = module(name).rows(experiment.Setup.small(ARM, experiment.engines(parse(text, ARM.tree))))
-    return result, [draw()[2] for draw in module(name).figures(result, ARM)]
 
 
 class Lines(list):

@@ -6,7 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 from files import PLAIN, TENDON, TWO, assert_the_same, case_of, mjcf
-from models import PATHS, gymnasium_files, random_tree
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from models import KINDS, PATHS, gymnasium_files, random_tree
 from trees import random_state
 
 from compare.engines.mujoco import ModelError, engine, read
@@ -48,7 +50,15 @@ def test_a_file_with_every_kind_of_joint():
     assert [f.feature for f in reading.features] == OF_MIXED
 
 
-@pytest.mark.parametrize("source", [PATHS["mixed"], *map(random_tree, range(4))], ids=["mixed", *"0123"])
+@settings(max_examples=20)
+@given(
+    st.integers(0, 2**32 - 1), st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True), st.integers(3, 6)
+)
+def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
+    compared(random_tree(seed, kinds, joints), np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("source", [PATHS["mixed"], random_tree(0)], ids=["mixed", "random"])
 def test_a_file_is_the_same_in_both_and_a_change_of_the_case_reaches_mujoco(source, rng):
     reading = compared(source, rng)
     tree = replace(reading.tree, gravity=(0.0,) * 3, damping=np.add(reading.tree.damping, 0.4))
