@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from crane import TREE, XML
-from trees import large_tree
+from trees import tree_of_kinds
 
 import tmt
 from compare import experiment
@@ -179,12 +179,14 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed
     assert alone.ended == again.ended == both.ended[1] and list(tmp_path.iterdir()) == []  # no log of MuJoCo's
 
 
-def test_what_cannot_take_part_says_so(monkeypatch, tmp_path):
+def test_what_cannot_take_part_says_so(monkeypatch, tmp_path, rng):
     monkeypatch.setattr("mujoco.__file__", str(tmp_path / "mujoco" / "__init__.py"))
     for name in ("heyoka", "pinocchio", "mujoco.batch"):
         monkeypatch.setattr(f"compare.engines.{name}.find_spec", lambda name: None)
     for engine in (Heyoka(), PinocchioCalls, BatchedCalls, MinimalCalls):
         assert engine.unavailable()
     driven = dataclasses.replace(tmt.ARM, position_gain=np.eye(3))
-    assert "hinges and slides" in PinocchioCalls.unfit(large_tree()) and "controller" in PinocchioCalls.unfit(driven)
+    assert "hinges and slides" in PinocchioCalls.unfit(tree_of_kinds(rng)) and "controller" in PinocchioCalls.unfit(
+        driven
+    )
     assert PinocchioCalls.unfit(tmt.ARM) is None
