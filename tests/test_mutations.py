@@ -47,6 +47,8 @@ def test_it():
 def toy(tmp_path, monkeypatch):
     """A project of one judge and its test."""
     monkeypatch.setenv("TMT_CACHE", str(tmp_path / "compiled"))
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # as fast as may be
+    monkeypatch.setenv("PYTEST_PLUGINS", "xdist.plugin")
     for name, text in (("compare/rules.py", JUDGE), ("tests/test_toy.py", TEST)):
         path = tmp_path / "toy" / name
         path.parent.mkdir(parents=True)

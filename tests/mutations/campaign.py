@@ -24,7 +24,7 @@ from tmt.compiled.store import cache_folder
 
 from .edit import Edit, Place
 
-NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "venv", "build", "latest")
+NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "latest")
 BLIND = ("test_mutations.py", "test_structure.py", "test_interrupt.py")  # they see any edit, or no edit of a judge
 SLICES = (0, 4, 16, 1000)  # the files of tests run in parts, the nearest first: most edits are caught by the first
 PATIENCE = 90.0, 20.0  # s that a part may take, and for each of its files: then an edit counts as an endless run
@@ -56,21 +56,16 @@ class Copy(NamedTuple):
 
     def failed(self, tests: list[str]) -> str:
         """The first of these tests (files or names) that fails, empty if none does."""
-        here, others = str(self.project), os.environ.get("PYTHONPATH", "").split(os.pathsep)
-        path = [here, *(other for other in others if other and not Path(other, "compare").is_dir())]
         scratch = self.project.parent / "scratch"
         scratch.mkdir(exist_ok=True)
-        own = {
-            "PYTHONPATH": os.pathsep.join(path),
-            "TMT_CACHE": str(self.store),
-            "TMPDIR": str(scratch),
-            "COLUMNS": "200",
-        }
+        own = {"PYTHONPATH": self.project, "TMT_CACHE": self.store, "TMPDIR": scratch, "COLUMNS": "200"}
         command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-rfE", *tests]
         limit = PATIENCE[0] + PATIENCE[1] * len(tests)
         with (self.project.parent / "output").open("w+", errors="replace") as output:
             streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}
-            process = subprocess.Popen(command, cwd=here, env=os.environ | own, start_new_session=True, **streams)
+            process = subprocess.Popen(
+                command, cwd=self.project, env=os.environ | own, start_new_session=True, **streams
+            )
             try:
                 process.wait(limit)
             except subprocess.TimeoutExpired:
@@ -88,17 +83,22 @@ class Copy(NamedTuple):
 
     def caught(self, name: Path, text: str, files: list[str]) -> str:
         """Which test notices a changed text of a file. files: of tests, the likeliest first."""
-        file = self.project / name
-        before, store = file.read_text(encoding="utf-8"), self.store.with_name("store of an edit")
-        shutil.copytree(self.store, store, copy_function=os.link)  # its machine code must not reach the next edit
-        edited = self._replace(store=store)
+        file, edited = self.project / name, self._replace(store=self.store.with_name("store of an edit"))
+        before = file.read_text(encoding="utf-8")
+        shutil.copytree(
+            self.store, edited.store, copy_function=os.link
+        )  # its machine code must not reach the next edit
         try:
-            write(file, text)
+            file.write_text(text, encoding="utf-8")
+            Path(cache_from_source(file)).unlink(
+                missing_ok=True
+            )  # of a source of the same size it would pass for the new one
             parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
             return next((caught for part in parts if (caught := edited.failed(part))), "")
         finally:
-            write(file, before)
-            shutil.rmtree(store, ignore_errors=True)
+            file.write_text(before, encoding="utf-8")
+            Path(cache_from_source(file)).unlink(missing_ok=True)
+            shutil.rmtree(edited.store, ignore_errors=True)
 
 
 def tried_edits(project: Path, places: dict[Edit, Place], jobs: int) -> Iterator[Tried]:
@@ -113,7 +113,9 @@ def tried_edits(project: Path, places: dict[Edit, Place], jobs: int) -> Iterator
             started = time.perf_counter()
             caught = copy.caught(name, changed.after, nearest(project, edit))
             copies.put(copy)
-            return Tried(edit, caught, time.perf_counter() - started, difference(name, changed))
+            texts = (text.splitlines() for text in (changed.before, changed.after))
+            diff = difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm="")
+            return Tried(edit, caught, time.perf_counter() - started, "\n".join(diff))
 
         with ThreadPoolExecutor(jobs) as pool:
             under_way = [pool.submit(tried, *place) for place in places.items()]
@@ -133,34 +135,23 @@ def fail_without_an_edit(project: Path, tests: list[str]) -> str:
         return Copy.of(project, Path(folder, "0")).failed(tests) if tests else ""
 
 
-def write(file, text) -> None:
-    """Write a source, and forget its byte code: of the same size within a second it would pass for the new one."""
-    file.write_text(text, encoding="utf-8")
-    Path(cache_from_source(file)).unlink(missing_ok=True)
-
-
 def end_children(pid: int) -> None:
     """Kill what a process has started, in whatever group; the process too, unless it is this one."""
     with suppress(psutil.NoSuchProcess):
         parent = psutil.Process(pid)
-        for one in [*parent.children(recursive=True), *([parent] if pid != os.getpid() else [])]:
+        for one in [*parent.children(recursive=True), *[parent] * (pid != os.getpid())]:
             with suppress(psutil.NoSuchProcess):
                 one.kill()
 
 
 def nearest(project: Path, edit: Edit) -> list[str]:
-    """The files of tests, those first that name what is edited."""
-    words = {*edit.module.split("."), *edit.where.split(".")}
+    """The files of tests, those first that name what is edited, in their own name above all."""
+    parts = edit.module.split(".")
+    words = {*parts, *edit.where.split(".")}
 
     def named(file):
         text = file.read_text(encoding="utf-8")
-        return sum(word in text for word in words) + (edit.module in file.stem)
+        return sum(word in text for word in words) + 2 * sum(part in str(file) for part in parts)
 
     files = [path for path in sorted(project.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
     return [str(file.relative_to(project)) for file in sorted(files, key=named, reverse=True)]
-
-
-def difference(name: Path, place: Place) -> str:
-    """An edit as a diff."""
-    texts = (text.splitlines() for text in (place.before, place.after))
-    return "\n".join(difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm=""))
