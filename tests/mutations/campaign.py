@@ -59,6 +59,7 @@ class Copy(NamedTuple):
         scratch = self.project.parent / "scratch"
         scratch.mkdir(exist_ok=True)
         own = {"PYTHONPATH": self.project, "TMT_CACHE": self.store, "TMPDIR": scratch, "COLUMNS": "200"}
+        own["PYTHONDONTWRITEBYTECODE"] = ""  # or each run would compile all sources again
         command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-rfE", *tests]
         limit = PATIENCE[0] + PATIENCE[1] * len(tests)
         with (self.project.parent / "output").open("w+", errors="replace") as output:
