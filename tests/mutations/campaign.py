@@ -86,14 +86,12 @@ class Copy(NamedTuple):
         """Which test notices a changed text of a file. files: of tests, the likeliest first."""
         file, edited = self.project / name, self._replace(store=self.store.with_name("store of an edit"))
         before = file.read_text(encoding="utf-8")
-        shutil.copytree(
-            self.store, edited.store, copy_function=os.link
-        )  # its machine code must not reach the next edit
+        # machine code of an edited source must not reach the next edit
+        shutil.copytree(self.store, edited.store, copy_function=os.link)
         try:
             file.write_text(text, encoding="utf-8")
-            Path(cache_from_source(file)).unlink(
-                missing_ok=True
-            )  # of a source of the same size it would pass for the new one
+            # byte code of a source of the same size would pass for the new one
+            Path(cache_from_source(file)).unlink(missing_ok=True)
             parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
             return next((caught for part in parts if (caught := edited.failed(part))), "")
         finally:
@@ -112,7 +110,7 @@ def tried_edits(project: Path, places: dict[Edit, Place], jobs: int) -> Iterator
         def tried(edit, changed):
             name, copy = changed.path.relative_to(project), copies.get()
             started = time.perf_counter()
-            caught = copy.caught(name, changed.after, nearest(project, edit))
+            caught = copy.caught(name, changed.after, nearest(project, edit, name))
             copies.put(copy)
             texts = (text.splitlines() for text in (changed.before, changed.after))
             diff = difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm="")
@@ -145,14 +143,16 @@ def end_children(pid: int) -> None:
                 one.kill()
 
 
-def nearest(project: Path, edit: Edit) -> list[str]:
-    """The files of tests, those first that name what is edited, in their own name above all."""
+def nearest(project: Path, edit: Edit, name: Path) -> list[str]:
+    """The files of tests, those first that import the edited file, or are named like it, or name what is edited."""
     parts = edit.module.split(".")
     words = {*parts, *edit.where.split(".")}
+    imported = re.compile(rf"\b{name.parent.name}( import .*|\.){name.stem}\b")
 
     def named(file):
         text = file.read_text(encoding="utf-8")
-        return sum(word in text for word in words) + 2 * sum(part in str(file) for part in parts)
+        in_name = sum(part in str(file) for part in parts)
+        return sum(word in text for word in words) + 2 * in_name + 4 * bool(imported.search(text))
 
     files = [path for path in sorted(project.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
     return [str(file.relative_to(project)) for file in sorted(files, key=named, reverse=True)]
