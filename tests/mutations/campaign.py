@@ -147,7 +147,8 @@ def nearest(project: Path, edit: Edit, name: Path) -> list[str]:
     """The files of tests, those first that import the edited file, or are named like it, or name what is edited."""
     parts = edit.module.split(".")
     words = {*parts, *edit.where.split(".")}
-    imported = re.compile(rf"\b{name.parent.name}( import .*|\.){name.stem}\b")
+    *_, folder, stem = (part for part in name.with_suffix("").parts if part != "__init__")
+    imported = re.compile(rf"\b{folder}( import .*|\.){stem}\b")
 
     def named(file):
         text = file.read_text(encoding="utf-8")
