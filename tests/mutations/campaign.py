@@ -153,7 +153,8 @@ def nearest(project: Path, edit: Edit, name: Path) -> list[str]:
     def named(file):
         text = file.read_text(encoding="utf-8")
         in_name = sum(part in str(file) for part in parts)
-        return sum(word in text for word in words) + 2 * in_name + 4 * bool(imported.search(text))
+        score = sum(word in text for word in words) + 2 * in_name + 4 * bool(imported.search(text))
+        return score, -len(text)  # of two, the smaller file
 
     files = [path for path in sorted(project.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
     return [str(file.relative_to(project)) for file in sorted(files, key=named, reverse=True)]
