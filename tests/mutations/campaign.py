@@ -148,7 +148,7 @@ def nearest(project: Path, edit: Edit, name: Path) -> list[str]:
     parts = edit.module.split(".")
     words = {*parts, *edit.where.split(".")}
     *_, folder, stem = (part for part in name.with_suffix("").parts if part != "__init__")
-    imported = re.compile(rf"\b{folder}( import .*|\.){stem}\b")
+    imported = re.compile(rf"\b{folder}( import [\w\s,(]*|\.)\b{stem}\b")
 
     def named(file):
         text = file.read_text(encoding="utf-8")
