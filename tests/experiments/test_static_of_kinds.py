@@ -103,15 +103,13 @@ def test_a_wrong_rate_of_mujocos_jacobian_is_named_and_decides_nothing():
     assert not right and "mj_jacDot" in kinematics.wrong_rates(setup, sample, by_accelerations + 0.1, scale)
 
 
-def test_the_figure_of_distances_says_who_is_how_far_from_what():
+def test_the_caption_of_distances_says_who_is_how_far_from_what():
     curves = {"TMT to MuJoCo": [1.0, 5.0], "TMT to exact": [1.5, 2.0], "MuJoCo to exact": [2.5, 3.0]}
     of_bias = {name: np.array([0.5, 0.7]) for name in curves}
     of_mass = {name: np.array(values) for name, values in curves.items()}
     result = Result("mass", curves={"random states": {"Mbar": of_mass, "bias": of_bias}})
-    name, fig, caption = draw.draw_distances(result, "random states")
-    assert name == "mass_distances" and re.search(r"5 eps apart \(Mbar\).* 2 .*TMT\D* 2 eps .*MuJoCo\D* 3\b", caption)
-    drawn = {line.get_label(): line for line in fig.axes[0].lines}
-    assert all(drawn[label].get_xdata().tolist() == values for label, values in curves.items())
+    *_, caption = draw.draw_distances(result, "random states")
+    assert re.search(r"5 eps apart \(Mbar\).* 2 .*TMT\D* 2 eps .*MuJoCo\D* 3\b", caption)
 
 
 @pytest.mark.parametrize("share, needs_none", [(0.99, True), (1.01, False)])

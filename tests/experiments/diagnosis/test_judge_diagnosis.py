@@ -7,7 +7,6 @@ from small_runs import Here, Lines
 from compare import experiment
 from compare.experiments import diagnosis
 from compare.experiments.diagnosis import single_steps
-from compare.judge.check import Result
 
 HEAVY = XML.replace('mass="1.5"', 'mass="1.51"')
 DAMPED = XML.replace('axis="1 0 0"/>', 'axis="1 0 0" damping="0.1"/>')
@@ -30,17 +29,15 @@ def test_the_arm_has_nothing_to_explain(monkeypatch):
             assert diagnosis.rows(setup).checks[k].passed is passes
 
 
-def test_a_cause_is_a_row_a_note_of_the_check_that_fails_and_a_bar_of_the_figure():
+def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     result = diagnosis.rows(setup_of(HEAVY))
     (row,), (check,), (cause,) = result.rows, failed(result), result.curves["causes"]
     assert row["explains"] == pytest.approx(1.51, rel=1e-12) and row["left_over"] < 1e-9
     named = {"rank": 2, "kind": "number", "place": "mass of forearm", "stated": 1.5, "unit": "kg", "tied": 0}
     assert row.items() >= named.items() and (cause["place"], cause["found"]) == (row["place"], row["explains"])
     assert "mass of forearm" in check.note and "1.51 kg" in check.note
-    ((name, figure, caption),) = [draw() for draw in diagnosis.figures(result, None)]
-    assert name == "diagnosis_nearest" and "mass of forearm" in caption
-    assert len(figure.axes[0].patches) == len(result.curves["nearest"])
-    assert list(diagnosis.figures(Result("diagnosis"), None)) == []
+    ((*_, caption),) = [draw() for draw in diagnosis.figures(result, None)]
+    assert "mass of forearm" in caption
 
 
 def test_damping_is_seen_in_accelerations_alone():

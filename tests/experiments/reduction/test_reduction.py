@@ -1,20 +1,17 @@
 """The whole experiment: a small run, joints that are locked in both engines, what each scene needs, and what additions cost."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
 from edited import XML, setup_of
 from models import PATHS, chain
-from trees import mjcf
 
 import tmt
-from compare.engines.mujoco import ModelError, Mujoco, additions, engine, parse, read
+from compare.engines.mujoco import ModelError, Mujoco, additions, engine, read
 from compare.experiments import reduction
 from compare.experiments.reduction import cost, needs, sub_blocks, times
 from compare.judge.check import Result
-from compare.robots import Robot
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.setup import Setup, engines
@@ -48,14 +45,6 @@ def test_a_model_whose_joints_cannot_be_locked_fails():
     tendon = '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
     (check,) = reduction.rows(setup_of(XML.replace("</mujoco>", tendon)), timed=False).checks
     assert check.quantity == "models whose hinges can be locked" and not check.passed
-
-
-def test_a_robot_of_two_hinges_without_postures_and_scenes_goes_through():
-    tree = dataclasses.replace(tmt.ARM.lock({"alpha": 0.3}), hinge_names=("a", "b"))
-    bare = Robot("bare", Path("bare.xml"), tree, {}, ())
-    result = reduction.rows(Setup.small(bare, engines(parse(mjcf(tree), tree))))
-    names = [figure()[0] for figure in reduction.figures(result, bare)]
-    assert failed(result) == [] and names == ["reduction_cost_in_mujoco"]
 
 
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):

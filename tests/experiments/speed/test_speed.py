@@ -137,16 +137,6 @@ def test_every_method_follows_the_scene(engines, known_reference):
     assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
 
 
-def test_the_smaller_model_has_the_error_of_the_whole_one(engines):
-    zero = next(case for case in ARM.cases if case.name == "zero, free")
-    known, smaller = reference.reference(zero), runs.reduced(zero)
-    method, setting = engines["tmt"].methods["rk4"], Setting(5.0, 1024)
-    whole, small = (runs.row_of_run(case, zero, engines, method, setting, known) for case in (zero, smaller))
-    for name in ("worst_error_rad", "energy_error_J"):
-        assert small[name] == pytest.approx(whole[name], rel=1e-3)
-    assert (whole["whole"], small["whole"], small["scene"]) == (None, "zero, free", "zero, free, beta locked")
-
-
 def test_rounding_leaves_eps_times_the_growth(engines, of_gripper):
     slow = BENT.changed(posture=(), gravity=False, duration=1.0, dt=1 / 64)
     at_rest, left = (floors.floor(case, engines["tmt"].of(case)) for case in (slow, BENT))

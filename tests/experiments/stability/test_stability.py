@@ -67,15 +67,6 @@ def test_a_stable_method_has_no_limit_but_on_a_saddle(name):
     assert BENT.limit(name) == ("never_fails", None) and BALL.limit(name) == ("always_fails", None)
 
 
-@pytest.mark.parametrize("at, name, product", [
-    (BENT, "rk4", 2.0 * np.sqrt(2.0)), (held(ARM, "hanging"), "implicit", 2.0),
-    (held(ARM, "bent", 50.0), "rk4", 2.785294),  # damped it meets the real limit at the stiffest mode
-])  # fmt: skip
-def test_limit_of_the_arm_is_that_of_its_fastest_mode(at, name, product):
-    kind, dt = at.limit(name)
-    assert kind == "finite" and dt * np.abs(at.modes[0]).max() == pytest.approx(product, rel=1e-6)
-
-
 def read(source):
     found = reading.read(source)
     return robot_of(found, "robot.xml"), reading.engine(found)

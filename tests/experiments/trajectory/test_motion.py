@@ -129,14 +129,6 @@ def test_between_two_states_stands_what_the_method_gives_with_half_a_step_and_no
     assert np.isfinite(scene.points["tmt"]).all() and np.isnan(scene.apart[gone]).all()
 
 
-def test_first_comes_what_is_held_and_left_then_what_is_let_go_from_there(drawn):
-    names = ["bent, held", "bent, free", "zero, free", "ball catch, held", "ball catch, free"]
-    scenes = [drawn._replace(scene=name) for name in names]
-    assert [one.scene for one in frames.in_order(scenes, ARM)] == names and frames.in_order([], ARM) == []
-    scenes[3] = scenes[3]._replace(left={"tmt": None, "mujoco": 4.0})
-    assert [one.scene for one in frames.in_order(scenes, ARM)] == [*names[3:], *names[:3]]
-
-
 def test_a_free_body_is_a_cross_that_turns_with_it():
     robot, half = robot_of(reading.read(PATHS["free_body"]), "stone.xml"), np.sqrt(0.5)
     a_quarter_about_z = np.array([[0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, half, 0.0, 0.0, half]])
