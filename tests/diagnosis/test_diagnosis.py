@@ -213,12 +213,6 @@ def test_a_parallel_axis_term_left_out():
     assert cause.place.startswith(f"{PARALLEL_AXIS}every body ") and cause.place.endswith(" in M alone")
 
 
-def test_what_no_term_explains_is_told_by_its_part():
-    found = told({H1: 0.1 * np.exp(KNEE / 3.0)})
-    assert found.causes == () and "h[knee], gravity" in found.details
-    assert not any(other in found.details for other in ("hip'", "M[", "h[hip]"))
-
-
 def test_rounded_constants_are_told_where_all_is_small_alone():
     """All terms are off by a little, or one that is small beside h by half."""
     cosine = np.cos(KNEE)

@@ -14,10 +14,7 @@ from compare.robots.file import robot_of
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
-ENDS = (
-    (INSIDE, None),
-    (OUTSIDE, 0.5),
-)  # shares of the energy that can be gained, and when a run of two states diverges
+ENDS = (INSIDE, None), (OUTSIDE, 0.5)  # shares of the energy that can be gained, and when a run of two states diverges
 T = np.array([0.0, 0.5])
 
 

@@ -146,6 +146,13 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
     assert table[1e-12]["mujoco"] is None and "3.1e-07" in table[1e-12]["why_not"]
 
 
+def test_what_to_use_for_a_step_response_is_of_the_error_asked_for():
+    line = {"target_rad": 1e-3, "mujoco": "RK4, 128 steps", "mujoco_dt_s": 1 / 512, "mujoco_ms": 0.4, "tmt": None}
+    table = [line | {"scene": "step"}, line | {"scene": "step", "target_rad": 1e-6, "mujoco": "RK4, 9 steps"}]
+    (said,) = advice.step_response_in_words(table, ["step"])
+    assert "128 steps" in said and "9 steps" not in said
+
+
 def test_a_row_gets_the_least_of_its_times():
     rows = [row("tmt", "rk4", 1.0), row("mujoco", "RK4", 1.0)]
     assert times.fill_in(rows, [[3e-3, 2e-3, 5e-3], [0.4]]) == [pytest.approx(1.5)]
