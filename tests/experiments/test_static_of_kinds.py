@@ -12,7 +12,6 @@ from compare.experiments import acceleration, figures_sketch, gravity, kinematic
 from compare.experiments import figures as draw
 from compare.judge.check import Result
 from compare.judge.entries import scales
-from compare.robots.arm import ARM
 
 MODULES = (kinematics, mass, gravity, acceleration)
 BODY = '<inertial pos="0.1 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></worldbody></mujoco>'
@@ -98,12 +97,3 @@ def test_the_caption_of_distances_says_who_is_how_far_from_what():
     result = Result("mass", curves={"random states": {"Mbar": of_mass, "bias": of_bias}})
     *_, caption = draw.draw_distances(result, "random states")
     assert re.search(r"5 eps apart \(Mbar\).* 2 .*TMT\D* 2 eps .*MuJoCo\D* 3\b", caption)
-
-
-@pytest.mark.parametrize("share, needs_none", [(0.99, True), (1.01, False)])
-def test_a_posture_needs_no_torque_within_64_eps_of_its_scale(share, needs_none):
-    weight = 9.81 * (1.9 * 0.15 + 1.5 * 0.45)  # N m: sum of m g reach
-    rest, none = np.full(3, share * 64 * 2.0**-52 * weight), np.zeros(3)
-    postures = {"zero": {"tmt": none, "mujoco": rest + 1.0}, "bent": {"tmt": rest + 1.0, "mujoco": rest}}
-    apart = draw.needless(postures, ARM)
-    assert (apart.index("TMT") < apart.index("zero") < apart.index("MuJoCo")) and ("bent" in apart) is needs_none

@@ -53,14 +53,10 @@ def test_a_wrong_integrator_is_named_where_all_else_agrees():
     assert (row["place"], row["stated"], row["explains"]) == ("scheme", "implicit", "semi_implicit_euler")
 
 
-@pytest.mark.parametrize(
-    "names, text, made, found",
-    [
-        (["mass", "diagnosis"], XML, ["mass"], []),  # nothing failed
-        (["mass", "diagnosis"], HEAVY, ["mass", "diagnosis"], ["mass of forearm"]),
-        (["diagnosis"], XML, ["diagnosis"], []),
-    ],
-)
+@pytest.mark.parametrize("names, text, made, found", [
+    (["mass", "diagnosis"], XML, ["mass"], []),  # nothing failed
+    (["mass", "diagnosis"], HEAVY, ["mass", "diagnosis"], ["mass of forearm"]), (["diagnosis"], XML, ["diagnosis"], []),
+])  # fmt: skip
 def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path, monkeypatch):
     monkeypatch.setattr(experiment, "find_causes", lambda setup: [])  # not by parameters, but in the values
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")

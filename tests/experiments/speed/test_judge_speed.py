@@ -147,10 +147,10 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
 
 
 def test_what_to_use_for_a_step_response_is_of_the_error_asked_for():
-    line = {"target_rad": 1e-3, "mujoco": "RK4, 128 steps", "mujoco_dt_s": 1 / 512, "mujoco_ms": 0.4, "tmt": None}
-    table = [line | {"scene": "step"}, line | {"scene": "step", "target_rad": 1e-6, "mujoco": "RK4, 9 steps"}]
+    line = {"scene": "step", "target_rad": 1e-3, "mujoco": "RK4", "mujoco_dt_s": 1 / 512, "mujoco_ms": 0.4, "tmt": None}
+    table = [line, line | {"target_rad": 1e-6, "mujoco": "Euler"}, line | {"scene": "let go"}]
     (said,) = advice.step_response_in_words(table, ["step"])
-    assert "128 steps" in said and "9 steps" not in said
+    assert said.index("step: RK4") < said.index("let go: RK4") and "Euler" not in said
 
 
 def test_a_row_gets_the_least_of_its_times():

@@ -134,6 +134,11 @@ def test_a_silent_failure_is_caught_within_a_step(result, since, caught, passes)
     assert [check.passed for check in result.checks] == 2 * passes
 
 
+def test_definiteness_is_the_sign_of_an_eigenvalue():
+    lost, kept = (failure.gain_in_words(silent_run(definite=least)) for least in (-1e-9, 1e-9))
+    assert "loses" in lost and "loses" not in kept
+
+
 @pytest.mark.parametrize("share, found", [(INSIDE, None), (1.001, 1.0)])
 def test_energy_gives_a_failure_away(share, found):
     """A free run from the centre that gains a share of the physical bound on its energy as motion in its second state."""

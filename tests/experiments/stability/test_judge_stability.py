@@ -114,6 +114,11 @@ def test_departure_within_one_step_or_three_hundredths(result, observed, predict
     assert only(result) is passes
 
 
+def test_the_farthest_departure_is_said():
+    rows = [departure_row(1.01, 1.0), departure_row(2.02, 2.0, engine="mujoco"), departure_row(3.0, 3.0)]
+    assert "0.020 s (ball catch, MuJoCo rk4" in departure.departures_in_words(rows)
+
+
 def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
     at, size = held(ARM, "ball catch"), 1e-4
     values, vectors = at.modes
@@ -146,3 +151,5 @@ def test_the_law_is_left_out_where_the_potential_is_not_cubic():
     about = dataclasses.replace(ARM.tree, axis=((0.0, 0.0, 1.0), *ARM.tree.axis[1:]))
     turning = held(dataclasses.replace(ARM, tree=about), "bent")
     assert turning.kind == "marginal" and falling.without_law(turning)
+    floating = held(dataclasses.replace(ARM, tree=dataclasses.replace(ARM.tree, gravity=(0.0, 0.0, 0.0))), "bent")
+    assert "3 " in falling.without_law(floating)  # modes without stiffness

@@ -11,7 +11,7 @@ import tmt
 from compare.case import Coordinates
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
-from compare.experiments.trajectory import drift, errors, horizon, leaving, rules
+from compare.experiments.trajectory import drift, errors, horizon, leaving, rules, sentences
 from compare.experiments.trajectory.derivative import check_derivative
 from compare.judge.check import Result
 from compare.judge.run import check_movement, departure, required_time
@@ -165,6 +165,14 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
     assert errors.errors_when_held(result, ARM) == {HELD.name: (0.25, None)}
     ((name, (ours, theirs)),) = errors.errors_when_free(result, ARM).items()
     assert name == FREE.name and ours == pytest.approx(0.27, rel=0.03) and theirs > 90.0
+
+
+@pytest.mark.parametrize("error, is_far", [(0.49, False), (0.51, True), (None, False)])
+def test_agreement_that_says_nothing_is_told(error, is_far):
+    """An error is a hundred times the distance of the engines."""
+    runs = {(HELD.name, "rk4", 64): run_of(HELD, 0.25, 0.26, until=2.5)}
+    first, second = sentences.of_errors(runs, {HELD.name: (error, 0.1)}, CASES)
+    assert HELD.name in first and (HELD.name in second) is is_far
 
 
 @BY_ENGINE

@@ -1,4 +1,4 @@
-"""The motion of the runs: its table, the pictures of it, who leaves when and where to, and the GIF."""
+"""The motion of the runs: its table, the pictures of it and the GIF."""
 
 import dataclasses
 
