@@ -188,8 +188,9 @@ def test_a_parameter_is_compared_within_64_eps_and_told_with_all_its_digits(off,
 def test_causes_come_by_rank_then_by_size():
     """Not in the order in which numbers are read: mass, CoM, air."""
     mass, com = ('mass="1.9"', 'mass="1.9000001"'), ('pos="0.15 0 0"', 'pos="0.151 0 0"')
-    text = edited(mass, com, ("<option ", '<option density="1.2" '))
-    assert places(text) == ["density", "com x of forearm", "mass of upper arm"]
+    causes = found(edited(mass, com, ("<option ", '<option density="1.2" ')))[1]
+    assert [cause["place"] for cause in causes] == ["density", "com x of forearm", "mass of upper arm"]
+    assert causes[1]["text"].index("0.15 m") < causes[1]["text"].index("0.151 m")  # the stated number first
 
 
 def test_a_force_that_no_number_explains_is_the_cause():
