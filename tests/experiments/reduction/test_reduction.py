@@ -35,7 +35,6 @@ def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
     planar, whole = (rows["zero, free", hinges, "tmt", "RK4"] for hinges in ("alpha gamma", "alpha beta gamma"))
     assert 0 < planar["operations"] < whole["operations"] and planar["ns_per_step"] > 0
     assert rows["bent, held", "none", "mujoco", "RK4"]["ns_per_step"] is None
-    assert reduction.claim(ARM) and reduction.tolerance(ARM)
     drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, ARM))}
     names = ["reduction_needs", "reduction_elbow_swing", "reduction_modes", "reduction_cost_in_mujoco"]
     assert list(drawn) == names and not any("nan" in caption for caption in drawn.values())

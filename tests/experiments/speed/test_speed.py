@@ -29,7 +29,6 @@ from compare.truth.free_body import free_turning
 OWN = Scene("my swing", (0, 0, 120), duration=2.0, dt=1 / 50, tags=("own",))
 MINE = dataclasses.replace(ARM, scenes=(*ARM.scenes, OWN))
 BENT = next(case for case in ARM.cases if case.name == "bent, free")  # in which errors fall regularly
-RK4 = Method("mujoco", "RK4", 4, "rk4")
 
 
 def robot_in(name):
@@ -97,8 +96,6 @@ def test_what_takes_too_long_is_left_out(engines):
     assert slow and not {(m.engine, m.name) for m in settings.methods(engines, "full", "all", HUMANOID)} & set(slow)
     implicit, arm7 = ("tmt", "implicit_midpoint"), robot_in("arm7")
     assert [implicit in settings.left_out(engines, size, arm7) for size in ("quick", "full")] == [True, False]
-    few, fewer = (settings.halvings(RK4, settings.regular_of(robot))[-1].steps for robot in (GRIPPER, HUMANOID))
-    assert few > 8 * fewer
 
 
 @pytest.mark.parametrize("engine, name, finest", [
