@@ -7,24 +7,11 @@ from models import PATHS
 
 from compare.engines.mujoco import Mujoco, parse, reading
 from compare.experiment import Setup, engines
-from compare.robots import Robot
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 
 XML = ARM.mjcf.read_text(encoding="utf-8")
 MOON = XML.replace("0 0 -9.81", "0 0 -1.62")
-MODELS = {  # what is replaced in the file by what
-    "the arm": ("", ""),
-    "on the moon": ("0 0 -9.81", "0 0 -1.62"),
-    "gravity off by its flag": ("<flag ", '<flag gravity="disable" '),
-    "ten times the gravity": ("-9.81", "-98.1"),
-    "damped by 5": ('axis="1 0 0"/>', 'axis="1 0 0" damping="5"/>'),
-    "with a spring": ('axis="1 0 0"/>', 'axis="1 0 0" stiffness="30"/>'),
-    "a muscle's activation": ("</mujoco>", '<actuator><position joint="beta" kp="3" timeconst="0.1"/></actuator></mujoco>'),
-    "a feather": (
-        'pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"', 'pos="1e-5 0 0" mass="1.5" diaginertia="1e-9 1e-9 1e-9"',
-    ),
-}  # fmt: skip
 STONE = PATHS["free_body"].read_text(encoding="utf-8")
 CART = """<mujoco model="cart">
   <compiler angle="radian"/>
@@ -51,12 +38,7 @@ def setup_of(model: str | Mujoco = XML, make=Setup.small, **fields) -> Setup:
     return make(ARM, engines(parse(model, ARM.tree) if isinstance(model, str) else model), **fields)
 
 
-def robot(text: str) -> Robot:
-    """The robot of an MJCF text, its numbers as MuJoCo compiled them."""
-    return robot_of(reading.read(text), "a text")
-
-
 def setup_between(text: str, edited: str | None = None, states: int = 30, exact_states: int = 1) -> Setup:
     """What an experiment needs to compare tmt's equations for a text with MuJoCo's for an edited one."""
-    engine = reading.engine(reading.read(edited or text))
-    return Setup(robot(text), engines(engine), states=states, exact_states=exact_states, size="small")
+    engine, robot = reading.engine(reading.read(edited or text)), robot_of(reading.read(text), "a text")
+    return Setup(robot, engines(engine), states=states, exact_states=exact_states, size="small")

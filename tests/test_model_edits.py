@@ -4,7 +4,6 @@ Every experiment in its smallest setting, in one process. In that of parameters 
 is the cause.
 """
 
-import re
 from functools import partial
 from math import pi
 
@@ -188,14 +187,10 @@ def test_a_parameter_is_compared_within_64_eps_and_told_with_all_its_digits(off,
 
 def test_causes_come_by_rank_then_by_size():
     """Not in the order in which numbers are read: mass, CoM, air."""
-    edits = (
-        ('mass="1.9"', 'mass="1.9000001"'),
-        ('pos="0.15 0 0"', 'pos="0.151 0 0"'),
-        ("<option ", '<option density="1.2" '),
-    )
-    causes = found(edited(*edits))[1]
+    mass, com = ('mass="1.9"', 'mass="1.9000001"'), ('pos="0.15 0 0"', 'pos="0.151 0 0"')
+    causes = found(edited(mass, com, ("<option ", '<option density="1.2" ')))[1]
     assert [cause["place"] for cause in causes] == ["density", "com x of forearm", "mass of upper arm"]
-    assert re.findall(r"\d\.\d+", causes[1]["text"]) == ["0.15", "0.151"]  # the stated number first
+    assert causes[1]["text"].index("0.15 m") < causes[1]["text"].index("0.151 m")  # the stated number first
 
 
 def test_a_force_that_no_number_explains_is_the_cause():
@@ -213,7 +208,6 @@ def test_geoms_that_cannot_touch_are_no_cause():
 
 @pytest.mark.parametrize("edits, causes", [
     ([('"0.015 0.014 0.002"', '"0.002 0.014 0.015"')], ["axes x and z of the inertia of upper arm exchanged"]),
-    ([('mass="1.9"', 'mass="3.9"'), ('pos="0.15 0 0"', 'pos="0.16 0 0"')], ["mass of upper arm", "com x of forearm"]),
     # 90 degrees where radians are meant
     ([(BODY, f'{BODY} euler="0 90 0"'), (GAMMA, f'{GAMMA} damping="0.1"')], ["zero of gamma", "damping of gamma"]),
     ([(BETA, f'{BETA} pos="0.01 0 0"')], ["anchor x of beta", "com x of upper arm"]),

@@ -71,24 +71,11 @@ def steps(method, dt=DT):
 WRONG = {  # the method and the step, and the scheme that is named: rank, place, what explains
     "scheme": ("rk4", DT, "semi_implicit_euler", 1, "scheme", "rk4"),
     "dt": ("rk4", 0.02, "rk4", 2, "dt", 0.02),
-    "sign": (
-        Altered(True, of_bias=-1.0),
-        DT,
-        "implicit",
-        2,
-        "derivative of the bias in the implicit step",
-        "enters with the wrong sign",
-    ),
-    "damping": (
-        Altered(False, of_damping=0.0),
-        DT,
-        "semi_implicit_euler",
-        2,
-        "damping in the implicit step",
-        "explicit",
-    ),
-}
-TWO = ("explicit_euler", 0.005, "semi_implicit_euler", 3, "scheme and dt", "explicit_euler and 0.005")  # fmt: skip
+    "sign": (Altered(True, of_bias=-1.0), DT, "implicit", 2,
+             "derivative of the bias in the implicit step", "enters with the wrong sign"),
+    "damping": (Altered(False, of_damping=0.0), DT, "semi_implicit_euler", 2, "damping in the implicit step", "explicit"),
+}  # fmt: skip
+TWO = ("explicit_euler", 0.005, "semi_implicit_euler", 3, "scheme and dt", "explicit_euler and 0.005")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Tolerances and rules of what is compared at states and with printed numbers, from the stated numbers written out."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from edited import MOON, setup_of
@@ -146,10 +144,5 @@ def test_each_column_is_whose_it_says_and_f4_is_asked_under_the_torque_of_c():
     assert of_alpha["exact"] == pytest.approx(-2.20725) and of_alpha["tolerance"] == pytest.approx(0.5e-4, rel=1e-6)
     for name in ("tmt", "exact"):
         assert max(abs(float(row[name])) for row in of_moon if row["item"] == "f4") < 1e-12
-    assert max(abs(float(row["tmt"])) for row in of_moon if row["item"] == "f1") > 40.0
     allowed = 64 * EPS * (least[-1] / least[0] + 1.0) / least[0] * 9.4176
     assert moon["f2", "alpha"]["tolerance"] == pytest.approx(allowed, rel=1e-9)
-
-
-def test_a_robot_of_which_nothing_is_printed_is_skipped():
-    assert published.skipped(ARM) is None and published.skipped(dataclasses.replace(ARM, printed=()))

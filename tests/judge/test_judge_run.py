@@ -5,6 +5,7 @@ import pytest
 from judged import BOTH, INSIDE, OUTSIDE
 
 import tmt
+from compare.actuators import Actuator, Drive
 from compare.case import Coordinates
 from compare.engines.mujoco import reading
 from compare.judge.run import departure, deviation, deviation_alive, diverged_at, leaves_no_digits, movement_unit
@@ -14,10 +15,7 @@ from compare.robots.file import robot_of
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
-ENDS = (
-    (INSIDE, None),
-    (OUTSIDE, 0.5),
-)  # shares of the energy that can be gained, and when a run of two states diverges
+ENDS = (INSIDE, None), (OUTSIDE, 0.5)  # shares of the energy that can be gained, and when a run of two states diverges
 T = np.array([0.0, 0.5])
 
 
@@ -81,6 +79,16 @@ def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_ha
         wrong = v.copy()
         wrong[-1] *= np.sqrt(1.0 + share)
         assert diverged_at(case, t, q, wrong) == ends
+
+
+def test_a_servo_gives_no_more_than_it_has_stored():
+    """At most 50 (0.2)^2 / 2 = 1 J beyond the 1 J that it has given when it is at its target."""
+    servo = Actuator("servo", "joint", (1.0,), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, 0.0))
+    robot = Robot("ball", None, alone("slide"), {}, (), drive=Drive((servo,)))
+    case = robot.case("step", torque="servos", targets=0.2)
+    for share, ends in ENDS:
+        speeds = np.array([[0.0], [np.sqrt(1.0 + share)]])  # of 2 kg
+        assert diverged_at(case, T, np.array([case.q, case.q + 0.2]), speeds) == ends
 
 
 def unit(*values) -> tuple:

@@ -6,8 +6,6 @@ from small_runs import Here, Lines
 
 from compare import experiment
 from compare.experiments import diagnosis
-from compare.experiments.diagnosis import single_steps
-from compare.judge.check import Result
 
 HEAVY = XML.replace('mass="1.5"', 'mass="1.51"')
 DAMPED = XML.replace('axis="1 0 0"/>', 'axis="1 0 0" damping="0.1"/>')
@@ -17,12 +15,10 @@ def failed(result):
     return [check for check in result.checks if not check.passed]
 
 
-def test_the_arm_has_nothing_to_explain(monkeypatch):
+def test_the_arm_has_nothing_to_explain():
     setup = setup_of()
     result = diagnosis.rows(setup)
     assert failed(result) == [] and result.rows == [] and result.curves["causes"] == []
-    monkeypatch.setattr(single_steps, "MOST_SPEEDS_STEPPED", 2)
-    assert len(diagnosis.rows(setup_of()).checks) == len(result.checks) - len(setup.engines["mujoco"].methods)
     found = setup.background["diagnosis"]  # a ratio of 1 is allowed
     for k, field in enumerate(("ratio", "force_ratio")):
         for ratio, passes in ((1.0, True), (1.001, False)):
@@ -30,17 +26,15 @@ def test_the_arm_has_nothing_to_explain(monkeypatch):
             assert diagnosis.rows(setup).checks[k].passed is passes
 
 
-def test_a_cause_is_a_row_a_note_of_the_check_that_fails_and_a_bar_of_the_figure():
+def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     result = diagnosis.rows(setup_of(HEAVY))
     (row,), (check,), (cause,) = result.rows, failed(result), result.curves["causes"]
     assert row["explains"] == pytest.approx(1.51, rel=1e-12) and row["left_over"] < 1e-9
     named = {"rank": 2, "kind": "number", "place": "mass of forearm", "stated": 1.5, "unit": "kg", "tied": 0}
     assert row.items() >= named.items() and (cause["place"], cause["found"]) == (row["place"], row["explains"])
     assert "mass of forearm" in check.note and "1.51 kg" in check.note
-    ((name, figure, caption),) = [draw() for draw in diagnosis.figures(result, None)]
-    assert name == "diagnosis_nearest" and "mass of forearm" in caption
-    assert len(figure.axes[0].patches) == len(result.curves["nearest"])
-    assert list(diagnosis.figures(Result("diagnosis"), None)) == []
+    ((*_, caption),) = [draw() for draw in diagnosis.figures(result, None)]
+    assert "mass of forearm" in caption
 
 
 def test_damping_is_seen_in_accelerations_alone():
@@ -59,14 +53,10 @@ def test_a_wrong_integrator_is_named_where_all_else_agrees():
     assert (row["place"], row["stated"], row["explains"]) == ("scheme", "implicit", "semi_implicit_euler")
 
 
-@pytest.mark.parametrize(
-    "names, text, made, found",
-    [
-        (["mass", "diagnosis"], XML, ["mass"], []),  # nothing failed
-        (["mass", "diagnosis"], HEAVY, ["mass", "diagnosis"], ["mass of forearm"]),
-        (["diagnosis"], XML, ["diagnosis"], []),
-    ],
-)
+@pytest.mark.parametrize("names, text, made, found", [
+    (["mass", "diagnosis"], XML, ["mass"], []),  # nothing failed
+    (["mass", "diagnosis"], HEAVY, ["mass", "diagnosis"], ["mass of forearm"]), (["diagnosis"], XML, ["diagnosis"], []),
+])  # fmt: skip
 def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_path, monkeypatch):
     monkeypatch.setattr(experiment, "find_causes", lambda setup: [])  # not by parameters, but in the values
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edited import XML
-from matplotlib.colors import to_hex
 from trees import mjcf
 
 import tmt
@@ -20,7 +19,6 @@ from compare.robots.arm import ARM
 from compare.setup import Setup
 from compare.setup import engines as engines_of
 
-GREEN, ORANGE = "#009e73", "#e69f00"
 FLOOR = additions.ON_FLOOR
 
 
@@ -181,7 +179,7 @@ def test_a_motion_is_mirrored_or_half_the_difference_of_two_is_taken_and_a_wrong
 # whose number stands where
 
 
-def test_the_cost_of_an_addition_is_the_ratio_of_its_times_and_is_drawn_so():
+def test_the_cost_of_an_addition_is_the_ratio_of_its_times():
     moved = np.zeros((3, 6))
     moved[1, 2], moved[2, 5] = 0.25, 9.0  # an angle, a rate
     names = (additions.MINIMAL, additions.AGAIN, "a motor", FLOOR)
@@ -191,13 +189,11 @@ def test_the_cost_of_an_addition_is_the_ratio_of_its_times_and_is_drawn_so():
     motor, floor = (row for row in table if row["integrator"] == "RK4" and row["added"] in ("a motor", FLOOR))
     assert (motor["ns_per_step"], motor["ratio"], floor["ratio"]) == pytest.approx((16.0, 2.0, 2.5))
     assert (motor["same_bits"], floor["same_bits"], floor["max_difference_rad"]) == (True, False, 0.25)
-    _, fig, caption = figures_needs.draw_costs(Result("reduction", tables={"cost_in_mujoco": table}))
-    bars = [(bar.get_width(), bar.get_hatch() is not None) for bar in fig.axes[0].patches]
-    assert sorted(bars) == [(pytest.approx(width), width == 1.5) for width in (0.5, 0.5, 1.0, 1.0, 1.5, 1.5)]
+    *_, caption = figures_needs.draw_costs(Result("reduction", tables={"cost_in_mujoco": table}))
     assert "2.50" in caption and "50.0 %" in caption and FLOOR in caption
 
 
-def test_the_table_and_the_figure_of_needs_have_the_times_of_each_engine(engines):
+def test_the_table_and_the_caption_of_needs_have_the_times_of_each_engine(engines):
     """Of a scene with a smaller model and of one that needs no run."""
     cases, seconds = {case.name: case for case in ARM.cases}, {}
     free, held, planar = cases["zero, free"], cases["bent, held"], cases["elbow swing"]  # stands for the smaller model
@@ -218,24 +214,16 @@ def test_the_table_and_the_figure_of_needs_have_the_times_of_each_engine(engines
 
     found = {free.name: {"locked": (), "stays": ("beta",)}, held.name: {"locked": ("alpha",), "stays": ("beta",)}}
     found[held.name]["undecided"] = ("gamma",)
-    _, fig, caption = figures_needs.draw_needs(Result("reduction", rows=table, curves={"needs": found}), ARM)
+    *_, caption = figures_needs.draw_needs(Result("reduction", rows=table, curves={"needs": found}), ARM)
     assert "TMT in zero, free" in caption and "1 of 3" in caption and "0.33" in caption  # the largest gain
-    assert [line.get_marker() for line in fig.axes[0].get_lines()] == [*"ooo", *"xod"]
-    lines = [line for line in fig.axes[1].get_lines() if len(line.get_xdata()) == 1]
-    for colour, drawn_times in ((GREEN, (100.0, 300.0)), (ORANGE, (4000.0, 6000.0))):
-        of_engine = [line for line in lines if to_hex(line.get_color()) == colour]
-        drawn = sorted(line.get_xdata()[0] for line in of_engine if round(line.get_ydata()[0]) == 0)
-        assert drawn == pytest.approx(drawn_times)
 
 
-def test_the_figure_of_a_swing_has_each_engine_in_its_place():
+def test_the_caption_of_a_swing_has_each_engine_in_its_place():
     errors = {("tmt", "RK4"): [1e-3] * 6, ("mujoco", "RK4"): [3e-3] * 6}
     errors |= {("tmt", "Euler"): [0.1] * 6, ("mujoco", "Euler"): [0.3] * 6}
     orders = {("tmt", "RK4"): 4.01, ("mujoco", "RK4"): 3.97, ("tmt", "Euler"): 1.02}
     swing = {"dt": 1.0 / np.arange(1, 7), "errors": errors, "orders": orders, "stated": {"RK4": 4, "Euler": 1}}
     result = Result("reduction", curves={"swings": {"elbow swing": swing}})
-    _, fig, caption = figures_motion.draw_swing(result, "elbow swing")
-    lines = {line.get_label(): line.get_ydata()[0] for line in fig.axes[0].get_lines()}
-    assert lines["RK4, TMT"] == 1e-3 and lines["RK4, MuJoCo"] == 3e-3
+    *_, caption = figures_motion.draw_swing(result, "elbow swing")
     found = [caption.index(number) for number in ("4.01", "3.97", "1.0e-03", "3.0e-03", "1.02")]
     assert found == sorted(found)

@@ -7,7 +7,7 @@ from judged import INSIDE, only
 import tmt
 from compare.engines.mujoco.engine import METHODS as INTEGRATORS
 from compare.engines.tmt import Tmt
-from compare.experiments.stability import beyond, choice, claims, claims_judged, failure, figures_claims, long_runs
+from compare.experiments.stability import beyond, choice, claims, claims_judged, failure, long_runs
 from compare.judge.scale import gravity_scale
 from compare.robots.arm import ARM
 
@@ -50,13 +50,6 @@ def test_claim_1(result, changed, word, passes):
     assert verdict(result.notes[-1]) == word and all(check.passed for check in result.checks[1:]) is passes
 
 
-def test_what_each_engine_does_is_drawn_of_that_engine(result):
-    claims_judged.check_torques(result, ARM, torque_rows(times=(4.11, 5.22)))
-    axes = figures_claims.draw_torques(result, ARM)[1].axes
-    for ax, engine, time in zip(axes, ("TMT", "MuJoCo"), (4.11, 5.22)):
-        assert engine in ax.get_ylabel() and {line.get_xdata()[0] for line in ax.lines} == {time}
-
-
 @pytest.mark.parametrize("to, found", [(0.3, 1), (-0.3, -1), (np.nan, None)])
 def test_the_side_to_which_a_posture_is_left(to, found):
     path = np.array([[1.0, 0.0, 0.0], [1.0 + to / 3, 0.0, 0.0], [1.0 + to, 9.0, 9.0]])
@@ -82,7 +75,6 @@ def finer_rows(moved=0.0, directions=(1, -1), times=(5.0, 6.0)):
 def test_claim_2(result, changed, word, passes):
     claims_judged.check_finer_steps(result, ARM, finer_rows(**changed))
     assert verdict(result.notes[-1]) == word and [check.passed for check in result.checks] == 4 * [passes]
-    assert figures_claims.draw_finer_steps(result, ARM)
 
 
 def kept_runs(observed=None, largest=0.06, leaves=(), acceleration=50.0, rest=0.0):

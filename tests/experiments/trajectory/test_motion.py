@@ -1,16 +1,15 @@
-"""The motion of the runs: its table, the pictures of it, who leaves when and where to, and the GIF."""
+"""The motion of the runs: its table, the pictures of it and the GIF."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from models import PATHS
 from PIL import Image
-from trajectory_curves import CASES, HELD, run_of
+from trajectory_curves import CASES
 
 from compare.coordinates import Coordinates
-from compare.engines import GRID, compared
+from compare.engines import GRID
 from compare.engines.mujoco import reading
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import motion
@@ -100,41 +99,6 @@ def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_
     for name in METHOD:
         np.testing.assert_allclose(drawn.points[name], seen(curve[name][0][::2]), atol=1e-15)
     np.testing.assert_array_equal(drawn.apart, np.abs(curve["tmt"][0] - curve["mujoco"][0]).max(axis=1)[::2])
-    assert drawn.left == {"tmt": None, "mujoco": None}  # there is no posture to leave
-
-
-def test_what_is_held_is_followed_until_both_have_left():
-    t = np.arange(129) * 5 / 64
-
-    def leaves(at):
-        q = HELD.q + 0.2 * (t >= at)[:, None]
-        return SimpleNamespace(run=lambda *_: SimpleNamespace(t=t, q=q, v=0.0 * q))
-
-    dynamics, both = {"tmt": leaves(6.25), "mujoco": leaves(3.75)}, {"tmt": 6.25, "mujoco": 3.75}
-    for left, end in (((None, 3.75), 6.75), ((3.75, 3.75), 5.0), ((None, None), 5.0)):
-        seen, paths, _, found = frames.followed_on(HELD, dynamics, METHOD, run_of(HELD, left=left), 64)
-        assert seen[-1] == pytest.approx(end, abs=5 / 64) and len(paths["tmt"][0]) == len(seen)
-        assert found == (both if end > 5.0 else dict(zip(both, left)))
-
-
-def test_between_two_states_stands_what_the_method_gives_with_half_a_step_and_nothing_after_divergence(runs, engines):
-    curve = runs[CATCH.name, "rk4", 64] | {"ended": {"tmt": None, "mujoco": 2.5}}
-    scene = frames.drawn_motion(CATCH, engines, {(CATCH.name, "rk4", 64): curve})
-    assert len(scene.t) == 129
-    for name, of in compared(engines, CATCH).items():
-        half = of.run(curve[name][0][5], curve[name][1][5], CATCH.tau, 5 / 128, 1, METHOD[name]).q[1]
-        np.testing.assert_allclose(scene.points[name][11], seen([half])[0], atol=1e-12)
-    gone = np.isnan(scene.points["mujoco"]).all(axis=(1, 2))
-    np.testing.assert_array_equal(gone, scene.t >= 2.5)
-    assert np.isfinite(scene.points["tmt"]).all() and np.isnan(scene.apart[gone]).all()
-
-
-def test_first_comes_what_is_held_and_left_then_what_is_let_go_from_there(drawn):
-    names = ["bent, held", "bent, free", "zero, free", "ball catch, held", "ball catch, free"]
-    scenes = [drawn._replace(scene=name) for name in names]
-    assert [one.scene for one in frames.in_order(scenes, ARM)] == names and frames.in_order([], ARM) == []
-    scenes[3] = scenes[3]._replace(left={"tmt": None, "mujoco": 4.0})
-    assert [one.scene for one in frames.in_order(scenes, ARM)] == [*names[3:], *names[:3]]
 
 
 def test_a_free_body_is_a_cross_that_turns_with_it():

@@ -8,12 +8,12 @@ CASES = {case.name: case for case in ARM.cases}
 FREE, HELD, DAMPED = (CASES[name] for name in ("bent, free", "ball catch, held", "bent, damped"))
 
 
-def run_of(case, ours=0.0, theirs=0.0, until=5.0, ended=(None, None), left=(None, None)) -> dict:
+def run_of(case, ours=0.0, theirs=0.0, until=5.0, left=(None, None)) -> dict:
     """The curves of a run of 64 steps whose angles end so far from where they started."""
     t = np.linspace(0.0, 5.0, 65)
     ramp = np.linspace(0.0, 1.0, 65)[:, None] * np.ones(len(case.joints))
     return {
         "integrator": "RK4", "t": t, "every": 1, "tmt": [case.q + ours * ramp, 10.0 + ours * ramp],
         "mujoco": [case.q + theirs * ramp, 20.0 + theirs * ramp], "band": np.full(65, 1e-9), "nudged": case.q + 0.0 * ramp,
-        "judged_until_s": until, "ended": dict(zip(("tmt", "mujoco"), ended)), "left": dict(zip(("tmt", "mujoco"), left)),
+        "judged_until_s": until, "ended": {"tmt": None, "mujoco": None}, "left": dict(zip(("tmt", "mujoco"), left)),
     }  # fmt: skip
