@@ -1,6 +1,6 @@
 """Runs of the command line as a user starts them: in a pipe, on a terminal, and ended by a signal.
 
-For test_command_line, test_help, small_runs, and the tests of fleet, process and report.
+For test_command_line, test_help, and the tests of fleet, process and report.
 """
 
 import fcntl

@@ -6,7 +6,6 @@ import platform
 from contextlib import closing
 from itertools import pairwise
 
-import pytest
 import toy_pieces as toy
 
 from compare.fleet.calls import door_opened
@@ -14,10 +13,9 @@ from compare.fleet.piece import Piece, outcomes
 from compare.fleet.pool import Pool
 
 
-@pytest.mark.parametrize("faults", [toy.SOME, pytest.param(toy.ALL, marks=pytest.mark.slow)], ids=["some", "all"])
-def test_what_becomes_of_a_piece(tmp_path, faults):
+def test_what_becomes_of_a_piece(tmp_path):
     with closing(Pool(2, toy.LIMIT, toy.MEMORY)) as pool:
-        toy.check_all(pool, tmp_path, faults)
+        toy.check_all(pool, tmp_path)
 
 
 def test_nothing_runs_beside_what_is_timed(tmp_path):

@@ -1,4 +1,4 @@
-"""Pieces that do what a piece can do, and what is to become of each; for test_pool, test_cluster and test_interrupted."""
+"""Pieces that do what a piece can do, and what is to become of each; for test_pool, test_cluster, test_fleet_command."""
 
 import math
 import os
@@ -8,7 +8,6 @@ import sys
 import threading
 import time
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 from compare.fleet.piece import Piece, outcomes
@@ -62,8 +61,7 @@ def in_time(folder, seconds):
 def waits(folder, opened, shared=b""):
     """Waits until a file is there; who waits is noted."""
     noted(folder, f"{os.getpid()} {os.getppid()}")
-    while not Path(opened).exists():
-        time.sleep(0.02)
+    soon(Path(opened).exists)
     return len(shared)
 
 
@@ -78,34 +76,27 @@ class Fault(NamedTuple):
     shared: bytes = b""
 
 
-GONE = ModuleType("gone")  # a module that no other process has
-exec("def nowhere():\n    return 0\n", GONE.__dict__)
-SOME = {
+FAULTS = {
     "for ever": Fault(for_ever, words=("3 s",), tries=1),
     "raises": Fault(math.sqrt, (-1.0,), words=("ValueError",)),
     "killed": Fault(killed, (9,), words=("SIGKILL", "4 times"), tries=4),
     "killed once": Fault(killed, (1,), "at last", tries=2),
+    "exits": Fault(exits, (3,), words=("status 3", "no hope", "4 times")),
     "eats": Fault(bytearray, (4 * MEMORY,), words=("memory", "1 GB")),
     "prints": Fault(prints, value=""),
     "asked with a lock": Fault(abs, (threading.Lock(),), words=("TypeError", "lock")),
     "shares": Fault(len, value=3 * 10**7, shared=b"x" * 3 * 10**7),
 }
-ALL = SOME | {
-    "exits": Fault(exits, (3,), words=("status 3", "no hope", "4 times")),
-    "leaves": Fault(sys.exit, (3,), words=("SystemExit: 3",)),
-    "asked of nobody": Fault(GONE.nowhere, words=("ModuleNotFoundError", "gone")),
-}
 
 
-def check_all(door, folder, faults):
+def check_all(door, folder):
     """Whether through a door what is to become of each piece does. folder: where they take notes of when they begin."""
-    sys.modules["gone"] = GONE
     asked = []
-    for name, fault in faults.items():
+    for name, fault in FAULTS.items():
         (folder / name).mkdir()
         arguments = (*fault.arguments, str(folder / name)) if fault.tries else fault.arguments
         asked.append(Piece(name, fault.function, arguments, shared=fault.shared))
-    for (name, fault), found in zip(faults.items(), outcomes(door, asked), strict=True):
+    for (name, fault), found in zip(FAULTS.items(), outcomes(door, asked), strict=True):
         if fault.value is None:
             assert all(word in found.broke for word in fault.words), f"{name}: {found.broke}"
         else:

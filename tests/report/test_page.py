@@ -17,14 +17,7 @@ from compare.report.verdict import Report, verdict
 from compare.robots import Question
 from compare.robots.arm import ARM
 
-CAUSE = {
-    "rank": 2,
-    "place": "mass of forearm",
-    "stated": 1.5,
-    "found": 1.6,
-    "text": "mass of forearm: 1.6 kg",
-    "size": 9.0,
-}
+CAUSE = {"rank": 2, "place": "mass of forearm", "stated": 1.5, "found": 1.6, "text": "forearm: 1.6 kg", "size": 9.0}
 
 
 @pytest.fixture
@@ -82,12 +75,8 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
     assert re.findall(r'<figure class="(\w+)"><a href="#([^"]+)"', top) == [
         ("bad", "trajectory"), ("good", "figure-mass_distances"),
     ]  # fmt: skip
-    for name, kind, sign in (("mass", "good", "✓"), ("trajectory", "bad", "✗"), ("speed", "none", "–")):
-        marked = f'<span class="mark {kind}" aria-hidden="true">{sign}</span>'
-        assert (
-            f'<li class="{kind}">{marked}<div><a href="#{name}">' in top
-            and f'<p class="outcome {kind}">{marked}' in rest
-        )
+    for name, kind in (("mass", "good"), ("trajectory", "bad"), ("speed", "none")):
+        assert re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top) and f'<p class="outcome {kind}">' in rest
     top, _ = page_of(folder, [with_figures(section("kinematics", *[BAD] * 5), "kinematics_distances")])
     assert '<div class="pictures"><figure class="bad"><a href="#figure-kinematics_distances">' in top  # not a picture
     assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4  # no cause is known
@@ -113,18 +102,16 @@ def test_results_have_every_check_cause_and_digit(folder):
     rows = [{"a": 0.12345678901234568, "b": k, "engine": "tmt", "ok": True} for k in range(3)]
     names = ("joint;" * 20)[:81]
     of = section("mass", GOOD, BAD, rows=rows, extra=[{"b": 1 / 3, "names": names}])
-    second = CAUSE | {"text": "com x of forearm: stated 3"}
-    write(folder, report_of(folder, [with_figures(of, "mass_distances")], [CAUSE, second]))
+    write(folder, report_of(folder, [with_figures(of, "mass_distances")], [CAUSE]))
     results = json.loads(text_of(folder / "results.json"))
     assert set(results) == {"passed", "reference", "checks", "causes", "skipped", "provenance"}
     assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
-    fields = ("rank", "place", "stated", "found", "text")
-    assert results["causes"] == [{name: cause[name] for name in fields} for cause in (CAUSE, second)]
+    assert [cause | {"size": 9.0} for cause in results["causes"]] == [CAUSE]
     lines = text_of(folder / "tables" / "mass.csv").splitlines()
     assert lines == ["a,b,engine,ok", *(f"{row['a']!r},{row['b']},tmt,true" for row in rows)]
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
     html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
-    assert names not in text and all(cause["text"] in html and cause["text"] in text for cause in (CAUSE, second))
+    assert names not in text and CAUSE["text"] in html and CAUSE["text"] in text
     assert html.count("<td>0.123</td>") == 3 and "**Checks that fail:**" in text
     assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]  # WebP is in the page alone
 
@@ -146,12 +133,9 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     }  # fmt: skip
     assert {name: why.split(":")[0] for name, why in parts.broken.items()} == whys
     text, html = text_of(folder / "report.md"), text_of(folder / "index.html")
-    assert all(name in text and name in html for name in whys)
-    assert "## Gravity\n" in text and "![nowhere]" in text and "A caption." not in html
-    assert '<main id="main" class="bad">' in html and '<div class="verdict bad">' in html
+    assert all(name in text and name in html for name in whys) and '<div class="verdict bad">' in html
     assert sorted(path.name for path in (folder / "tables").iterdir()) == ["gravity.csv", "mass.csv"]
     results = json.loads(text_of(folder / "results.json"))
     failed = [check for check in results["checks"] if not check["passed"]]
     assert results["passed"] is False and {check["experiment"] for check in failed} == {"report"}
-    assert all(check["quantity"].startswith(name) for check, name in zip(failed, whys, strict=True))
-    assert len(results["causes"]) == 1
+    assert len(failed) == len(whys) and len(results["causes"]) == 1
