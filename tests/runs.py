@@ -39,10 +39,7 @@ def in_shell(text, cwd):
 
 
 def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
-    """A run on a pseudo-terminal: status, output, and seconds from the key Ctrl-C, if that is pressed, to the end.
-
-    interrupt_at: what stands in the output when the key is pressed.
-    """
+    """A run on a pseudo-terminal: status, output. interrupt_at: what stands in the output when the key Ctrl-C is pressed."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
 
@@ -54,7 +51,7 @@ def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
     environment = ENVIRONMENT | {"TERM": term}
     run = subprocess.Popen(command(*arguments), cwd=cwd, env=environment, preexec_fn=own_terminal, **streams)
     os.close(theirs)
-    output, pressed = b"", None
+    output, pressed = b"", False
     while True:
         select.select([ours], [], [], 60)
         try:
@@ -64,11 +61,10 @@ def on_terminal(arguments, columns, term, cwd, interrupt_at=None):
         output += new
         if interrupt_at and not pressed and interrupt_at in output:
             os.write(ours, b"\x03")
-            pressed = time.perf_counter()
+            pressed = True
     status = run.wait(timeout=60)
-    seconds = time.perf_counter() - pressed if pressed else None
     os.close(ours)
-    return SimpleNamespace(status=status, output=output.decode(), seconds=seconds, columns=columns)
+    return SimpleNamespace(status=status, output=output.decode(), columns=columns)
 
 
 def words(lines) -> str:

@@ -1,4 +1,4 @@
-"""Sections of plain checks, for tests of what is said of them: test_examine, test_references, and those of report."""
+"""Sections of plain checks, for tests of what is said of them: test_references, and those of report."""
 
 from compare.judge.check import Result
 from compare.report.verdict import Section

@@ -1,6 +1,7 @@
 """Small runs that several tests look at, which the fixture `shared` computes once.
 
-Used by conftest.py (`small`), test_own_reference, test_second_robot and experiments/diagnosis/test_judge_diagnosis.
+Used by conftest.py (`small`), test_own_reference, test_second_robot, report/test_verdict and
+experiments/diagnosis/test_judge_diagnosis.
 """
 
 from functools import cache

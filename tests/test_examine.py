@@ -1,23 +1,19 @@
-"""What breaks inside a run is a failed check, and the rest goes on; what is timed comes last; what was computed is kept."""
+"""What breaks inside a run is a failed check, and the rest goes on; what is timed comes last."""
 
 import json
 import os
 import sys
-from concurrent.futures import Future
 from functools import partial
 from types import SimpleNamespace
 
 import pandas as pd
-from in_process import runs_in_this_process as runs_in_this_process
 from matplotlib.figure import Figure
-from sections import GOOD, section
 
 from compare import __main__ as entry
 from compare import command_line, drawing, experiment
 from compare.__main__ import main
 from compare.fleet.file_pieces import Here
 from compare.judge.check import Result
-from compare.process.workers import WorkerEnded
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 
@@ -54,37 +50,29 @@ BROKEN = {  # functions of the experiment; the check that fails, and the error t
 }  # fmt: skip
 
 
-def test_an_experiment_that_raises_is_one_failed_check(tmp_path, capsys, monkeypatch):
+def test_an_experiment_that_raises_is_one_failed_check_and_a_part_of_the_report_that_breaks_is_said(
+    tmp_path, capsys, monkeypatch
+):
     for name, (functions, *_) in BROKEN.items():
         made(monkeypatch, name, **functions)
-    only(monkeypatch, *BROKEN, "published")
+    made(monkeypatch, "odd", rows=lambda setup: Result("odd", shown=["a", "b"], rows=[{"a": 1.5}]))
+    only(monkeypatch, *BROKEN, "odd", "published")
     monkeypatch.setattr(experiment, "find_causes", lambda setup: [])
     status, results = ran(tmp_path, "all")
-    failed = [check for check in results["checks"] if not check["passed"]]
-    assert status == 1 and [check["experiment"] for check in failed] == list(BROKEN)
     out, err = capsys.readouterr()
-    assert "published     ok" in out and err == ""
-    for check, (name, (_, quantity, error)) in zip(failed, BROKEN.items()):
-        assert (check["quantity"], check["value"], check["rule"]) == (quantity, None, "equal")
-        assert error in check["note"]
-        assert f"FAIL {name}: {quantity}" in out
-
-
-def test_a_report_of_which_a_part_breaks_is_kept_and_not_complete(inside, tmp_path, capsys, monkeypatch):
-    def rows(setup):
-        result = Result("odd", shown=["a", "b"], rows=[{"a": 1.5}])
-        result.check("zero", "a", 0.5, 1.0, "m")
-        return result
-
-    made(monkeypatch, "odd", rows=rows)
-    only(monkeypatch, "odd", "published")
-    status, results = ran(tmp_path, "all")
-    out, err = capsys.readouterr()
-    assert status == 1 and "odd           ok" in out
+    assert status == 1 and "published     ok" in out and not results["passed"]
+    failed = [check for check in results["checks"] if not check["passed"] and check["experiment"] in BROKEN]
+    for check, (name, (_, quantity, error)) in zip(failed, BROKEN.items(), strict=True):
+        assert (check["experiment"], check["quantity"], check["value"], check["rule"]) == (
+            name,
+            quantity,
+            None,
+            "equal",
+        )
+        assert error in check["note"] and f"FAIL {name}: {quantity}" in out
     for line, name in zip(err.splitlines(), ("report.md", "index.html"), strict=True):
         assert f"odd in {name}" in line and "KeyError: " in line
     assert pd.read_csv(tmp_path / "out/tables/odd.csv")["a"].tolist() == [1.5]
-    assert not results["passed"] and results["checks"][0]["passed"]
 
 
 def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):
@@ -92,14 +80,6 @@ def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsy
     only(monkeypatch, "broken")
     assert ran(tmp_path, "broken") == (2, None)
     assert len(capsys.readouterr().err.splitlines()) == 1 and list(tmp_path.iterdir()) == []
-
-
-def test_what_was_computed_is_kept_though_the_process_that_draws_is_ended(capsys):
-    drawn, ended = section("mass", GOOD), Future()
-    ended.set_exception(WorkerEnded("no longer there"))
-    experiment.take_figures(Terminal(), drawn, ended)
-    assert [check.passed for check in drawn.result.checks] == [True, False]
-    assert "FAIL mass: figure number 1 is drawn" in " ".join(capsys.readouterr().out.split())
 
 
 # what is drawn, and when

@@ -119,7 +119,7 @@ def answers(names=("mass", "speed"), **more):
     return {"names": names, "door": Inside(before=answered)} | more
 
 
-def test_what_has_changed_is_computed_anew_and_nothing_else(fleet):
+def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
     every = ["read", "mass", "speed, untimed", "speed", "report"]
     first, second = fleet(TWO, **answers()), fleet(TWO, **answers())
     assert len(first.door.names) == 10 and second.door.names == [] and second.of.done_before == 2
@@ -133,6 +133,10 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet):
     ):
         found = fleet({}, found=found_models(["m/a.xml"]), is_quick=is_quick, **answers(names))
         assert [step_of(name) for name in found.door.names] == computed
+    for solution, computed in ((PENDULUM.format(0.1), 5), (PENDULUM.format(0.1), 0), (PENDULUM.format(0.2), 5)):
+        (tmp_path / "solution.xml").write_text(solution)
+        found = fleet({}, found=found_models(["m/a.xml"]), reference="solution.xml", **answers())
+        assert len(found.door.names) == computed
 
 
 def test_each_file_is_timed_and_reported_with_what_was_found_of_itself(fleet):
@@ -228,14 +232,6 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
     assert [name for name, row in found.rows.items() if not row["has_report"]] == ["slide.xml"]
     assert "--only parameters --reference solution.xml" in (report(tmp_path, "renamed.xml") / "report.md").read_text()
     assert not report(tmp_path, "heavy_too.xml").exists() and found.rows["heavy_too.xml"]["report_of"] == "m/heavy.xml"
-
-
-def test_another_solution_is_another_fleet_and_the_same_computes_nothing(fleet, tmp_path):
-    computed = []
-    for text, reference in [(SOLUTION, "solution.xml")] * 2 + [(HEAVY, "solution.xml"), (HEAVY, None)]:
-        (tmp_path / "solution.xml").write_text(text)
-        computed.append(len(fleet(ONE, reference=reference, **answers()).door.names))
-    assert computed == [5, 0, 5, 5]
 
 
 def test_files_of_one_content_are_computed_once_if_what_they_load_is_the_same(fleet):

@@ -58,7 +58,6 @@ def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
     assert row_of(good(0.2), good(3.0), OWN)["worst_ratio"] == 3.0
     diverged = row_of(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
     assert (diverged["verdict"], diverged["worst_ratio"]) == (DIFFER, 0.2)
-    assert row_of(BROKEN)["worst_ratio"] is None
 
 
 def limit(dt, stable, integrator="Euler", base="fixed", kind="finite"):

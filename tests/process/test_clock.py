@@ -29,10 +29,7 @@ def test_waiting_is_nobodys_and_work_is_whose_it_is():
         time.sleep(LONG)
     with clock.of("works"):
         busy(LONG)
-    clock.begins("works")
-    assert clock.under_way == "works"
     clock.ends("works")
-    assert clock.under_way == ""
     busy(LONG)  # for nobody
     assert clock.seconds_of("waits") < LONG / 2 and LONG <= clock.seconds_of("works") < 2 * LONG
     assert 2 * LONG <= clock.ended["works"] <= clock.elapsed - LONG

@@ -8,9 +8,8 @@ import shutil
 import pytest
 from runs import ROOT, compare, in_shell
 
-from compare.experiments import EXPERIMENTS
 from compare.process.clock import Clock
-from compare.report.remaining import AFTER_FULL, AFTER_QUICK, END, START, Remaining, plan
+from compare.report.remaining import END, START, Remaining
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 
@@ -41,7 +40,6 @@ PARTS = ["4 of 11", "acceleration", "about 35 s left"]
     (80, ["9 of 11", "speed"], "speed: timing", "9 of 11, speed: timing"),
     (49, PARTS, "bias", "4 of 11, acceleration, about 35 s left: ..."),
     (40, PARTS, "bias", "4 of 11, about 35 s left: bias"),
-    (10, PARTS, "bias", "4 of 11, ab..."),
 ])  # fmt: skip
 def test_the_line_of_progress_fits(columns, how_far, text, line):
     terminal = Terminal()
@@ -67,8 +65,6 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     assert ROOT.as_posix() not in run.stderr
 
 
-# how long a run takes still: from the last run of its kind, corrected by what is seen
-
 PLAN = {START: 10.0, "a": 20.0, "b": 60.0, END: 100.0}
 
 
@@ -83,15 +79,3 @@ def test_an_estimate_is_what_is_left_of_the_plan_scaled_by_what_was_seen(elapsed
     clock.ended, clock.under_way = ended, "a"
     left = Remaining(clock, ["a", "b"], PLAN)
     assert left.seconds == pytest.approx(seconds) and len(left.words()) == (3 if seconds else 2)
-
-
-@pytest.mark.parametrize("last, command, ended, is_used", [
-    ("compare all --out=there --quick", "compare --quick all --out 'a b'", PLAN, True),
-    ("compare all", "compare all --quick", PLAN, False),
-    ("compare all", "compare all", {"a": 2.0, END: 1.0}, False),
-])  # fmt: skip
-def test_the_last_run_of_the_same_kind_is_what_is_planned(tmp_path, last, command, ended, is_used):
-    (tmp_path / "results.json").write_text(json.dumps({"provenance": {"command": last, "ended_after_s": ended}}))
-    quick = "--quick" in command
-    expected = ended if is_used else AFTER_QUICK if quick else AFTER_FULL
-    assert plan([*EXPERIMENTS], quick, command, tmp_path) == expected

@@ -1,17 +1,16 @@
 """What is said of plain checks and rows: the verdict, the answers, the one number of each experiment, and what is drawn."""
 
 import re
-from types import SimpleNamespace
 
 import pytest
 from matplotlib.colors import to_hex
 from sections import BAD, GOOD, section
+from small_runs import Lines
 
 from compare.experiment import say_outcome
 from compare.judge.check import About, Result
 from compare.judge.units import renamed
 from compare.report import engines_apart, figures_overview, methods_compared
-from compare.report.engines_apart import SceneRun
 from compare.report.methods_compared import Cheapest, Curve, Limit
 from compare.report.one_number import one_number
 from compare.report.questions import answers
@@ -19,7 +18,6 @@ from compare.report.style import BLUE, ORANGE, RED
 from compare.report.verdict import Section, failures, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
 
-LIMIT = ("limit, observed / predicted - 1", 0.009, 0.001, "at most", False, About.PREDICTION)
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
 
 
@@ -73,20 +71,6 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
     assert len(said) == 4 and standing(section("mass", GOOD))[0] is True and standing(section("mass"))[0] is None
     assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True))) == [1, 0, 0, 0]  # it diverged
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
-
-
-def test_an_unstable_step_and_an_unconfirmed_prediction_are_named():
-    text = verdict([section("stability", GOOD, LIMIT)], 2)
-    assert "all 1 checks" in text and "limit, observed / predicted - 1, zero: 0.009" in text
-    text = verdict([section("stability", GOOD, OWN_STEP, (*OWN_STEP[:2], 0.001, *OWN_STEP[3:]))], 2)
-    assert "all 1 checks" in text and all(part in text for part in (" 2 ms", "one more", " 1 ms."))
-
-
-class Lines(list):
-    """A terminal that keeps what is said."""
-
-    def say(self, text, style=""):
-        self.append(text)
 
 
 def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
@@ -156,7 +140,6 @@ FASTER = {"speedup": 4.21, "hinges": "gamma", "scene": "a"}
 
 
 @pytest.mark.parametrize("name, rows, numbers, named", [
-    ("mass", [{"odd": 1}], "1 1 50", ""),  # how many checks pass
     ("parameters", [SAME, OFF], "1 2 0.5", "com x of forearm"),
     ("parameters", [OFF, HEAVY], "0 2 0.5", "com x of forearm"),  # relative to their sizes
     ("published", [PRINTED | {"mujoco": 0.8}], "0 1", ""),
@@ -165,7 +148,7 @@ FASTER = {"speedup": 4.21, "hinges": "gamma", "scene": "a"}
     ("diagnosis", [FAULT, FAULT | {"outcome": "wrong"}, FAULT | {"visible": False}], "3 6", ""),
     ("stability", [STEP, STEP | {"observed_dt_s": 0.0995}], "2 0.5", ""),
     ("reduction", [FASTER | {"speedup": 1.05}], "1.1", "gamma"),
-    ("reduction", [FASTER | {"speedup": 1.04}], "1 1 50", ""),  # as much as the clock may be off
+    ("reduction", [FASTER | {"speedup": 1.04}], "1 1 50", ""),  # as much as the clock may be off: how many checks pass
 ])  # fmt: skip
 def test_the_one_number_is_computed_and_comes_out_either_way(name, rows, numbers, named):
     said = one_number(section(name, GOOD, rows=rows))
@@ -177,7 +160,6 @@ def test_the_one_number_is_computed_and_comes_out_either_way(name, rows, numbers
 
 OF_BIAS = {"quantity": "Mbar", "difference_eps": 2.0, "tmt_from_exact_eps": 1.0, "mujoco_from_exact_eps": 4.0,
            "passed": True}  # fmt: skip
-RUN = {"scene": "a", "level": "open loop", "difference_over_band": 0.2, "judged_until_s": 3.0, "diverged_at_s": None}
 
 
 def timed(engine, method, seconds, error, **more):
@@ -205,22 +187,6 @@ def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_
     assert found.apart == float("inf") and not found.passed
     drawn = marks("mass", Result("mass", rows=[OF_BIAS]))
     assert drawn == {("D", to_hex("black"), 2.0), ("o", to_hex(BLUE), 1.0), ("s", to_hex(ORANGE), 4.0)}
-
-
-def test_a_scene_at_a_glance():
-    rows = [RUN, RUN | {"judged_until_s": 0.5, "diverged_at_s": 0.6}, RUN | {"level": "one step", "difference_over_band": 0.7},
-            RUN | {"scene": "a, more", "difference_over_band": None}]  # fmt: skip
-    left = {("a", "rk4", 64): {"t": [0.0, 5.0], "left": {"tmt": 4.7, "mujoco": None}}}
-    result = Result("trajectory", rows=rows, curves={"runs": left})
-    result.check("a, more, RK4", "one step", 2.0, 1.0, "rad")
-    result.check("a, RK4", "one step", 1.0, 1.0, "rad")
-    robot = SimpleNamespace(cases=[SimpleNamespace(name="a", duration=5.0, is_held=True, steps=64)])
-    found = engines_apart.scene_runs(result, robot)
-    assert found == [
-        SceneRun("a", 0.7, (0.5, 3.0), 5.0, 0.6, (4.7, None), True),
-        SceneRun("a, more", None, (3.0, 3.0), 3.0, None, None, False),
-    ]
-    assert "a, more" in engines_apart.scenes_in_words(found, "yours")
 
 
 def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_named():
