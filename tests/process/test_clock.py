@@ -26,13 +26,14 @@ def break_off():
 def test_waiting_is_nobodys_and_work_is_whose_it_is():
     clock = Clock()
     with clock.of("waits"):
-        time.sleep(LONG)
+        time.sleep(5 * LONG)
     with clock.of("works"):
         busy(LONG)
     clock.ends("works")
     busy(LONG)  # for nobody
-    assert clock.seconds_of("waits") < LONG / 2 and LONG <= clock.seconds_of("works") < 2 * LONG
-    assert 2 * LONG <= clock.ended["works"] <= clock.elapsed - LONG
+    # the processor's time is that of all threads, and one of another test may be at its end
+    assert clock.seconds_of("waits") < 2 * LONG and LONG <= clock.seconds_of("works") < 3 * LONG
+    assert 5 * LONG <= clock.ended["works"] < clock.elapsed
 
 
 def test_what_a_worker_does_is_for_the_task_that_asked():
