@@ -4,6 +4,8 @@ import base64
 import io
 import json
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +106,21 @@ def test_a_large_robot_has_fewer_pictures_and_then_fewer_scenes(rng):
     assert len(text.encode()) <= 300_000 and len(found) < 6 and found[0]["dt"] == pytest.approx(5.0 / 16)
     assert len(found[0]["paths"][0]) == len(found[0]["apart"]) == 17
     assert all(f"scene {k}" in text for k in range(6))  # also those that are not shown
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium to run the script")
+def test_the_script_draws_each_engine_where_it_is(tmp_path):
+    text = page_of(drawn(apart=0.3))
+    script = text.index("<script")
+    page = tmp_path / "page.html"
+    page.write_text(re.sub(r' d="M[^"]*"', ' d=""', text[:script]) + text[script:], encoding="utf-8")
+    asked = ["--headless=new", "--no-sandbox", "--disable-gpu", "--force-prefers-reduced-motion", "--dump-dom",
+             f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=2000", page.as_uri()]  # fmt: skip
+    run = subprocess.run(["chromium", *asked], capture_output=True, text=True, timeout=120)
+    for name, pictures in zip(("ours", "theirs"), pictures_of(data_of(text)["scenes"][0])):
+        assert f'class="{name}" d="{motion.outline(pictures[-1], [(0, 1), (1, 2)])}"' in run.stdout, name
+    assert all(part in run.stdout for part in ("5.00 s", "0.3 rad", '<div class="controls">'))
 
 
 # figures
