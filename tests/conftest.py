@@ -27,8 +27,8 @@ settings.load_profile("project")
 
 HERE = Path(__file__).resolve().parent
 BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
-    "tests": 70, "diagnosis": 20, "engines": 30, "experiments": 85, "fleet": 25, "judge": 3, "process": 6, "report": 12,
-    "tmt": 35, "truth": 14,
+    "tests": 90, "diagnosis": 15, "engines": 18, "experiments": 65, "fleet": 16, "judge": 2, "process": 5, "report": 12,
+    "tmt": 28, "truth": 13,
 }  # fmt: skip
 LONGEST = 10  # tests that are listed
 

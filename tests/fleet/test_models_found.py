@@ -2,6 +2,7 @@
 
 import io
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +91,7 @@ def test_parts_are_left_out_unless_they_are_named(here):
 
 def test_reports_of_two_files_are_never_in_one_folder(tmp_path):
     asked = ["a/b.xml", "/a/b.xml", "../a/b.xml", "../../a/b.xml", "a/../b.xml", "b.xml", "up/a/b.xml", "x" * 300 + ".xml",
-             "x" * 301 + ".xml", "ü/b.xml", "a/B.xml/c.xml"]  # fmt: skip
+             "x" * 301 + ".xml", "ü/b.xml" if sys.getfilesystemencoding() == "utf-8" else "u/b.xml", "a/B.xml/c.xml"]  # fmt: skip
     places = [place_of_report(shown) for shown in asked]
     assert len({place.casefold() for place in places}) == len(asked) and places[0] == "files/a/b.xml"
     assert not any(other.startswith(f"{place}/") for place in places for other in places)

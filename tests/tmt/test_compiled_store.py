@@ -172,7 +172,7 @@ NO_COMPILER = "from tmt.compiled import store; store.object_code = None; "
 @posix
 def test_processes_share_what_they_compile(tmp_path):
     """In any path, where Python takes every text for ASCII, and nothing is left elsewhere; a refusal is a line on stderr."""
-    folder, home = tmp_path / "Zwischenlager für Übersetztes", tmp_path / "home"
+    folder, home = tmp_path / os.fsdecode("Zwischenlager für Übersetztes".encode()), tmp_path / "home"
     home.mkdir()
     environment = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONDONTWRITEBYTECODE": "1"}
     environment |= {"PYTHONPATH": str(ROOT), "TMT_CACHE": str(folder), "HOME": str(home), "PATH": os.environ["PATH"]}
