@@ -7,7 +7,7 @@ from models import PATHS
 from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.stated import Stated
 from compare.experiments import parameters
-from compare.experiments.parameters.file import compare_number, tolerance_of
+from compare.experiments.parameters.file import compare_number, tolerance_of, treatments_in_words
 from compare.judge.check import Result
 from compare.judge.scale import EPS
 from compare.reference import compared_with
@@ -116,3 +116,12 @@ def test_what_no_equation_has_is_compared_by_its_numbers(tmp_path):
     solution, other = (CART.replace('damping="0.5"', f'damping="0.5" frictionloss="{size}"') for size in (0.1, 9.0))
     assert failing(beside_solution(tmp_path, solution, solution)) == []
     assert failing(beside_solution(tmp_path, other, solution)) == ["frictionloss, its numbers"]
+
+
+def test_what_is_modelled_is_not_called_switched_off():
+    features = read(PATHS["gripper"]).features
+    off = [f.feature for f in features if f.treatment not in ("modelled", "open_tree")]
+    modelled = [f.feature for f in features if f.treatment == "modelled"]
+    first, second, *_ = treatments_in_words(features)
+    assert off and all(f"{name} (" in second for name in off) and all(f"{name} (" in first for name in modelled)
+    assert len(treatments_in_words([f for f in features if f.treatment == "modelled"])) == 1
