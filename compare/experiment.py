@@ -173,7 +173,7 @@ def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
 
 
 def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
-    """What explains the values of Mbar, h and accelerations, but for places that are known as causes."""
+    """What explains the values of Mbar, h and accelerations, except for places that are known as causes."""
     diagnosis = module("diagnosis")
     found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
     return (

@@ -45,7 +45,7 @@ def compared(before: list[dict], after: list[dict], renamed=RENAMED) -> dict[str
 
 
 def alike(one, other, check) -> bool:
-    """Whether two numbers are the same but for rounding; of a check of rounding a share of the tolerance is rounding."""
+    """Whether two numbers are the same except for rounding; of a check of rounding a share of the tolerance is rounding."""
     if None in (one, other):
         return one is other
     allowed = check["tolerance"] if check["rule"] == "at most" and check["tolerance"] else 0.0

@@ -108,7 +108,7 @@ def test_python_runs_as_it_is_printed(text, tmp_path, monkeypatch):
 
 
 def same(printed, shown):
-    """The same words, and the same numbers but for their last digits."""
+    """The same words, and the same numbers except for their last digits."""
     one, other = ([line.rstrip() for line in text.strip().splitlines()] for text in (printed, shown))
     numbers = [list(map(float, NUMBER.findall("\n".join(lines)))) for lines in (one, other)]
     words = [NUMBER.sub("#", "\n".join(lines)) for lines in (one, other)]

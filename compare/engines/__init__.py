@@ -15,7 +15,7 @@ from ..case import Case, Coordinates
 
 LABELS = {"tmt": "TMT", "own": "yours", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
 WHOSE = {"tmt": "TMT's", "own": "your", "mujoco": "MuJoCo's"}  # before what they have
-COMPARED = ("tmt", "mujoco")  # the two engines that every experiment compares, but for equations of a user's own
+COMPARED = ("tmt", "mujoco")  # the two engines that every experiment compares, except for equations of a user's own
 GRID = 64  # equal times, and the start, at which a prepared run is read
 
 
@@ -25,7 +25,7 @@ class Method(NamedTuple):
     engine: str
     name: str
     order: int | None  # of its error in the step; None: it chooses its own steps
-    scheme: str  # what it does: methods of the same scheme do the same but for rounding
+    scheme: str  # what it does: methods of the same scheme do the same except for rounding
     adaptive: bool = False  # it chooses its own steps and takes a tolerance
 
     @property

@@ -151,7 +151,7 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
 
 
 def needless(postures: dict, robot: Robot) -> str:
-    """Which postures need no torque, but for rounding, in both engines or in one, in words."""
+    """Which postures need no torque, except for rounding, in both engines or in one, in words."""
     zero = {
         posture: FACTOR * EPS * scales(robot.tree, robot.is_read, robot.poses[posture][None]).holding
         if has_own_scales(robot.tree, robot.is_read)
@@ -171,5 +171,7 @@ def needless(postures: dict, robot: Robot) -> str:
 def needless_in_words(needs: str, postures: list) -> str:
     """Where no torque is needed, in a sentence that begins with who needs."""
     return (
-        f"{needs} none, but for rounding, at: {', '.join(postures)}." if postures else f"{needs} some at every posture."
+        f"{needs} none, except for rounding, at: {', '.join(postures)}."
+        if postures
+        else f"{needs} some at every posture."
     )

@@ -145,7 +145,7 @@ def rows(setup: Setup) -> Result:
 
 
 def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray | None = None) -> None:
-    """What MuJoCo is compared with has both triangles, the same but for rounding. scale: of each entry; None: the largest."""
+    """What MuJoCo is compared with has both triangles, the same except for rounding. scale: of each entry; None: the largest."""
     of = "its largest entry" if scale is None else "the scale of the entry"
     skew = over(np.abs(M - M.transpose(0, 2, 1)), np.abs(M).max(axis=(1, 2), keepdims=True) if scale is None else scale)
     what = f"{result.label}: Mbar - Mbar' over {of}"

@@ -46,13 +46,13 @@ def skipped(robot: Robot) -> str | None:
 
 
 def claim(robot: Robot) -> str:
-    """What is claimed of what is printed: numbers are met; those that are rounding alone are zero but for rounding."""
+    """What is claimed of what is printed: numbers are met; those that are rounding alone are zero except for rounding."""
     noise, turns = [item.item for item in robot.printed if is_noise(item)], angles(robot)
     apart = f", {listed(noise)} apart," if noise else ""
     text = f"Every number that the assignment prints{apart} is met by TMT, by MuJoCo and by exact arithmetic."
     if noise:
         text += (
-            f" {listed(noise)} {'are' if len(noise) > 1 else 'is'} zero but for rounding, and both engines are within "
+            f" {listed(noise)} {'are' if len(noise) > 1 else 'is'} zero except for rounding, and both engines are within "
             f"rounding of what is exact{f' at the doubles nearest to {listed(turns)}' if turns else ''}."
         )
     every, sizes = shared(robot)
@@ -79,7 +79,7 @@ def tolerance(robot: Robot) -> str:
 
 
 def is_noise(item: Printed) -> bool:
-    """Whether it is printed as a number and is zero but for rounding."""
+    """Whether it is printed as a number and is zero except for rounding."""
     return item.is_rounding and bool(np.any(item.values))
 
 
@@ -191,7 +191,7 @@ def check_answer(result: Result, item: Printed, of: Answer, joints: tuple) -> No
 
 
 def digits_in_words(item: Printed, of: Answer, robot: Robot) -> str:
-    """Which printed components of an item that is zero but for rounding are met to every digit, and by whom."""
+    """Which printed components of an item that is zero except for rounding are met to every digit, and by whom."""
     met_by = []
     for finder, values in (("exact arithmetic", of.nearest), ("TMT", of.tmt), ("MuJoCo", of.mujoco)):
         of_joints = [(name, v, p) for name, v, p in zip(robot.joints, values, item.values) if p]

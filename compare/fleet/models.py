@@ -1,4 +1,4 @@
-"""Which models a fleet has: every MJCF that is found, but for files that are only parts of others."""
+"""Which models a fleet has: every MJCF that is found, except for files that are only parts of others."""
 
 import hashlib
 import os

@@ -180,7 +180,7 @@ class Run(Standing):
             self.go_on(task, step, outcome.returned)
 
     def was_read(self, task: Task, known: Known) -> None:
-        """Its experiments are asked for, but for those that are known; a file without a model of its own is left out."""
+        """Its experiments are asked for, except for those that are known; a file without a model of its own is left out."""
         task.known = known
         if known.refused and task.model.included_by:
             task.row = {}

@@ -105,7 +105,7 @@ class Work:
             interrupt.settle()
 
     def remove(self):
-        """Take away what this run has made, but for the report."""
+        """Take away what this run has made, except for the report."""
         if self.path is not None:
             delete(self.path)
         if self.lock is not None:

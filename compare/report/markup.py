@@ -35,7 +35,7 @@ def details(summary: str, text: str) -> str:
 
 
 def of_section(section: Section) -> list[tuple[str, str]]:
-    """The figures of a section: names of files (.png is left out) and captions, but for the pictures of the first screen."""
+    """The figures of a section: names of files (.png is left out) and captions, except for the pictures of the first screen."""
     return [(file, caption) for file, caption in section.figures if not file.startswith(BEGINNING)]
 
 

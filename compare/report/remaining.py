@@ -95,7 +95,7 @@ def same_kind(one: str, other: str) -> bool:
 
 
 def asked(command: str) -> list[str]:
-    """The words of a command but for those that change nothing of what is computed, in one order."""
+    """The words of a command except for those that change nothing of what is computed, in one order."""
     words = shlex.split(command)
     for name in WITHOUT_EFFECT:
         words = [word for word in words if not word.startswith(f"{name}=")]

@@ -23,7 +23,7 @@ class Printed(NamedTuple):
     unit: str
     half_digit: float  # half a unit of the last printed digit
     torque: str = "none"  # or the item whose answer acts: the torque that holds its posture
-    is_rounding: bool = False  # zero but for rounding: compared with the exact value, not with what is printed
+    is_rounding: bool = False  # zero except for rounding: compared with the exact value, not with what is printed
     to_every_digit: tuple = ()  # who meets the digits of what is rounding alone, of "exact", "tmt"
     sizes: tuple = ()  # the joints whose component exact arithmetic shares in its size alone
 

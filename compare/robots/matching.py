@@ -42,7 +42,7 @@ def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
 
 
 def same_names(reference: Sequence[str], names: Sequence[str]) -> dict[int, int]:
-    """Those of the same name, and of the same but for capital letters: by their numbers."""
+    """Those of the same name, and of the same except for capital letters: by their numbers."""
     pairs = {i: names.index(name) for i, name in enumerate(reference) if name in names}
     small, right = [name.casefold() for name in names], [name.casefold() for name in reference]
     for i, name in enumerate(right):

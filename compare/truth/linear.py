@@ -192,7 +192,7 @@ class Held:
     def growth(self, name, dt) -> np.ndarray:
         """Growth of the fastest-growing mode in one step, (...) for dt (...): the spectral radius of `step`.
 
-        A mode without stiffness grows by nothing, but for rounding.
+        A mode without stiffness grows by nothing, except for rounding.
         """
         stepping, dt = METHODS[name], np.asarray(dt, float)
         idle = self.without_stiffness

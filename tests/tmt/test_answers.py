@@ -125,7 +125,7 @@ WRONG = {
     "no unit quaternion": (BALL, (1.0 * TURNS[0] + [1.01e-6, 0, 0, 0], Z, Z)),
     "one of many is short": (BALL, (TURNS - np.eye(10)[:, :4] * [1.01e-6, 0, 0, 0], Z, Z)),
     "singular": (WRIST, (Z, Z, Z)),
-    "singular but for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), Z, Z)),
+    "singular except for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), Z, Z)),
     "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z)),
     "no model": ("arm", (Z, Z, Z)),
 }

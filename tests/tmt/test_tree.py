@@ -105,7 +105,7 @@ def test_a_model_that_is_singular_everywhere_is_refused(given, says):
 
 
 def test_what_is_singular_is_what_rounding_hides():
-    """A point on the axis but for r, 1 m along it: of all the inertia that it could have, r^2 is left."""
+    """A point on the axis except for r, 1 m along it: of all the inertia that it could have, r^2 is left."""
     rounding = 64 * np.finfo(float).eps
     chain([Z], (np.sqrt(1.02 * rounding), 0, 1))
     with pytest.raises(ValueError, match="singular"):

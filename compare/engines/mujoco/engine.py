@@ -114,7 +114,7 @@ class Mujoco:
         return dynamics
 
     def changed(self, case: Case) -> mujoco.MjModel:
-        """The model with what the case changes, but for the damping that it adds."""
+        """The model with what the case changes, except for the damping that it adds."""
         copied = mujoco.MjModel.__copy__
         model = locked_model(self.source, case.locked, self.bare) if case.locked else copied(self.model)
         if self.bare:

@@ -29,7 +29,7 @@ class Stated(NamedTuple):
     stated: np.ndarray | float | None  # kg, m, kg m2 ...; None: the file leaves it to the compiler
     compiled: np.ndarray | float
     why: str  # the option of the file that asks for a change of it, "": none does
-    precision: float = 0.0  # how exactly the compiler itself takes it over, relative; 0.0: but for rounding
+    precision: float = 0.0  # how exactly the compiler itself takes it over, relative; 0.0: except for rounding
 
 
 def stated_numbers(reading: Reading) -> list[Stated]:

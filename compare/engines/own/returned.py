@@ -11,7 +11,7 @@ from tmt.model.values import real_numbers, shown
 
 from .functions import STATE, OwnError
 
-SAME = 1e-12  # of the largest value: a batch gives what single states give, but for rounding
+SAME = 1e-12  # of the largest value: a batch gives what single states give, except for rounding
 MOST_SHOWN = 8  # numbers of a state in a message
 
 

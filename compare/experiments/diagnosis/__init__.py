@@ -11,7 +11,7 @@ one".
 In `all` it is made where mass, gravity, acceleration or trajectory has failed.
 Alone and without a file it tries itself: hundreds of made faults, each of
 which must be found. They go to other processes with --workers N, and with
---dask ADDRESS to a Dask cluster: the same rows, but for the seconds; a fault
+--dask ADDRESS to a Dask cluster: the same rows, except for the seconds; a fault
 whose process ends three times more, or that takes ten minutes, is a failed
 check.
 

@@ -120,7 +120,7 @@ def by_lagrange(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, of_rate: float, o
 
 
 def slope(function) -> np.ndarray:
-    """The derivative at 0 of a trigonometric polynomial of second degree in angles: exact but for rounding, by four angles.
+    """The derivative at 0 of a trigonometric polynomial of second degree in angles: exact except for rounding, by four angles.
 
     f = a + b cos t + c sin t + d cos 2t + e sin 2t gives f' = c + 2 e.
     """

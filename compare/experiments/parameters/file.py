@@ -103,7 +103,7 @@ def compare_number(result: Result, number: Stated, unit: str) -> list[dict]:
 
 
 def check_forces(result: Result, setup: Setup) -> None:
-    """Checks that nothing acts but what the equations have: of a sum with springs and damping but for its rounding."""
+    """Checks that nothing acts but what the equations have: of a sum with springs and damping except for its rounding."""
     tree, sample = setup.robot.tree, setup.random
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
     for source, force in setup.compared()["mujoco"].other_forces(sample.q, sample.qd).items():

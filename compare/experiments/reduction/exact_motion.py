@@ -116,7 +116,7 @@ def of_pendulum(result: Result, setup: Setup, case: Case, t: np.ndarray, exact: 
 def order_from(order: int, angles: np.ndarray) -> int | None:
     """The order of the error that a method of an order shows in a swing, of angles from where it hangs, (times,) rad.
 
-    Semi-implicit Euler is leapfrog, of order 2, but for half a kick at the start: where no force acts there, its error has
+    Semi-implicit Euler is leapfrog, of order 2, except for half a kick at the start: where no force acts there, its error has
     that order; where little does, none, for one part is as large as the other (None).
     """
     force = np.abs(np.sin(angles))
@@ -126,7 +126,7 @@ def order_from(order: int, angles: np.ndarray) -> int | None:
 
 
 def check_function(result: Result, scene: str, off: float, scale: float) -> None:
-    """A check: the elliptic function in doubles is that with 50 digits, but for rounding. off, scale: rad."""
+    """A check: the elliptic function in doubles is that with 50 digits, except for rounding. off, scale: rad."""
     what = f"elliptic function, scipy to {DIGITS} digits"
     result.check(scene, what, off, FACTOR * EPS * scale, "rad", rounding=True, about=About.PREDICTION)
 

@@ -29,7 +29,7 @@ against error), speed_energy (drift of energy against time),
 speed_evaluation_cost.
 
 Tolerance: times make no checks. Checked is that each method has its order, that
-MuJoCo and the same scheme in tmt make the same error but for rounding, and that
+MuJoCo and the same scheme in tmt make the same error except for rounding, and that
 errors which have stopped falling are of the size of rounding.
 
 Examples:
@@ -92,8 +92,8 @@ def tolerance(robot: Robot) -> str:
         f"Errors are the largest of the {what} on a grid of {GRID + 1} times, against {reference_in_words(robot)}. Checked: "
         "that each method of fixed step has its order in the error of the first second, which falls "
         "regularly (of order 8 only the least, for rounding comes before its error has settled; the tests show it in many "
-        f"digits); that MuJoCo and the same scheme in tmt make the same error but for rounding, {FACTOR} eps times the growth of "
-        "a small difference along the scene; that MuJoCo's RK4 comes as near to the reference as tmt's; and that errors which "
+        f"digits); that MuJoCo and the same scheme in tmt make the same error except for rounding, {FACTOR} eps times the growth "
+        "of a small difference along the scene; that MuJoCo's RK4 comes as near to the reference as tmt's; and that errors which "
         "have stopped falling are of that same size of rounding. So a model with other numbers fails: its motion is another."
     )
 

@@ -20,7 +20,7 @@ ALIKE = 0.01  # of an error: two that differ by less are the same in a sentence
 def check_same_schemes(
     result: Result, floors: Floors, schemes: Mapping[str, Mapping[str, str]], unit: str = "rad"
 ) -> None:
-    """MuJoCo's integrators and the same schemes in tmt make the same error, but for rounding.
+    """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding.
 
     Judged where either error is below 0.1 rad: one that is not, or a run that has diverged, beside one that is, fails.
     schemes: of each scene {integrator of MuJoCo: the method of tmt}.

@@ -161,7 +161,7 @@ def order_between(coarse: dict, fine: dict) -> float:
 
 
 def has_settled(rows: Sequence[dict]) -> bool:
-    """Whether the order of the last two of these rows, from coarse to fine, is that of the two before but for ORDER_MARGIN.
+    """Whether the order of the last two of these rows, from coarse to fine, is that of the two before except for ORDER_MARGIN.
 
     An error C dt^p (1 + c dt) seems to fall by an order that is off p by c dt / ln 4, half as much with half the step: what the
     order still changes is how far it is from p.

@@ -55,8 +55,8 @@ def agreeing(checks: Sequence[Check]) -> str:
     if not alike:
         return ""
     return (
-        f"Of {len(alike)} settings of MuJoCo near the reference {sum(alike)} have the error of the same scheme in tmt, but for "
-        "rounding. "
+        f"Of {len(alike)} settings of MuJoCo near the reference {sum(alike)} have the error of the same scheme in tmt, except "
+        "for rounding. "
     )
 
 
