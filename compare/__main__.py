@@ -20,12 +20,12 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from .command_line import FLEET, PROGRAM, request
+from .cli.command_line import FLEET, PROGRAM, request
 from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import in_one_line
 
-COMPUTING = ("compare.experiment", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
+COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
 LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a word
 
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return answered(partial(fleet, arguments[1:]))
     options = request(arguments)
     if options.version:
-        from .version import OURS, own_version  # what is imported takes its time
+        from .report.version import OURS, own_version  # what is imported takes its time
 
         with suppress(OSError, ValueError, AttributeError):  # nobody may be there to read it
             print(OURS, own_version(), flush=True)
@@ -90,14 +90,14 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     from tmt.compiled.store import cache_folder, size_of_cache
 
     from .engines.mujoco import ModelError
+    from .engines.own.own_file import OwnFileError
     from .fleet.calls import door_opened
     from .fleet.piece import FleetError
-    from .own_file import OwnFileError
     from .process.workers import WorkerEnded, load_modules, start_workers
-    from .reference import compared_with  # imports are here, so that --help and a wrong word answer at once
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
-    from .scene_file import SceneError, read_scenes
+    from .robots.scene_file import SceneError, read_scenes
+    from .run.reference import compared_with  # imports are here, so that --help and a wrong word answer at once
 
     terminal, kept = Terminal(), size_of_cache()
     names = list(EXPERIMENTS) if options.experiment == "all" else [options.experiment]
@@ -120,11 +120,11 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             with start_workers() as workers, terminal.progress("imports"):
                 for needed in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
                     workers.submit(load_modules, *needed)
-                from . import experiment
-                from .case import SEED
+                from .experiments.setup import Setup, engines
                 from .report import files, provenance, remaining, verdict
                 from .report.parts import Parts
-                from .setup import Setup, engines
+                from .robots.case import SEED
+                from .run import examine as experiment
 
                 reasons = {name: reason for name in names if (reason := skipped(name, robot))}
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read

@@ -12,9 +12,9 @@ from filelock import FileLock
 from hypothesis import settings
 from small_runs import of_arm
 
-from compare import experiment
 from compare.engines.mujoco import load
 from compare.robots.arm import ARM
+from compare.run import examine as experiment
 
 # a process in the background, or under nohup, is started with these ignored, and so would be those that it starts
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import tmt
-from compare.case import Scene
 from compare.robots import Robot
+from compare.robots.case import Scene
 
 XML = """
 <mujoco model="crane">

@@ -6,9 +6,9 @@ The arm; a cart with a slide, a hinge and a ball on it; a free stone.
 from models import PATHS
 
 from compare.engines.mujoco import Mujoco, parse, reading
-from compare.experiment import Setup, engines
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
+from compare.run.examine import Setup, engines
 
 XML = ARM.mjcf.read_text(encoding="utf-8")
 MOON = XML.replace("0 0 -9.81", "0 0 -1.62")

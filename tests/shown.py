@@ -6,7 +6,7 @@ from pathlib import Path
 from textwrap import dedent
 
 import tmt
-from compare.command_line import EXAMPLES, help_of, what_can_be_asked
+from compare.cli.command_line import EXAMPLES, help_of, what_can_be_asked
 from compare.experiments import EXPERIMENTS
 from compare.fleet.command import EPILOG
 

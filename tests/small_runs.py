@@ -11,12 +11,12 @@ from types import SimpleNamespace
 
 from crane import crane
 
-from compare import experiment
 from compare.engines.mujoco import load
 from compare.experiments import EXPERIMENTS, module, skipped
 from compare.fleet.file_pieces import Here
 from compare.report import files, verdict
 from compare.robots.arm import ARM
+from compare.run import examine as experiment
 
 
 @cache

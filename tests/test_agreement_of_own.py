@@ -13,10 +13,10 @@ from own_equations import acceleration, bias, gravity, mass_matrix, wrong_bias
 
 import compare
 from compare.engines.mujoco import engine, read
-from compare.joint_map import joint_map
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from compare.robots.file import robot_of
+from compare.robots.joint_map import joint_map
 
 READING = read(PENDULUM)
 TREE, ROBOT = READING.tree, robot_of(READING, "a pendulum")
@@ -236,7 +236,7 @@ def test_states_that_are_not_compared_are_warned_of(monkeypatch):
     monkeypatch.setattr("compare.agreement.given.OWN_SECONDS", 0.2)
     with pytest.warns(UserWarning, match="100"):
         assert 4 <= len(compare.differences(PENDULUM, mass_matrix=slow)) <= 40
-    monkeypatch.setattr("compare.states.MOST_NUMBERS", 120)
+    monkeypatch.setattr("compare.robots.states.MOST_NUMBERS", 120)
     for more, word in (({"q": THREE, "states": 500}, "500"), ({"states": 10**6}, "1,000,000")):
         with pytest.warns(UserWarning, match=word) as caught:
             compare.assert_agrees(PENDULUM, mass_matrix=mass_matrix, **more)

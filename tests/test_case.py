@@ -7,11 +7,11 @@ import pytest
 from edited import XML
 
 import tmt
-from compare.case import Case, Scene
 from compare.engines.mujoco import parse
-from compare.given import WrongField
 from compare.robots import Robot
 from compare.robots.arm import ARM
+from compare.robots.case import Case, Scene
+from compare.robots.given import WrongField
 
 
 def refused(robot=ARM, **fields) -> WrongField | None:

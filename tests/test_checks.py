@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from compare.engines.mujoco import load
-from compare.experiment import Setup, engines, module
 from compare.experiments import EXPERIMENTS
 from compare.robots.arm import ARM
+from compare.run.examine import Setup, engines, module
 
 LISTED = Path(__file__).with_name("checks_of_a_small_run.txt")
 MEASURED = re.compile(r"\d+\.\d+(e[-+]?\d+)?|\d+e[-+]?\d+")

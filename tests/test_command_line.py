@@ -11,10 +11,11 @@ from models import PATHS
 from runs import ROOT, on_terminal, readable_lines, words
 
 from compare import __main__ as entry
-from compare import command_line, experiment
 from compare.__main__ import main
+from compare.cli import command_line
 from compare.experiments import EXPERIMENTS
 from compare.robots.arm import ARM
+from compare.run import examine as experiment
 
 XML = ARM.mjcf.read_text(encoding="utf-8")
 STATIC = ("parameters", "published", "kinematics", "diagnosis")  # which take little time

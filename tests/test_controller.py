@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from models import PATHS
 
-from compare.actuators import Actuator, Drive, Tendon
-from compare.case import rates_at
-from compare.controller import controller, reason
 from compare.engines.mujoco import read
-from compare.given import WrongField
+from compare.robots.actuators import Actuator, Drive, Tendon
+from compare.robots.case import rates_at
+from compare.robots.controller import controller, reason
 from compare.robots.file import robot_of
+from compare.robots.given import WrongField
 
 PLAIN = Actuator("s", "a", (1.0,))
 SERVO = Actuator("servo", "b", (0.0, 2.0), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, -4.0))

@@ -10,12 +10,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from compare import __main__ as entry
-from compare import command_line, drawing, experiment
 from compare.__main__ import main
+from compare.cli import command_line
 from compare.fleet.file_pieces import Here
 from compare.judge.check import Result
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
+from compare.run import drawing
+from compare.run import examine as experiment
 
 
 def made(monkeypatch, name, **functions):

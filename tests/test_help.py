@@ -12,13 +12,13 @@ from in_process import runs_in_this_process as runs_in_this_process
 from runs import ENVIRONMENT
 from shown import blocks, command_lines
 
-from compare import version
 from compare.__main__ import main
-from compare.command_line import LINE_WIDTH, OPTIONS_OF_ALL, help_of, request
+from compare.cli.command_line import LINE_WIDTH, OPTIONS_OF_ALL, help_of, request
 from compare.experiments import EXPERIMENTS
 from compare.fleet.command import experiments_of, fleet_parser
+from compare.report import version
 from compare.robots.arm import ARM
-from compare.scene_file import read_scenes
+from compare.robots.scene_file import read_scenes
 
 PARTS = ["Asks", "Compares", "Tables", "Figures", "Tolerance", "Examples"]
 

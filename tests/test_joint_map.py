@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from compare.coordinates import Coordinates
-from compare.joint_map import JointsError, joint_map
+from compare.robots.coordinates import Coordinates
+from compare.robots.joint_map import JointsError, joint_map
 
 ARM = Coordinates(("hip", "knee", "rail"), ("hinge", "hinge", "slide"))
 MIXED = Coordinates(("rail", "turn", "knee"), ("slide", "ball", "hinge"))

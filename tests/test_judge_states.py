@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 
-from compare import states
-from compare.experiment import Setup
+from compare.robots import states
 from compare.robots.arm import ARM
-from compare.states import Sample
+from compare.robots.states import Sample
+from compare.run.examine import Setup
 
 
 def test_the_states_are_spread_and_the_same_in_every_run(engines):

@@ -10,7 +10,6 @@ from math import pi
 import pytest
 from edited import XML, setup_of
 
-from compare.experiment import Setup, new_causes
 from compare.experiments import (
     acceleration,
     gravity,
@@ -26,6 +25,7 @@ from compare.experiments import (
 from compare.judge.check import Result
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
+from compare.run.examine import Setup, new_causes
 
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'

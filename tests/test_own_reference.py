@@ -13,12 +13,12 @@ from in_process import runs_in_this_process as runs_in_this_process
 from models import PATHS
 from small_runs import Here, Lines
 
-from compare import experiment
 from compare.__main__ import main
+from compare.engines.own.own_file import OwnFileError, own_object
 from compare.experiments import EXPERIMENTS, skipped
-from compare.own_file import OwnFileError, own_object
-from compare.reference import compared_with
-from compare.setup import Setup, engines
+from compare.experiments.setup import Setup, engines
+from compare.run import examine as experiment
+from compare.run.reference import compared_with
 
 OTHERS = ["parameters", "published", "kinematics", "speed", "stability", "reduction"]
 STATIC = ["mass", "gravity", "acceleration"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from shown import BLOCKS, README, ROOT, blocks
 
-from compare.reference import compared_with
+from compare.run.reference import compared_with
 
 EXAMPLE = ROOT / "reports" / "example"
 PENDULUM = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/><inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/>

@@ -11,10 +11,10 @@ from sections import GOOD, section
 
 import tmt
 from compare.engines.mujoco import ModelError
-from compare.reference import JointsDiffer, compared_with
 from compare.report.files import write
 from compare.report.verdict import Report
 from compare.robots.arm import ARM
+from compare.run.reference import JointsDiffer, compared_with
 
 XML, ITSELF = ARM.mjcf.read_text(encoding="utf-8"), str(ARM.mjcf)
 

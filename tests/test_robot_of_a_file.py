@@ -8,9 +8,9 @@ import pytest
 from models import PATHS, random_tree
 
 import tmt
-from compare.actuators import Drive
 from compare.engines.mujoco import engine, read
 from compare.experiments.speed.settings import scenes_of as scenes_of_speed
+from compare.robots.actuators import Drive
 from compare.robots.file import COARSER, DURATION, added_damping, coarsest, robot_of, scenes_from
 
 ONE = replace(tmt.ARM.lock({"alpha": 0.0, "beta": 0.0}), gravity=(0.0, 0.0, 0.0))  # one hinge, its inertia 0.0527 kg m2

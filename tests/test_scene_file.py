@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from models import PATHS
 
-from compare.case import Case
-from compare.reference import compared_with
 from compare.robots.arm import ARM
-from compare.scene_file import SceneError, read_scenes
+from compare.robots.case import Case
+from compare.robots.scene_file import SceneError, read_scenes
+from compare.run.reference import compared_with
 
 WHOLE = """
 [[scene]]

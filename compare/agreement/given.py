@@ -12,15 +12,15 @@ import numpy as np
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import real_numbers, shown
 
-from ..coordinates import Coordinates
 from ..engines.own import ARGUMENTS, OwnEquations, is_function
-from ..given import is_number
-from ..joint_map import JointMap, joint_map
 from ..judge.check import over
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
+from ..robots.coordinates import Coordinates
 from ..robots.file import robot_of
-from ..states import random
+from ..robots.given import is_number
+from ..robots.joint_map import JointMap, joint_map
+from ..robots.states import random
 
 SYMBOLS_OF = {
     "mass_matrix": "M",

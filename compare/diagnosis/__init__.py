@@ -14,8 +14,8 @@ import numpy as np
 
 import tmt
 
-from ..coordinates import Coordinates
 from ..judge.scale import EPS, FACTOR
+from ..robots.coordinates import Coordinates
 from .compared import Compared
 from .finding import LEAST_STATES, Diagnosis
 from .fit import Fitted, OutOfTime, Search, nearest_changes

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..coordinates import Coordinates
+from ..robots.coordinates import Coordinates
 from .model import Equations
 from .places import bias_at_rest, entry_name, products_of_rates, rates_name
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..coordinates import Coordinates
 from ..judge.scale import EPS, FACTOR
+from ..robots.coordinates import Coordinates
 
 STEP = 2e-3  # rad or m, or s along a motion of about one rad/s
 SAFETY = 8.0  # times the error or the noise that is estimated

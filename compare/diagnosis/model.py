@@ -15,8 +15,8 @@ import tmt
 from tmt.equations import method
 from tmt.equations.vectors import Vector
 
-from ..coordinates import Coordinates
-from ..joint_map import JointMap
+from ..robots.coordinates import Coordinates
+from ..robots.joint_map import JointMap
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
 BODY_TERMS = (

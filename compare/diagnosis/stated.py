@@ -6,8 +6,8 @@ import numpy as np
 
 import tmt
 
-from ..coordinates import Coordinates
-from ..joint_map import JointMap, joint_map
+from ..robots.coordinates import Coordinates
+from ..robots.joint_map import JointMap, joint_map
 from . import Diagnosis, diagnose, packed
 from .words import Cause, joints_stated
 

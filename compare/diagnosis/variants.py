@@ -14,9 +14,9 @@ import numpy as np
 import tmt
 from tmt import literal
 
-from ..coordinates import Coordinates
-from ..joint_map import PER_UNIT, Joint, JointMap
 from ..judge.words import listed
+from ..robots.coordinates import Coordinates
+from ..robots.joint_map import PER_UNIT, Joint, JointMap
 from .model import BODY_TERMS, Equations
 
 MAPS_AT_ONCE = 2000  # maps of the joints in one evaluation

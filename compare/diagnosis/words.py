@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..coordinates import Coordinates
-from ..joint_map import Joint, JointMap
+from ..robots.coordinates import Coordinates
+from ..robots.joint_map import Joint, JointMap
 from .fit import Fitted
 from .places import OF_ZERO, Place
 from .variants import Variant

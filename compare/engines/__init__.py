@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..case import Case, Coordinates
+from ..robots.case import Case, Coordinates
 
 LABELS = {"tmt": "TMT", "own": "yours", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
 WHOSE = {"tmt": "TMT's", "own": "your", "mujoco": "MuJoCo's"}  # before what they have

@@ -13,7 +13,7 @@ from tmt.equations import composite
 from tmt.equations.method import acceleration
 from tmt.equations.vectors import arctan, cos, sin, sqrt
 
-from ..case import Case
+from ..robots.case import Case
 from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .scipy import as_far_as_it_goes, each, of_length_1
 from .tmt import TmtDynamics

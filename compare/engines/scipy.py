@@ -7,7 +7,7 @@ import numpy as np
 
 from tmt.compiled import evaluator
 
-from ..case import Case, Coordinates
+from ..robots.case import Case, Coordinates
 from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .tmt import TmtDynamics
 

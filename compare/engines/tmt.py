@@ -11,7 +11,7 @@ from tmt.compiled import prepared
 from tmt.methods import method_named
 from tmt.simulation import reasons
 
-from ..case import Case
+from ..robots.case import Case
 from . import GRID, Method, Motion, Prepared, Setting
 
 # schemes of MuJoCo that differ from others for some robots alone, which have balls, lone bodies or springs

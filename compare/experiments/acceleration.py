@@ -40,8 +40,8 @@ from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import gravity_scale
 from ..judge.words import ROWS_COMPILED, listed
 from ..robots import Robot
-from ..setup import Setup
 from ..truth.conserved import conserved
+from .setup import Setup
 
 TITLE = "Accelerations: the same equations in motion?"
 

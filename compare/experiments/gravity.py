@@ -30,7 +30,6 @@ import numpy as np
 import tmt
 from tmt import literal
 
-from ..case import Coordinates
 from ..engines import LABELS, WHOSE
 from ..engines.tmt import Compiled
 from ..judge.check import Result
@@ -38,7 +37,8 @@ from ..judge.entries import Entries, has_own_scales, per_speed, scales, unit
 from ..judge.scale import gravity_scale, spring_scale
 from ..judge.words import ROWS_COMPILED, capital
 from ..robots import Robot
-from ..setup import Setup
+from ..robots.case import Coordinates
+from .setup import Setup
 
 TITLE = "Gravity balance: do both hold the model with the same torque?"
 MOST_ENERGIES = 150_000  # of one engine, at random states

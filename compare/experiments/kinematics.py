@@ -36,8 +36,8 @@ from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR, reaches
 from ..judge.words import ROWS_COMPILED, listed
 from ..robots import Robot
-from ..setup import Setup
-from ..states import Sample
+from ..robots.states import Sample
+from .setup import Setup
 
 RATED, RATE_STEP = 20, 1e-6  # states at most, and step in s, of central differences of a Jacobian along the motion
 CLEARLY = 1e3  # of two ways, one is wrong if it is off by so many times more

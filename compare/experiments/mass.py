@@ -38,7 +38,7 @@ from ..judge.entries import has_own_scales, scales
 from ..judge.scale import EPS, FACTOR
 from ..judge.words import ROWS_COMPILED
 from ..robots import Robot
-from ..setup import Setup
+from .setup import Setup
 
 TITLE = "Mass matrix: is Mbar MuJoCo's M?"
 SAME_PLACE = np.radians(0.01)  # what a search finds of the place of a flat maximum

@@ -35,7 +35,7 @@ from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
 from ..judge.words import capital, listed
 from ..robots import Printed, Robot
-from ..setup import Setup
+from .setup import Setup
 
 TITLE = "Published numbers: does either engine contradict the assignment?"
 

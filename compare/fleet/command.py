@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tmt.compiled.cores import cores
 
-from ..command_line import FLEET, PROGRAM, Parser, expected, in_lines, not_empty, process_count
+from ..cli.command_line import FLEET, PROGRAM, Parser, expected, in_lines, not_empty, process_count
 from ..experiments import EXPERIMENTS
 from ..process.streams import in_one_line
 from ..report.remaining import in_words
@@ -203,7 +203,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
 def with_reference(asked: "Asked", reference: str | None) -> tuple["Asked", dict[str, bytes]]:
     """What is asked of each file with a reference, and the files of a solution. FleetError if that cannot be read."""
     from ..engines.mujoco import ModelError, read  # what is imported takes its time
-    from ..reference import is_solution
+    from ..run.reference import is_solution
     from .models import Model, bundle
     from .parts import needed_by
 

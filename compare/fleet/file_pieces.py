@@ -13,18 +13,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from .. import experiment
-from ..case import SEED
-from ..drawing import quiet
 from ..engines.mujoco import ModelError, read
 from ..experiments import EXPERIMENTS, module, skipped
+from ..experiments.setup import Setup, engines
 from ..judge.check import ENDS, About, Result
 from ..judge.timing import vectors
 from ..process.clock import Clock
-from ..reference import SOLUTION, Compared, JointsDiffer, compared_with
 from ..report import files, folder, provenance, verdict
 from ..report.parts import Parts
-from ..setup import Setup, engines
+from ..robots.case import SEED
+from ..run import examine as experiment
+from ..run.drawing import quiet
+from ..run.reference import SOLUTION, Compared, JointsDiffer, compared_with
 from .models import unpacked
 from .row import row_of_file
 

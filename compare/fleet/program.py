@@ -4,7 +4,7 @@ import hashlib
 from functools import cache
 
 from ..process.crash import ROOT
-from ..version import installed
+from ..report.version import installed
 
 COMPUTE_WITH = ("mujoco", "numpy", "scipy", "llvmlite", "mpmath")  # whose versions may change what is found
 

@@ -7,7 +7,7 @@ from ..judge.check import ENDS, About, Check
 from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_in_words, worst
 
 if TYPE_CHECKING:
-    from ..reference import Reference
+    from ..run.reference import Reference
 
 FLEET_COLUMNS = (
     "file", "sha256", "verdict", "reason", "joints", "worst_ratio",

@@ -7,8 +7,8 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
-from ..experiment import TIMED_LAST
 from ..experiments import EXPERIMENTS
+from ..run.examine import TIMED_LAST
 from .file_pieces import Asked, Known, findings, read_file, reported, untimed_part
 from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report

@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from ..judge.timing import vectors
-from ..reference import SOLUTION
 from ..report.provenance import commit
-from ..version import OURS, installed, own_version
+from ..report.version import OURS, installed, own_version
+from ..run.reference import SOLUTION
 from .kept import write_whole
 from .page import fleet_page
 from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, VERDICTS, order

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from ..experiment import TIMED_LAST
+from ..run.examine import TIMED_LAST
 
 # s that a piece takes of a robot with so many joints, before one of its kind has ended; other kinds
 EXPECTED, FEW_SECONDS, JOINTS = (

@@ -8,7 +8,7 @@ import tmt
 from tmt import literal
 from tmt.equations.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 
-from ..case import Case, Coordinates, rates_at
+from ..robots.case import Case, Coordinates, rates_at
 from .check import About, Result
 from .rounding import NARROW
 from .scale import EPS, FACTOR, gravity_scale

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..judge.timing import vectors
 from ..process.clock import Clock
 from ..process.streams import readable
-from ..version import OURS, installed, own_version
+from .version import OURS, installed, own_version
 
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
 PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # what beside them has changed is no other program

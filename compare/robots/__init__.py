@@ -9,8 +9,8 @@ import numpy as np
 
 import tmt
 
-from ..actuators import Drive
-from ..case import Case, Coordinates, Scene
+from .actuators import Drive
+from .case import Case, Coordinates, Scene
 
 
 class Printed(NamedTuple):

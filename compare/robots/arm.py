@@ -7,8 +7,8 @@ import numpy as np
 
 import tmt
 
-from ..case import Scene
 from . import Claims, Conditioning, Printed, Question, Robot
+from .case import Scene
 
 POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "zero": (0, 0, 0),

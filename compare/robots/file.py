@@ -14,10 +14,10 @@ from tmt.equations.composite import (
 )
 from tmt.model.tree import GAINS
 
-from ..actuators import Drive
-from ..case import Coordinates, Scene, fastest_rates
-from ..controller import controller
 from . import Robot
+from .actuators import Drive
+from .case import Coordinates, Scene, fastest_rates
+from .controller import controller
 
 DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
 LEAST_STEPS, MOST_STEPS_OF_A_FILE = 64, 8192  # of a scene, by its coarsest step

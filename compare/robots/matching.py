@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 
 import tmt
 
-from ..given import some
+from .given import some
 
 OTHER_TYPE = 1e6  # what keeps two joints from being matched: a hinge is no slide
 # what speaks against a match: the angle of the axes (1 if upright on each other), joints between it and the world, the place as

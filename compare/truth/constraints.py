@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..case import Coordinates
+from ..robots.case import Coordinates
 from .deviations import SYMMETRIC
 
 TURNED_BY = 1e-6  # rad or m, of central differences where a moment turns with the posture

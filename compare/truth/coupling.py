@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..actuators import Rows
+from ..robots.actuators import Rows
 from .deviations import Deviations
 from .step_limits import LIMIT_UP_TO, Small, upwards
 

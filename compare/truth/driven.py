@@ -10,7 +10,7 @@ import tmt
 from tmt.equations.composite import mass_matrix_and_bias  # the sum over bodies takes long for tens of joints
 from tmt.methods import by_speed, lone_speeds
 
-from ..actuators import Cut, Rows
+from ..robots.actuators import Cut, Rows
 from .constraints import turning
 from .coupling import Coupled, of_small
 from .servos import Driven

@@ -11,7 +11,7 @@ from tmt import METHODS, literal
 from tmt.equations import composite, method
 from tmt.equations.dual import seeded
 
-from ..case import SEED, Case, Coordinates
+from ..robots.case import SEED, Case, Coordinates
 from .conserved import floats
 from .derivative import holding, moving, slopes, stiffness
 from .steps import growth_of, is_runge_kutta, linear_step

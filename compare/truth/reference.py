@@ -14,7 +14,7 @@ import tmt
 from tmt.exact.motion import TooManySteps, truth
 from tmt.methods import METHODS
 
-from ..case import Case, Coordinates, rates_at
+from ..robots.case import Case, Coordinates, rates_at
 from .steps import growth_of
 
 RECORDS = 64  # of a run, and its start

@@ -6,7 +6,7 @@ from scipy.linalg import eigh
 import tmt
 from tmt import literal
 
-from ..case import Coordinates
+from ..robots.case import Coordinates
 from .derivative import stiffness
 
 BALANCED = 1e-13  # of the largest torque of gravity and springs on the way: less is rounding

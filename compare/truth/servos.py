@@ -10,8 +10,8 @@ import tmt
 from tmt import literal
 from tmt.methods import by_speed
 
-from ..actuators import Cut, Drive
-from ..case import Coordinates
+from ..robots.actuators import Cut, Drive
+from ..robots.case import Coordinates
 from .constraints import TURNED_BY, constraint_forces, downhill, turning
 from .weight import Weight, spring_slope, weight
 

@@ -26,7 +26,7 @@ from tmt.equations.vectors import solve
 from tmt.exact.tree import exact_tree
 from tmt.exact.values import DIGITS
 
-from ..case import SEED, Case
+from ..robots.case import SEED, Case
 
 TRIALS = 3  # random states of the other joints, with 50 digits
 EVERY_TRIAL = 6  # joints, up to which every trial is made

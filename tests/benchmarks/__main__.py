@@ -33,7 +33,7 @@ START = """
 import sys, numpy, tmt
 tree = tmt.ARM
 if len(sys.argv) > 1:
-    from compare.reference import compared_with
+    from compare.run.reference import compared_with
     tree = compared_with(None, sys.argv[1]).robot.tree
 n = len(tree.axis)
 {}tmt.simulate(numpy.array(tree.zero), numpy.full(n, 0.1), numpy.zeros(n), 0.001, 4096, "rk4", tree)

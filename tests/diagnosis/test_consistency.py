@@ -7,9 +7,9 @@ import pytest
 from models import PATHS
 
 import tmt
-from compare.coordinates import Coordinates
 from compare.diagnosis.consistency import conditions
 from compare.engines.mujoco import reading
+from compare.robots.coordinates import Coordinates
 
 ARM = tmt.ARM
 HEAVY = replace(ARM, mass=(2.0, 1.5))

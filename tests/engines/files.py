@@ -6,7 +6,7 @@ import numpy as np
 from trees import random_state
 
 import tmt
-from compare.coordinates import Coordinates
+from compare.robots.coordinates import Coordinates
 
 EPS = np.finfo(float).eps
 

@@ -8,8 +8,6 @@ from crane import TREE, XML
 from trees import tree_of_kinds
 
 import tmt
-from compare import experiment
-from compare.case import Case, Scene
 from compare.engines import GRID, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import Mujoco, parse
@@ -22,6 +20,8 @@ from compare.judge import scale
 from compare.judge.scale import EPS, FACTOR
 from compare.robots import Robot
 from compare.robots.arm import ARM
+from compare.robots.case import Case, Scene
+from compare.run import examine as experiment
 from tmt.exact.values import distance, exact
 
 ENGINES = (Tmt, Mujoco, Scipy, Heyoka)

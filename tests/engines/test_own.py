@@ -11,11 +11,11 @@ from models import PATHS
 from sympy.physics.mechanics import dynamicsymbols
 
 import tmt
-from compare.case import Coordinates
 from compare.engines.mujoco import read
 from compare.engines.own import ARGUMENTS, Own, OwnEquations, OwnError
 from compare.engines.tmt import Tmt
 from compare.robots.arm import ARM
+from compare.robots.case import Coordinates
 from compare.robots.file import robot_of
 
 COORDINATES = ARM.coordinates

@@ -4,8 +4,8 @@ import pytest
 from edited import setup_of
 
 import tmt
-from compare.experiment import Setup
 from compare.experiments import acceleration, gravity, kinematics, mass
+from compare.run.examine import Setup
 from tmt import literal
 
 OF_MUJOCO = [  # the experiment, what is off (of a pair which; without gravity only), the checks of both engines that fail

@@ -8,11 +8,11 @@ from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.stated import Stated
 from compare.experiments import parameters
 from compare.experiments.parameters.file import compare_number, tolerance_of, treatments_in_words
+from compare.experiments.setup import Setup, engines
 from compare.judge.check import Result
 from compare.judge.scale import EPS
-from compare.reference import compared_with
 from compare.robots.file import robot_of
-from compare.setup import Setup, engines
+from compare.run.reference import compared_with
 
 TOTAL = """
 <mujoco><compiler settotalmass="3"/><worldbody>

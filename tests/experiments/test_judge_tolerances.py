@@ -7,11 +7,11 @@ from judged import verdicts
 
 import tmt
 from compare.engines.mujoco import parse
-from compare.experiment import Setup
 from compare.experiments import acceleration, gravity, kinematics, mass, published
 from compare.judge.check import Result
 from compare.robots.arm import ARM, PRINTED
-from compare.states import Sample
+from compare.robots.states import Sample
+from compare.run.examine import Setup
 
 EPS = 2.0**-52
 WEIGHT = 9.81 * (1.9 * 0.15 + 1.5 * 0.45)  # N m: sum of m g reach

@@ -16,8 +16,8 @@ from compare.fleet.row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUS
 from compare.fleet.since import changes, earlier
 from compare.fleet.table import csv_of_fleet, write_table
 from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
-from compare.reference import Reference
 from compare.report.verdict import Section
+from compare.run.reference import Reference
 
 CAUSES = [{"text": "mass of upper: stated 1 kg, compiled 2 kg"}, {"text": "another"}]
 BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM

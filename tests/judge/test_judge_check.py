@@ -6,7 +6,7 @@ import pytest
 
 from compare.judge.check import Result, closest, largest, worst_of_each
 from compare.robots.arm import ARM
-from compare.states import Sample
+from compare.robots.states import Sample
 
 EPS = 2.0**-52
 

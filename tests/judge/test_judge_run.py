@@ -5,12 +5,12 @@ import pytest
 from judged import BOTH, INSIDE, OUTSIDE
 
 import tmt
-from compare.actuators import Actuator, Drive
-from compare.case import Coordinates
 from compare.engines.mujoco import reading
 from compare.judge.run import departure, deviation, deviation_alive, diverged_at, leaves_no_digits, movement_unit
 from compare.robots import Robot
+from compare.robots.actuators import Actuator, Drive
 from compare.robots.arm import ARM
+from compare.robots.case import Coordinates
 from compare.robots.file import robot_of
 from compare.truth.reference import has_no_reference
 

@@ -11,8 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 from runs import ENVIRONMENT
 
-from compare.drawing import draw
 from compare.report.folder import FolderError, new_report
+from compare.run.drawing import draw
 
 OLD = {"tables/mass.csv": "old", "results.json": "old"}
 

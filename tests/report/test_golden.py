@@ -8,12 +8,12 @@ import os
 import re
 from pathlib import Path
 
-from compare import drawing
 from compare.experiments import EXPERIMENTS, module
 from compare.report import images, overview, verdict
 from compare.report.markdown import markdown, markdown_body
 from compare.report.parts import Parts
 from compare.robots.arm import ARM
+from compare.run import drawing
 
 GOLDEN = Path(__file__).with_name("golden.md")
 NUMBER = re.compile(r"(?<![A-Za-z_])[-+]?\d+(\.\d+)?(e[-+]?\d+)?")

@@ -7,7 +7,6 @@ from matplotlib.colors import to_hex
 from sections import BAD, GOOD, section
 from small_runs import Lines
 
-from compare.experiment import say_outcome
 from compare.judge.check import About, Result
 from compare.judge.units import renamed
 from compare.report import engines_apart, figures_overview, methods_compared
@@ -17,6 +16,7 @@ from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
 from compare.report.verdict import Section, failures, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
+from compare.run.examine import say_outcome
 
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from mujoco.rollout import rollout
 
-from ...actuators import UNCUT, Cut, Drive, Rows
+from ...robots.actuators import UNCUT, Cut, Drive, Rows
 from .actuators import OF_A_JOINT, control_of
 from .flags import INTEGRATORS, bit
 from .holding import constraint_rows

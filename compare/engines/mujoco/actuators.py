@@ -6,7 +6,7 @@ from contextlib import suppress
 import mujoco
 import numpy as np
 
-from ...actuators import Actuator, Drive, Tendon
+from ...robots.actuators import Actuator, Drive, Tendon
 from .flags import on
 from .joints import joint_name, kind_of, own_name
 from .lock import editable_again

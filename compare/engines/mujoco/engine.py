@@ -8,7 +8,7 @@ import mujoco
 import tmt
 from tmt.methods import lone_speeds
 
-from ...case import Case
+from ...robots.case import Case
 from .. import Method
 from .dynamics import MujocoDynamics
 from .flags import INTEGRATORS

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from ...actuators import Rows
+from ...robots.actuators import Rows
 from .flags import on
 
 DISCRETE = getattr(mujoco.mjtIntegrator, "mjINT_DISCRETE", None)  # it has the constraints' springs and dampers implicit

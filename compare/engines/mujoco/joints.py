@@ -11,7 +11,7 @@ import numpy as np
 
 from tmt.model.coordinates import KINDS as NUMBERS  # of a joint in qpos and in qvel: MuJoCo has the same
 
-from ...case import Coordinates
+from ...robots.case import Coordinates
 
 KINDS = {
     mujoco.mjtJoint.mjJNT_HINGE: "hinge",

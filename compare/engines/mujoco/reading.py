@@ -10,7 +10,7 @@ import numpy as np
 
 import tmt
 
-from ...actuators import Drive
+from ...robots.actuators import Drive
 from .actuators import drive_of
 from .engine import Mujoco, methods_for
 from .file import compiled

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from ...actuators import Drive
+from ...robots.actuators import Drive
 from .actuators import control_of
 from .flags import INTEGRATORS
 

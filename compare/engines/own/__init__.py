@@ -8,7 +8,7 @@ import tmt
 from tmt import literal
 from tmt.methods.stepping import stepped
 
-from ...case import Case
+from ...robots.case import Case
 from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states
 from .equations import OwnEquations
 from .functions import ARGUMENTS, QUICK, OwnError, is_function

@@ -9,8 +9,8 @@ import tmt
 from tmt import literal
 from tmt.model.values import shown
 
-from ...case import Coordinates
-from ...joint_map import JointMap, JointsError, joint_map
+from ...robots.case import Coordinates
+from ...robots.joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
 from .functions import ARGUMENTS, STATE, OwnError, call, functions_of, names_of
 from .returned import SHAPES, Problem, and_more, as_raised, converted, same, state_in_words

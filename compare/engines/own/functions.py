@@ -10,7 +10,7 @@ import numpy as np
 import tmt
 from tmt.model.values import shown
 
-from ...case import Coordinates
+from ...robots.case import Coordinates
 
 # how many of q, qd, tau each takes
 ARGUMENTS = {

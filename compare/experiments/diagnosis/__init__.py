@@ -74,7 +74,7 @@ from ...judge.check import Result, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...setup import Setup
+from ..setup import Setup
 from . import fault_table
 from .own_equations import asked_conditions, for_command_line
 from .single_steps import Stepped, steps_of_integrators

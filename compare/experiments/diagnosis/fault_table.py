@@ -16,7 +16,7 @@ from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots.arm import ARM
 from ...robots.six_hinges import SIX_HINGES
-from ...setup import Setup
+from ..setup import Setup
 from .confirmed import confirmed
 from .faults import Fault, fault_list
 from .generator import generated

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...diagnosis.steps import Steps, diagnose_steps
 from ...diagnosis.words import Cause
-from ...setup import Setup
+from ..setup import Setup
 
 DAMPING_ADDED = 0.5  # N m s/rad, so that it is seen how damping enters
 MOST_SPEEDS_STEPPED = 12

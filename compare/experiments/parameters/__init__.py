@@ -60,12 +60,12 @@ import numpy as np
 
 import tmt
 
-from ...case import Coordinates
 from ...engines.mujoco.parameters import STATED_FLAGS, options, parameters
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...setup import Setup
+from ...robots.case import Coordinates
+from ..setup import Setup
 from . import file, solution
 
 TITLE = "Parameters: is MuJoCo's compiled model the stated one?"

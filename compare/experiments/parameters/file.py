@@ -12,7 +12,7 @@ from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...judge.words import listed
 from ...robots import Robot
-from ...setup import Setup
+from ..setup import Setup
 
 CLAIM = (
     "The model as MuJoCo compiled it has every number that the file states: mass, centre of mass, inertia tensor and place (pos) "

@@ -9,7 +9,7 @@ import tmt
 from ...engines.mujoco.inventory import MODELLED
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
-from ...setup import Setup
+from ..setup import Setup
 
 MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # of which no equation of motion without them says anything
 CLAIM_OF_SOLUTION = (

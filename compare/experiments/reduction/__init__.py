@@ -38,7 +38,6 @@ from functools import partial
 
 from tmt.exact.values import DIGITS
 
-from ...case import Case
 from ...engines.mujoco import ModelError
 from ...judge.check import About, Result
 from ...judge.entries import has_own_scales
@@ -46,7 +45,8 @@ from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from ...setup import Setup, nothing
+from ...robots.case import Case
+from ..setup import Setup, nothing
 from . import exact_motion, sub_blocks
 from .cost import measure_costs
 from .needs import MOST_IN_A_BAND, of_case

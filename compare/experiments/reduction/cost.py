@@ -7,7 +7,6 @@ import numpy as np
 
 import tmt
 
-from ...case import Case, Coordinates
 from ...engines import Setting
 from ...engines.mujoco.additions import AGAIN, CAPSULES, MINIMAL, OFF_FLOOR, ON_FLOOR, contacts, with_additions
 from ...judge.check import About, Result
@@ -17,7 +16,8 @@ from ...judge.timing import fastest
 from ...judge.units import renamed
 from ...judge.words import capital
 from ...robots import Robot
-from ...setup import Setup
+from ...robots.case import Case, Coordinates
+from ..setup import Setup
 from .times import TIMED_STEPS, TWO_INTEGRATORS
 
 FALL_TIME, FALL_STEPS = 5.0, 1024  # s, long enough to come to rest on the floor; of the run whose bits are compared

@@ -8,15 +8,15 @@ import tmt
 from tmt import literal
 from tmt.exact.values import DIGITS, distance
 
-from ...case import SEED, Case
 from ...engines import LABELS
 from ...judge.check import About, Result
 from ...judge.run import MOVES, ORDER_MARGIN
 from ...judge.scale import EPS, FACTOR, gravity_scale, mass_scale
 from ...robots import Robot
-from ...setup import Setup
+from ...robots.case import SEED, Case
 from ...truth.linear import held, modes, small_oscillation
 from ...truth.pendulum import exact_swing, pendulum, swing
+from ..setup import Setup
 from .times import TWO_INTEGRATORS, method_of
 
 SWING_STEPS = (4, 8, 16, 32, 64, 128)  # times the case's own steps

@@ -7,15 +7,15 @@ import numpy as np
 import tmt
 from tmt.exact.values import DIGITS
 
-from ...case import Case, Coordinates
 from ...engines import LABELS
 from ...judge.check import About, Result, closest
 from ...judge.rounding import NARROW, band
 from ...judge.run import check_movement, deviation, movement_unit, required_time, step_in_words
 from ...judge.words import capital
-from ...setup import Setup
-from ...states import seconds
+from ...robots.case import Case, Coordinates
+from ...robots.states import seconds
 from ...truth.smallest import MOST_FOLDED, Needed, needed, reduced
+from ..setup import Setup
 from .times import TWO_INTEGRATORS, finer, method_of, scheme_of
 
 # speeds of the robot of a file whose runs by both integrators are compared, of more those by the last

@@ -7,12 +7,12 @@ import numpy as np
 
 import tmt
 
-from ...case import SEED, Case, Coordinates
 from ...judge.check import Result, closest, worst_of_each
 from ...judge.entries import scales
 from ...judge.scale import EPS, FACTOR
-from ...setup import Setup
-from ...states import seconds
+from ...robots.case import SEED, Case, Coordinates
+from ...robots.states import seconds
+from ..setup import Setup
 from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles

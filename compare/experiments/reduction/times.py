@@ -6,13 +6,13 @@ from functools import lru_cache
 import tmt
 from tmt.compiled import evaluator
 
-from ...case import Case
 from ...engines import Engine, Setting, same_scheme
 from ...judge.check import Result
 from ...judge.run import movement_unit
 from ...judge.timing import fastest
 from ...judge.units import renamed
-from ...setup import Setup
+from ...robots.case import Case
+from ..setup import Setup
 
 TWO_INTEGRATORS = ("Euler", "RK4")  # of MuJoCo, a cheap and an accurate one, with the same schemes in tmt
 TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a timed run: it passes between the interruptions of a busy machine

@@ -48,8 +48,8 @@ from ...judge.scale import FACTOR
 from ...judge.units import renamed, said
 from ...judge.words import scene_begins
 from ...robots import Robot
-from ...setup import Setup
 from ...truth.reference import has_no_reference
+from ..setup import Setup
 from . import accuracy, advice, evaluations, tumbling
 from .accuracy import reference_in_words
 from .runs import measured

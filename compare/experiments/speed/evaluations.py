@@ -11,9 +11,9 @@ import tmt
 from tmt.compiled import evaluator, runner
 from tmt.equations import method
 
-from ...case import SEED, Case, Coordinates
 from ...judge import timing
-from ...setup import Setup
+from ...robots.case import SEED, Case, Coordinates
+from ..setup import Setup
 from .peers import FEWER, Peers, peers_in_words
 from .settings import coarsest_steps, regular_of
 from .ways import (

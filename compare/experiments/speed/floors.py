@@ -4,10 +4,10 @@ import numpy as np
 
 from tmt.methods import METHODS, amplification
 
-from ...case import Case
 from ...engines import GRID, Dynamics
 from ...judge.rounding import growth
 from ...judge.scale import EPS
+from ...robots.case import Case
 from .settings import coarsest_steps
 
 EVERY = 16  # steps of the run along which the growth is taken, for each time at which a run is read

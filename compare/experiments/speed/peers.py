@@ -10,7 +10,7 @@ from tmt.compiled import evaluator
 from ...engines.heyoka import Heyoka, compiled_accelerations
 from ...engines.pinocchio import PinocchioCalls
 from ...judge.scale import EPS, FACTOR, acceleration_scale, bias_scale, spring_scale
-from ...setup import Setup
+from ..setup import Setup
 from .ways import FORWARD, IN_LANES, RK4_STEP
 
 COMPILED, COMPILED_FAST = "heyoka, compiled function", "heyoka, compiled function, fast math"

@@ -7,12 +7,12 @@ import numpy as np
 
 from tmt import literal
 
-from ...case import Case
 from ...engines import Engine, Method, Setting
 from ...judge.run import diverged_at
-from ...setup import Setup
+from ...robots.case import Case
 from ...truth.reference import Reference, references
 from ...truth.smallest import reduced
+from ..setup import Setup
 from . import accuracy, advice
 from .floors import floor
 from .settings import methods, settings_of, too_long_next

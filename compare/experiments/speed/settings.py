@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from tmt import Tree
 from tmt.methods import method_named
 
-from ...case import Case
 from ...engines import COMPARED, GRID, LABELS, Engine, Method, Setting, methods_in, one_of_each_scheme
 from ...robots import Robot
-from ...setup import Setup
+from ...robots.case import Case
+from ..setup import Setup
 
 FINEST = {"mujoco": 2**16, "tmt": 2**18}  # steps beyond which a run would take too long to be timed again and again
 FINEST_RK4, FINEST_IMPLICIT = 2**17, 2**15  # of MuJoCo's RK4; of methods that solve their stages, and of other engines

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...engines import Method, Setting
 from ...judge import timing
-from ...setup import Setup
+from ..setup import Setup
 
 FIRST_STEPS = 4096  # of a run of MuJoCo that has more
 

@@ -7,11 +7,11 @@ import numpy as np
 
 import tmt
 
-from ...case import Case
 from ...engines import LABELS, Engine, Method
 from ...engines.mujoco import engine, read
 from ...judge.check import About, Result
 from ...robots import Robot
+from ...robots.case import Case
 from ...truth.free_body import free_turning
 from .advice import CLEAR, REGULAR, check_order
 

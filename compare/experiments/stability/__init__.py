@@ -64,8 +64,8 @@ from ...engines import same_scheme
 from ...judge.check import Result
 from ...judge.run import leaves_no_digits
 from ...robots import Robot
-from ...setup import Setup
 from ...truth.linear import held
+from ..setup import Setup
 from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs, servos
 from .choice import dampings_of
 from .claims_judged import check_claims

@@ -6,10 +6,10 @@ import numpy as np
 
 import tmt
 
-from ...case import Case
 from ...engines import LABELS, Engine, Method, one_of_each_scheme
 from ...judge.scale import gravity_scale
 from ...robots import Robot
+from ...robots.case import Case
 from ...truth.linear import NEGLIGIBLE, held
 from ...truth.postures import all_that_stay
 

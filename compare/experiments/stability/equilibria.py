@@ -14,10 +14,10 @@ from ...judge.rounding import step_rounding
 from ...judge.scale import EPS, FACTOR
 from ...judge.words import posture_begins
 from ...robots import Robot
-from ...setup import Setup
 from ...truth.linear import Held, held
 from ...truth.postures import posture_names
 from ...truth.steps import beyond_limit, is_runge_kutta, region
+from ..setup import Setup
 from .choice import coarsest_case, dampings_of
 from .growth import MOST_OF_A_STEP
 from .subjects import Subjects, places, subjects_of

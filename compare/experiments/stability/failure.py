@@ -8,13 +8,13 @@ import numpy as np
 import tmt
 from tmt import literal
 
-from ...case import Case
 from ...engines import LABELS, Engine, Method
 from ...engines.mujoco.linear import left_to_itself
 from ...judge.check import About, Result
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import gravity_scale
 from ...robots import Robot
+from ...robots.case import Case
 from ...truth.linear import Held
 from ...truth.postures import posture_names
 from .choice import fraction

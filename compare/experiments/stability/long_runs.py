@@ -6,10 +6,10 @@ import numpy as np
 
 from tmt import literal
 
-from ...case import Case
 from ...engines import Engine, Method
 from ...judge.check import Result
 from ...judge.run import diverged_at, number_or_none
+from ...robots.case import Case
 from ...truth.linear import Held
 from .choice import who
 from .growth import stiffest

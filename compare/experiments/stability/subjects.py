@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...case import Case
 from ...judge.words import posture_begins
 from ...robots import Robot
+from ...robots.case import Case
 from ...truth.conserved import floats
 from ...truth.linear import Held, held
 from ...truth.postures import all_of_kind, all_that_stay, of_kind, posture_names

@@ -60,8 +60,8 @@ from ...judge.check import Result
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
-from ...setup import Setup
 from ...truth.reference import reference
+from ..setup import Setup
 from . import drift, errors, horizon, leaving, motion, sentences
 from .derivative import compare_derivatives
 from .motion_frames import follow_and_draw, in_order

@@ -8,12 +8,12 @@ import numpy as np
 import tmt
 from tmt import literal
 
-from ...case import Case
 from ...engines import LABELS, Dynamics, Engine, Method, compared, one_of_each_scheme, same_scheme
 from ...judge.check import About, Result
 from ...judge.run import ORDER_MARGIN
 from ...judge.scale import EPS, FACTOR, gravity_scale
 from ...robots import Robot
+from ...robots.case import Case
 
 DRIFT_DURATION = 1.0  # s: short enough for the order to show, long enough to move
 DRIFT_STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method

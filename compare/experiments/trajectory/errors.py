@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
-from ...case import Case
 from ...judge.check import Result
 from ...judge.run import deviation, number_or_none
 from ...robots import Robot
+from ...robots.case import Case
 from ...truth import reference
 
 SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from ...case import Case
 from ...engines import LABELS
 from ...judge.run import moved_from
 from ...report.style import LINES, plain
+from ...robots.case import Case
 
 MOST_LINES = len(LINES)  # of joints in a panel
 LEVEL = 1e-6  # of a position: a smaller change is not seen in a panel

@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from ...case import Case
 from ...engines import LABELS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit, step_in_words
 from ...judge.scale import EPS
 from ...judge.words import capital, scene_begins
 from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name, zero_at_the_end
+from ...robots.case import Case
 from .figures_lines import differing_most, drawn, named_with_its_factor, over_time, while_it_lasts
 from .leaving import left_in_words, why_in_words
 from .sentences import agreement, rad

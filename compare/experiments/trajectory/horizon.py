@@ -8,13 +8,13 @@ import numpy as np
 from tmt.exact.values import DIGITS, distance
 from tmt.methods import METHODS, one_step
 
-from ...case import Case
 from ...engines import Engine
 from ...judge.check import Result, closest
 from ...judge.rounding import growth
 from ...judge.run import step_in_words
 from ...judge.words import listed
 from ...robots import Robot
+from ...robots.case import Case
 from .runs import steps_afforded
 
 GROWTH_EVERY = 16  # steps between two recorded values of a growth

@@ -7,11 +7,11 @@ import numpy as np
 
 from tmt.methods import METHODS, amplification
 
-from ...case import Case
 from ...engines import LABELS, Engine, compared
 from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT, movement_unit
 from ...judge.words import capital
+from ...robots.case import Case
 
 NO_TIME = 1e-6  # s: a step in which nothing moves
 STEADY = 1e-3  # per second: a slower growth is none in these runs

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 
-from ...case import Case, Coordinates
 from ...engines import GRID
 from ...judge.check import Result
 from ...robots import Robot
+from ...robots.case import Case, Coordinates
 
 IN_COLUMNS = {  # what stands behind a joint's name: of its positions, of its speeds
     "hinge": (["_rad"], ["_rad_per_s"]),

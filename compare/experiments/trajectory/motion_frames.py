@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...case import Case
 from ...engines import LABELS, Dynamics, Engine, compared
 from ...judge.check import Result
 from ...judge.run import LEFT, departure, diverged_at, movement_unit, step_in_words
 from ...judge.words import capital
 from ...robots import Robot
+from ...robots.case import Case
 from ...robots.stick import as_seen, stick_figure
 from .errors import SCHEMES_OF_RK4
 from .leaving import accelerations_left, predicted_leaving

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from ...case import Case
 from ...judge.words import listed
-from ...setup import Setup
+from ...robots.case import Case
+from ..setup import Setup
 from .runs import counts, recorded
 
 SECONDS_OF_RUNS = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all scenes together, about

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...case import Coordinates
 from ...judge.check import About, Result, closest
 from ...judge.rounding import NARROW
 from ...judge.run import movement_unit
+from ...robots.case import Coordinates
 
 
 def ends_first(ends: Mapping[str, float | None]) -> float:

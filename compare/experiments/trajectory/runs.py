@@ -7,7 +7,6 @@ import numpy as np
 
 from tmt.methods import METHODS
 
-from ...case import Case, Coordinates
 from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
 from ...judge.check import About, Result
 from ...judge.rounding import NARROW, band, slope_rounding, step_rounding
@@ -21,6 +20,7 @@ from ...judge.run import (
     step_in_words,
 )
 from ...judge.scale import EPS
+from ...robots.case import Case, Coordinates
 from ...truth.linear import Held
 from ...truth.smallest import reduced
 from ...truth.steps import beyond_limit

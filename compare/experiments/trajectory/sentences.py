@@ -6,13 +6,13 @@ import numpy as np
 
 from tmt.methods import METHODS
 
-from ...case import Case
 from ...engines import LABELS, WHOSE, Engine, Method, methods_in
 from ...engines.mujoco.flags import INTEGRATORS
 from ...judge.check import Result
 from ...judge.run import moved_from, movement_unit
 from ...judge.words import scene_begins
 from ...robots import Robot
+from ...robots.case import Case
 from .errors import coarsest_run, deviations
 from .leaving import causes_in_words, left_in_words, stays_in_words
 from .runs import MOST_ENTRIES, STEPS_AT_MOST, counts, steps_afforded

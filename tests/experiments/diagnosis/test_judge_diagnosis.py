@@ -4,8 +4,8 @@ import pytest
 from edited import XML, setup_of
 from small_runs import Here, Lines
 
-from compare import experiment
 from compare.experiments import diagnosis
+from compare.run import examine as experiment
 
 HEAVY = XML.replace('mass="1.5"', 'mass="1.51"')
 DAMPED = XML.replace('axis="1 0 0"/>', 'axis="1 0 0" damping="0.1"/>')

@@ -9,15 +9,15 @@ from edited import XML
 from trees import mjcf
 
 import tmt
-from compare.case import Coordinates
 from compare.engines.mujoco import additions, parse
 from compare.experiments.reduction import cost, exact_motion, figures_motion, figures_needs, needs, sub_blocks, times
+from compare.experiments.setup import Setup
+from compare.experiments.setup import engines as engines_of
 from compare.judge.check import Result
 from compare.judge.scale import EPS
 from compare.robots import Robot
 from compare.robots.arm import ARM
-from compare.setup import Setup
-from compare.setup import engines as engines_of
+from compare.robots.case import Coordinates
 
 FLOOR = additions.ON_FLOOR
 

@@ -11,10 +11,10 @@ import tmt
 from compare.engines.mujoco import ModelError, Mujoco, additions, engine, read
 from compare.experiments import reduction
 from compare.experiments.reduction import cost, needs, sub_blocks, times
+from compare.experiments.setup import Setup, engines
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
-from compare.setup import Setup, engines
 from compare.truth.smallest import needed, reduced
 
 

@@ -10,19 +10,19 @@ from edited import XML, setup_of
 from models import PATHS
 
 import tmt
-from compare.case import Scene
 from compare.engines import Method, Setting
 from compare.engines.heyoka import Heyoka
 from compare.engines.mujoco import engine, read
 from compare.engines.scipy import Scipy
 from compare.experiments import speed
+from compare.experiments.setup import Setup
+from compare.experiments.setup import engines as engines_of
 from compare.experiments.speed import accuracy, floors, runs, settings, tumbling
 from compare.judge.check import Result
 from compare.judge.rounding import growth
 from compare.robots.arm import ARM
+from compare.robots.case import Scene
 from compare.robots.file import robot_of
-from compare.setup import Setup
-from compare.setup import engines as engines_of
 from compare.truth import reference
 from compare.truth.free_body import free_turning
 

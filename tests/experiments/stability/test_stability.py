@@ -10,12 +10,12 @@ import tmt
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.linear import left_to_itself
 from compare.experiments import stability
+from compare.experiments.setup import Setup
+from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import choice, departure, failure, falling, growth, limits, torques
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
-from compare.setup import Setup
-from compare.setup import engines as engines_of
 from compare.truth.linear import held
 from compare.truth.postures import posture_names
 from compare.truth.steps import region

@@ -10,6 +10,8 @@ from servo_models import FILTERED, FLOATING, FORK, INERTIA, acting_of, hinge, po
 
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.flags import INTEGRATORS
+from compare.experiments.setup import Setup
+from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import servos
 from compare.experiments.stability.servos import figures_step, full_model, observed, predicted, response
 from compare.experiments.stability.servos.lifting import lifts
@@ -18,8 +20,6 @@ from compare.experiments.stability.servos.sentences import shaking
 from compare.judge.check import AT_OWN_STEP, Result
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
-from compare.setup import Setup
-from compare.setup import engines as engines_of
 
 SERVO = '<position name="servo" joint="swing" kp="50" kv="4"/>'
 SWING = """<mujoco><option timestep="0.002" integrator="{integrator}"/><worldbody><body>

@@ -8,7 +8,6 @@ import pytest
 from trajectory_curves import CASES, FREE, HELD, run_of
 
 import tmt
-from compare.case import Coordinates
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
 from compare.experiments.trajectory import drift, errors, horizon, leaving, rules, sentences
@@ -17,6 +16,7 @@ from compare.judge.check import Result
 from compare.judge.run import check_movement, departure, required_time
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
+from compare.robots.case import Coordinates
 from tmt.methods import METHODS, one_step
 
 LIFT_AND_HEAD = Coordinates(("lift", "head"), ("slide", "ball"))  # four movements, and four speeds

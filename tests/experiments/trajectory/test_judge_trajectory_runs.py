@@ -10,13 +10,13 @@ from compare.engines.mujoco import parse, reading
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
+from compare.experiments.setup import engines as engines_of
 from compare.experiments.trajectory import derivative, drift, figures_drift, figures_lines, figures_runs, horizon, runs
 from compare.experiments.trajectory.sentences import of_left_out
 from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
-from compare.setup import engines as engines_of
 
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("derivative", "one step", "open loop")}
 

@@ -8,7 +8,6 @@ from models import PATHS
 from PIL import Image
 from trajectory_curves import CASES
 
-from compare.coordinates import Coordinates
 from compare.engines import GRID
 from compare.engines.mujoco import reading
 from compare.experiments.trajectory import figures_motion_gif as gif
@@ -17,6 +16,7 @@ from compare.experiments.trajectory import motion_frames as frames
 from compare.experiments.trajectory.runs import follow
 from compare.judge.check import Result
 from compare.robots.arm import ARM, landmarks
+from compare.robots.coordinates import Coordinates
 from compare.robots.file import robot_of
 from compare.robots.stick import as_seen, stick_figure
 

@@ -9,14 +9,14 @@ import pytest
 from models import PATHS
 from trajectory_curves import CASES
 
-from compare.case import Case, Scene
 from compare.engines.mujoco import reading
 from compare.engines.own import Own
+from compare.experiments.setup import engines as engines_of
 from compare.experiments.trajectory.own_runs import within_time
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
+from compare.robots.case import Case, Scene
 from compare.robots.file import robot_of
-from compare.setup import engines as engines_of
 from tmt.compiled import Library, store
 from tmt.compiled.runner import known as compiled_runs
 from tmt.methods import METHODS, RungeKutta, SemiImplicitEuler, semi_implicit

@@ -7,9 +7,9 @@ from ....engines.mujoco import Reading
 from ....engines.mujoco.flags import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, About, Result
 from ....robots import Robot
-from ....setup import Setup
 from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO
+from ...setup import Setup
 from . import full_model, lifting, observed, response
 from .circumstances import circumstances
 from .predicted import Predicted, Steps, acting_at, limit_rows, predicted_at, steps_at

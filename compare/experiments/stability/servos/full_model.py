@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ....case import SEED
 from ....engines.mujoco.whole import whole_run
+from ....robots.case import SEED
 from ....truth.driven import Posture
 
 FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run, and of its part whose speeds are looked at

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ....case import SEED
 from ....engines.mujoco.acting import Acting
+from ....robots.case import SEED
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO
 

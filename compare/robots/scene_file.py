@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from . import Robot
 from .case import TORQUES, Case, Scene
 from .given import WrongField, are_numbers, is_number, shorten, some
-from .robots import Robot
 
 KEYS = ("name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt")
 UNITS = {  # of what is given for each joint: of hinges, slides and balls

@@ -17,8 +17,8 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from types import ModuleType
 
-from .judge.words import listed
-from .process.crash import described
+from ...judge.words import listed
+from ...process.crash import described
 
 FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
 SHOWN_NAMES = 6  # of which none is close

@@ -9,8 +9,8 @@ from tmt.equations.composite import (
 )
 from tmt.exact.values import exact
 
+from . import Robot
 from .case import SEED
-from .robots import Robot
 
 SECONDS_OF_EXACT = 5.0  # of all exact values of a report, about
 SHOWN_NUMBERS = 8  # of a position, in a sentence

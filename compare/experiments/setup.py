@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
-from . import states as samples
-from .case import Case
-from .engines import Dynamics, Engine, compared
-from .engines.heyoka import Heyoka
-from .engines.scipy import Scipy
-from .engines.tmt import Tmt
-from .robots import Robot
+from ..engines import Dynamics, Engine, compared
+from ..engines.heyoka import Heyoka
+from ..engines.scipy import Scipy
+from ..engines.tmt import Tmt
+from ..robots import Robot
+from ..robots import states as samples
+from ..robots.case import Case
 
 T = TypeVar("T")
 SECONDS_OF_OWN = 5.0  # of a user's own equations, called once at each random state

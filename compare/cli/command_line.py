@@ -9,12 +9,12 @@ from difflib import get_close_matches
 from pathlib import Path
 from textwrap import fill
 
-from .experiments import EXPERIMENTS, NOT_OF_OWN
-from .process.streams import in_one_line
+from ..experiments import EXPERIMENTS, NOT_OF_OWN
+from ..process.streams import in_one_line
 
 PROGRAM = "python -m compare"
 FLEET = "fleet"  # the word that is no experiment: it is of many files
-FOLDER = Path(__file__).resolve().parent / "experiments"
+FOLDER = Path(__file__).resolve().parents[1] / "experiments"
 LONGEST_ASKED = 5.0  # s, that can be asked about
 WITH_LISTS = ("diagnosis",)  # which have long lists, that go to other processes
 FOLLOWING_SCENES = ("trajectory", "speed", "reduction")

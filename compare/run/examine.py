@@ -6,18 +6,18 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
+from ..experiments import EXPERIMENTS, module
+from ..experiments.setup import Setup as Setup
+from ..experiments.setup import engines as engines
+from ..judge.check import ENDS, About, Result
+from ..process.clock import Clock
+from ..process.crash import described
+from ..process.workers import WorkerEnded, Workers
+from ..report import overview
+from ..report.remaining import END, START
+from ..report.terminal import Terminal
+from ..report.verdict import Section, failures
 from .drawing import FIRST, HALVES, draw, quiet
-from .experiments import EXPERIMENTS, module
-from .judge.check import ENDS, About, Result
-from .process.clock import Clock
-from .process.crash import described
-from .process.workers import WorkerEnded, Workers
-from .report import overview
-from .report.remaining import END, START
-from .report.terminal import Terminal
-from .report.verdict import Section, failures
-from .setup import Setup as Setup
-from .setup import engines as engines
 
 Found = tuple[
     Result | None, Result | None

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..judge.words import listed
 from .coordinates import Coordinates
-from .judge.words import listed
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 STATED = re.compile(r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")

@@ -10,19 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .case import SEED
-from .engines import Engine
-from .engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
-from .engines.mujoco.flags import integrator_by_name
-from .engines.own import Own, OwnEquations, OwnError
-from .given import some
-from .joint_map import JointsError, joint_map
-from .own_file import OwnFileError, aside, own_object
-from .process.streams import in_one_line
-from .robots import Robot
-from .robots.arm import ARM
-from .robots.file import robot_of, robot_of_solution
-from .robots.matching import Unmatched, matched_joints
+from ..engines import Engine
+from ..engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
+from ..engines.mujoco.flags import integrator_by_name
+from ..engines.own import Own, OwnEquations, OwnError
+from ..engines.own.own_file import OwnFileError, aside, own_object
+from ..process.streams import in_one_line
+from ..robots import Robot
+from ..robots.arm import ARM
+from ..robots.case import SEED
+from ..robots.file import robot_of, robot_of_solution
+from ..robots.given import some
+from ..robots.joint_map import JointsError, joint_map
+from ..robots.matching import Unmatched, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file

@@ -9,7 +9,7 @@ OURS = "arm-tmt-mujoco"
 
 def own_version() -> str | None:
     """The version of the program that runs."""
-    return of_checkout(Path(__file__).resolve().parents[1]) or installed(OURS)
+    return of_checkout(Path(__file__).resolve().parents[2]) or installed(OURS)
 
 
 def of_checkout(root: Path) -> str | None:

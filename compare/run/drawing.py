@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .experiments import module
-from .judge.check import Result
-from .process.crash import described
-from .report import images, overview
-from .report.folder import writing
-from .robots import Robot
+from ..experiments import module
+from ..judge.check import Result
+from ..process.crash import described
+from ..report import images, overview
+from ..report.folder import writing
+from ..robots import Robot
 
 FIRST = "the first"  # of the figures of an experiment
 HALVES = ("like the first", "others")  # drawn side by side
