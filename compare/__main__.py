@@ -96,6 +96,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     from .process.workers import WorkerEnded, load_modules, start_workers
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
+    from .report.text import say
     from .robots.scene_file import SceneError, read_scenes
     from .run.reference import compared_with  # imports are here, so that --help and a wrong word answer at once
 
@@ -106,7 +107,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         if options.scenes:
             robot = robot.with_scenes(read_scenes(options.scenes, robot))
         if options.experiment != "all" and (reason := skipped(options.experiment, robot)):
-            raise Refused(f"{options.experiment} cannot serve {robot.name}: {reason}")
+            raise Refused(f"{options.experiment} does not apply to {robot.name}: {say(reason)}")
         asked = known.asked_step(options.dt, options.integrator)
         before = made_by(options.out)
         with door_opened(options.dask, options.workers) as door, new_report(options.out) as folder:
@@ -126,7 +127,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 from .robots.case import SEED
                 from .run import examine as experiment
 
-                reasons = {name: reason for name in names if (reason := skipped(name, robot))}
+                reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference

@@ -15,6 +15,7 @@ from compare.engines.mujoco import load
 from compare.experiments import EXPERIMENTS, module, skipped
 from compare.fleet.file_pieces import Here
 from compare.report import files, verdict
+from compare.report.text import say
 from compare.robots.arm import ARM
 from compare.run import examine as experiment
 
@@ -38,7 +39,7 @@ def of_crane():
         folder, lines = Path(place), Lines()
         robot = crane(folder)
         setup = experiment.Setup.small(robot, experiment.engines(load(robot.mjcf, robot.tree)))
-        reasons = {name: reason for name in EXPERIMENTS if (reason := skipped(name, robot))}
+        reasons = {name: say(reason) for name in EXPERIMENTS if (reason := skipped(name, robot))}
         sections, causes, _ = experiment.examine(
             [n for n in EXPERIMENTS if n not in reasons], setup, folder, lines, Here()
         )

@@ -13,7 +13,7 @@ from runs import ROOT, on_terminal, readable_lines, words
 from compare import __main__ as entry
 from compare.__main__ import main
 from compare.cli import command_line
-from compare.experiments import EXPERIMENTS
+from compare.experiments import EXPERIMENTS, TIMED
 from compare.robots.arm import ARM
 from compare.run import examine as experiment
 
@@ -64,7 +64,7 @@ def test_a_quick_run_of_all_passes_with_a_line_for_each_experiment(of_the_termin
     first, *lines = readable_lines(run)
     assert first.startswith("reference: arm; mjcf/arm.xml ")
     # there is nothing to diagnose
-    order = sorted(EXPERIMENTS, key=experiment.TIMED_LAST.__contains__)
+    order = sorted(EXPERIMENTS, key=TIMED.__contains__)
     expected = [[name, "skipped:" if name == "diagnosis" else "ok"] for name in order]
     assert [line.split()[:2] for line in lines[: len(EXPERIMENTS)]] == expected
     assert "Report: reports/latest/index.html (" in words(lines[len(EXPERIMENTS) :])

@@ -7,30 +7,36 @@ from functools import partial
 from types import SimpleNamespace
 
 import pandas as pd
+from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
 
 from compare import __main__ as entry
 from compare.__main__ import main
 from compare.cli import command_line
+from compare.experiments import EXPERIMENTS, Experiment
 from compare.fleet.file_pieces import Here
 from compare.judge.check import Result
 from compare.report.terminal import Terminal
+from compare.report.text import environment
 from compare.robots.arm import ARM
 from compare.run import drawing
 from compare.run import examine as experiment
 
 
 def made(monkeypatch, name, **functions):
-    """An experiment of this name with these functions, in place of what every experiment has."""
-    usual = {"TITLE": name, "claim": lambda robot: "None.", "tolerance": lambda robot: "None."}
-    usual |= {"rows": lambda setup: Result(name, shown=[]), "figures": lambda result, robot: ()}
+    """An experiment of this name with these functions, in place of what every experiment has, and its template."""
+    usual = {"rows": lambda setup: Result(name, shown=[]), "figures": lambda result, robot: ()}
+    macros = ("title(robot)", "claim(robot, values)", "tolerance(robot, values)", "summary()")
+    template = "".join(f"{{% macro {macro} %}}{name}{{% endmacro %}}" for macro in macros)
+    loaders = [DictLoader({f"{name}.md.jinja": template}), environment().loader]
+    monkeypatch.setattr(environment(), "loader", ChoiceLoader(loaders))
     monkeypatch.setitem(sys.modules, f"compare.experiments.{name}", SimpleNamespace(**usual | functions))
 
 
 def only(monkeypatch, *names):
     """These are all experiments that there are."""
     for module in (entry, command_line, experiment):
-        monkeypatch.setattr(module, "EXPERIMENTS", dict.fromkeys(names, ""))
+        monkeypatch.setattr(module, "EXPERIMENTS", {name: EXPERIMENTS.get(name, Experiment(0)) for name in names})
 
 
 def ran(tmp_path, *arguments):

@@ -20,10 +20,10 @@ DIRECTIONS = {
     "engines": "tmt robots judge process",
     "truth": "tmt robots",
     "diagnosis": "tmt robots judge",
-    "report": "judge process",
+    "report": "judge process experiments",
     "experiments": "tmt robots engines truth judge diagnosis",
     "run": "tmt robots engines judge process report experiments",
-    "cli": "experiments process",
+    "cli": "experiments process report",
     "fleet": "tmt robots engines judge process report experiments run cli",
     "__main__": "tmt robots engines judge process report experiments run cli fleet",
 }

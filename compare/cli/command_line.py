@@ -1,24 +1,19 @@
 """What can be asked on the command line: words, options, help, and one line for what is mistyped."""
 
 import argparse
-import ast
 import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from difflib import get_close_matches
-from pathlib import Path
 from textwrap import fill
 
-from ..experiments import EXPERIMENTS, NOT_OF_OWN
+from ..experiments import EXPERIMENTS
 from ..process.streams import in_one_line
+from ..report.text import block
 
 PROGRAM = "python -m compare"
 FLEET = "fleet"  # the word that is no experiment: it is of many files
-FOLDER = Path(__file__).resolve().parents[1] / "experiments"
 LONGEST_ASKED = 5.0  # s, that can be asked about
-WITH_LISTS = ("diagnosis",)  # which have long lists, that go to other processes
-FOLLOWING_SCENES = ("trajectory", "speed", "reduction")
-OF_OWN = tuple(name for name in EXPERIMENTS if name not in NOT_OF_OWN)  # which can serve equations of one's own
 LINE_WIDTH = 80
 SHORT = f"""\
 {PROGRAM} compares equations of motion with MuJoCo, in a report.
@@ -61,12 +56,14 @@ def in_lines(text: str, indent: str = "") -> str:
     return fill(text, LINE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
-FOR_ALL = "\n".join([
-    in_lines("Compare equations of motion with MuJoCo, on the assignment's arm or on your robot, and write a report."),
-    "",
-    "experiments (`all`: every one of them):",
-    *(in_lines(f"  {name:<13} {what}", " " * 16) for name, what in EXPERIMENTS.items()),
-])  # fmt: skip
+def help_of_all() -> str:
+    """What the program does, and a line for each experiment."""
+    return "\n".join([
+        in_lines("Compare equations of motion with MuJoCo, on the assignment's arm or on your robot, and write a report."),
+        "",
+        "experiments (`all`: every one of them):",
+        *(in_lines(f"  {name:<13} {block(name, 'summary')}", " " * 16) for name in EXPERIMENTS),
+    ])  # fmt: skip
 
 
 class Parser(argparse.ArgumentParser):
@@ -110,40 +107,40 @@ def stated_reference(text: str) -> str:
     raise argparse.ArgumentTypeError(f"{text!r} is no reference; {hint}")
 
 
-# every option with the experiments that take it; None: all of them do
+# every option; those with False are of the experiments whose record has them
 OPTIONS_OF_ALL = {
-    "--out": (None, {
+    "--out": (True, {
         "type": not_empty, "default": "reports/latest", "metavar": "DIR",
         "help": "where the report goes (default: %(default)s)",
     }),
-    "--quick": (None, {"action": "store_true", "help": "fewer states; with all, one figure of each experiment that passes"}),
-    "--mjcf": (None, {"type": not_empty, "metavar": "FILE", "help": "your model, an MJCF file"}),
-    "--reference": (None, {
+    "--quick": (True, {"action": "store_true", "help": "fewer states; with all, one figure of each experiment that passes"}),
+    "--mjcf": (True, {"type": not_empty, "metavar": "FILE", "help": "your model, an MJCF file"}),
+    "--reference": (True, {
         "type": stated_reference, "metavar": "WHAT",
         "help": "what it is compared with: arm, the stated numbers (default for a file with exactly the arm's hinges); FILE.xml, "
         "a solution; model, tmt's equations for it as MuJoCo compiled it (default for any other); or equations of your own, "
         "FILE.py:OBJECT or MODULE:OBJECT, with mass_matrix(q) and bias(q, qd) (nothing after the colon: the module itself)",
     }),
-    "--joints": (OF_OWN, {
+    "--joints": (False, {
         "type": not_empty, "metavar": "LIST",
         "help": "the joints as your own equations take them, in their order: first,-second,third+90deg",
     }),
-    "--scenes": (FOLLOWING_SCENES, {
+    "--scenes": (False, {
         "type": not_empty, "metavar": "FILE",
         "help": "scenes of your own (TOML), beside those of the robot in trajectory, speed and reduction",
     }),
-    "--dt": (("stability",), {
+    "--dt": (False, {
         "type": step_in_seconds, "metavar": "S",
         "help": "stability: whether this step, s, is stable under the robot's own servos (default: the file's)",
     }),
-    "--integrator": (("stability",), {
+    "--integrator": (False, {
         "type": not_empty, "metavar": "NAME",
         "help": "stability: the same with this integrator of MuJoCo (default: the file's)",
     }),
-    "--workers": (WITH_LISTS, {
+    "--workers": (False, {
         "type": process_count, "metavar": "N", "help": "the made faults of diagnosis in N processes",
     }),
-    "--dask": (WITH_LISTS, {
+    "--dask": (False, {
         "type": not_empty, "metavar": "ADDRESS",
         "help": "the same on the Dask cluster of this scheduler",
     }),
@@ -155,7 +152,7 @@ def parser(experiment: str | None = None) -> Parser:
     made = Parser(
         prog=PROGRAM,
         usage=f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]",
-        description=(FOR_ALL if experiment is None else help_of(experiment)),
+        description=(help_of_all() if experiment is None else help_of(experiment)),
         epilog=None if experiment else EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         add_help=False,
@@ -164,18 +161,21 @@ def parser(experiment: str | None = None) -> Parser:
         made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
         made.add_argument("--version", action="store_true", help="the version of this program, and nothing else")
     made.add_argument("-h", "--help", action="store_true", help="this text; after an experiment: what it asks")
-    for name, (takers, how) in OPTIONS_OF_ALL.items():
-        if takers is None or experiment is None or experiment in takers:
+    for name, (of_all, how) in OPTIONS_OF_ALL.items():
+        if of_all or experiment is None or name in EXPERIMENTS[experiment].options:
             made.add_argument(name, **how)
     return made
 
 
 def help_of(experiment: str) -> str:
-    """What an experiment asks, compares and writes: the docstring of its module, which is not imported for that."""
-    file = FOLDER / f"{experiment}.py"
-    file = file if file.exists() else FOLDER / experiment / "__init__.py"
-    first, *rest = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))).split("\n")
+    """What an experiment asks, compares and writes."""
+    first, *rest = block(experiment, "help").split("\n")
     return "\n".join([in_lines(first), *rest])
+
+
+def takers(option: str) -> list[str]:
+    """The experiments that take an option."""
+    return [name for name, record in EXPERIMENTS.items() if option in record.options]
 
 
 def what_can_be_asked() -> str:
@@ -239,8 +239,8 @@ def expected(word: str, known: dict[str, str], choices: str) -> str:
 def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace) -> None:
     """End with the first option that the experiment does not take."""
     name = options.experiment
-    if options.scenes and name not in (*FOLLOWING_SCENES, "all"):
-        whole.error(f"--scenes is for {', '.join(FOLLOWING_SCENES)} and all; {name} follows no scene")
+    if options.scenes and name not in (*takers("--scenes"), "all"):
+        whole.error(f"--scenes is for {', '.join(takers('--scenes'))} and all; {name} follows no scene")
     if options.joints and ":" not in (options.reference or ""):
         whole.error("--joints is for equations of your own (--reference FILE.py:OBJECT or MODULE:OBJECT)")
     if (options.dt, options.integrator) != (None, None) and name != "stability":

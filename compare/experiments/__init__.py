@@ -1,30 +1,60 @@
-"""The experiments, one file or folder for each word of the command line.
+"""The experiments, one file or folder for each word of the command line; this module finds them by looking into its folder.
 
-Each is the module of its name, whose docstring is its help. `rows(setup)` computes, `figures(result, robot)` yields calls that
-draw; TITLE, `claim(robot)` and `tolerance(robot)` say what is asked. It may have `begin(setup)`, which sets long work going, and
-`skipped(robot)`, which says why it cannot serve a robot.
+An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals: they are read
+without importing the module. Beside it is its text, NAME.md.jinja: a macro for its help, title, claim, tolerance, and for each
+kind of finding and caption. The module has
+
+    rows(setup) -> Result                    numbers: tables, checks, findings
+    figures(result, robot)                   yields calls that draw, each returning (file name, figure, caption)
+    headline(result) -> Finding | None       its one number on the first screen
+    overview(results, robot)                 draws its picture of the first screen (of a record with `overview`)
+    claim_values(robot) -> dict              what the macros claim and tolerance take beside the robot (optional)
+    skipped(robot) -> Finding | None         why it does not apply to a robot (optional)
+    begin(setup)                             starts long work (optional)
 """
 
+import ast
 import importlib
+from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # for who asks for help, the words are enough
+from ..judge.finding import Finding
+
+if TYPE_CHECKING:  # for --help, the names are enough
     from ..robots import Robot
 
-EXPERIMENTS = {
-    "parameters": "MuJoCo's compiled model read back beside the stated numbers, and what is switched off",
-    "published": "every number that the assignment prints",
-    "kinematics": "positions, angular velocities, Jacobians, convective terms",
-    "mass": "the mass matrix",
-    "gravity": "the torque that holds each posture",
-    "acceleration": "bias in motion, forward and inverse dynamics, energy, power",
-    "trajectory": "motion in each scene, by every integrator of MuJoCo and the same scheme in tmt",
-    "diagnosis": "what explains a difference: one number, one term, a convention; alone, without a file: made faults",
-    "speed": "time against error: every method, every step, and what to use",
-    "stability": "step limits, also under a robot's own servos; departure from unstable postures; where methods fail",
-    "reduction": "what each scene needs of the model, and what the rest costs",
-}
+FOLDER = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What the program has to know of an experiment before it imports it."""
+
+    order: int  # of `all` and of the report
+    serves_own: bool = True  # whether it applies to a user's own equations; if not, the macro not_of_own says why
+    asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
+    options: tuple[str, ...] = ()  # of the command line, beside those that every experiment takes
+    timed: bool = False  # it measures times: it runs last, while nothing else does
+    diagnosed: bool = False  # where it fails, `diagnosis` looks for the cause
+    overview: str = ""  # the picture of the first screen that its result is part of
+
+
+def found_in(folder: Path) -> dict[str, Experiment]:
+    """The experiments of a folder by their names, in their order."""
+    found = {}
+    for file in (*folder.glob("*.py"), *folder.glob("*/__init__.py")):
+        text = file.read_text(encoding="utf-8")
+        for node in ast.parse(text).body if "\nEXPERIMENT = Experiment(" in text else ():
+            if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) == "EXPERIMENT":
+                fields = {field.arg: ast.literal_eval(field.value) for field in node.value.keywords}
+                found[file.parent.name if file.stem == "__init__" else file.stem] = Experiment(**fields)
+    return dict(sorted(found.items(), key=lambda item: item[1].order))
+
+
+EXPERIMENTS = found_in(FOLDER)
+TIMED = tuple(name for name, record in EXPERIMENTS.items() if record.timed)
 
 
 def module(name: str) -> ModuleType:
@@ -32,18 +62,8 @@ def module(name: str) -> ModuleType:
     return importlib.import_module(f".{name}", __package__)
 
 
-NOT_OF_OWN = {  # why an experiment has nothing to do with equations of a user's own
-    "parameters": "your equations are functions, and have no numbers to read back beside MuJoCo's",
-    "published": "it compares tmt's numbers with printed ones, not yours",
-    "speed": "its methods integrate tmt's equations, not yours",
-    "stability": "its limits are predicted from exact derivatives of the equations, which yours do not give",
-    "reduction": "it takes joints out of the equations, which cannot be done with yours",
-}
-
-
-def skipped(name: str, robot: "Robot") -> str | None:
-    """Why an experiment cannot serve a robot, or None."""
-    if robot.own and name in NOT_OF_OWN:
-        return NOT_OF_OWN[name]
-    why = getattr(module(name), "skipped", None)
-    return why(robot) if why else None
+def skipped(name: str, robot: "Robot") -> Finding | None:
+    """Why an experiment does not apply to a robot, or None."""
+    if robot.own and not EXPERIMENTS[name].serves_own:
+        return Finding(name, "not_of_own")
+    return getattr(module(name), "skipped", lambda robot: None)(robot)

@@ -1,27 +1,4 @@
-"""Bias in motion, forward and inverse dynamics, energy and power.
-
-Asks: are the equations the same in motion?
-
-Compares, at random states under random torque: the bias h of Mbar qdd + h = tau
-- D qd with qfrc_bias; accelerations; the acceleration of one engine, put into
-the inverse dynamics of the other, must give the torque back; energies; the
-power of the torque with the rate of the energy; and without gravity and torque
-the angular momentum about the first hinge must be constant.
-
-Tables: acceleration.csv (the largest difference of each quantity, the worst
-state, both engines' distance from 50 digits).
-
-Figures: acceleration_distances (distance from the exact values, in eps).
-
-Tolerance: 64 eps x the sum of the absolute values of the terms that are added
-up (convective, Euler and gravity terms, and the torque), never the result
-itself, which may be the small rest of large terms; where a linear system is
-solved, times the condition number of Mbar.
-
-Examples:
-    python -m compare acceleration
-    python -m compare acceleration --mjcf robot.xml
-"""
+"""Bias in motion, forward and inverse dynamics, energy and power."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -41,9 +18,10 @@ from ..judge.scale import gravity_scale
 from ..judge.words import ROWS_COMPILED, listed
 from ..robots import Robot
 from ..truth.conserved import conserved
+from . import Experiment
 from .setup import Setup
 
-TITLE = "Accelerations: the same equations in motion?"
+EXPERIMENT = Experiment(order=60, options=("--joints",), diagnosed=True, overview="agreement")
 
 
 def claim(robot: Robot) -> str:

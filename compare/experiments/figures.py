@@ -60,30 +60,20 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     worst, of_worst = max((largest_of(curves[q][f"{label} to MuJoCo"]), q) for q in quantities)
-    against = ""
+    known = None
     if exact:
         ours, theirs = (
             max(largest_of(curves[q][f"{engine} to exact"]) for q in quantities) for engine in (label, "MuJoCo")
         )
-        known = len(curves[quantities[0]][f"{label} to exact"])
-        against = (
-            f" Against the exact value, at the first {known} of the states, {label} is {eps_in_words(ours)} off and "
-            f"MuJoCo at most {theirs:.3g}."
-        )
-    caption = (
-        f"Share of the {sample} whose difference is at most so many eps. The engines are {eps_in_words(worst)} apart "
-        f"({of_worst}).{against}{f' Differences below {ZERO_AT:g} eps are drawn at 0.' if zeros else ''}"
-    )
+        known = {"states": len(curves[quantities[0]][f"{label} to exact"]), "ours": ours, "theirs": theirs}
+    values = {"sample": sample, "label": label, "worst": worst, "of_worst": of_worst, "exact": known}
+    caption = result.finding("distances", of="shared", **values, zero_at=ZERO_AT if zeros else None)
     return f"{result.experiment}_distances", fig, caption
 
 
 def largest_of(curve: np.ndarray) -> float:
     """The last of sorted differences; inf where one is no number, as one's own equations may give."""
     return float(curve[-1]) if np.isfinite(curve[-1]) else np.inf
-
-
-def eps_in_words(most: float) -> str:
-    return f"at most {most:.3g} eps" if np.isfinite(most) else "somewhere no number of eps"
 
 
 def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
@@ -98,18 +88,16 @@ def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     ax.clabel(lines, fontsize=7)
     ax.set(xlabel=f"{x}, deg", ylabel=f"{y}, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
     fig.colorbar(image, label="condition number of Mbar")
-    largest = []
+    maxima = []
     for (name, (value, at, mirrored)), look in zip(result.curves["worst"].items(), WORST_LOOKS):
         a, b = np.degrees(at)
         twice = abs(mirrored - value) <= 1e-6 * value
-        other = f"the same at -{x}" if twice else f"{mirrored:.2f} at -{x}"
         places = ([a, -a], [b, b]) if twice else ([a], [b])
         ax.plot(*places, linestyle="none", **look, label=f"maximum, {LABELS[name]}")
-        largest.append(f"{LABELS[name]}'s is {value:.2f} at {x} = {a:.1f}°, {y} = {b:.1f}°, and {other}")
+        maxima.append({"label": LABELS[name], "value": value, "at": (a, b), "twice": twice, "mirrored": mirrored})
     fig.legend(loc="outside upper center", ncols=2)
-    others = "".join(f", {robot.symbol(joint)} = 0" for joint in robot.joints if joint not in robot.conditioning.joints)
-    caption = f"Condition number of TMT's Mbar over {x} and {y}{others}. The maximum: {'; '.join(largest)}."
-    return "mass_condition", fig, caption
+    zero = [robot.symbol(joint) for joint in robot.joints if joint not in robot.conditioning.joints]
+    return "mass_condition", fig, result.finding("condition", joints=[x, y], zero=zero, maxima=maxima)
 
 
 def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:

@@ -1,26 +1,4 @@
-"""The torque that holds a robot against gravity.
-
-Asks: do both engines hold the model with the same torque?
-
-Compares, at named postures and random states: TMT's holding torque dV/dq with
-qfrc_bias at rest; each with the gradient of the engine's own potential energy,
-which is exact here and no small difference; and TMT's torque, given to MuJoCo,
-must leave the robot at rest.
-
-Tables: gravity.csv (the largest difference of each quantity, the worst state,
-both engines' distance from 50 digits).
-
-Figures: gravity_postures (the named postures), gravity_distances (distance from
-the exact values, in eps).
-
-Tolerance: 64 eps x the sum of m g reach over the bodies; of the accelerations
-that are left, that times the condition number of the mass matrix and its
-inverse.
-
-Examples:
-    python -m compare gravity
-    python -m compare gravity --mjcf robot.xml
-"""
+"""The torque that holds a robot against gravity."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -38,9 +16,10 @@ from ..judge.scale import gravity_scale, spring_scale
 from ..judge.words import ROWS_COMPILED, capital
 from ..robots import Robot
 from ..robots.case import Coordinates
+from . import Experiment
 from .setup import Setup
 
-TITLE = "Gravity balance: do both hold the model with the same torque?"
+EXPERIMENT = Experiment(order=50, asks_of_own=("gravity", "bias", "energy"), options=("--joints",), diagnosed=True)
 MOST_ENERGIES = 150_000  # of one engine, at random states
 
 

@@ -1,27 +1,4 @@
-"""Positions, angular velocities, Jacobians and convective terms.
-
-Asks: do the bodies move alike in both engines?
-
-Compares, at named postures and random states: positions of the centres of mass,
-angular velocities, both Jacobians of every body (T_b and B_b), and the
-convective terms, which are what is left of the accelerations where the joints
-do not accelerate. These are all quantities between the joint angles and the
-equations of motion: a wrong one is named here.
-
-Tables: kinematics.csv (the largest difference of each quantity, the state at
-which it comes closest to its tolerance, and both engines' distance from 50
-digits).
-
-Figures: kinematics_distances (distance from the exact values, in eps).
-
-Tolerance: 64 eps x scale. The scale of a length is the largest distance from
-the origin that a centre of mass can have, of an angular velocity the sum of the
-speeds.
-
-Examples:
-    python -m compare kinematics
-    python -m compare kinematics --mjcf robot.xml --quick
-"""
+"""Positions, angular velocities, Jacobians and convective terms."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -37,12 +14,12 @@ from ..judge.scale import EPS, FACTOR, reaches
 from ..judge.words import ROWS_COMPILED, listed
 from ..robots import Robot
 from ..robots.states import Sample
+from . import Experiment
 from .setup import Setup
 
+EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"), options=("--joints",))
 RATED, RATE_STEP = 20, 1e-6  # states at most, and step in s, of central differences of a Jacobian along the motion
 CLEARLY = 1e3  # of two ways, one is wrong if it is off by so many times more
-
-TITLE = "Kinematics: do the bodies move alike?"
 
 
 OF_COMPILED = ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv")

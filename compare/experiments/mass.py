@@ -1,27 +1,4 @@
-"""The mass matrix.
-
-Asks: is TMT's reduced mass matrix Mbar the matrix M of MuJoCo?
-
-Compares, at named postures and random states: Mbar = sum of T' m T + B' I B
-over the bodies with mj_fullM; both with 50 digits. Mbar must be symmetric and
-positive definite. Its condition number multiplies every rounding error of an
-acceleration; where its maximum is known, that and its place are found again by
-a search. Rows that are called compiled show the compiled code of tmt.
-
-Tables: mass.csv (the largest difference of each quantity, the worst state, both
-engines' distance from 50 digits).
-
-Figures: mass_distances (distance from the exact values, in eps), mass_condition
-(the condition number over two joints).
-
-Tolerance: 64 eps x the largest entry of Mbar at that state; of a robot's file
-each entry has its own scale. The smallest eigenvalue is at least 64 eps of the
-largest.
-
-Examples:
-    python -m compare mass
-    python -m compare mass --mjcf robot.xml --reference my_equations.py:
-"""
+"""The mass matrix."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -33,46 +10,25 @@ from tmt import literal
 
 from ..engines import LABELS
 from ..engines.tmt import Compiled
-from ..judge.check import Result, over
+from ..judge.check import Result, agreement_headline, over
 from ..judge.entries import has_own_scales, scales
 from ..judge.scale import EPS, FACTOR
-from ..judge.words import ROWS_COMPILED
 from ..robots import Robot
+from . import Experiment
 from .setup import Setup
 
-TITLE = "Mass matrix: is Mbar MuJoCo's M?"
+EXPERIMENT = Experiment(
+    order=40, asks_of_own=("mass_matrix",), options=("--joints",), diagnosed=True, overview="agreement"
+)
 SAME_PLACE = np.radians(0.01)  # what a search finds of the place of a flat maximum
 
 
-def claim(robot: Robot) -> str:
-    """What is claimed of any robot, and of where its condition number is largest if that is known."""
-    which = "Your Mbar" if robot.own else "Mbar = sum T' m T + B' I B"
-    text = f"{which} equals mj_fullM at every posture; it is symmetric and positive definite"
-    if robot.conditioning is None:
-        return f"{text}."
-    (first, second), (x, y) = robot.conditioning
-    return (
-        f"{text}; its condition number, which multiplies every rounding error of an acceleration, has its maximum "
-        f"{largest_condition(robot):.2f} at {first} = +-{x:g} deg, {second} = {y:g} deg."
-    )
-
-
-def tolerance(robot: Robot) -> str:
-    """By what the claim is judged."""
-    if has_own_scales(robot.tree, robot.is_read):
-        return (
-            "64 eps x scale, each entry its own: the sum over the bodies of k (m t_i t_j + |I| u_i u_j), and the armature; t = L "
-            "of a hinge or ball that moves the body, 1 of a slide, and u = 1 and 0; k hinges and balls turn the body; L is the "
-            "largest distance from the origin that a centre of mass can have at that state. Definite: the smallest eigenvalue of "
-            "Mbar, in units of its diagonal, is at least 64 eps of the largest."
-        )
-    text = (
-        "64 eps x the largest entry of Mbar at that state. Definite: the smallest eigenvalue is at least 64 eps of the "
-        "largest."
-    )
-    if robot.conditioning is None:
-        return text
-    return f"{text} Condition number: 64 eps x its square; its place, found by search: 0.01 deg."
+def claim_values(robot: Robot) -> dict:
+    """What the claim and the tolerance of this robot name, beside the robot."""
+    return {
+        "own_scales": has_own_scales(robot.tree, robot.is_read),
+        "condition": robot.conditioning and largest_condition(robot),
+    }
 
 
 def at_angles(robot: Robot, angles: np.ndarray) -> np.ndarray:
@@ -136,11 +92,10 @@ def rows(setup: Setup) -> Result:
         degrees = setup.of(3.0, 3.0, 15.0)
         result.curves["condition"] = condition_grid(robot, compared[ours].mass_matrix, degrees)
     elif not robot.is_read:
-        result.notes.append(
-            f"Nothing is stated of where the condition number of Mbar of the {robot.noun} is largest: that is neither checked "
-            "nor drawn."
-        )
-    result.notes += [ROWS_COMPILED] * (not setup.robot.own)
+        result.find("conditioning_not_stated", noun=robot.noun)
+    if not robot.own:
+        result.find("rows_compiled", of="shared")
+    result.headline = agreement_headline(result)
     return result
 
 

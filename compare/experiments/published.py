@@ -1,25 +1,4 @@
-"""Every number that an assignment prints, from TMT, from MuJoCo and exactly.
-
-Asks: does either engine contradict the assignment?
-
-Compares: each printed holding torque, acceleration and mass matrix with tmt's,
-MuJoCo's and the value in 50-digit arithmetic. Where a printed number is
-rounding alone (it should be 0), the exact value at the doubles that are nearest
-to the angles shows which rounding it is. Slips of the printed text are named.
-
-It serves a robot whose printed numbers are known, which is the assignment's
-arm.
-
-Tables: published.csv (each number: printed, exact, tmt's, MuJoCo's, tolerance).
-
-Figures: none.
-
-Tolerance: half a unit of the last printed digit, and 64 eps x the scale of the
-quantity; of an acceleration times the condition number of the mass matrix.
-
-Examples:
-    python -m compare published
-"""
+"""Every number that an assignment prints, from TMT, from MuJoCo and exactly."""
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
@@ -35,9 +14,10 @@ from ..judge.check import Result
 from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
 from ..judge.words import capital, listed
 from ..robots import Printed, Robot
+from . import Experiment
 from .setup import Setup
 
-TITLE = "Published numbers: does either engine contradict the assignment?"
+EXPERIMENT = Experiment(order=20, serves_own=False)
 
 
 def skipped(robot: Robot) -> str | None:

@@ -21,6 +21,7 @@ from ..judge.timing import vectors
 from ..process.clock import Clock
 from ..report import files, folder, provenance, verdict
 from ..report.parts import Parts
+from ..report.text import say
 from ..robots.case import SEED
 from ..run import examine as experiment
 from ..run.drawing import quiet
@@ -104,7 +105,7 @@ def read_file(shown: str, asked: Asked, bundle: bytes) -> Known:
             .replace(f" {shown}:", " it:")
             .replace(f"{shown} is ", "it is ")
         )
-    reasons = {name: reason for name in asked.names if (reason := skipped(name, known.robot))}
+    reasons = {name: say(reason) for name in asked.names if (reason := skipped(name, known.robot))}
     serving = tuple(name for name in asked.names if name not in reasons)
     about = len(known.robot.joints), reading.integrator, reading.dt, known.reference.kind
     return Known("", serving, tuple(reasons.items()), *about, why_itself=known.reference.why_itself)
@@ -143,7 +144,7 @@ def findings(name: str, work: bytes | None, shown: str, asked: Asked, bundle: by
         setup.background[name] = pickle.loads(zlib.decompress(work))
     found = experiment.computed(name, module(name), setup)
     for result in filter(None, found):
-        result.notes = [as_given(note, shown, bundle) for note in result.notes]
+        result.notes = [as_given(say(note), shown, bundle) for note in result.notes]
         result.checks = [replace(check, note=as_given(check.note, shown, bundle)) for check in result.checks]
     if work and found[0]:
         found[0].notes.append(f"Timed on {platform.node()} ({vectors()}), by a worker that did nothing else.")

@@ -7,8 +7,7 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
-from ..experiments import EXPERIMENTS
-from ..run.examine import TIMED_LAST
+from ..experiments import EXPERIMENTS, TIMED
 from .file_pieces import Asked, Known, findings, read_file, reported, untimed_part
 from .kept import Kept, write_report
 from .models import Model, bundle, place_of_report
@@ -102,13 +101,13 @@ class Run(Standing):
         self.count += 1
         weight = inf if step == "report" else task.joints or 0  # what ends a file comes before what begins another
         insort(
-            self.timed if step in TIMED_LAST else self.waiting,
+            self.timed if step in TIMED else self.waiting,
             Waiting(rank, -weight, self.count, task, step),
         )
 
     def hand_out(self) -> None:
         """As many pieces as keep the workers busy; timed ones of a pool at the end, for all others wait meanwhile."""
-        of_timed = sum(step in TIMED_LAST for _, step in self.under_way.values())
+        of_timed = sum(step in TIMED for _, step in self.under_way.values())
         while self.waiting and len(self.under_way) - of_timed < self.most:
             self.hand(self.waiting.pop(0))
         first = self.waiting[0].rank if self.waiting else TO_REPORT
@@ -131,7 +130,7 @@ class Run(Standing):
         }.get(step, lambda: self.computing(task, step))()
         piece = Piece(
             f"{step} of {task.model.shown}", function, arguments, task.model.hash, rank, -entry.lighter,
-            step in TIMED_LAST, task.packed,
+            step in TIMED, task.packed,
         )  # fmt: skip
         self.under_way[piece.name] = task, step
         task.in_door += 1
@@ -143,7 +142,7 @@ class Run(Standing):
         about = task.model.shown, self.asked
         if step.endswith(UNTIMED):
             return untimed_part, (step.removesuffix(UNTIMED), *about)
-        work = self.kept.get(task.keys[step + UNTIMED]) if step in TIMED_LAST else None
+        work = self.kept.get(task.keys[step + UNTIMED]) if step in TIMED else None
         return findings, (step, work and work[0], *about)
 
     def found(self, task: Task) -> dict:
@@ -192,7 +191,7 @@ class Run(Standing):
         if known.differs:
             self.ended(task, DIFFER, known.differs)
             return
-        timed = [name for name in known.experiments if name in TIMED_LAST] if self.no_timing else []
+        timed = [name for name in known.experiments if name in TIMED] if self.no_timing else []
         task.left_out = [*known.reasons, *((name, f"it measures time: {self.no_timing}") for name in timed)]
         names = [name for name in known.experiments if name not in timed]
         if not names:
@@ -209,7 +208,7 @@ class Run(Standing):
             self.ended(task, **row)
             return
         for name in (name for name in names if name in task.keys):
-            steps = [name + UNTIMED, name] if name in TIMED_LAST else [name]
+            steps = [name + UNTIMED, name] if name in TIMED else [name]
             have = {step: value[1] for step in steps if (value := self.kept.get(task.keys[step]))}
             task.seconds += sum(have.values())
             self.pieces_before += len(have)
@@ -221,7 +220,7 @@ class Run(Standing):
     def ask_next(self, task: Task, step: str) -> None:
         """A step of an experiment is asked for."""
         when_timed = TO_TIME if self.door.times_alone else TO_READ
-        self.ask(task, step, when_timed if step in TIMED_LAST else TO_COMPUTE)
+        self.ask(task, step, when_timed if step in TIMED else TO_COMPUTE)
 
     def go_on(self, task: Task, step: str, value: object) -> None:
         """After what of an experiment is no timing come its times; after the last one the report."""
@@ -242,7 +241,7 @@ class Run(Standing):
         """An experiment has come back; after the last one comes the report, but not between timed ones that all wait for."""
         task.expected.discard(name)
         if not task.expected:
-            after_timed = self.door.times_alone and any(name in TIMED_LAST for name in task.keys)
+            after_timed = self.door.times_alone and any(name in TIMED for name in task.keys)
             self.ask(task, "report", TO_REPORT if after_timed else TO_COMPUTE)
 
     def still(self) -> list[tuple[Task, str]]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from ..run.examine import TIMED_LAST
+from ..experiments import TIMED
 
 # s that a piece takes of a robot with so many joints, before one of its kind has ended; other kinds
 EXPECTED, FEW_SECONDS, JOINTS = (
@@ -32,7 +32,7 @@ class Spent(NamedTuple):
 def time_of_workers(took_by_kind: Took, workers: int, took: float, times_alone: bool) -> Spent:
     """How the time of so many workers in so many seconds was spent; times_alone: all wait while a timed piece runs."""
     whole = workers * took
-    timed = sum(wall for kind in TIMED_LAST for _, wall in took_by_kind.get(kind, ()))
+    timed = sum(wall for kind in TIMED for _, wall in took_by_kind.get(kind, ()))
     computing = min(sum(wall for each in took_by_kind.values() for _, wall in each) / whole, 1.0)
     waiting = min((workers - 1) * timed / whole if times_alone else 0.0, 1.0 - computing)
     return Spent(computing, waiting, 1.0 - computing - waiting)
@@ -62,5 +62,5 @@ def seconds_left(
             ended = [*took_by_kind.get(kind, ()), (JOINTS, EXPECTED.get(kind, FEW_SECONDS))]
             rates[kind] = sum(wall for _, wall in ended) / sum(AS_JOINTS + size for size, _ in ended)
         seconds = rates[kind] * (AS_JOINTS + (JOINTS if joints is None else joints))
-        timed, others = (timed + seconds, others) if kind in TIMED_LAST else (timed, others + seconds / workers)
+        timed, others = (timed + seconds, others) if kind in TIMED else (timed, others + seconds / workers)
     return timed + others if times_alone else max(timed, others)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from tmt.exact.values import distance
 
+from .finding import Finding
 from .scale import EPS, FACTOR
 
 AGREEMENT = [
@@ -95,12 +96,21 @@ class Result:
     rows: list = field(default_factory=list)
     checks: list = field(default_factory=list)
     curves: dict = field(default_factory=dict)
-    notes: list = field(default_factory=list)  # sentences for the report
+    notes: list = field(default_factory=list)  # Findings for the report
     shown: list | None = None  # columns of the table in the report, if not all; none: only in its file
     tables: dict = field(default_factory=dict)  # further tables by name: lists of rows
     filed: tuple = ()  # further tables, by name, that stand in their files alone
-    top: list = field(default_factory=list)  # sentences for the top of the report and for the terminal
+    top: list = field(default_factory=list)  # Findings for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that MuJoCo is compared with
+    headline: Finding | None = None  # its one number, on the first screen; None: how many checks pass
+
+    def finding(self, kind: str, of: str = "", **values) -> Finding:
+        """A sentence of this experiment's template, or of another one."""
+        return Finding(of or self.experiment, kind, values)
+
+    def find(self, kind: str, of: str = "", **values) -> None:
+        """Add such a sentence to what was found."""
+        self.notes.append(self.finding(kind, of, **values))
 
     def check(
         self, scene, quantity, value, tolerance, unit, note="", rounding=False, rule="at most", about=About.MODELS
@@ -164,6 +174,17 @@ class Result:
         curves = {name: np.sort(values) for name, values in in_eps.items()}
         self.curves.setdefault(sample.name, {})[quantity] = curves
         self.shown = [*AGREEMENT, *(f"{engine.lower()}_from_exact_eps" for engine in (self.label, "MuJoCo"))]
+
+
+def agreement_headline(result: Result) -> Finding | None:
+    """The difference that comes closest to its tolerance, or is farthest beyond it."""
+    missing = [row for row in result.rows if row["worst_difference"] is None]
+    known = [row for row in result.rows if row["difference_over_bar"] is not None]
+    top = missing[0] if missing else max(known, key=lambda row: row["difference_over_bar"], default=None)
+    if top is None:
+        return None
+    values = {"difference": top["worst_difference"], "unit": top["unit"], "share": top["difference_over_bar"]}
+    return Finding("shared", "agreement_headline", {"quantity": top["quantity"], **values})
 
 
 def closest(difference: np.ndarray, tolerance: np.ndarray) -> tuple[int, ...]:

@@ -97,7 +97,7 @@ def answers_in_markdown(sections: Sequence[Section], robot: object) -> list[str]
 
 def section_in_markdown(section: Section, size: Size = SECTION_SIZES[0]) -> list[str]:
     """The paragraphs of one experiment: what was found, the tolerance, the worst rows, figures, and where the rest is."""
-    failed, notes = failing(section), section.result.notes
+    failed, notes = failing(section), section.notes
     number = one_number(section)
     lines = [f"## {section.title}", f"**{outcome(section)}** {number}{'.' if number else ''}"]
     lines += [f"- *Claim:* {section.claim}", f"- *Tolerance:* {section.tolerance}"]

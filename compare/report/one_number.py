@@ -8,11 +8,14 @@ from ..judge.check import Result
 from .engines_apart import largest_known
 from .methods_compared import best_curves, cheapest_of_curves, known_limits, limits_found
 from .overview import times_in_print
+from .text import say
 from .verdict import Section
 
 
 def one_number(section: Section) -> str:
     """The number of a section, with its unit; how many checks pass where its result has no such number."""
+    if section.result.headline:
+        return say(section.result.headline)
     find, found = FINDERS.get(section.name), ""
     if find and section.result.rows:
         with suppress(KeyError, TypeError):  # rows without the columns of which that number is

@@ -6,14 +6,13 @@
 import importlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from ..experiments import EXPERIMENTS
 from ..judge.check import Result
 from .verdict import Section
 
 PICTURES = {  # the pictures in their order, and the experiments whose results they need
-    "agreement": ("mass", "acceleration"),
-    "scenes": ("trajectory",),
-    "times": ("speed",),
-    "limits": ("stability",),
+    picture: tuple(name for name, record in EXPERIMENTS.items() if record.overview == picture)
+    for picture in dict.fromkeys(record.overview for record in EXPERIMENTS.values() if record.overview)
 }
 BEGINNING = "overview_"  # of the names of their files
 

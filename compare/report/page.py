@@ -82,7 +82,7 @@ def section_in_html(folder: Path, section: Section) -> list[str]:
     """What stands in the page of one experiment: what was found, figures, the tolerance, and the details folded."""
     good, _ = standing(section)
     kind = "good" if good else "none" if good is None else "bad"
-    number, notes = one_number(section), section.result.notes
+    number, notes = one_number(section), section.notes
     texts = [
         top(section),
         f'<p class="outcome {kind}">{mark(good)} <strong>{html.escape(outcome(section))}</strong> {words(number)}.</p>',

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from ..judge.check import ENDS, About, Check, Result
 from ..judge.words import capital, listed
+from .text import say
 
 SEEKS_CAUSES = "diagnosis"  # the experiment in which nothing can agree or not: it says why others fail
 
@@ -20,6 +21,11 @@ class Section:
     tolerance: str
     result: Result
     figures: list = field(default_factory=list)  # (file name, caption)
+
+    @property
+    def notes(self) -> list[str]:
+        """What was found, in sentences."""
+        return [say(note) for note in self.result.notes]
 
     @property
     def tables(self) -> dict:
@@ -42,7 +48,7 @@ class Report(NamedTuple):
     @property
     def top(self) -> list[str]:
         """What is said of the robot below the verdict, in sentences."""
-        return [text for section in self.sections for text in section.result.top]
+        return [say(text) for section in self.sections for text in section.result.top]
 
 
 class Failures(NamedTuple):

@@ -12,6 +12,7 @@ from ..judge.check import Result
 from ..process.crash import described
 from ..report import images, overview
 from ..report.folder import writing
+from ..report.text import say
 from ..robots import Robot
 
 FIRST = "the first"  # of the figures of an experiment
@@ -46,7 +47,7 @@ def draw(
                 path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
                 with writing(path), quiet(robot):
                     images.save_figure(figure, path)
-                drawn.append((path.name.removesuffix(".png"), caption))
+                drawn.append((path.name.removesuffix(".png"), say(caption)))
             except OSError:
                 raise
             except Exception as error:

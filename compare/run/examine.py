@@ -6,16 +6,18 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
-from ..experiments import EXPERIMENTS, module
+from ..experiments import EXPERIMENTS, TIMED, Experiment, module
 from ..experiments.setup import Setup as Setup
 from ..experiments.setup import engines as engines
 from ..judge.check import ENDS, About, Result
+from ..judge.finding import Finding
 from ..process.clock import Clock
 from ..process.crash import described
 from ..process.workers import WorkerEnded, Workers
 from ..report import overview
 from ..report.remaining import END, START
 from ..report.terminal import Terminal
+from ..report.text import block, has, say
 from ..report.verdict import Section, failures
 from .drawing import FIRST, HALVES, draw, quiet
 
@@ -23,18 +25,11 @@ Found = tuple[
     Result | None, Result | None
 ]  # what an experiment found, or the failed check that stands for it where it broke off
 
-# which of a user's own equations an experiment asks; others ask all
-ASKED_BY = {
-    "kinematics": ("com_positions", "jacobians"),
-    "mass": ("mass_matrix",),
-    "gravity": ("gravity", "bias", "energy"),
-}
-DIAGNOSED = ("mass", "gravity", "acceleration", "trajectory")  # of whose failure `diagnosis` seeks the cause
+DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers that Mbar and h follow from, as `parameters` calls them
 IN_EQUATIONS = (
     "order", "parent", "ref", "axis", "anchor", "mass", "com", "inertia", "gravity", "armature", "flag gravity",
 )  # fmt: skip
-TIMED_LAST = ("speed", "reduction")  # they come last, for they wait until nothing else is under way
 NOTHING_FAILED = "nothing failed"
 SHOWN = 5  # checks of an experiment that fail, on the terminal
 
@@ -61,7 +56,7 @@ def examine(
     begin = {name: experiment for name, experiment in modules.items() if name not in have}
     crashed = {name: begun(name, experiment, setup, clock) for name, experiment in begin.items()}
     clock.ends(START)
-    order = sorted(modules, key=TIMED_LAST.__contains__)
+    order = sorted(modules, key=TIMED.__contains__)
     for name in order:
         experiment = modules[name]
         asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
@@ -72,12 +67,12 @@ def examine(
             continue
         clock.begins(name)
         with clock.of(name):
-            setup.progress(EXPERIMENTS[name])
+            setup.progress(block(name, "summary"))
             result, crash = have.get(name) or found_by(name, experiment, setup, crashed[name])
-            asked, unsaid = attempt(name, partial(own_words, experiment), setup)
+            asked, unsaid = attempt(name, partial(own_words, name, experiment), setup)
             if own:
                 add_problems(crash or result, own.equations.problems, said)
-            sections.append(Section(name, *(asked or (experiment.TITLE, "", "")), crash or result))
+            sections.append(Section(name, *(asked or (name, "", "")), crash or result))
             sections[-1].result.checks += unsaid.checks if unsaid else []
             new = new_causes(setup, sections, causes)
             causes = new + causes
@@ -87,7 +82,7 @@ def examine(
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
             parts = [] if crash else parts_drawn(name, sections[-1], setup)
             jobs = [(sections[-1], partial(drawing, part)) for part in parts]
-            if name in TIMED_LAST:  # no drawing delays a timing
+            if name in TIMED:  # no drawing delays a timing
                 waiting += jobs
             else:
                 drawings += [(section, job()) for section, job in jobs]
@@ -126,18 +121,27 @@ def add_problems(result: Result, problems: Sequence, said: set) -> None:
     """
     others, result.checks = result.checks, []
     for k, problem in enumerate(problems):
-        if k not in said and problem.quantity in ASKED_BY.get(result.experiment, (problem.quantity,)):
+        if k not in said and problem.quantity in (asks_of_own(result.experiment) or (problem.quantity,)):
             said.add(k)
             result.check("", f"{problem.quantity} gives what it should", None, 0.0, "", problem.text, rule="equal")
     result.checks += others
 
 
-def own_words(experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
+def asks_of_own(name: str) -> tuple[str, ...] | None:
+    """Which of a user's own functions an experiment calls; None: all."""
+    return EXPERIMENTS.get(name, Experiment(0)).asks_of_own
+
+
+def own_words(name: str, experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
     """What an experiment says of itself: its title, its claim, its tolerance."""
-    robot = setup.robot
-    kind = "TITLE_OF_OWN" if robot.own else "TITLE_OF_A_FILE" if robot.is_read and not robot.is_stated else "TITLE"
-    title = getattr(experiment, kind, experiment.TITLE)
-    return title, experiment.claim(robot), experiment.tolerance(robot)
+    values = getattr(experiment, "claim_values", lambda robot: {})(setup.robot)
+    claim, tolerance = (
+        say(Finding(name, kind, {"robot": setup.robot, "values": values}))
+        if has(name, kind)
+        else getattr(experiment, kind)(setup.robot)
+        for kind in ("claim", "tolerance")
+    )
+    return block(name, "title", robot=setup.robot), claim, tolerance
 
 
 def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict]) -> list[dict]:
@@ -206,7 +210,7 @@ def parts_drawn(name: str, section: Section, setup: Setup) -> Sequence[str | Non
     """What is drawn of an experiment: all its figures; in a quick run of several experiments the first, unless a check fails."""
     if setup.is_quick and not setup.alone and not any(failures([section])):
         return (FIRST,)
-    return HALVES if name in TIMED_LAST else (None,)
+    return HALVES if name in TIMED else (None,)
 
 
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:

@@ -7,13 +7,14 @@ names of scenes, quantities and coordinates ~: which of them comes out worst dep
 import os
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 from compare.experiments import EXPERIMENTS, module
 from compare.report import images, overview, verdict
 from compare.report.markdown import markdown, markdown_body
 from compare.report.parts import Parts
 from compare.robots.arm import ARM
-from compare.run import drawing
+from compare.run import drawing, examine
 
 GOLDEN = Path(__file__).with_name("golden.md")
 NUMBER = re.compile(r"(?<![A-Za-z_])[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
@@ -34,8 +35,7 @@ def report_of_arm(small, folder) -> str:
     """report.md of all experiments on the arm, its figures not rendered: what is wrong with these, test_drawn_figures sees."""
     sections = []
     for name in EXPERIMENTS:
-        of = module(name)
-        section = verdict.Section(name, of.TITLE, of.claim(ARM), of.tolerance(ARM), small(name))
+        section = verdict.Section(name, *examine.own_words(name, module(name), SimpleNamespace(robot=ARM)), small(name))
         sections.append(section)
         others = overview.results_needed(name, list(EXPERIMENTS), sections)
         section.figures, lost = drawing.draw(name, section.result, ARM, folder, others)

@@ -1,59 +1,4 @@
-"""What explains a difference: in Mbar, h and accelerations of a file beside its reference, or of one's own equations.
-
-Asks: which one mistake explains what differs?
-
-Compares: the values of both engines with those of models that are wrong in one
-place: one number (a mass, a length, an inertia), one term (a factor, a sign),
-one coefficient of the equations, or the convention of a joint (its order, sign,
-zero or unit). What explains all of the difference is named, with the stated and
-the found value: "h[hip], coefficient of knee'^2: yours is -1 times the right
-one".
-In `all` it is made where mass, gravity, acceleration or trajectory has failed.
-Alone and without a file it tries itself: hundreds of made faults, each of
-which must be found. They go to other processes with --workers N, and with
---dask ADDRESS to a Dask cluster: the same rows, except for the seconds; a fault
-whose process ends three times more, or that takes ten minutes, is a failed
-check.
-
-Equations of your own are a file or a module with functions mass_matrix(q) and
-bias(q, qd) of M(q) q'' + h(q, q') = tau, by themselves or in an object (also a
-tmt.Tree, or SymPy matrices and their `symbols`); also gravity(q) and
-acceleration(q, qd, tau). They take one state or a batch, whichever they can.
-Joints are matched by `joint_names` where there are such; --joints says
-otherwise: order, sign, zero and unit, as in knee,-hip+90deg.
-
-In a test or a notebook, without a report, from a whiteboard, SymPy or MATLAB:
-`compare.assert_agrees`. M, h, gravity and accelerations, one of them or all,
-are functions, or pairs of a SymPy matrix and the list of its symbols, or arrays
-of their values at the q, qd and tau that you give, so that an export is a CSV:
-
-    import compare, numpy as np
-
-
-    def test_my_export():  # a row: q1, q2, M11, M12, M21, M22
-        table = np.loadtxt("export.csv", delimiter=",")
-        compare.assert_agrees("robot.xml", q=table[:, :2], mass_matrix=table[:, 2:], rtol=1e-6)
-
-`rtol` is for constants that are rounded: the tolerance is (64 eps + rtol) times
-the sum of the absolute terms of each entry, not the entry, which may be the
-small rest of large terms. `compare.differences` takes the same and returns
-every entry.
-
-Tables: diagnosis.csv (each cause: stated, what explains the difference, what is
-left over); of made faults faults.csv.
-
-Figures: diagnosis_nearest (what is left over of the nearest causes); of made
-faults diagnosis_outcomes.
-
-Tolerance: a cause explains a difference if what is left over is within the
-tolerances of mass, gravity and acceleration.
-
-Examples:
-    python -m compare diagnosis --mjcf robot.xml --reference my_equations.py:
-    python -m compare diagnosis --mjcf my_arm.xml
-    python -m compare diagnosis
-    python -m compare diagnosis --dask tcp://10.0.0.5:8786
-"""
+"""What explains a difference: in Mbar, h and accelerations of a file beside its reference, or of one's own equations."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -74,12 +19,13 @@ from ...judge.check import Result, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
+from .. import Experiment
 from ..setup import Setup
 from . import fault_table
 from .own_equations import asked_conditions, for_command_line
 from .single_steps import Stepped, steps_of_integrators
 
-TITLE = "Diagnosis: what explains a difference?"
+EXPERIMENT = Experiment(order=80, options=("--joints", "--workers", "--dask"))
 SECONDS = 8.0  # of a search
 CAUSE_COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
 NO_NUMBERS = "not all values are numbers"

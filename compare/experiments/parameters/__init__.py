@@ -1,57 +1,4 @@
-"""The compiled model read back beside the stated numbers.
-
-Asks: is the model that MuJoCo runs the one that is meant?
-
-Compares: masses, centres of mass, inertia tensors (turned back into the axes of
-their bodies), joint axes, anchors, order, zero and gravity of the compiled
-model with the stated numbers; and nothing else may act: no armature, friction,
-spring, limit or further mass that was not stated. Where a number differs, it is
-named as the cause of whatever else fails ("com x of link 2: stated 0.15 m,
-compiled 0.151 m"), before all other checks.
-
-Of a robot's file the numbers are those of the model as MuJoCo compiled it: that
-the two engines agree then says that their equations are the same, not that the
-numbers are right. What the compiler itself changed, such as inertia from geoms
-or `settotalmass`, stands here. A file may have hinges, slides, ball and free
-joints, with armature, damping and springs. What the equations do not have is
-switched off in MuJoCo for the comparison, and listed with the reason in
-inventory.csv: contacts, limits, friction loss, clamps, fluid, gravity
-compensation, actuators, tendons. Equalities are off too; the second line of the
-output names them, and the open tree is compared. Refused in one line, with exit
-status 2: tendon armature, flexes, plugins in the passive force, callbacks, and
-whatever the reader does not know.
-
-The first line of the output and of the report says what is compared with what:
-
-    reference: model; robot.xml compared with tmt's equations for the model as compiled
-
-It is `arm`, the stated numbers, by default where a file has exactly the hinges
-of the assignment's arm, else `model`, itself; --reference says otherwise.
-
-Postures of a file are its keyframes by their names (`key 0` without one),
-`qpos0` and `middle`, that of the joints' ranges.
-
-With --reference FILE.xml the numbers of both files, as MuJoCo compiled them,
-are compared, joint by joint and body by body: masses, centres of mass, inertia
-tensors, axes, anchors, zero, gravity, damping, armature and springs. Of limits,
-actuators, equalities and whatever else the equations do not have, the number of
-each is compared.
-
-Tables: parameters.csv (each number: stated, compiled, difference); of a robot's
-file inventory.csv (each feature of the file: modelled or switched off, and
-why).
-
-Figures: the robot as its numbers have it, under the robot's name (arm).
-
-Tolerance: 64 eps x the largest entry of the quantity, for the compiler stores
-each number once; what must be absent must be exactly 0.
-
-Examples:
-    python -m compare parameters
-    python -m compare parameters --mjcf robot.xml
-    python -m compare parameters --mjcf my_arm.xml --reference arm
-    python -m compare parameters --mjcf my_robot.xml --reference solution.xml
-"""
+"""The compiled model read back beside the stated numbers."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -65,11 +12,11 @@ from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.case import Coordinates
+from .. import Experiment
 from ..setup import Setup
 from . import file, solution
 
-TITLE = "Parameters: is MuJoCo's compiled model the stated one?"
-TITLE_OF_A_FILE = "Parameters: did MuJoCo compile the numbers that its file states?"
+EXPERIMENT = Experiment(order=10, serves_own=False)
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
 # numbers of the whole file, and those of bodies; the others are of joints
 OF_ALL = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *NOT_HAD)

@@ -1,36 +1,4 @@
-"""What each scene needs of the model: the fewest joints, an integrator at all; and what the rest costs.
-
-Asks: which joints of a scene can be left out without changing its motion?
-
-Compares: the smaller model with the whole one, in both engines. A joint may be
-locked if, with it at its start value and at rest, its acceleration vanishes for
-all values of the others: proved on the expressions of the traced method, which
-fold to the number 0, and confirmed with 50 digits at random states. A held
-posture needs no integrator. A single free hinge is a physical pendulum, whose
-angle is an elliptic function of time, and small swings are linear modes: runs
-are compared with these. Then what geoms, contacts, sensors and flags cost in
-MuJoCo when they change nothing.
-
-`tmt.ARM.lock({"NAME": 0.3})` is the same for a model alone (rad): constants
-fold, and the compiled code becomes shorter. In a scene of your own (see
-trajectory) it is locked = ["NAME"].
-
-Tables: reduction.csv (each scene with fewer joints: operations, time,
-difference), reduction_subsets.csv (blocks of Mbar and bias with joints locked),
-reduction_joints.csv (of a robot's file, by joint), cost_in_mujoco.csv.
-
-Figures: reduction_needs, reduction_modes, reduction_cost_in_mujoco; where a
-scene comes down to one hinge reduction_SCENE (its exact swing).
-
-Tolerance: 64 eps x the scale of the whole model; of runs the band of rounding
-(see trajectory); what exerts no force leaves the same bits. Times make no
-checks.
-
-Examples:
-    python -m compare reduction
-    python -m compare reduction --scenes my.toml
-    python -m compare reduction --mjcf robot.xml --quick
-"""
+"""What each scene needs of the model: the fewest joints, an integrator at all; and what the rest costs."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -46,13 +14,14 @@ from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...robots.case import Case
+from .. import Experiment
 from ..setup import Setup, nothing
 from . import exact_motion, sub_blocks
 from .cost import measure_costs
 from .needs import MOST_IN_A_BAND, of_case
 from .times import TWO_INTEGRATORS, time_models
 
-TITLE = "Reduction: no more model than a scene needs"
+EXPERIMENT = Experiment(order=110, serves_own=False, options=("--scenes",), timed=True)
 
 
 def claim(robot: Robot) -> str:

@@ -1,42 +1,4 @@
-"""Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps.
-
-Asks: which method, with which step, comes to so many digits in the least time?
-
-Compares: the largest error of each run with the true motion (a Taylor series in
-pairs of doubles, good to some 30 digits, confirmed by a second run in another
-form of the equations and of another order), and the time that the run takes,
-over all useful steps of every integrator of MuJoCo, every method of tmt,
-SciPy's and (where installed) heyoka's. What is compared is code made for this
-one model with an engine made for any model: the ratio says what that costs, not
-that one is better. It is taken apart: so much is the order of the method, so
-much the compiled code.
-
-Then what one evaluation of the forward dynamics costs: mj_forward, the calls of
-MuJoCo that do the same work, tmt's compiled code for independent states, for
-states where each waits for the last, and for many side by side; heyoka's and
-Pinocchio's where they are installed. Timed are compiled loops: a call of
-tmt.simulate from Python adds some microseconds.
-
-A robot with servos answers to a step of their targets: which integrator and
-step come to 1e-3 rad (not with --quick).
-
-Tables: speed.csv (each run), what_should_i_use.csv (the cheapest setting for
-each error, of MuJoCo, of tmt, of all), speed_orders.csv (measured orders),
-evaluations.csv (what one evaluation costs).
-
-Figures: speed_SCENE (time against error), speed_evaluations (evaluations
-against error), speed_energy (drift of energy against time),
-speed_evaluation_cost.
-
-Tolerance: times make no checks. Checked is that each method has its order, that
-MuJoCo and the same scheme in tmt make the same error except for rounding, and that
-errors which have stopped falling are of the size of rounding.
-
-Examples:
-    python -m compare speed
-    python -m compare speed --scenes my.toml
-    python -m compare speed --mjcf robot.xml --quick
-"""
+"""Time against error: every integrator of MuJoCo, every method of tmt, SciPy and heyoka, over all useful steps."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -49,6 +11,7 @@ from ...judge.units import renamed, said
 from ...judge.words import scene_begins
 from ...robots import Robot
 from ...truth.reference import has_no_reference
+from .. import Experiment
 from ..setup import Setup
 from . import accuracy, advice, evaluations, tumbling
 from .accuracy import reference_in_words
@@ -65,7 +28,7 @@ from .settings import (
 )
 from .times import fill_in, prepared, spread_in_words, take_times
 
-TITLE = "Speed against accuracy"
+EXPERIMENT = Experiment(order=90, serves_own=False, options=("--scenes",), timed=True, overview="times")
 PARTS = (
     "In the table of what to use, mujoco, tmt and of_all are the cheapest settings whose worst error is at most target_rad. "
     "ratio is MuJoCo's time over tmt's: the product of integrator_part (MuJoCo's cheapest over its RK4), kernel_part (MuJoCo's "

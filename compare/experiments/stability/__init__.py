@@ -1,58 +1,4 @@
-"""Stability: where each method fails, predicted from one step of it and shown in runs, with all joints together.
-
-Asks: up to which step is a method stable, and what happens beyond? For a robot
-with actuators: which step is stable under its own servos, before it explodes?
-
-Compares: limits of the step, growth on unstable postures and the time at which
-such a posture is left, as predicted from one step of the method (its
-amplification, by exact derivatives), with runs of both engines, which find them
-by bisection without the prediction. Then what fails without a warning: a wrong
-side that is taken by the last bits of a torque, a stable run with a wrong
-motion, energy over a minute; of the assignment's arm the three claims about its
-figures.
-
-A robot with servos: the limits follow in closed form from mass matrix,
-stiffness and damping at each posture at rest, with the actuators as the file
-states them, and runs of MuJoCo show the same within 1 %. The answer stands at
-the end of the output and at the top of the report. The notes say which joint
-limits, and what would lift that: another integrator, so much kv at most, so
-much armature at least, each tried in a run. A file that is unstable at its own
-step is a failed check, "stable at its own step" (exit status 1); the two models
-agree all the same. --dt and --integrator ask about another step. Stable is not
-exact: what a step costs is in the figure stability_step_response. Velocity
-gains are explicit or implicit in tmt as they are in MuJoCo's integrator.
-
-Actuators are those of joints, fixed and spatial tendons and sites; position,
-velocity, general and motor, with their filters. Named and left out: muscles,
-plugins, PID, DC motors, delays and whatever is not linear. Equalities of the
-file are on, as MuJoCo's soft constraints, and so are limits at which a joint
-rests; contacts are off, which the answer says of a file that has them. Joints
-that nothing holds are set aside by name. A floating robot is taken without
-gravity, its base free; a posture that is not at rest is followed to the rest
-near it, and a saddle is called one.
-
-Tables: stability.csv (each limit, predicted and observed),
-stability_growth.csv, departure.csv (when an unstable posture is left),
-stability_modes.csv, stability_energy.csv, stability_newton.csv (where an
-implicit method finds no step); of the assignment's arm stability_torques.csv,
-stability_finer_steps.csv and stability_bent.csv (its claims); of a robot with
-servos step_limits.csv (every posture and integrator) and full_model.csv (the
-whole file for two seconds, contacts and friction on).
-
-Figures: stability_limits, stability_regions, stability_departure,
-stability_energy, stability_map, stability_edge, stability_silent; of the
-assignment's arm stability_torques, stability_finer_steps, stability_bent,
-stability_zero; of a robot with servos stability_step_response.
-
-Tolerance: limits within 0.1 % of the predicted step, growth within 0.1 % over
-all steps, departure within one step or 0.03 s; amplification within the
-rounding of a difference quotient.
-
-Examples:
-    python -m compare stability
-    python -m compare stability --mjcf robot.xml
-    python -m compare stability --mjcf robot.xml --integrator Euler --dt 0.001
-"""
+"""Stability: where each method fails, predicted from one step of it and shown in runs, with all joints together."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -65,6 +11,7 @@ from ...judge.check import Result
 from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...truth.linear import held
+from .. import Experiment
 from ..setup import Setup
 from . import beyond, choice, claims, departure, failure, falling, growth, limits, long_runs, servos
 from .choice import dampings_of
@@ -73,7 +20,7 @@ from .equilibria import check_equilibria, planes
 from .limits_judged import check_limits
 from .subjects import MANY, places, subjects_of
 
-TITLE = "Stability: where methods fail"
+EXPERIMENT = Experiment(order=100, serves_own=False, options=("--dt", "--integrator"), overview="limits")
 FINE_DEPARTURES = (1e-2, 1e-3)  # s, beside the coarsest step
 MAP_STEPS = np.geomspace(0.03, 1.0, 100)  # s
 SMALL_RESONANCE = failure.RESONANCE + np.array([-0.01, -0.005, 0.0, 0.005])  # of a small run

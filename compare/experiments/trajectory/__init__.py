@@ -1,56 +1,4 @@
-"""Motion by the same scheme on both sides: a method of tmt for every integrator of MuJoCo.
-
-Asks: does the same scheme give the same motion, for as long as rounding allows?
-
-Compares, for every integrator of MuJoCo and every scene: the derivative and one
-step at every recorded state, and the run of some seconds in the open loop, with
-the same scheme in tmt. A scene that needs fewer joints (see reduction) runs
-once more without the others. Then what agreement alone does not show: errors
-against the true motion, drift of energy and momentum, how small differences
-grow, and the same scheme in 50 digits. Two engines can agree to 1e-11 rad and
-both be far from the true motion, because they take the same large step.
-
-Scenes of a robot's file: held at its first posture but qpos0 (by its servos
-too, without clamps), let go there for a second, let go with damping; a free
-body is thrown; a robot with servos answers to a step of their targets of 6 deg,
-or 2 cm. A robot with a free body floats while its servos act: gravity is off.
-
-Scenes of your own come from a file, with a table for each; --scenes my.toml
-adds them here, in speed, in reduction and in all:
-
-    [[scene]]
-    name = "my swing"
-    q = [0, 0, 120]        # deg; or posture = "NAME"; nothing: all zero
-    speed = [50, 0, 0]     # deg/s; of slides m and m/s, of a ball a quaternion
-                           # w, x, y, z and three speeds
-    torque = "free"        # or "hold", "servos" (the file's actuators), or N m
-    targets = 0            # deg (m): how far the targets of servos are moved
-    damping = 0.1          # N m s/rad, added to every hinge's
-    gravity = true
-    locked = []            # names of joints that stay where they start
-    duration = 2.0         # s
-    dt = 0.03125           # s, the coarsest step; without it 64 of them
-
-A quaternion of a length within 0.001 of 1 is divided by it; another is refused.
-
-Tables: trajectory.csv (a row for each scene, integrator and quantity: the
-largest difference, its band of rounding, until when it is judged), motion.csv
-(each scene at equal times, by both engines).
-
-Figures: trajectory_SCENE for every scene, trajectory_drift (energy and
-momentum), trajectory_growth (how differences grow), motion (both engines, a
-GIF); of the assignment's arm also assignment_figure_2 and assignment_figure_3.
-
-Tolerance: a band that is computed along the run: the rounding that every step
-can add, carried to the present by the exact Jacobians of the method's own
-steps. A run is judged while its band is below 0.001 rad. A free run must move
-by 0.1 rad.
-
-Examples:
-    python -m compare trajectory
-    python -m compare trajectory --scenes my.toml
-    python -m compare trajectory --mjcf robot.xml --quick
-"""
+"""Motion by the same scheme on both sides: a method of tmt for every integrator of MuJoCo."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -61,6 +9,7 @@ from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
 from ...truth.reference import reference
+from .. import Experiment
 from ..setup import Setup
 from . import drift, errors, horizon, leaving, motion, sentences
 from .derivative import compare_derivatives
@@ -68,8 +17,7 @@ from .motion_frames import follow_and_draw, in_order
 from .own_runs import within_time
 from .runs import FEW_ENTRIES, MOST_ENTRIES
 
-TITLE = "Trajectories: the same scheme for every integrator of MuJoCo"
-TITLE_OF_OWN = "Trajectories: your equations and MuJoCo, both by RK4"
+EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
 FEW_EXACT_STEPS = 8  # with many digits, in a small run
 
 

@@ -1,0 +1,60 @@
+"""Sentences from templates: `say(finding)` is the text of a finding.
+
+Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a set of macros; numbers are formatted there, with
+the filters below or Python's `format`.
+"""
+
+from functools import cache
+from math import isfinite
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from ..judge.finding import Finding
+from ..judge.words import capital, listed
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def count(number: int, one: str, many: str = "") -> str:
+    """A count with its noun: 1 check, 3 checks."""
+    return f"{number:,} {one if number == 1 else many or f'{one}s'}"
+
+
+FILTERS = {
+    "g": lambda value, digits=3: f"{value:.{digits}g}",
+    "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
+    "degrees": lambda angle, digits=4: f"{angle * 57.29577951308232:.{digits}g} deg",
+    "count": count,
+    "listed": lambda words: listed(list(words)),
+    "capital": capital,
+}
+
+
+@cache
+def environment() -> Environment:
+    """Jinja2 with the folders of all templates."""
+    folders = sorted({str(file.parent) for file in ROOT.rglob("*.jinja")})
+    made = Environment(
+        loader=FileSystemLoader(folders), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    made.filters |= FILTERS
+    made.tests["finite"] = isfinite
+    return made
+
+
+def say(finding: Finding | str) -> str:
+    """The text of a finding, in one line. What is text already stays as it is."""
+    if isinstance(finding, str):
+        return finding
+    return " ".join(block(finding.of, finding.kind, **finding.values).split())
+
+
+def block(of: str, kind: str, **values) -> str:
+    """What the macro `kind` of a template gives, with its lines."""
+    return str(getattr(environment().get_template(f"{of}.md.jinja").module, kind)(**values)).strip()
+
+
+def has(of: str, kind: str) -> bool:
+    """Whether a template has this macro."""
+    return hasattr(environment().get_template(f"{of}.md.jinja").module, kind)
