@@ -130,7 +130,7 @@ def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, fo
     asked = ["--quick", "--mjcf", "double.xml", "--reference", "mine.py:Object", "--out", "out"]
     assert main(["speed", *asked]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and "speed cannot serve double" in err.splitlines()[-1]
+    assert out == "" and "speed does not apply to double" in err.splitlines()[-1]
     assert main(["gravity", "--joints", "-hip,knee", *asked]) == 1
     out, err = capsys.readouterr()
     assert out.startswith("reference: own; double.xml ") and err == "a user's file may print\n"
