@@ -10,6 +10,7 @@ from string import Template
 import numpy as np
 
 from .engines_apart import scene_named_in
+from .text import say
 from .verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page
@@ -99,7 +100,7 @@ def inlined_scene(one: object, stride: int) -> dict:
     alive = [k for k in range(len(ours)) if ours[k] is not None and theirs[k] is not None]
     return {
         "name": one.scene,
-        "seen": f"{one.scene[:1].upper()}{one.scene[1:]}, {one.run}. {one.seen}{shown}",
+        "seen": f"{one.scene[:1].upper()}{one.scene[1:]}, {one.run}. {say(one.seen)}{shown}",
         "dt": dt,
         "pause": max(1, round(1000.0 * dt * slow)),
         "unit": one.unit,

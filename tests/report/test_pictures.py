@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from sections import section
 
-from compare.experiments.trajectory.motion_frames import Drawn
+from compare.experiments.trajectory.motion import Drawn
 from compare.judge.check import About
 from compare.report import images, motion, style
 from compare.robots.arm import ARM

@@ -1,7 +1,7 @@
 """The motion as a GIF: the stick figures of both engines over each other, held and let go.
 
-Drawn without matplotlib, which takes seconds for some hundred pictures: two masks, one for each engine, and one of text, in the
-colours of one small palette. What is drawn is wide and filled for the first engine, narrow and with rings for MuJoCo.
+Drawn without matplotlib, which takes seconds for a hundred pictures: a mask for each engine and one of text, in the colours of
+one small palette. The first engine's sticks are wide with discs, MuJoCo's narrow with rings.
 """
 
 from collections.abc import Sequence
@@ -14,14 +14,15 @@ from PIL import Image, ImageChops, ImageDraw, ImageFont
 
 from ...engines import LABELS
 from ...judge.check import Result
+from ...judge.finding import Finding
 from ...judge.words import capital
 from ...report.style import BLUE, ORANGE
-from .motion_frames import Drawn
+from .motion import Drawn
 
-PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and what is left to text above and below
-FINE = 2  # masks are drawn so many times as large
-LEVELS = 5  # of the shades of each colour
-CENTISECONDS, PAUSE = 4, 120  # for which a picture stands, and the last of a scene
+PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
+FINE = 2  # masks are drawn larger by this factor
+LEVELS = 5  # shades of each colour
+CENTISECONDS, PAUSE = 4, 120  # of a picture, and of the last one of a scene
 NAMES_AT = 16, 150  # pixels from the left: the engines' names
 MOST_WIDE = 6  # sticks that are drawn wide
 
@@ -46,14 +47,12 @@ class Animation:
         first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=False)
 
 
-def draw_motion(result: Result) -> tuple[str, Animation, str]:
-    """The first scenes of those that are drawn in motion, of which one is held and one let go."""
+def draw_motion(result: Result) -> tuple[str, Animation, Finding]:
+    """The first two scenes that are drawn in motion, of which one is held and one let go."""
     scenes = result.curves["drawn"][:2]
-    engines = " and ".join(LABELS[name] for name in scenes[0].points)
-    caption = f"The motion in {engines}, over each other. " + " ".join(
-        f"{capital(scene.scene)}, {scene.run}: {scene.seen}" for scene in scenes
-    )
-    return "motion", Animation(scenes, result.label), caption
+    engines = [LABELS[name] for name in scenes[0].points]
+    seen = [{"name": scene.scene, "run": scene.run, "seen": scene.seen.values} for scene in scenes]
+    return "motion", Animation(scenes, result.label), result.finding("figure_motion", engines=engines, scenes=seen)
 
 
 def place_of(scene: Drawn) -> tuple[float, np.ndarray]:
@@ -68,7 +67,7 @@ def place_of(scene: Drawn) -> tuple[float, np.ndarray]:
 
 
 def one_picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image.Image:
-    """The k-th picture of a scene in the colours of the palette; still: the text that stands in all of them."""
+    """The k-th picture of a scene in the colours of the palette; still: the text in all of them."""
     scale, origin = place
     text = still.copy()
     write = partial(ImageDraw.Draw(text).text, fill=255, font=font(17))
@@ -92,14 +91,14 @@ def one_picture(scene: Drawn, k: int, still: Image.Image, place: tuple) -> Image
 
 
 def words_of_picture(scene: Drawn, k: int) -> tuple[str, str, str]:
-    """What the k-th picture says: its time; how far the engines are apart, or who has diverged; who has left by then."""
+    """The text of the k-th picture: its time; the engines' difference, or which has diverged; which has left by then."""
     lost = [name for name, path in scene.points.items() if not np.isfinite(path[k]).all()]
     apart = "; ".join(f"{capital(LABELS[name])} has diverged" for name in lost)
     left = [(time, LABELS[name]) for name, time in scene.left.items() if time is not None and time <= scene.t[k]]
     gone = "; ".join(f"{capital(name)} has left at {time:.2f} s" for time, name in sorted(left))
     return (
         f"t = {scene.t[k]:.2f} s",
-        apart or f"apart in any joint by at most {scene.apart[k]:.2g} {scene.unit}",
+        apart or f"largest difference of a joint: {scene.apart[k]:.2g} {scene.unit}",
         gone,
     )
 
@@ -109,8 +108,8 @@ def draw_sticks(pen: ImageDraw.ImageDraw, points: Sequence[tuple], links: Sequen
     few = len(links) <= MOST_WIDE
     width = FINE * ((14 if few else 8), (4 if few else 3))[which]
     disc = FINE * ((7 if few else 4), (6 if few else 3))[which]
-    for one, other in links:
-        pen.line([points[one], points[other]], fill=255, width=width)
+    for start, end in links:
+        pen.line([points[start], points[end]], fill=255, width=width)
     for x, y in points:
         pen.ellipse([x - disc, y - disc, x + disc, y + disc], fill=255)
         if which:
@@ -119,7 +118,7 @@ def draw_sticks(pen: ImageDraw.ImageDraw, points: Sequence[tuple], links: Sequen
 
 
 def text_of_scene(scene: Drawn, label: str, place: tuple) -> Image.Image:
-    """What stands in all pictures of a scene: its name, its run, the engines' names, a frame where the robot is fixed."""
+    """The text in all pictures of a scene: its name, its run, the engines' names, a frame where the robot is fixed."""
     text = Image.new("L", PIXELS)
     pen = ImageDraw.Draw(text)
     pen.text((16, 10), scene.scene, fill=255, font=font(20))
@@ -133,7 +132,7 @@ def text_of_scene(scene: Drawn, label: str, place: tuple) -> Image.Image:
 
 
 def slower(scene: Drawn) -> str:
-    """How much slower than it is a scene is shown, in words; nothing where that is hardly seen."""
+    """By what factor a scene is shown slower, in words; nothing where that is hardly seen."""
     times = CENTISECONDS / 100.0 / float(scene.t[1] - scene.t[0])
     if 0.9 < times < 1.1:
         return ""

@@ -24,22 +24,19 @@ from ...robots.case import Case, Coordinates
 from ...truth.linear import Held
 from ...truth.smallest import reduced
 from ...truth.steps import beyond_limit
-from .motion import at_equal_times
+from .motion import Drawn, at_equal_times, drawn_motion
 from .rules import check_divergence, check_level, check_same_bits, ends_first, judged
 
 STEPS_AT_MOST = 8192  # steps of a run that is finer than the scene's own
-MOST_ENTRIES, FEW_ENTRIES = (
-    2_700_000,
-    100_000,
-)  # of the Jacobians of all steps of a run: they take the time; in a small run
+MOST_ENTRIES, FEW_ENTRIES = 2_700_000, 100_000  # of all Jacobians of a run, which take the time; in a small run
 RECORDED = 64  # states of a run that are compared: one for each of the scene's own steps, or fewer
 HALF_TURN = (
     np.pi
-)  # rad: the bound of a step's rounding is of first order in dt, and none for a step that turns a joint farther
+)  # rad: the bound of a step's rounding is of first order in dt, and too small where a joint turns farther
 
 
 class TmtSide(NamedTuple):
-    """What TMT, or a user's own equations, give of one case with one scheme and step, recorded at the scene's own steps."""
+    """One case with one scheme and step by TMT, or by a user's own equations, recorded at the scene's own steps."""
 
     t: np.ndarray  # (steps + 1,) s
     q: np.ndarray  # (steps + 1, nq) rad
@@ -51,83 +48,85 @@ class TmtSide(NamedTuple):
     derivative_tolerance: np.ndarray  # (states,)
     stepped: list  # q and v one step from each of the states
     step_tolerance: np.ndarray  # (states, 2 nv)
-    nudged: np.ndarray  # (steps + 1, nq): positions of the run that starts as little away as a number of 1 can
+    perturbed: np.ndarray  # (steps + 1, nq): positions of the run from a start that is 1 eps off
 
 
 def steps_afforded(case: Case, entries: int = MOST_ENTRIES) -> int:
-    """The steps of a run up to which its band is computed, if all Jacobians have so many entries: each has (2 nv)^2."""
+    """The steps of a run for which its band is computed: each has a Jacobian of (2 nv)^2 of all the entries."""
     return entries // (2 * case.coordinates.nv) ** 2
 
 
-def counts(case: Case, finer: Sequence[int], entries: int = MOST_ENTRIES) -> list[int]:
-    """The numbers of steps of a case's runs: multiples of its own; at most 8192 and what is steps_afforded, its own excepted."""
+def step_counts(case: Case, finer: Sequence[int], entries: int = MOST_ENTRIES) -> list[int]:
+    """The numbers of steps of a case's runs, multiples of its own: its own, and those up to 8192 and steps_afforded."""
     most = min(STEPS_AT_MOST, steps_afforded(case, entries))
     return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= most]
 
 
 def recorded(case: Case) -> int:
-    """How many states of a run are compared, its start excepted: those of its own steps, or every second, fourth ... of them."""
+    """The number of states of a run that are compared, without its start: all its own steps, or every 2nd, 4th ..."""
     count = case.steps
     while count > RECORDED and count % 2 == 0:
         count //= 2
     return count
 
 
-def off_by(coordinates: Coordinates, one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
-    """How far states (q, v) are from others: movements and speeds, (..., 2 nv)."""
-    return np.concatenate([coordinates.difference(one[0], other[0]), one[1] - other[1]], axis=-1)
+def state_difference(coordinates: Coordinates, state: Sequence, other: Sequence) -> np.ndarray:
+    """The difference of states (q, v): movements and speeds, (..., 2 nv)."""
+    return np.concatenate([coordinates.difference(state[0], other[0]), state[1] - other[1]], axis=-1)
+
+
+def follow_and_draw(
+    case: Case, engines: Mapping[str, Engine], finer: Sequence[int], entries: int
+) -> tuple[Result, Drawn | None]:
+    """The runs of a case, and its motion as it is drawn."""
+    result = follow(case, engines, finer, entries=entries)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return result, drawn_motion(case, engines, result.curves)
 
 
 def follow(
     case: Case,
     engines: Mapping[str, Engine],
     finer: Sequence[int],
-    known: dict | None = None,
+    cache: dict | None = None,
     entries: int = MOST_ENTRIES,
 ) -> Result:
     """One case with every scheme and step size, and once by RK4 without the joints that it does not need.
 
-    finer: steps as multiples of the scene's own. known: a dict in which TMT's side is kept, for whoever compares it with
-    several engines. entries: of the Jacobians of a run, see `steps_afforded`.
+    finer: steps as multiples of the scene's own. cache: where TMT's side is kept for comparisons with several engines.
+    entries: of the Jacobians of a run, see `steps_afforded`.
     """
     ours, theirs = case.robot.compared
-    result, known = Result("trajectory", label=LABELS[ours]), {} if known is None else known
-    if case not in known:  # what joints a scene of a robot from a file needs is not asked here
-        known[case] = None if case.robot.is_read else reduced(case)
-    schemes, here = {}, {method.scheme for method in methods_in(engines[ours], case).values()}
+    result, cache = Result("trajectory", label=LABELS[ours]), {} if cache is None else cache
+    if case not in cache:  # a file's scenes are not reduced here
+        cache[case] = None if case.robot.is_read else reduced(case)
+    schemes, available = {}, {method.scheme for method in methods_in(engines[ours], case).values()}
     for method in methods_in(engines[theirs], case).values():
-        if method.scheme in here:
+        if method.scheme in available:
             schemes.setdefault(method.scheme, []).append(method)
-    runs = [(case, steps, *item) for steps in counts(case, finer, entries) for item in schemes.items()]
-    if smaller := known[case]:
+    runs = [(case, steps, *item) for steps in step_counts(case, finer, entries) for item in schemes.items()]
+    if smaller := cache[case]:
         runs.append((smaller, smaller.steps, "rk4", schemes["rk4"]))
     dynamics = {each: compared(engines, each) for each in {run[0] for run in runs}}
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for each, steps, scheme, methods in runs:
-            if (each, steps, scheme) not in known:
-                known[each, steps, scheme] = tmt_side(each, dynamics[each][ours], steps, scheme, entries)
-            compare_runs(result, each, dynamics[each][theirs], steps, methods, known[each, steps, scheme])
-    if fast := result.notes:
-        result.notes = [
-            "Recorded states from which a step turns a hinge by more than half a turn are not compared in one step: "
-            f"{'; '.join(fast)}."
-        ]
+            if (each, steps, scheme) not in cache:
+                cache[each, steps, scheme] = tmt_side(each, dynamics[each][ours], steps, scheme, entries)
+            compare_runs(result, each, dynamics[each][theirs], steps, methods, cache[each, steps, scheme])
+    if result.notes:  # one finding for all runs
+        result.notes = [result.finding("long_steps", runs=[note.values for note in result.notes])]
     unjudged = [row for row in result.rows if row["level"] == "open loop" and not row["judged_until_s"]]
     if unjudged:
-        runs = "; ".join(run_in_words(case, row) for row in unjudged)
-        result.notes.append(
-            f"{case.name}: no state of a run but its start is judged, as rounding may drive the next one apart by more than "
-            f"{NARROW:g} {movement_unit(case.coordinates)}, or the run has diverged there: {runs}. Nothing is said of these runs "
-            "beyond single steps."
-        )
+        runs = [
+            {
+                "integrator": row["engine_integrator"],
+                "steps": round(case.duration / row["dt_s"]),
+                "beyond_limit": beyond_limit(Held(case), row["twin"], row["dt_s"]),
+            }
+            for row in unjudged
+        ]
+        result.find("unjudged", scene=case.name, narrow=NARROW, unit=movement_unit(case.coordinates), runs=runs)
     return result
-
-
-def run_in_words(case: Case, row: dict) -> str:
-    """Which run a row is of, and how far its step is beyond the limit at the start, if it is."""
-    times = beyond_limit(Held(case), row["twin"], row["dt_s"])
-    beyond = f", a step {times:.2g} times beyond the limit" if times > 1.0 else ""
-    return f"{row['engine_integrator']}, {case.duration / row['dt_s']:.0f} steps{beyond}"
 
 
 def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: int = MOST_ENTRIES) -> TmtSide:
@@ -138,7 +137,7 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
     ended = diverged_at(case, t, q, v)
     alive = t[::every] < (np.inf if ended is None else ended)
     states = [path[::every][alive] for path in (q, v)]
-    beside = (nudged(start) for start in case.start)
+    start = (perturbed(values) for values in case.start)
     return TmtSide(
         t, q, v,
         band(stepping, tree, q, v, tau, dt, every, steps_afforded(case, entries)),
@@ -148,12 +147,12 @@ def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: i
         slope_rounding(METHODS["rk4"], tree, *states, tau, dt)[2],
         one_step(dynamics, states, tau, dt, scheme),
         step_rounding(stepping, tree, *states, tau, dt),
-        dynamics.run(*beside, tau, dt, steps, scheme).q,
+        dynamics.run(*start, tau, dt, steps, scheme).q,
     )  # fmt: skip
 
 
-def nudged(start: np.ndarray) -> np.ndarray:
-    """Numbers, eps away, which is one unit of the last place of 1; of larger ones one unit of their own last place."""
+def perturbed(start: np.ndarray) -> np.ndarray:
+    """Numbers that are off by eps, or by their own last place where that is more."""
     return start + np.maximum(np.spacing(np.abs(start)), EPS)
 
 
@@ -162,7 +161,7 @@ def compare_runs(
 ) -> None:
     """One side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step.
 
-    Noted is from how many of the recorded states a step is too long to be compared alone.
+    Single steps that turn a joint by more than half a turn are not compared, but counted in result.notes.
     """
     tau, dt, every, coordinates = case.tau, case.duration / steps, steps // recorded(case), case.coordinates
     t, times, first, name = mine.t, mine.t[::every], None, case.robot.compared[0]
@@ -183,19 +182,24 @@ def compare_runs(
             "twin_diverged_at_s": ends[name],
         }  # fmt: skip
         slow = dt * np.abs(mine.states[1][:, turning]).max(axis=1, initial=0.0) <= HALF_TURN
-        one = one_step(dynamics, mine.states, tau, dt, method.name)
+        stepped = one_step(dynamics, mine.states, tau, dt, method.name)
         judged_states = [[path[::every][:count] for path in paths] for paths in ((mine.q, mine.v), theirs)]
         alive = times[: len(mine.states[0])]
         for level, difference, tolerance, at in (
             ("derivative", mine.derivative - accelerations, mine.derivative_tolerance[:, None], alive),
-            ("one step", off_by(coordinates, mine.stepped, one)[slow], mine.step_tolerance[slow], alive[slow]),
-            ("open loop", off_by(coordinates, *judged_states), mine.width[:count], times[:count]),
+            (
+                "one step",
+                state_difference(coordinates, mine.stepped, stepped)[slow],
+                mine.step_tolerance[slow],
+                alive[slow],
+            ),
+            ("open loop", state_difference(coordinates, *judged_states), mine.width[:count], times[:count]),
         ):
             if not len(at):
                 continue
             check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
         if not slow.all():
-            result.notes.append(f"{where}: {np.sum(~slow)} of {len(slow)}")
+            result.find("long_steps", run=where, fast=int(np.sum(~slow)), states=len(slow))
         if required:  # a scene may leave it open
             result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
         check_divergence(result, where, ends, dt, steps, angle_band)
@@ -207,7 +211,7 @@ def compare_runs(
             first = method, theirs
             result.curves[(case.name, method.scheme, steps)] = {
                 "integrator": method.name, "t": t, "every": every, name: [mine.q, mine.v], "mujoco": theirs,
-                "band": angle_band, "nudged": mine.nudged, "judged_until_s": until, "ended": ends,
+                "band": angle_band, "perturbed": mine.perturbed, "judged_until_s": until, "ended": ends,
                 "left": {name: departure(t, mine.q, coordinates), "mujoco": departure(t, theirs[0], coordinates)},
                 "records": records,
             }  # fmt: skip

@@ -11,8 +11,8 @@ from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
 from compare.experiments import trajectory
 from compare.experiments.setup import engines as engines_of
-from compare.experiments.trajectory import derivative, drift, figures_drift, figures_lines, figures_runs, horizon, runs
-from compare.experiments.trajectory.sentences import of_left_out
+from compare.experiments.trajectory import drift, figures_runs, rules, runs
+from compare.experiments.trajectory.plan import shortened
 from compare.judge.check import Result
 from compare.judge.run import diverged_at
 from compare.robots.arm import ARM
@@ -56,7 +56,7 @@ def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     checks = judged_with(mujoco, mine, case, result)
     count, fast = len(mine.states[0]), int((np.abs(mine.states[1]).max(axis=1) / 64 > np.pi).sum())
     assert ("one step, TMT to MuJoCo" in checks) == (fast < count) and bool(fast) == (rate > 201.1)
-    assert [f"{fast} of {count}" in note for note in result.notes] == [True] * bool(fast)
+    assert [(note.values["fast"], note.values["states"]) for note in result.notes] == [(fast, count)] * bool(fast)
 
 
 @pytest.mark.parametrize("judged, passes", [(3.12, True), (3.13, False)])
@@ -90,16 +90,15 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
     long = robot_of(reading.read(chain(40)), "chain.xml")
     case = long.case("c", duration=1.0, dt=1 / 512)
     coarse, fine = FREE, FREE.changed(dt=5 / 8193)
-    assert runs.counts(coarse, (1, 16, 128)) == [64, 1024, 8192] and runs.counts(fine, (1, 2)) == [8193]
-    assert [runs.counts(case, (1, 2), 6400 * steps) for steps in (1023, 1024)] == [[512], [512, 1024]]
+    assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192] and runs.step_counts(fine, (1, 2)) == [8193]
+    assert [runs.step_counts(case, (1, 2), 6400 * steps) for steps in (1023, 1024)] == [[512], [512, 1024]]
     assert [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)] == [5, 65, 65, 64]
-    assert [len(of_left_out([case], (1, 2), 6400 * steps)) for steps in (511, 512, 1024)] == [2, 1, 0]
-    assert horizon.growth_run(long, [case], small=False) == (416 / 512, 416)
+    assert [len(shortened([case], (1, 2), 6400 * steps)) for steps in (511, 512, 1024)] == [2, 1, 0]
 
 
 def test_the_derivative_of_the_bias_is_that_of_mujoco_for_joints_of_all_kinds():
     read, result = reading.read(random_tree(2, joints=5)), Result("trajectory")
-    derivative.compare_derivatives(result, robot_of(read, "kinds.xml"), engines_of(reading.engine(read)))
+    rules.compare_derivatives(result, robot_of(read, "kinds.xml"), engines_of(reading.engine(read)))
     assert result.checks[0].passed and result.checks[0].unit == "N m s/rad or N s/m"
 
 
@@ -112,16 +111,18 @@ def result_of(curve, **curves) -> Result:
 def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
     curve = run_of(HELD, 0.1, 0.2, until=2.5, left=(None, 4.0))
     result = result_of(curve)
-    caption = figures_runs.draw_held(result, HELD, 2)[2]
-    assert "MuJoCo is 0.1 rad away at 4.00 s" in caption
-    at = [caption.index(number) for number in ("1.0e-01 rad", "2.0e-01 rad", "2.50 s", "5.0e-02 rad")]
-    assert at == sorted(at) and caption.count("4.00 s") == 1  # TMT's error, MuJoCo's, how long judged, how far apart
+    caption = figures_runs.draw_held(result, HELD, 2)[2].values
+    engines = [{"label": "TMT", "left": None, "error": 0.1}, {"label": "MuJoCo", "left": 4.0, "error": 0.2}]
+    assert caption["engines"] == engines and (caption["judged"], caption["apart"]) == (2.5, pytest.approx(0.05))
 
     about = {"scene": HELD.name, "level": "open loop", "engine_integrator": "RK4", "dt_s": 5 / 64}
     ends = ((None, 0.25), (0.0, None), (None, 0.125))
     result.rows = [about | {"diverged_at_s": at, "difference_over_band": used} for at, used in ends]
     _, fig, caption = figures_runs.draw_run(result, HELD)
-    assert all(number in caption for number in ("2.5e-01", "1.0e-01 rad", "2.0e-01 rad", "0.0781 s", "2.50 s"))
+    assert caption.values["errors"] == {"TMT": 0.1, "MuJoCo": 0.2} and caption.values["share"] == 0.25
+    assert caption.values["diverged"] == ["RK4 at dt = 0.0781 s"] and {at for _, at in caption.values["judged"]} == {
+        2.5
+    }
     for ax, k in ((fig.axes[0], 0), (fig.axes[3], 1)):  # angles and rates of the first scheme
         assert np.array_equal(ax.lines[0].get_ydata(), curve["tmt"][k][:, 0])
         assert np.array_equal(ax.lines[1].get_ydata(), curve["mujoco"][k][::3, 0])
@@ -131,18 +132,19 @@ def test_the_caption_of_drift_has_each_engine_in_its_place():
     steps = {METHODS[name]: drift.DRIFT_STEPS[METHODS[name].order] for name in ("Euler", "implicit", "RK4")}
     made = {method: {"tmt": [8.0, 4.0, 2.0], "mujoco": [48.0, 12.0, 3.0]} for method in steps}
     curves = {"drift": {"drifts": {("bent, free", "energy", "J"): made}, "steps": steps}}
-    *_, caption = figures_drift.draw_drift(Result("trajectory", curves=curves))
-    assert "TMT 1.00 to 1.00, MuJoCo 2.00 to 2.00" in caption
-    assert "TMT 2.0e+00 J, MuJoCo 3.0e+00 J" in caption and caption.endswith(": 1.5 to 6.")  # MuJoCo's over TMT's
+    *_, caption = figures_runs.draw_drift(Result("trajectory", curves=curves))
+    engines = [("TMT", (1.0, 1.0), 2.0), ("MuJoCo", (2.0, 2.0), 3.0)]
+    assert [tuple(engine.values()) for engine in caption.values["methods"][0]["engines"]] == engines
+    assert caption.values["ratios"] == (1.5, 6.0)  # MuJoCo's over TMT's
 
 
 def test_which_figures_there_are_follows_what_was_run():
-    t, names = np.linspace(0.0, 60.0, 61), ["assignment_figure_2", "trajectory_bent_free", "trajectory_ball_catch_held"]
+    names = ["assignment_figure_2", "trajectory_bent_free", "trajectory_ball_catch_held"]
     runs = {(case.name, "rk4", 64): run_of(case) for case in (CASES["bent, free"], HELD)}
     result = result_of(None, runs=runs, drift={"drifts": {}})
     assert [call()[0] for call in trajectory.figures(result, ARM)] == names[:2]
-    result.curves["growth"] = {"t": t, "curves": {"bent, free": np.where(t < 51.0, 0.4 * t, np.nan)}}
-    assert [call()[0] for call in trajectory.figures(result, ARM)] == [*names, "trajectory_growth"]
+    runs[HELD.name, "rk4", 1024] = runs[HELD.name, "rk4", 64]  # finer steps, which only the scene's own figure shows
+    assert [call()[0] for call in trajectory.figures(result, ARM)] == names
 
 
 def test_a_ball_is_drawn_by_its_turn_from_the_start():
@@ -150,7 +152,7 @@ def test_a_ball_is_drawn_by_its_turn_from_the_start():
     case = robot_of(reading.read(random_tree(2, joints=5)), "kinds.xml").case("c")
     turns = np.array([0.0, 0.1, 1.75, 1.85])
     q = case.coordinates.move(case.q, turns[:, None] * np.ones(case.coordinates.nv))
-    values = figures_lines.drawn(case, q)
+    values = figures_runs.drawable(case, q)
     for kind, at, by in case.coordinates.places.joints:
         if kind == "ball":
             assert values[:3, by] == pytest.approx(turns[:3, None] * np.ones(3)) and np.isnan(values[3, by]).all()

@@ -12,7 +12,7 @@ from trajectory_curves import CASES
 from compare.engines.mujoco import reading
 from compare.engines.own import Own
 from compare.experiments.setup import engines as engines_of
-from compare.experiments.trajectory.own_runs import within_time
+from compare.experiments.trajectory.plan import within_time
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene

@@ -57,9 +57,9 @@ EDITS = (
          "min((largest_of(curves[q][f'{label} to MuJoCo']), q) for q in quantities)", "the least distance is told as the largest"),  # noqa: E501
     Edit("experiments.figures", "draw_distances", "(label, 'MuJoCo')", "('MuJoCo', label)", "the caption exchanges the engines"),
     Edit("figures_runs", "draw_held", "curve['left']['tmt']", "curve['left']['mujoco']", "MuJoCo's departure is told of TMT"),
-    Edit("figures_runs", "draw_held", "(ours, theirs)", "(theirs, ours)", "the caption exchanges the engines"),
+    Edit("figures_runs", "draw_held", "ours, theirs = _1", "theirs, ours = _1", "the caption exchanges the engines"),
     Edit("figures_runs", "run_caption", "max(used)", "min(used)", "the least use of the band is told as the most"),
-    Edit("figures_drift", "drift_caption", "theirs / ours if ours else np.nan", "ours / theirs if ours else np.nan",
+    Edit("figures_runs", "drift_caption", "theirs / ours if ours else np.nan", "ours / theirs if ours else np.nan",
          "the ratio of the drifts is inverted"),
     Edit("figures_runs", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
     Edit("figures_panels", "fewest", "min(good, default=None)", "max(good, default=None)",
