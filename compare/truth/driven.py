@@ -11,10 +11,8 @@ from tmt.equations.composite import mass_matrix_and_bias  # the sum over bodies 
 from tmt.methods import by_speed, lone_speeds
 
 from ..robots.actuators import Cut, Rows
-from .constraints import turning
-from .coupling import Coupled, of_small
-from .servos import Driven
-from .step_limits import Small
+from .servos import Driven, turning
+from .step_limits import Coupled, Small, of_small
 
 BASES = {
     "fixed": "the robot stands on the world",

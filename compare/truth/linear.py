@@ -13,7 +13,7 @@ from tmt.equations.dual import seeded
 
 from ..robots.case import SEED, Case, Coordinates
 from .conserved import floats
-from .derivative import holding, moving, slopes, stiffness
+from .rest import holding, moving, slopes, stiffness
 from .steps import growth_of, is_runge_kutta, linear_step
 
 AS_IT_STANDS = 6  # speeds, up to which the method is differentiated as written; beyond it is regrouped

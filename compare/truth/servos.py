@@ -1,4 +1,4 @@
-"""The equations of motion at rest under a robot's own servos: M x'' + D x' + K x = 0 for small deviations x."""
+"""Forces and their derivatives at rest under a robot's own servos: K and D of M x'' + D x' + K x = 0 for small deviations x."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -12,12 +12,14 @@ from tmt.methods import by_speed
 
 from ..robots.actuators import Cut, Drive
 from ..robots.case import Coordinates
-from .constraints import TURNED_BY, constraint_forces, downhill, turning
-from .weight import Weight, spring_slope, weight
+from .deviations import SYMMETRIC
+from .rest import Weight, spring_slope, weight
 
 REST_STEPS = 60  # at most
 REST_FORCE = 1e-9  # of the largest single force: what may be left at rest
 REST_REACH = 0.3  # rad or m, of one step of it
+TURNED_BY = 1e-6  # rad or m, of central differences where a moment turns with the posture
+SINGULAR = 1e-9  # of the largest stiffness: less is zero
 
 
 class Along(NamedTuple):
@@ -245,3 +247,34 @@ class Driven:
         """A force (nv,) without that at locked speeds."""
         force[list(self.locked)] = 0.0
         return force
+
+
+def constraint_forces(ask: Callable | None, coordinates: Coordinates, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """J' f of constraints at rest, (nv,), and the stiffness that they have as springs, (nv, nv). ask: the Rows at q."""
+    n = coordinates.nv
+    if ask is None:
+        return np.zeros(n), np.zeros((n, n))
+    rows = ask(q)
+    return rows.jacobian.T @ rows.forces, rows.springs
+
+
+def turning(ask: Callable | None, coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
+    """-d(J' f)/dq of constraints whose f stays, (nv, nv): what they do by turning with the posture."""
+    n = coordinates.nv
+    found, rows = np.zeros((n, n)), ask and ask(q)
+    if rows and rows.forces.any():
+        for j, step in enumerate(TURNED_BY * np.eye(n)):
+            ahead, behind = (ask(coordinates.move(q, sign * step)).jacobian for sign in (1.0, -1.0))
+            if ahead.shape == behind.shape == rows.jacobian.shape:
+                found[:, j] = (behind - ahead).T @ rows.forces / (2.0 * TURNED_BY)
+    return found
+
+
+def downhill(K: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Where Newton's method goes, rad or m, with the sizes of the stiffnesses if K is symmetric: away from a saddle."""
+    if np.abs(K - K.T).max(initial=0.0) > SYMMETRIC * np.abs(K).max(initial=0.0):
+        return np.linalg.lstsq(K, force, rcond=SINGULAR)[0]
+    sizes, modes = np.linalg.eigh(0.5 * (K + K.T))
+    sizes = np.abs(sizes)
+    held = sizes > SINGULAR * sizes.max(initial=0.0)
+    return modes[:, held] @ (modes[:, held].T @ force / sizes[held])

@@ -11,7 +11,7 @@ from compare.engines.mujoco.flags import INTEGRATORS
 from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at, predicted_at
 from compare.robots.file import robot_of
-from compare.truth.constraints import constraint_forces, turning
+from compare.truth.servos import constraint_forces, turning
 
 # two fingers of unlike mass on slides, one servo: the other finger follows by an equality
 GRIPPER = """<mujoco><worldbody>

@@ -12,12 +12,10 @@ from compare.engines.mujoco import read
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.conserved import floats
-from compare.truth.derivative import holding, stiffness
 from compare.truth.linear import Held, held
 from compare.truth.pendulum import exact_swing, pendulum, swing
 from compare.truth.postures import posture_names
-from compare.truth.rest import at_rest
-from compare.truth.weight import spring_slope, weight
+from compare.truth.rest import at_rest, holding, spring_slope, stiffness, weight
 from tmt import METHODS
 from tmt.exact.values import distance
 from tmt.methods import amplification
