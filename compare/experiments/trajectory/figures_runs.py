@@ -89,7 +89,7 @@ def draw_difference(ax: Axes, c: dict, case: Case, label: str) -> None:
     from_perturbed = moved_from(ours, c["perturbed"], case.coordinates).max(axis=1)
     band = np.where(c["band"] < 1e3, c["band"], np.nan)
     for values, look, name in (
-        (from_perturbed, {"color": BLUE, "linewidth": 0.9}, f"{label}, start off by {EPS:.0e}"),
+        (from_perturbed, {"color": BLUE, "linewidth": 0.9}, f"{label} to itself, start off by {EPS:.0e}"),
         (difference, {"color": "black", "linewidth": 1}, f"{label} to MuJoCo"),
     ):
         ax.semilogy(c["t"][1:], np.maximum(values[1:], DRAWN_ZERO), **look, label=name)
@@ -128,7 +128,6 @@ def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int,
     return result.finding(
         "figure_run",
         scene=scene_begins(case.name, case.robot),
-        label=result.label,
         judged=[(c["integrator"], c["judged_until_s"]) for c in columns],
         to_the_end=all(c["judged_until_s"] >= case.duration for c in columns),
         share=max(used) if used else None,
@@ -139,7 +138,6 @@ def run_caption(result: Result, case: Case, columns: Sequence[dict], shown: int,
         positions=case.coordinates.nv,
         shown=shown,
         balls=case.coordinates.has_balls,
-        eps=EPS,
         zero_at=DRAWN_ZERO if zeros else None,
         ended=any(at is not None for c in columns for at in c["ended"].values()),
     )

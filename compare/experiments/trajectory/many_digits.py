@@ -18,6 +18,7 @@ TOO_FAST = 1e4  # rad/s: a run with many digits that is faster has diverged
 
 def many_digits(result: Result, cases: Sequence[Case], runs: Iterable[dict]) -> None:
     """Both runs compared with one of the same scheme with many digits. runs: of each case such positions by the scheme."""
+    distances = []
     for case, paths in zip(cases, runs):
         for scheme, exact in paths.items():
             curve, dt = result.curves["runs"][(case.name, scheme, case.steps)], case.duration / case.steps
@@ -29,6 +30,10 @@ def many_digits(result: Result, cases: Sequence[Case], runs: Iterable[dict]) -> 
             }
             where = f"{case.name}, {curve['integrator']}, {step_in_words(case, case.steps)}"
             check_digits(result, where, off, curve["band"][: last + 1], every * dt)
+            largest = {name: float(values.max()) for name, values in off.items()}
+            distances.append({"run": where, "until": last * every * dt, **largest})
+    if distances:
+        result.find("many_digits", digits=DIGITS, runs=distances)
 
 
 def distance_of(case: Case, q: np.ndarray, exact: np.ndarray) -> np.ndarray:
@@ -47,8 +52,6 @@ def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: fl
         (k,) = closest(apart, band)
         at = f"t = {k * dt:.3f} s"
         result.check(where, f"{label} to many digits of its own scheme", apart[k], band[k], "rad", at, True)
-    largest = {"tmt": float(off["tmt"].max()), "mujoco": float(off["mujoco"].max())}
-    result.find("many_digits", digits=DIGITS, run=where, until=dt * (len(band) - 1), **largest)
 
 
 def exact_runs(case: Case, schemes: Sequence[str], most: int = MOST_EXACT_STEPS) -> dict[str, np.ndarray]:

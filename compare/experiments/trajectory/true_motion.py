@@ -77,7 +77,7 @@ def find_errors(result: Result, robot: Robot, references: Mapping[str, reference
         if is_far(errors[case.name], difference):
             far.append(case.name)
     result.curves["errors"] = errors
-    if lines:
+    if any(line["true"] == "series" for line in lines):  # what is held has its own finding
         steps = {case.steps for case in robot.cases if case.name in errors}
         labels = [LABELS[name] for name in robot.compared]
         count = steps.pop() if len(steps) == 1 else None
@@ -128,6 +128,7 @@ def departures(case: Case, engines: Mapping[str, Engine], left: Mapping, farthes
         "limit": LEFT,
         "unit": movement_unit(case.coordinates),
         "stated": case.robot.compared[0] == "tmt",
+        "stays": all(engine["finite"] and engine["left"] is engine["predicted"] is None for engine in each),
         "engines": each,
     }
 

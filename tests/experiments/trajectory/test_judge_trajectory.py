@@ -165,6 +165,7 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
     true_motion.find_errors(result, ARM, {})
     assert list(result.curves["errors"]) == [HELD.name, FREE.name]
     assert result.curves["errors"][HELD.name] == (0.25, None)
+    assert result.notes[0].values["far"] == [] and len(result.notes[0].values["scenes"]) == 2
     ours, theirs = result.curves["errors"][FREE.name]
     assert ours == pytest.approx(0.27, rel=0.03) and theirs > 90.0
 
@@ -172,12 +173,8 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
 @pytest.mark.parametrize("error, far", [(0.49, False), (0.51, True), (None, False)])
 def test_an_error_of_more_than_a_hundred_times_the_difference_is_far(error, far):
     assert true_motion.is_far((0.1, error), 0.005) is far
-    runs = {(HELD.name, "rk4", 64): run_of(HELD, 0.25, 0.26, until=2.5)}
-    result = Result("trajectory", curves={"runs": runs})
-    true_motion.find_errors(result, ARM, {})
-    (finding,) = result.notes
-    (scene,) = finding.values["scenes"]
-    assert scene["difference"] == pytest.approx(0.005) and finding.values["far"] == []
+    curve = run_of(HELD, 0.25, 0.26, until=2.5)
+    assert true_motion.difference_while_judged(curve, HELD) == pytest.approx(0.005)
 
 
 @BY_ENGINE
