@@ -1,9 +1,9 @@
-"""What a robot conserves without gravity and torque: momentum along the joint that carries it, or of a free body both momenta.
+"""Momenta that a robot conserves without gravity and torque.
 
-The first joint is fixed to the world. A turn about its axis, or a movement along it, moves all that it carries as one body, and
-leaves the kinetic energy alone: that row of Mbar qd changes by the torque at that joint alone, whatever the others do. Of a ball
-it is the angular momentum about its centre, in the world's axes; of a free body (three slides and a ball) the linear momentum,
-and the angular momentum about the origin.
+The first joint is fixed to the world. A rotation about its axis, or a translation along it, moves the whole robot as one body
+without a change of the kinetic energy: that row of Mbar qd changes only by the torque at that joint. For a ball it is the angular
+momentum about its centre, in the world's axes; for a free body (three slides and a ball) the linear momentum, and the angular
+momentum about the origin.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ FREE = ("slide", "slide", "slide", "ball")
 
 
 class Conserved(NamedTuple):
-    """One momentum: of the rows of Mbar qd from the first to before the last, as a movement along the joint, or turned."""
+    """One momentum, from the first rows of Mbar qd."""
 
     tree: tmt.Tree
     name: str
@@ -27,7 +27,7 @@ class Conserved(NamedTuple):
     unit: str
 
     def of_rows(self, frames: Sequence, p: Sequence) -> list:
-        """The momentum, in the world's axes, of rows p of Mbar qd; of forces at the joints their effect on it. Any scalars."""
+        """The momentum, in the world's axes, from rows p of Mbar qd, or its rate from forces p at the joints. Any scalars."""
         if self.kind == "row":
             return [p[0]]
         if self.kind == "linear":
@@ -39,12 +39,12 @@ class Conserved(NamedTuple):
 
     @property
     def rows(self) -> int:
-        """How many of the first rows of Mbar qd it needs."""
+        """The number of rows of Mbar qd that it needs."""
         joints = self.tree.coordinates.joints
         return 6 if self.tree.kind[:4] == FREE else joints[0].qd.stop
 
     def momentum(self, q: Sequence, qd: Sequence) -> list:
-        """It, over any scalars, N m s or N s."""
+        """The momentum, over any scalars, N m s or N s."""
         parts = method.bodies(self.tree, q, qd)
         p = [rotor * v for rotor, v in zip(self.tree.armature[: self.rows], qd)]
         for body in parts:
@@ -60,10 +60,7 @@ class Conserved(NamedTuple):
         return np.stack(np.broadcast_arrays(*rates), axis=-1)
 
     def size(self, q: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """The largest effect of forces of these sizes, (states, nv) -> (states, 1) or (states, rows).
-
-        Of one size for all joints, (states,), that one.
-        """
+        """The largest effect of forces of these sizes, (states, nv) -> (states, 1) or (states, rows); (states,) stays."""
         if force.ndim == 1:
             return force
         if self.kind != "angular":
@@ -75,9 +72,9 @@ class Conserved(NamedTuple):
 
 
 def conserved(tree: tmt.Tree) -> tuple[Conserved, ...]:
-    """The momenta that a tree conserves; no angular one where a ball's rotors differ between its axes: they do not turn.
+    """The momenta that a tree conserves; none if a controller acts at the first joint.
 
-    None where a controller acts at the joint that carries it.
+    The angular one is left out if a ball's armature differs between its axes, as armature does not rotate.
     """
     free = tree.kind[:4] == FREE and tree.parent[:4] == (-1, 0, 1, 2)
     name = tree.hinge_names[0]
@@ -94,8 +91,5 @@ def conserved(tree: tmt.Tree) -> tuple[Conserved, ...]:
 
 
 def floats(tree: tmt.Tree) -> bool:
-    """Whether a free body carries nothing or the rest: three slides and a ball from the world. Under gravity it has no rest."""
-    kinds = tree.kind
-    return any(
-        tree.parent[i] == -1 and kinds[i : i + 4] == ("slide", "slide", "slide", "ball") for i in range(len(kinds) - 3)
-    )
+    """Whether a joint to the world is free (three slides and a ball): such a robot has no rest under gravity."""
+    return any(tree.parent[i] == -1 and tree.kind[i : i + 4] == FREE for i in range(len(tree.kind) - 3))

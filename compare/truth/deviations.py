@@ -1,38 +1,40 @@
-"""Small deviations from a posture at rest, M x'' + D x' + K x = 0: what becomes of them without any step."""
+"""Small deviations from a posture at rest, M x'' + D x' + K x = 0: their modes, rates and growth."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-SYMMETRIC = 1e-7  # of the largest entry: what a matrix and its transpose may differ by, and what is nothing beside it
-VANISHING = 1e-10  # of the largest stiffness or damping, in the units of M: nothing
-# what K and D may be off where K is not symmetric: each entry of itself, as it may be a difference, and of the largest one
+SYMMETRIC = (
+    1e-7  # of the largest entry: the largest difference of a matrix from its transpose; entries below it are zero
+)
+VANISHING = 1e-10  # of the largest stiffness or damping, in the units of M: zero
+# errors of K and D where K is not symmetric: of each entry, as it may be a finite difference, and of the largest one
 DOUBTED, ROUNDED_OFF = 1e-8, 1e-14
-CREEPING = 1e-8  # 1/s2 and 1/s: and so is less than this
+CREEPING = 1e-8  # 1/s2 and 1/s: zero
 
 
 @dataclass(frozen=True)
 class Deviations:
-    """Small deviations from a posture at rest, all (nv, nv) but where it says otherwise."""
+    """The equation of small deviations; matrices are (nv, nv)."""
 
     names: tuple[str, ...]  # of the speeds
     M: np.ndarray
     K: np.ndarray
     D: np.ndarray
-    damping: np.ndarray  # of D what Euler has implicit, (nv,): of joints; zeros where the file switches eulerdamp off
-    uncut: np.ndarray  # of this implicitfast and implicit have implicit what is on one path, see servos.Slopes
-    springs: np.ndarray  # what `discrete` has implicit, of K
-    brakes: np.ndarray  # and of D
+    damping: np.ndarray  # (nv,), joint damping, implicit in Euler; zeros where the file disables eulerdamp
+    uncut: np.ndarray  # damping, implicit in implicitfast and implicit between speeds on one path, see servos.Slopes
+    springs: np.ndarray  # the part of K that is implicit in discrete
+    brakes: np.ndarray  # the part of D that is implicit in discrete
     on_path: np.ndarray  # whether two speeds are on one path to the root
-    # of filters: the actuator, its time constant in s, and whether it is a filterexact
+    # filters: the actuator, its time constant in s, whether it is a filterexact
     poles: tuple[tuple[str, float, bool], ...] = ()
     base: tuple[int, ...] = ()  # the speeds of free bodies, which may drift
 
     def free(self, base: list[int]) -> "Deviations":
-        """With a free base, (n,) numbers of speeds: those that nothing holds or brakes move so that momentum stays zero."""
-        meets = [np.abs(matrix) > SYMMETRIC * np.abs(matrix).max(initial=0.0) for matrix in (self.K, self.D)]
-        loose = [k for k in base if not any(one[k].any() or one[:, k].any() for one in meets)]
+        """With a free base, given by its speeds: those without stiffness and damping keep the momentum at zero."""
+        nonzero = [np.abs(matrix) > SYMMETRIC * np.abs(matrix).max(initial=0.0) for matrix in (self.K, self.D)]
+        loose = [k for k in base if not any(matrix[k].any() or matrix[:, k].any() for matrix in nonzero)]
         kept, rest = self.locked(loose), [k for k in range(len(self.M)) if k not in loose]
         across = np.linalg.solve(self.M[np.ix_(loose, loose)], self.M[np.ix_(loose, rest)])
         M = kept.M - self.M[np.ix_(rest, loose)] @ across
@@ -60,7 +62,7 @@ class Deviations:
 
     @cached_property
     def unrooted(self) -> np.ndarray:
-        """L^-1, once for all: for matrices so small SciPy's solution waits for its threads, for ms where cores are busy."""
+        """L^-1, computed once: for small matrices SciPy's triangular solver waits ms for its threads on a busy machine."""
         return np.linalg.inv(self.root)
 
     def scaled(self, matrix: np.ndarray) -> np.ndarray:
@@ -77,7 +79,7 @@ class Deviations:
 
     @cached_property
     def is_symmetric(self) -> bool:
-        """Whether the closed form holds: K and D are symmetric, and D takes energy away. K may have any sign: see `drifts`."""
+        """Whether the closed form applies: K and D are symmetric, and D dissipates. K may have any sign."""
         halves = [np.abs(matrix - matrix.T).max() <= SYMMETRIC * np.abs(matrix).max() for matrix in (self.K, self.D)]
         lowest = np.linalg.eigvalsh(self.damped).min()
         return all(halves) and lowest >= -10.0 * ROUNDED_OFF * np.abs(self.damped).max()
@@ -92,7 +94,7 @@ class Deviations:
 
     @cached_property
     def drifts(self) -> bool:
-        """Whether a movement, other than of a free base, meets neither stiffness nor damping."""
+        """Whether a movement other than of a free base has neither stiffness nor damping."""
         both = np.vstack([self.stiff / self.largest(self.stiff), self.damped / self.largest(self.damped)])
         of_base = self.root.T[:, list(self.base)]
 
@@ -103,12 +105,12 @@ class Deviations:
 
     @staticmethod
     def largest(matrix: np.ndarray) -> float:
-        """The largest entry, beside which what is below VANISHING is nothing; a matrix of nothing but rounding is nothing."""
+        """The largest entry, to which VANISHING is relative; a matrix of rounding errors counts as zero."""
         return max(np.abs(matrix).max(initial=0.0), CREEPING / VANISHING)
 
     @cached_property
     def growing(self) -> tuple[float, np.ndarray] | None:
-        """The rate, 1/s, and the movement of the mode that grows fastest by itself, or None."""
+        """The rate, 1/s, and the movement of the fastest growing mode of the equations of motion, or None."""
         if not self.names:
             return None
         values, moves = self.modes
@@ -118,13 +120,13 @@ class Deviations:
                 return None
             fastest = max(values.real.max(), 0.0)
             return float(fastest), moves[:, np.argmax(values.real)] if fastest else shapes[:, 0]
-        known = np.flatnonzero(values.real > self.doubts)
-        fastest = known[np.argmax(values[known].real)] if len(known) else None
+        certain = np.flatnonzero(values.real > self.doubts)
+        fastest = certain[np.argmax(values[certain].real)] if len(certain) else None
         return None if fastest is None else (float(values[fastest].real), moves[:, fastest])
 
     @property
     def doubts(self) -> np.ndarray:
-        """How far each of the eigenvalues of `modes` may be off, 1/s, (2nv,): much where two are one, as of what is loose."""
+        """The error bound of each eigenvalue of `modes`, 1/s, (2nv,): large for double eigenvalues."""
         n, size = len(self.M), max(np.sqrt(np.abs(self.stiff).max(initial=0.0)), 1.0)
         balanced = np.block([[np.zeros((n, n)), size * np.eye(n)], [-self.stiff / size, -self.damped]])
         values, right = np.linalg.eig(balanced)
@@ -137,10 +139,10 @@ class Deviations:
 
     @cached_property
     def neutral(self) -> float:
-        """The rate, 1/s, at which something seems to grow by itself, but within `doubts`."""
+        """The largest growth rate, 1/s, that is within `doubts`."""
         return 0.0 if self.growing else max(float(self.modes[0].real.max(initial=0.0)), 0.0)
 
     def joint_of(self, shape: np.ndarray) -> str:
-        """The speed that has most of the kinetic energy of a movement."""
+        """The speed with most of the kinetic energy of a movement."""
         x = self.unrooted.T @ shape
         return self.names[int(np.argmax(np.abs(x.conj() * (self.M @ x))))]

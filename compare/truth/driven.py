@@ -1,4 +1,4 @@
-"""A robot under its own servos at a posture: where it comes to rest, and the equations of small deviations there."""
+"""A robot under its own servos at a posture: its rest, and the equation of small deviations there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,23 +14,16 @@ from ..robots.actuators import Cut, Rows
 from .servos import Driven, turning
 from .step_limits import Coupled, Small, of_small
 
-BASES = {
-    "fixed": "the robot stands on the world",
-    "free": "the robot floats, without gravity",
-    "locked": "its free base is held",
-}
-
-
-BEYOND = 1e-3  # rad or m, of a range: what soft limits give way
+BEYOND = 1e-3  # rad or m beyond a range: soft limits yield by less
 
 
 @dataclass(frozen=True)
 class Posture:
-    """A posture of a robot under u of each actuator: at its name's position, then where it rests.
+    """A named posture of a robot under the controls u, and its rest near it.
 
-    ask: see Driven. A robot that floats is without gravity: it has no rest with it. rows: Rows at q, a step and an integrator,
-    None: no constraints; dt, integrator: at which the rest is, all but discrete alike. aside: speeds that are locked, because
-    nothing holds them. begin: from where the rest is looked for, by default the posture.
+    ask: see Driven. A floating robot has no gravity, as it has no rest with it. rows: Rows at q, a step and an integrator, None:
+    no constraints. dt, integrator: those of the rest, which only discrete changes. aside: speeds that are locked because nothing
+    holds them. begin: where the search for the rest starts, by default the posture.
     """
 
     robot: object  # a robots.Robot
@@ -47,7 +40,7 @@ class Posture:
 
     @cached_property
     def driven(self) -> Driven:
-        """The tree with its drive. A free body that stands alone neither holds nor moves the rest: it is without weight."""
+        """The tree with its drive. A free body on its own has no effect on the others: it gets no weight."""
         tree, drive = self.robot.tree, self.robot.drive
         if self.lone:
             parts = list(drive.compensation or (0.0,) * len(tree.mass))
@@ -65,12 +58,12 @@ class Posture:
 
     @cached_property
     def u(self) -> np.ndarray:
-        """Of each actuator, see Drive.control."""
+        """Controls of the actuators, see Drive.control."""
         return self.robot.drive.control(self.name, self.driven.along(self.start).lengths)
 
     @cached_property
     def rest(self) -> tuple[np.ndarray, float]:
-        """Where it rests, (nq,), found from the posture, and the size of the force that is left, N m or N; 0.0: it rests."""
+        """The posture at rest, (nq,), and the residual force, N m or N; 0.0: it rests."""
         return self.driven.at_rest(self.start if self.begin is None else np.array(self.begin), self.u)
 
     @property
@@ -79,26 +72,26 @@ class Posture:
 
     @cached_property
     def limits(self) -> tuple[int, ...]:
-        """The joints of the model at whose limits it rests, if these are among its rows."""
+        """The joints of the model that rest at their limits, if limits are among its rows."""
         return self.rows(self.q, self.dt, self.integrator).limits if self.rows else ()
 
     def beyond(self, by: float = BEYOND) -> tuple[str, ...]:
-        """The joints, of one number each, that rest beyond their ranges by more than so much, rad or m."""
+        """The hinges and slides that rest beyond their ranges by more than this, rad or m."""
         coordinates = self.robot.coordinates
         return tuple(
             name
-            for name, (kind, at, _), known in zip(coordinates.names, coordinates.places.joints, self.robot.ranges)
-            if known and kind != "ball" and not known[0] - by <= self.q[at.start] <= known[1] + by
+            for name, (kind, at, _), limits in zip(coordinates.names, coordinates.places.joints, self.robot.ranges)
+            if limits and kind != "ball" and not limits[0] - by <= self.q[at.start] <= limits[1] + by
         )
 
     @property
     def moved(self) -> float:
-        """How far the rest is from the posture, the largest movement of a joint, rad or m."""
+        """The largest movement of a joint from the posture to the rest, rad or m."""
         return float(np.abs(self.robot.coordinates.difference(self.q, self.start)).max())
 
     @cached_property
     def lone(self) -> list[int]:
-        """The speeds of free bodies that stand alone, and that no actuator or tendon moves."""
+        """The speeds of free bodies on their own that no actuator or tendon moves."""
         alone, pulled = lone_speeds(self.robot.tree), self.pulled
         return [
             k for body in floating(self.robot.tree) if alone.issuperset(body) and not pulled & {*body} for k in body
@@ -114,20 +107,20 @@ class Posture:
     def base(self) -> list[int]:
         """The speeds of free joints that carry the robot, or parts of it, and that no servo or spring of their own holds."""
         tree, drive = self.robot.tree, self.robot.drive
-        held = np.any([one.moment for one in drive.servos if one.moment] or [[False] * len(tree.axis)], axis=0)
+        held = np.any([servo.moment for servo in drive.servos if servo.moment] or [[False] * len(tree.axis)], axis=0)
         held = held | np.repeat(np.array(tree.stiffness or [0.0] * len(tree.kind)) != 0.0, widths(tree))
         return [k for body in floating(tree) if not held[body].any() for k in body if k not in self.lone]
 
     @property
     def bases(self) -> tuple[str, ...]:
-        """With what base limits are asked: of BASES."""
+        """The bases to which limits apply: "fixed" to the world, "free" (floating without gravity), "locked" (held)."""
         if not self.base:
             return ("fixed",)
         return ("free", "locked") if len(self.base) + len(self.lone) < len(self.robot.tree.axis) else ("free",)
 
     @cached_property
     def cut(self) -> Cut:
-        """What ranges cut at rest."""
+        """The forces that ranges cut at rest."""
         return self.driven.cut(self.q, self.u)
 
     @cached_property
@@ -136,7 +129,7 @@ class Posture:
         tree, drive = self.robot.tree, self.robot.drive
         slopes = self.driven.slopes(self.q, self.u)
         speeds = np.add(tree.damping, drive.damping or 0.0) * (not drive.explicit_damping)
-        filters = [one for one in drive.actuators if one.acts and one.dynamics in ("filter", "filterexact")]
+        filters = [act for act in drive.actuators if act.acts and act.dynamics in ("filter", "filterexact")]
         return Small(
             names=self.robot.coordinates.speeds,
             M=np.array(mass_matrix_and_bias(tree, self.q.tolist(), [0.0] * len(speeds))[0]),
@@ -149,11 +142,11 @@ class Posture:
             else slopes.springs,
             brakes=np.diag(speeds) if drive.joints_alone else slopes.brakes,
             on_path=on_one_path(tree),
-            poles=tuple((one.name, one.time_constant, one.dynamics == "filterexact") for one in filters),
+            poles=tuple((act.name, act.time_constant, act.dynamics == "filterexact") for act in filters),
         )
 
     def small(self, base: str) -> Small:
-        """Small deviations with a base of BASES; free bodies that stand alone are left out."""
+        """Small deviations with one of `bases`, without free bodies on their own."""
         still = {*self.lone, *self.aside}
         if base == "free":
             names = [self.whole.names[k] for k in self.base]
@@ -173,10 +166,10 @@ class Posture:
 
     @cached_property
     def unheld(self) -> tuple[int, ...]:
-        """The speeds that no servo, no spring and no constraint to such holds, but those of a base or of what stands alone."""
+        """The speeds without servo or spring, also through constraints, except those of a base or of free bodies on their own."""
         tree, drive = self.robot.tree, self.robot.drive
         along = self.driven.along(self.start)
-        pulling = [one.is_servo for one in drive.actuators] + [one.stiffness != 0.0 for one in drive.tendons]
+        pulling = [act.is_servo for act in drive.actuators] + [tendon.stiffness != 0.0 for tendon in drive.tendons]
         springs = np.array(by_speed(tree, tree.stiffness or [0.0] * len(tree.kind)))
         held = along.moments[pulling].any(axis=0) | (springs != 0.0)
         rows = self.rows(self.start, self.dt, "Euler").jacobian != 0.0 if self.rows else np.zeros((0, len(held)), bool)
@@ -187,23 +180,23 @@ class Posture:
 
 def floating(tree: tmt.Tree) -> list[list[int]]:
     """The six speeds of each free joint: three slides that carry nothing else, and a ball, from the world."""
-    found = []
+    bodies = []
     for i in range(3, len(tree.kind)):
         chain = [i - 3, i - 2, i - 1, i]
         free = tuple(tree.kind[j] for j in chain) == ("slide",) * 3 + ("ball",)
         if free and [tree.parent[j] for j in chain] == [-1, *chain[:3]] and not {*chain[:3]} & {*tree.body_hinge}:
             joints = tree.coordinates.joints
-            found.append(list(range(joints[i - 3].qd.start, joints[i].qd.stop)))
-    return found
+            bodies.append(list(range(joints[i - 3].qd.start, joints[i].qd.stop)))
+    return bodies
 
 
 def widths(tree: tmt.Tree) -> list[int]:
-    """How many speeds each joint has."""
+    """The number of speeds of each joint."""
     return [by.stop - by.start for _, _, by in tree.coordinates.joints]
 
 
 def on_one_path(tree: tmt.Tree) -> np.ndarray:
-    """Whether two speeds are of joints on one path to the root, (nv, nv)."""
+    """Whether the joints of two speeds are on one path to the root, (nv, nv)."""
     n = len(tree.parent)
     before = np.eye(n, dtype=bool)
     for i, parent in enumerate(tree.parent):

@@ -1,4 +1,4 @@
-"""A rigid body that turns freely, known without an integrator: Jacobi's elliptic functions."""
+"""The exact rotation of a free rigid body, by Jacobi's elliptic functions."""
 
 from collections.abc import Sequence
 
@@ -7,8 +7,8 @@ import numpy as np
 
 from tmt.exact.values import DIGITS
 
-GUARD = 10  # digits more in the calculation
-BESIDE_SEPARATRIX = 1e-20  # L2 - 2 E I2 over the sum of its terms: nearer, too few digits are left
+GUARD = 10  # extra digits in the calculation
+BESIDE_SEPARATRIX = 1e-20  # L2 - 2 E I2 over the sum of its terms: below, too few digits are left
 
 
 def free_turning(
@@ -26,7 +26,7 @@ def free_turning(
         t, moments, omega, start = ([mpmath.mpmathify(v) for v in values] for values in (t, moments, omega, quaternion))
         if min(moments) <= 0:
             raise ValueError(
-                f"moments of inertia are {', '.join(map(str, map(float, moments)))}; positive ones are expected"
+                f"moments of inertia are {', '.join(map(str, map(float, moments)))}; expected positive values"
             )
         length = mpmath.norm(start)
         start = [v / length for v in start]
@@ -40,7 +40,7 @@ def free_turning(
 
 
 def tumbling(t: list, moments: list, omega: list) -> list[tuple[list, list]]:
-    """For each time: the angular velocity and the turn since t = 0, a quaternion in the body axes of t = 0.
+    """For each time: the angular velocity and the rotation since t = 0, a quaternion in the body axes of t = 0.
 
     The axes in an order in which the third keeps its sign: omega = (a cn, b sn, c dn)(p t + begin, m).
     """
@@ -49,7 +49,7 @@ def tumbling(t: list, moments: list, omega: list) -> list[tuple[list, list]]:
     excess = mpmath.fsum(terms)  # L2 - 2 E I2
     if abs(excess) <= BESIDE_SEPARATRIX * mpmath.fsum(terms, absolute=True):
         raise ValueError(
-            "the body starts on the separatrix (2 E I2 = L2), towards its middle axis: it has no elliptic function"
+            "the body starts on the separatrix (2 E I2 = L2), where the motion is not an elliptic function"
         )
     order = order if excess > 0 else order[::-1]
     i, j, k = order
@@ -70,7 +70,7 @@ def tumbling(t: list, moments: list, omega: list) -> list[tuple[list, list]]:
     begin = mpmath.ellipf(mpmath.atan2(w2 / b, w1 / a), m)
 
     def state(time):
-        """Angular velocity, and the turn from the body to axes whose third is L: spin, nutation, precession."""
+        """Angular velocity, and the rotation from the body to axes whose third is L: spin, nutation, precession."""
         u = p * time + begin
         halves = mpmath.nint(u / (2 * quarter))
         sn, cn, dn = (mpmath.ellipfun(name, u=u - 2 * quarter * halves, m=m) for name in ("sn", "cn", "dn"))
@@ -92,7 +92,7 @@ def tumbling(t: list, moments: list, omega: list) -> list[tuple[list, list]]:
 
 
 def turned_about(omega: Sequence, time: mpmath.mpf) -> list:
-    """The quaternion, w first, of a turn with a constant angular velocity."""
+    """The quaternion, w first, of a rotation with a constant angular velocity."""
     half = mpmath.norm(omega) * time / 2
     return [mpmath.cos(half), *(mpmath.sinc(half) * time / 2 * v for v in omega)]
 

@@ -1,4 +1,4 @@
-"""The equations of motion linearised: small oscillations, modes of a held posture, and what one step of a method does to them."""
+"""The linearized equations of motion: small oscillations, modes of a held posture, and steps of a method there."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -16,18 +16,18 @@ from .conserved import floats
 from .rest import holding, moving, slopes, stiffness
 from .steps import growth_of, is_runge_kutta, linear_step
 
-AS_IT_STANDS = 6  # speeds, up to which the method is differentiated as written; beyond it is regrouped
-LONGEST_STEP, SHORTEST_STEP = 1e3, 1e-4  # s: steps among which a limit is sought
-SCANNED = 281  # steps between these, 40 for each power of ten
-NEUTRAL = 1e-9  # growth per step that rounding can pretend
+AS_IT_STANDS = 6  # speeds up to which the method is differentiated as written; beyond, composite inertias are faster
+LONGEST_STEP, SHORTEST_STEP = 1e3, 1e-4  # s: the range in which a limit is searched
+SCANNED = 281  # steps in this range, 40 for each power of ten
+NEUTRAL = 1e-9  # growth per step that can be rounding
 NEGLIGIBLE = 1e-6  # relative to the fastest mode: a rate below is zero
-SLOWEST = 1e-6  # 1/s: and so is a rate below this, where no mode is fast
-PUSHED_ALONG = 3  # random directions among the movements without stiffness, in which it is seen whether they are flat
-AT_ONE = (1e-7, 1e-3)  # how far from 1 rounding and a rate of zero may put the growth of a mode without stiffness
+SLOWEST = 1e-6  # 1/s: a rate below is zero
+PUSHED_ALONG = 3  # random directions without stiffness in which the second derivative of the torque is computed
+AT_ONE = (1e-7, 1e-3)  # least and largest distance from 1 of the growth of a mode without stiffness
 
 
 def modes(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies, rad/s, and modes (columns) of small oscillations about a posture that rests, lowest first.
+    """Frequencies, rad/s, and modes (columns) of small oscillations about a posture at rest, lowest first.
 
     K u = frequency^2 Mbar u, modes with u' Mbar u = 1.
     """
@@ -36,7 +36,7 @@ def modes(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def small_oscillation(t: np.ndarray, tree: tmt.Tree, q: np.ndarray, away: np.ndarray) -> np.ndarray:
-    """Positions, rad, (times, nq), of the linear modes about q, let go at rest so far `away`, (nv,) rad."""
+    """Positions, rad, (times, nq), of the linear modes about q, released at rest at the distance `away`, (nv,) rad."""
     frequencies, shapes = modes(tree, q)
     parts = shapes.T @ literal.mass_matrix(q, tree) @ away
     return Coordinates(tree.hinge_names, tree.kind).move(q, np.cos(np.outer(t, frequencies)) * parts @ shapes.T)
@@ -44,13 +44,13 @@ def small_oscillation(t: np.ndarray, tree: tmt.Tree, q: np.ndarray, away: np.nda
 
 @dataclass(frozen=True)
 class Held:
-    """A posture under the torque that holds it, and the equations of motion linearised there."""
+    """A posture under its holding torque, and the equations of motion linearized there."""
 
     case: Case  # held at a posture, at rest
 
     @property
     def name(self) -> str:
-        """The posture's."""
+        """The name of the posture."""
         return self.case.scene.posture
 
     @property
@@ -80,7 +80,7 @@ class Held:
 
     @property
     def sizes(self) -> np.ndarray:
-        """The numbers in whose last place movements are rounded, (nv,): angles, lengths, and 1 of a quaternion."""
+        """The numbers whose last digit limits the accuracy of movements, (nv,): angles, lengths, and 1 for a quaternion."""
         if not self.tree.coordinates.balls:
             return self.q
         return np.concatenate(
@@ -89,12 +89,12 @@ class Held:
 
     @cached_property
     def steps(self) -> dict:
-        """What `step` found, by method and dt."""
+        """Results of `step` by method and dt."""
         return {}
 
     @cached_property
     def limits(self) -> dict:
-        """What `limit` found, by method."""
+        """Results of `limit` by method."""
         return {}
 
     @cached_property
@@ -104,7 +104,7 @@ class Held:
 
     @cached_property
     def matrix(self) -> np.ndarray:
-        """d(qd, qdd)/d(q, qd), (2nv, 2nv), for movements of q: exact derivatives of TMT's right-hand side, by dual numbers."""
+        """d(qd, qdd)/d(q, qd), (2nv, 2nv), for movements of q: TMT's right-hand side differentiated by dual numbers."""
         nq, n, unit = len(self.q), self.nv, np.eye(2 * self.nv)
         start = [float(x) for x in self.q]
         state = seeded([*start, *np.zeros(n)], [*self.tree.coordinates.component_rates(start, unit[:n]), *unit[n:]])
@@ -132,10 +132,10 @@ class Held:
 
     @cached_property
     def measures(self) -> np.ndarray:
-        """What gives the share of each mode with a rate in a deviation (2nv,): (modes, 2nv), for angles scaled as in `shapes`."""
+        """Left eigenvectors: measures @ deviation (2nv,) is the share of each mode with a rate, scaled as in `shapes`."""
         if not self.without_stiffness.any():
             return np.linalg.inv(self.shapes)
-        # modes that neither swing, grow nor decay may share one eigenvector with another, and have no measure
+        # modes without a rate may have a common eigenvector, and have no measure
         values, left = eig(self.matrix, left=True, right=False)
         left = left[:, np.abs(values) > self.small].conj().T
         return np.linalg.solve(left @ self.shapes, left)
@@ -148,7 +148,7 @@ class Held:
 
     @property
     def kind(self) -> str:
-        """saddle: a mode grows; marginal: a mode neither swings, grows nor decays; centre: all swing or decay."""
+        """saddle: a mode grows; marginal: a mode has the rate zero; centre: all modes swing or decay."""
         values, small = self.modes[0], self.small
         if values.real.max() > small:
             return "saddle"
@@ -156,12 +156,12 @@ class Held:
 
     @cached_property
     def soft(self) -> np.ndarray:
-        """Movements that change no force, (nv, k), each of length 1: modes without stiffness."""
+        """Movements without stiffness, (nv, k), each of length 1."""
         _, sizes, rows = np.linalg.svd(self.matrix[self.nv :, : self.nv])
         return rows[sizes <= max(NEGLIGIBLE**2 * sizes.max(), SLOWEST**2)].T
 
     def curvature(self, direction) -> np.ndarray:
-        """The second derivative of the torque that holds along a movement (nv,), N m, (nv,): by nested dual numbers."""
+        """The second derivative of the holding torque along a movement (nv,), N m, (nv,): by nested dual numbers."""
         inner = moving(self.tree, self.q, direction)
         outer = moving(self.tree, inner, direction)
         torque = holding(self.tree, outer)
@@ -169,7 +169,7 @@ class Held:
 
     @cached_property
     def stays(self) -> bool:
-        """Whether a small deviation stays small: no mode grows, and nothing pushes along those without stiffness."""
+        """Whether a small deviation stays small: no mode grows, and no torque acts along those without stiffness."""
         if self.kind != "marginal":
             return self.kind == "centre"
         rng, stiff = np.random.default_rng(SEED), self.mass_matrix @ self.matrix[self.nv :, : self.nv]
@@ -177,47 +177,40 @@ class Held:
         return bool(np.abs(pushes @ self.soft).max(initial=0.0) <= NEGLIGIBLE * np.abs(stiff).max())
 
     def step(self, name, dt) -> np.ndarray:
-        """What one step of a method of tmt does to a small deviation, (..., 2nv, 2nv) for dt of shape (...).
+        """The amplification matrix of a step of a method of tmt, (..., 2nv, 2nv) for dt of shape (...).
 
-        A step of the linearised equations, which is the amplification of a step of the exact ones; of a method that is none of
-        tmt's own this is computed itself.
+        For tmt's own methods a step of the linearized equations, which is the same; for others the derivative of a step.
         """
         if np.ndim(dt):
             return linear_step(self, METHODS[name], np.asarray(dt, float))
         dt = float(dt)
-        if (METHODS[name], dt) not in self.steps:  # the same step is asked for many perturbations
+        if (METHODS[name], dt) not in self.steps:  # many perturbations need the same step
             self.steps[METHODS[name], dt] = self.step(name, np.array([dt]))[0]
         return self.steps[METHODS[name], dt]
 
     def growth(self, name, dt) -> np.ndarray:
-        """Growth of the fastest-growing mode in one step, (...) for dt (...): the spectral radius of `step`.
-
-        A mode without stiffness grows by nothing, except for rounding.
-        """
+        """The spectral radius of `step`, (...) for dt (...). The growth of a mode without stiffness is 1."""
         stepping, dt = METHODS[name], np.asarray(dt, float)
         idle = self.without_stiffness
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             if is_runge_kutta(stepping):
-                found = growth_of(stepping, dt[..., None] * np.where(idle, 0.0, self.modes[0]))
-                return np.abs(found).max(axis=-1)
-            found = np.linalg.eigvals(self.step(name, dt))
+                return np.abs(growth_of(stepping, dt[..., None] * np.where(idle, 0.0, self.modes[0]))).max(axis=-1)
+            factors = np.linalg.eigvals(self.step(name, dt))
             if idle.any():
                 near = np.clip(self.small * dt, *AT_ONE)[..., None]
-                found = np.where(np.abs(found - 1.0) <= near, 1.0, found)
-            return np.abs(found).max(axis=-1)
+                factors = np.where(np.abs(factors - 1.0) <= near, 1.0, factors)
+            return np.abs(factors).max(axis=-1)
 
     def limit(self, name) -> tuple[str, float | None]:
-        """("finite", dt in s), ("never_fails", None) or ("always_fails", None): up to which step no mode grows.
+        """("finite", dt in s), ("never_fails", None) or ("always_fails", None): the largest step at which no mode grows.
 
-        The first step at which one does, among 40 for each power of ten, then refined. Engines that share a method ask
-        again, so it is kept.
+        The first unstable step of 40 for each power of ten, then refined; cached by method.
         """
         if METHODS[name] not in self.limits:
             self.limits[METHODS[name]] = self.first_failing(name)
         return self.limits[METHODS[name]]
 
     def first_failing(self, name) -> tuple[str, float | None]:
-        """What `limit` returns, computed."""
         low, high = min(SHORTEST_STEP, 1.0 / max(np.abs(self.modes[0]).max(), SLOWEST)), LONGEST_STEP
         for _ in range(4):
             steps = np.geomspace(low, high, SCANNED)
@@ -231,9 +224,9 @@ class Held:
         return "finite", float(low)
 
     def fastest_growing(self, name, dt) -> tuple[float, np.ndarray, np.ndarray]:
-        """The mode that a step of a method lets grow most: growth per step, its state (2n,), and its measure (2n,).
+        """The fastest growing mode of a step of a method: growth per step, state (2n,), and measure (2n,).
 
-        The state is scaled to a largest angle of 1 rad; measure @ deviation is its share in a deviation.
+        The largest angle of the state is 1 rad; measure @ deviation is the share of the mode in a deviation.
         """
         values, left, vectors = eig(self.step(name, dt), left=True)
         k = int(np.argmax(np.abs(values)))
@@ -243,7 +236,7 @@ class Held:
         return float(np.abs(values[k])), vector / top, measure * top
 
     def rate(self, shape) -> float:
-        """The rate |lambda|, 1/s, of the mode of the equations of motion whose state is nearest to a given one (2n,)."""
+        """The rate |lambda|, 1/s, of the mode of the equations of motion with the nearest state (2n,)."""
         values, vectors = self.modes
         n = self.nv
         shape = shape[:n] / np.linalg.norm(shape[:n])
@@ -255,6 +248,6 @@ class Held:
 
 @lru_cache(maxsize=64)
 def held(robot, posture: str, damping: float = 0.0) -> Held:
-    """A named posture under TMT's own torque, with joint damping added, N m s/rad; without gravity if it floats."""
+    """A named posture under TMT's holding torque, with added joint damping, N m s/rad; without gravity if the robot floats."""
     gravity = not floats(robot.tree)
     return Held(robot.case(f"{posture}, held", posture=posture, torque="hold", damping=damping, gravity=gravity))

@@ -1,4 +1,4 @@
-"""A motion that is known without an integrator: the elliptic function of a pendulum."""
+"""The exact motion of a pendulum, by elliptic functions."""
 
 import mpmath
 import numpy as np
@@ -9,9 +9,9 @@ from tmt.exact.values import DIGITS
 
 
 def pendulum(tree: tmt.Tree) -> tuple[float, float]:
-    """The angle at which a Tree with one hinge hangs, rad, and the frequency of small swings about it, rad/s.
+    """The hanging angle of a Tree with one hinge, rad, and the frequency of small swings about it, rad/s.
 
-    Plain mechanics of a rigid body on a fixed axis, from the numbers of the Tree and not by the method:
+    Mechanics of a rigid body on a fixed axis, from the numbers of the Tree and not by the method:
     I qdd = -|sum m r| |g| sin(q - hanging), with r and g across the axis and I the moment of inertia about it.
     """
     axis, gravity = np.array(tree.axis[0]), np.array(tree.gravity)

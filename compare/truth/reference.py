@@ -1,7 +1,7 @@
-"""The runs that errors are measured against: Taylor's method in pairs of doubles, for any robot and any scene.
+"""Reference runs for errors: Taylor's method in pairs of doubles, for any robot and any scene.
 
-How many digits are right is seen from a second run in another form of the equations and of another order. Where a series would
-take too long, as with a stiff robot, a run in doubles of order 8 serves, whose digits are seen by halving its steps.
+A second run with another form of the equations and another order gives the accuracy. Where a series takes too long, as for a
+stiff robot, the reference is a run in doubles of order 8, whose accuracy is known from halving its steps.
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ from tmt.methods import METHODS
 from ..robots.case import Case, Coordinates, rates_at
 from .steps import growth_of
 
-RECORDS = 64  # of a run, and its start
-LOST = 1e-30  # of a run in pairs: its error about, over the growth of a small difference
-DOUBLES, MOST_DOUBLINGS = "dopri8", 5  # the method of a run in doubles; how often its steps are doubled at most
-DIVERGES = 1.05  # growth in a step: in the thousands of steps of a run a number overflows
+RECORDS = 64  # states of a run, without its start
+LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
+DOUBLES, MOST_DOUBLINGS = "dopri8", 5  # the method of a run in doubles; how often its number of steps is doubled
+DIVERGES = 1.05  # growth in a step that overflows in the thousands of steps of a run
 
 
 class Reference(NamedTuple):
@@ -28,14 +28,14 @@ class Reference(NamedTuple):
 
     t: np.ndarray  # (65,) s
     high: np.ndarray  # (65, nq + nv) rad, rad/s
-    low: np.ndarray  # (65, nq + nv), 0 of a run in doubles
+    low: np.ndarray  # (65, nq + nv), 0 in a run in doubles
     apart: float  # largest difference from the second run; of a run in doubles from that with half the steps
     steps: int
     coordinates: Coordinates
-    why: str | None = None  # it is in doubles
+    why: str | None = None  # the reason for a run in doubles
 
     def error(self, q: np.ndarray, joints: Sequence[int]) -> np.ndarray:
-        """The largest error of the positions q (65, ...) of some joints by their places at each time, rad or m, (65,)."""
+        """The largest error at each time of the positions q (65, ...) of these joints of the robot, rad or m, (65,)."""
         whole = self.coordinates
         part = Coordinates(*(tuple(names[i] for i in joints) for names in (whole.names, whole.all_kinds)))
         places = [whole.places.joints[i].q for i in joints]
@@ -51,7 +51,7 @@ def references(cases: Sequence[Case]) -> dict[str, Reference]:
 
 
 def reference(case: Case) -> Reference:
-    """That of one case, at the times at which every run of it is read; ValueError if none reaches the end of the scene."""
+    """The reference of one case at 65 equal times; ValueError if no run reaches the end of the scene."""
     count = RECORDS if case.controller else first_steps(case)  # as the coarsest runs of `speed`
     start = (tuple(values.tolist()) for values in (*case.start, case.tau))
     try:
@@ -59,29 +59,29 @@ def reference(case: Case) -> Reference:
     except TooManySteps as error:
         return in_doubles(case)._replace(why=str(error))
     except ValueError as error:
-        raise ValueError(f"scene {case.name!r}: {error}; a slower start or a shorter scene is expected") from error
+        raise ValueError(f"scene {case.name!r}: {error}; expected a slower start or a shorter scene") from error
     return Reference(times(case), path.high, path.low, apart, path.steps, case.coordinates)
 
 
-in_pairs = lru_cache(maxsize=64)(truth)  # several experiments ask for the same
+in_pairs = lru_cache(maxsize=64)(truth)  # several experiments need the same
 
 
 def first_steps(case: Case) -> int:
-    """The least multiple of 64 that is no less than the scene's own number of steps."""
+    """The smallest multiple of 64 that is at least the scene's own number of steps."""
     return -(-case.steps // RECORDS) * RECORDS
 
 
 def times(case: Case) -> np.ndarray:
-    """At which a run is read, s."""
+    """The recorded times of a run, s."""
     return np.linspace(0.0, case.duration, RECORDS + 1)
 
 
 def in_doubles(case: Case) -> Reference:
-    """A run in doubles by tmt's method of order 8: twice the steps as long as two runs come nearer to each other.
+    """A run in doubles by tmt's method of order 8: the steps are doubled while the difference of two runs falls.
 
-    ValueError if none reaches the end of the scene.
+    ValueError if no run reaches the end of the scene.
     """
-    count, found = first_steps(case), []
+    count, runs = first_steps(case), []
     before = after = None
     for _ in range(MOST_DOUBLINGS + 1):
         after = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)
@@ -89,24 +89,22 @@ def in_doubles(case: Case) -> Reference:
         after = after.q[::every], after.qd[::every]
         if before is not None:
             apart = case.coordinates.difference(after[0], before[0]), after[1] - before[1]
-            found.append((np.abs(np.concatenate(apart, axis=1)).max(), after, count))
-            if len(found) > 1 and np.isfinite(found[-2][0]) and not found[-1][0] < found[-2][0] / 2.0:
+            runs.append((np.abs(np.concatenate(apart, axis=1)).max(), after, count))
+            if len(runs) > 1 and np.isfinite(runs[-2][0]) and not runs[-1][0] < runs[-2][0] / 2.0:
                 break
         before, count = after, 2 * count
-    apart, path, count = min(found, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
+    apart, path, count = min(runs, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
     if not np.isfinite(apart):
         raise ValueError(
-            f"scene {case.name!r}: runs with up to {found[-1][2]} steps of {DOUBLES} do not reach its end; a slower start or a "
-            "shorter scene is expected"
+            f"scene {case.name!r}: runs with up to {runs[-1][2]} steps of {DOUBLES} diverge; expected a slower start or a "
+            "shorter scene"
         )
     high = np.concatenate(path, axis=1)
     return Reference(times(case), high, np.zeros_like(high), float(apart), count, case.coordinates)
 
 
 def has_no_reference(robot: object) -> str | None:
-    """Why neither a series nor a run in doubles can follow a file's robot: with its finest steps too the fastest mode
-    diverges; or None.
-    """
+    """Why a file's robot has no reference, as its fastest mode diverges even with the finest steps; or None."""
     for case in robot.cases_of_torque if robot.is_read else ():
         count = first_steps(case) << MOST_DOUBLINGS
         decay, swing = rates_at(case.tree, case.q)

@@ -1,14 +1,14 @@
-"""The smallest model that has a scene's motion: which joints stay where they start, whatever the others do.
+"""The smallest model with the same motion in a scene: which joints stay where they start for any motion of the others.
 
-A set of joints stays if, with these at their start value and at rest, their accelerations vanish for all values of the
-others: then the motion with them at rest solves the equations of the whole model, and its solution is the only one. The
-union of two such sets is one too, so there is a largest, and it is found by taking out of all joints those that move
-until none does. "For all values" is decided on the expressions of the traced method, where the acceleration must fold to
-the number 0; "moves" is decided by one state at which 50 digits give another value than 0. A joint of which neither can
-be said is kept: sin of the double nearest to pi is not 0, and terms that only cancel in sum do not fold.
+A set of joints stays if their accelerations vanish for all values of the others, with these joints at their start and at
+rest: then the motion with them at rest solves the equations of the whole model, and the solution is unique. The union of
+two such sets is such a set, so there is a largest one: remove the joints that move from all joints until none moves.
+"Stays" is decided on the expressions of the traced method, where the acceleration must fold to the number 0; "moves" is
+decided by one state at which the acceleration in 50 digits is not 0. A joint for which neither is decided is kept: sin of
+the double nearest to pi is not 0, and terms that cancel only in their sum do not fold.
 
-With 50 digits the numbers of the robot are what their doubles are exactly, its sums of masses too, and directions and
-quaternions have length 1 in all digits: a value that is not 0 is then none of rounding.
+In 50 digits the numbers of the robot are their doubles exactly, also in sums of masses, and directions and quaternions
+have length 1: a value that is not 0 is not rounding.
 """
 
 import dataclasses
@@ -30,17 +30,17 @@ from ..robots.case import SEED, Case
 
 TRIALS = 3  # random states of the other joints, with 50 digits
 EVERY_TRIAL = 6  # joints, up to which every trial is made
-# what 50 digits leave of an acceleration that vanishes, of the largest one at that state, which is taken as at least 1
+# an acceleration in 50 digits that counts as 0, relative to the largest one at that state, which is taken as at least 1
 ZERO = mpmath.mpf(10) ** (10 - DIGITS)
-MOST_FOLDED = 20  # speeds up to which accelerations are traced; of more the forces alone
+MOST_FOLDED = 20  # speeds up to which accelerations are traced; beyond only the forces
 
 
 class Needed(NamedTuple):
-    """Of the free joints of a case: which stay, and why each of the others is needed."""
+    """Which free joints of a case stay, and why each of the others is needed."""
 
     stays: tuple
     moves: dict  # name: why
-    undecided: tuple  # no state was found at which they move, but their acceleration does not fold to 0
+    undecided: tuple  # they move in no state that was tried, but their acceleration does not fold to 0
 
 
 def needed(case: Case) -> Needed:
@@ -54,20 +54,20 @@ def needed(case: Case) -> Needed:
         when = "at the start" if len(still) == len(names) else "when the others move"
         largest = dict.fromkeys(still, 0.0)
         rng, alone = np.random.default_rng(SEED), len(still) == len(names)
-        # where all are still there is one state, and of many joints an evaluation takes long
+        # if no joint moves there is only one state; with many joints an evaluation takes long
         for _ in range(1 if alone or coordinates.nv > MOST_FOLDED else TRIALS):
             (q,), qd = coordinates.random(rng, 1), rng.uniform(-10.0, 10.0, coordinates.nv)
             for name, values in exact_accelerations(case, still, q, qd).items():
                 largest[name] = max(largest[name], *map(abs, values))
             if len(names) > EVERY_TRIAL and min(largest.values()) > 0.0:
-                break  # nothing is left to be found
-        found = {
+                break
+        accelerated = {
             name: f"{name} accelerates by {float(a):.2g} {units[name]}/s2 {when}"
             for name, a in largest.items()
             if a > 0.0
         }
-        moves |= found
-        if not found:
+        moves |= accelerated
+        if not accelerated:
             unfolded = tuple(name for name, parts in folded(case, still).items() if any(n != 0.0 for n in parts))
             if not unfolded:
                 break
@@ -78,8 +78,8 @@ def needed(case: Case) -> Needed:
 def forces(case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence, qd: Sequence) -> tuple[list, list]:
     """Mbar qdd (nv,) and the position: joints in `still` at their start and at rest, the others at q, qd.
 
-    tree: the case's, of numbers that agree with those of start (nq,), q and qd. A torque that holds is the model's own bias
-    (and springs) at the start, over the same numbers: not its rounded value.
+    tree: the case's, over the same number type as start (nq,), q and qd. A holding torque is the model's own bias (and springs)
+    at the start in these numbers, not its rounded value.
     """
     q, qd, joints = list(q), list(qd), dict(zip(case.joints, tree.coordinates.joints))
     for name in still:
@@ -91,7 +91,7 @@ def forces(case: Case, tree, still: Sequence[str], start: Sequence, q: Sequence,
         springs = method.spring_torque(tree, q)
     if case.scene.torque == "hold":
         tau = method.bias(method.bodies(tree, start), tree.gravity)
-        if tree.has_springs:  # what a spring needs more than at the start, 0 of one that is there
+        if tree.has_springs:  # the change from the start, 0 for a joint that stays
             springs = [now - before for now, before in zip(springs, method.spring_torque(tree, start))]
     h = method.bias(method.bodies(tree, q, qd), tree.gravity)
     return [t - d * v - hi - spring for t, d, v, hi, spring in zip(tau, tree.damping, qd, h, springs)], q
@@ -106,18 +106,17 @@ def exact_accelerations(case: Case, still: Sequence[str], q: np.ndarray, qd: np.
             for turns in (start, q):
                 length = mpmath.sqrt(sum(part * part for part in turns[joint.q]))
                 turns[joint.q] = [part / length for part in turns[joint.q]]
-        found, q = forces(case, tree, still, start, q, qd)
-        if max(map(abs, found)) > ZERO:
+        values, q = forces(case, tree, still, start, q, qd)
+        if max(map(abs, values)) > ZERO:
             still_tree = dataclasses.replace(case.tree, damping=np.zeros(len(qd)))
-            found = solve(exact_mass_matrix(still_tree, tuple(q)), found)
-        vanish = ZERO * max(1, *map(abs, found))
-        found = [a if abs(a) > vanish else mpmath.mpf(0) for a in found]
-        return of_joints(case, still, found)
+            values = solve(exact_mass_matrix(still_tree, tuple(q)), values)
+        zero = ZERO * max(1, *map(abs, values))
+        return of_joints(case, still, [a if abs(a) > zero else mpmath.mpf(0) for a in values])
 
 
 @lru_cache(maxsize=8)
 def exact_mass_matrix(tree: tmt.Tree, q: tuple) -> list:
-    """Mbar at a position with the digits that are set: scenes of a robot ask for the same ones."""
+    """Mbar at a position in mpmath's current digits; cached, as the scenes of a robot share positions."""
     tree = exact_tree(tree, mpmath.mpf)
     return method.mass_matrix(method.bodies(tree, q), tree.armature)
 
@@ -130,21 +129,21 @@ def folded(case: Case, still: Sequence[str]) -> dict:
     force, q = forces(case, tree, still, [tape.lift(float(value)) for value in case.q], q, qd)
     numbers = [tape.lift(part).number for part in force]
     if any(number != 0.0 for number in numbers):  # else Mbar, which is regular, has nothing to solve
-        found = [None] * len(qd)
+        accelerations = [None] * len(qd)
         if len(qd) <= MOST_FOLDED:
-            found = solve(method.mass_matrix(method.bodies(tree, q), tree.armature), force)
-        numbers = [None if a is None else tape.lift(a).number for a in found]
+            accelerations = solve(method.mass_matrix(method.bodies(tree, q), tree.armature), force)
+        numbers = [None if a is None else tape.lift(a).number for a in accelerations]
     return of_joints(case, still, numbers)
 
 
 def of_joints(case: Case, names: Sequence[str], values: Sequence) -> dict:
-    """Of one value for each speed of a case those of some joints, tuples by name."""
+    """The values of these joints, tuples by name, from one value for each speed of a case."""
     joints = dict(zip(case.joints, case.tree.coordinates.joints))
     return {name: tuple(values[joints[name].qd]) for name in names}
 
 
 def reduced(case: Case, need: Needed | None = None) -> Case | None:
-    """The same case with the joints locked that stay; None if it needs all of them, or none. need: what `needed` found."""
+    """The same case with the joints locked that stay; None if it needs all of them, or none. need: the result of `needed`."""
     stays = (need or needed(case)).stays
     if not stays or len(stays) == len(case.joints):
         return None

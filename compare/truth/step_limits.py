@@ -1,11 +1,11 @@
-"""Up to which step an integrator of MuJoCo keeps a posture at rest stable under a robot's own servos: in closed form.
+"""The largest stable step of MuJoCo's integrators at rest under a robot's own servos, in closed form where there is one.
 
 Of the equations M x'' + D x' + K x = 0, D = D_impl + D_expl, a step of Euler, implicitfast or implicit is
 (M + dt D_impl) (v+ - v) = -dt (K x + D v), x+ = x + dt v+. With z = (1 + s) / (1 - s) for its eigenvalues it is
-P s^2 + 2 dt D s + dt^2 K = 0, P = 4 M + 2 dt (D_impl - D_expl) - dt^2 K: where M, D and K are symmetric and D and K not
-negative it is stable if and only if P is positive definite. A step of discrete, which has all of D and the springs S of joints
-and actuators implicit, gives P = 4 M + 2 dt D + dt^2 (2 S - K) and D + dt S in the place of D: the same holds where S is not
-negative. Elsewhere the eigenvalues of the step decide.
+P s^2 + 2 dt D s + dt^2 K = 0, P = 4 M + 2 dt (D_impl - D_expl) - dt^2 K. If M, D and K are symmetric and D and K positive
+semidefinite, the step is stable if and only if P is positive definite. In a step of discrete all of D and the springs S of joints
+and actuators are implicit: P = 4 M + 2 dt D + dt^2 (2 S - K), with D + dt S instead of D; the condition is the same if S is
+positive semidefinite. In all other cases the eigenvalues of the step decide.
 """
 
 from collections.abc import Callable
@@ -22,38 +22,38 @@ from .deviations import SYMMETRIC, VANISHING, Deviations
 from .linear import NEUTRAL
 from .steps import growth_of
 
-LIMIT_UP_TO = 5.0  # s: what is stable up to it has no limit here
-LIMIT_FROM = 0.01  # of the time of the fastest mode: stable if anything is
-STEPS_A_DECADE = 12  # steps for each power of ten, where no closed form tells the limit
-REFINED = 1e-10  # of a limit
-BEYOND_LIMIT = 1e-3  # of a limit that is found coarsely: where its movement is told
-SPLIT = 1e-6  # of a factor 1
+LIMIT_UP_TO = 5.0  # s: the longest step that is tried
+LIMIT_FROM = 0.01  # of the time of the fastest mode: the shortest step that is tried
+STEPS_A_DECADE = 12  # steps that are tried for each power of ten, where there is no closed form
+REFINED = 1e-10  # of a limit: its relative accuracy
+BEYOND_LIMIT = 1e-3  # of a coarse limit: how far beyond it the unstable movement is computed
+SPLIT = 1e-6  # the distance from 1 of a factor that counts as 1
 SAME_SHAPE = 0.9  # of the largest overlap: modes of one shape
-POLE = 2.0  # dt over the time constant of a filter, up to which it is stable
-POLE_RK4 = 2.7852935634052816  # and of RK4
-NEARLY = 0.3  # of the limit of rigid constraints: from there on the limit of soft ones is sought step by step
-COARSELY = 1e-6  # of a limit
-DEPENDENT = 1e-8  # of the largest singular value of the Jacobian of constraints: less is none
+POLE = 2.0  # largest stable dt over the time constant of a filter
+POLE_RK4 = 2.7852935634052816  # the same for RK4
+NEARLY = 0.3  # of the limit with rigid constraints: from there on steps with soft constraints are tried one by one
+COARSELY = 1e-6  # the relative accuracy of a limit with soft constraints
+DEPENDENT = 1e-8  # of the largest singular value of the Jacobian of constraints: less is zero
 
 
 class Limit(NamedTuple):
-    """How far a step may go.
+    """The largest stable step.
 
-    limit: finite; none, up to 5 s; saddle, a mode grows by itself; drifts, nothing holds a mode and nothing brakes it.
+    limit: finite; none, stable up to 5 s; saddle, the posture is unstable; drifts, a mode has neither stiffness nor damping.
     """
 
     limit: str
     dt: float | None  # s, of a finite one
-    joint: str  # the speed, or the actuator, that limits; or that grows most; "": none
-    rate: float | None  # 1/s, of the mode of the equations of motion, |lambda|; of a saddle how fast it is left
+    joint: str  # the speed or actuator that limits, or that grows most; "": none
+    rate: float | None  # 1/s, |lambda| of the mode; of a saddle its growth rate
     kind: str  # swing, real; "": no mode
     shape: np.ndarray | None = None  # (nv,) of the mode, M x scaled to length 1
 
 
 class Small(Deviations):
-    """Small deviations, and what steps make of them."""
+    """Small deviations and the steps of MuJoCo's integrators."""
 
-    is_coupled = False  # whether constraints hold speeds together
+    is_coupled = False  # whether constraints couple speeds
     refined = REFINED
 
     @property
@@ -62,7 +62,7 @@ class Small(Deviations):
         return np.eye(len(self.M))
 
     def braking(self, integrator: str) -> np.ndarray:
-        """What of D an integrator has implicit, (nv, nv)."""
+        """The part of D that is implicit in an integrator, (nv, nv)."""
         if integrator == "Euler":
             return np.diag(self.damping)
         if integrator in ("implicitfast", "implicit"):
@@ -71,16 +71,16 @@ class Small(Deviations):
 
     @cached_property
     def held(self) -> dict[str, np.ndarray]:
-        """Of K what each integrator has implicit, in the units of M."""
+        """The part of K that is implicit in each integrator, in the units of M."""
         return dict.fromkeys(self.implicit, np.zeros_like(self.M)) | {"discrete": self.scaled(self.springs)}
 
     @cached_property
     def implicit(self) -> dict[str, np.ndarray]:
-        """The same by the integrator's name, in the units of M."""
+        """The part of D that is implicit in each integrator, in the units of M."""
         return {name: self.scaled(self.braking(name)) for name in ("Euler", "implicitfast", "implicit", "discrete")}
 
     def step(self, integrator: str, dt: float) -> np.ndarray:
-        """What a step makes of a small deviation (x, v), in the units of M, (2nv, 2nv)."""
+        """The matrix of a step of a small deviation (x, v), in the units of M, (2nv, 2nv)."""
         n = len(self.M)
         unit, none = np.eye(n), np.zeros((n, n))
         if integrator == "RK4":
@@ -96,14 +96,14 @@ class Small(Deviations):
     def constrained(
         self, integrator: str, dt: float, stiff: np.ndarray, damped: np.ndarray, matrix: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Stiffness, damping and what becomes of other forces, in the units of M, with the forces of constraints: here of none.
+        """Stiffness, damping and the effect of other forces, in the units of M, with the forces of constraints: here none.
 
-        matrix: by which a step divides.
+        matrix: the left side of the step.
         """
         return stiff, damped, np.eye(len(self.M))
 
     def equations(self, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Those of a step of this size without its error: from the state (x, v) the accelerations, and those of a unit force."""
+        """Accelerations by the state (x, v) and by a unit force, with constraints as in a step of this size."""
         stiff, damped, share = self.constrained("Euler", dt, self.stiff, self.damped, np.eye(len(self.M)))
         L, back = self.root, self.unrooted
         return tuple(back.T @ each for each in (-stiff @ L.T, -damped @ L.T, share @ back))
@@ -118,28 +118,28 @@ class Small(Deviations):
         return float(np.where(np.abs(factors - 1.0) <= SPLIT, 1.0, np.abs(factors)).max(initial=0.0))
 
     def is_stable(self, integrator: str, dt: float) -> bool:
-        """Whether nothing grows in a step; nothing but what grows or drifts by itself is asked."""
+        """Whether a step is stable, filters included."""
         slowest = min(self.pole_limits(integrator), default=(np.inf, ""))[0]
         return dt < slowest and self.stays(integrator, dt)
 
     def stays(self, integrator: str, dt: float) -> bool:
-        """Whether nothing grows in a step but by rounding."""
+        """Whether nothing grows in a step beyond rounding."""
         return self.growth(integrator, dt) <= 1.0 + max(NEUTRAL, 2.0 * dt * self.neutral)
 
     def pole_limits(self, integrator: str) -> list[tuple[float, str]]:
-        """Up to which step, s, each filter is stable, and its actuator. RK4 has a filterexact no more exact than a filter."""
+        """The largest stable step, s, of each filter, and its actuator. RK4 integrates a filterexact like a filter."""
         if integrator == "RK4":
             return [(POLE_RK4 * constant, name) for name, constant, _ in self.poles]
         return [(POLE * constant, name) for name, constant, is_exact in self.poles if not is_exact]
 
     def P(self, integrator: str, dt: float) -> np.ndarray:
         """4 M + 2 dt (D_impl - D_expl) - dt^2 K, of discrete with 2 S dt^2, in the units of M."""
-        found = (
+        P = (
             4.0 * np.eye(len(self.M))
             + 2.0 * dt * (2.0 * self.implicit[integrator] - self.damped)
             - dt * dt * (self.stiff - 2.0 * self.held[integrator])
         )
-        return 0.5 * (found + found.T)
+        return 0.5 * (P + P.T)
 
     def holds(self, integrator: str, dt: float) -> bool:
         """Whether P is positive definite."""
@@ -172,19 +172,19 @@ class Small(Deviations):
 
     @cached_property
     def pulls_back(self) -> bool:
-        """Whether the springs that discrete has implicit are symmetric, and none pushes away."""
+        """Whether the springs that are implicit in discrete are symmetric and positive semidefinite."""
         S = self.held["discrete"]
         size = max(np.abs(S).max(), np.abs(self.stiff).max())
         return np.abs(S - S.T).max() <= SYMMETRIC * size and np.linalg.eigvalsh(S).min() >= -VANISHING * size
 
     def closed_form(self, integrator: str) -> float | None:
-        """The limit by P, s; None: up to 5 s. Along any movement P is a quadratic of dt that comes to zero once at most."""
+        """The limit by P, s; None: stable up to 5 s. Along any movement P is a quadratic in dt with at most one positive root."""
         if self.holds(integrator, LIMIT_UP_TO):
             return None
         return bisected(lambda dt: self.holds(integrator, dt), 0.0, LIMIT_UP_TO)
 
     def scanned(self, integrator: str) -> float | None:
-        """The limit by the eigenvalues of steps, s: the first that grows; None: none up to 5 s."""
+        """The limit by the eigenvalues of steps, s: the first unstable one; None: stable up to 5 s."""
         low = 0.0
         for dt in self.steps_tried(integrator):
             if not self.stays(integrator, dt):
@@ -193,30 +193,30 @@ class Small(Deviations):
         return None
 
     def steps_tried(self, integrator: str) -> np.ndarray:
-        """Upwards to 5 s, s."""
+        """Steps from short to 5 s, s."""
         return upwards(min(LIMIT_FROM / max(np.abs(self.modes[0]).max(initial=0.0), 1e-300), 0.1 * LIMIT_UP_TO))
 
     def limiting(self, integrator: str, dt: float) -> np.ndarray:
-        """The movement, in the units of M, (nv,), that a step of this size lets grow first."""
+        """The movement, in the units of M, (nv,), that becomes unstable at this step."""
         if self.has_closed_form(integrator):
             return np.linalg.eigh(self.P(integrator, dt))[1][:, 0]
         if integrator == "RK4" and not self.is_coupled:
             values, moves = self.modes
             return moves[:, np.argmax(np.abs(growth_of(METHODS["rk4"], dt * values)))]
-        beyond = BEYOND_LIMIT * self.is_coupled  # there it is larger than what stays, whose factor is 1
+        beyond = BEYOND_LIMIT * self.is_coupled  # there its factor is above 1, that of all others
         values, vectors = np.linalg.eig(self.step(integrator, (1.0 + beyond) * dt))
         move = vectors[: len(self.M), np.argmax(np.abs(values))]
         return move / np.linalg.norm(move)
 
     def nearest(self, shape: np.ndarray) -> tuple[float, str]:
-        """Rate, 1/s, and kind, swing or real, of the mode whose movement is nearest, the fastest of several."""
+        """Rate, 1/s, and kind, swing or real, of the mode with the nearest movement, the fastest of several."""
         values, moves = self.modes
-        if not len(values):  # all that moves is what soft constraints give way
+        if not len(values):  # only the soft constraints yield
             return 0.0, "real"
         overlap = np.abs(moves.conj().T @ shape)
         near = np.flatnonzero(overlap >= SAME_SHAPE * overlap.max())
-        found = values[near[np.argmax(np.abs(values[near]))]]
-        return float(np.abs(found)), "swing" if abs(found.imag) > 1e-6 * abs(found) else "real"
+        value = values[near[np.argmax(np.abs(values[near]))]]
+        return float(np.abs(value)), "swing" if abs(value.imag) > 1e-6 * abs(value) else "real"
 
 
 def upwards(first: float) -> np.ndarray:
@@ -225,7 +225,7 @@ def upwards(first: float) -> np.ndarray:
 
 
 def bisected(holds, low: float, high: float, refined: float = REFINED) -> float:
-    """The largest step, s, at which something holds that holds at `low` and not at `high`."""
+    """The largest step, s, at which a condition holds that holds at `low` and not at `high`."""
     while high - low > refined * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
@@ -237,7 +237,7 @@ def bisected(holds, low: float, high: float, refined: float = REFINED) -> float:
 
 @dataclass(frozen=True)
 class Rigid(Small):
-    """Small deviations that meet constraints, in coordinates for these, as if the constraints were rigid."""
+    """Small deviations in the coordinates that rigid constraints leave free."""
 
     soft: "Coupled | None" = None
 
@@ -248,11 +248,11 @@ class Rigid(Small):
 
 @dataclass(frozen=True)
 class Coupled(Small):
-    """Small deviations where constraints hold joints together; K has what these do by turning with the posture.
+    """Small deviations with equalities, or limits at which joints rest: MuJoCo's soft constraints. K includes their rotation.
 
-    What grows or drifts by itself and which modes there are is said of rigid constraints, in coordinates that meet them. A step
-    is MuJoCo's: it finds the force of the soft constraints without what an integrator has implicit (discrete: with it), so that
-    its limit is not that of rigid ones. couple: the Rows at a step size and an integrator, of all these speeds.
+    Modes, growth and drift are those of rigid constraints. A step is MuJoCo's: the force of the soft constraints is computed
+    without the implicit part of an integrator (discrete: with it), so that its limit differs from that of rigid ones.
+    couple: the Rows at a step size and an integrator, of all these speeds.
     """
 
     couple: Callable[[float, str], Rows] | None = None
@@ -285,15 +285,15 @@ class Coupled(Small):
 
     @cached_property
     def growing(self):
-        found = self.rigid.growing if self.meeting.size else None
-        return found and (found[0], self.of_all(found[1]))
+        growing = self.rigid.growing if self.meeting.size else None
+        return growing and (growing[0], self.of_all(growing[1]))
 
     @cached_property
     def drifts(self):
         return bool(self.meeting.size) and self.rigid.drifts
 
     def steps_tried(self, integrator):
-        """A few up to well below the limit of rigid constraints, then as of others: each takes a forward pass and eigenvalues."""
+        """A few up to well below the limit of rigid constraints, as each takes a forward pass and eigenvalues; then all."""
         near = NEARLY * (self.rigid.limit(integrator).dt or LIMIT_UP_TO)
         return np.concatenate([np.geomspace(near / 100.0, near, 5)[:-1], upwards(near)])
 
@@ -311,5 +311,5 @@ class Coupled(Small):
 
 
 def of_small(small: Small) -> dict:
-    """What small deviations are made of, by name."""
-    return {one.name: getattr(small, one.name) for one in fields(Deviations)}
+    """The fields of Deviations by name."""
+    return {field.name: getattr(small, field.name) for field in fields(Deviations)}

@@ -1,4 +1,4 @@
-"""What one step of a method does to a linear motion: to a deviation from a held posture, to a single mode."""
+"""One step of a method in a linear motion: of a deviation from a held posture, of a single mode."""
 
 import numpy as np
 
@@ -14,10 +14,10 @@ def is_runge_kutta(stepping) -> bool:
 
 
 def linear_step(at, stepping, dt: np.ndarray) -> np.ndarray:
-    """What a step of a method does to a small deviation from a held posture, see linear.Held: (k, 2nv, 2nv) for dt (k,), s."""
+    """The matrix of a step for small deviations from a held posture, see linear.Held: (k, 2nv, 2nv) for dt (k,), s."""
     unit, n, each = np.eye(2 * at.nv), at.nv, dt[:, None, None]
     if type(stepping) is SemiImplicitEuler:
-        # at rest the bias has no derivative by the speeds, so it does not matter whether it is implicit
+        # at rest the bias has no derivative by the speeds: an implicit bias makes no difference
         stiff = np.diag(by_speed(at.tree, at.tree.stiffness)) * stepping.implicit_springs
         damped = np.diag(at.tree.damping)
         if at.tree.has_gains:
@@ -41,7 +41,7 @@ def linear_step(at, stepping, dt: np.ndarray) -> np.ndarray:
 
 
 def growth_of(stepping, z: np.ndarray) -> np.ndarray:
-    """What a step of a Runge-Kutta method makes of 1 where y' = lambda y, for z = lambda dt of any shape."""
+    """The stability function of a Runge-Kutta method at z = lambda dt, of any shape."""
     if type(stepping) is ImplicitRungeKutta:
         A = np.eye(len(stepping.b)) - z[..., None, None] * np.array(stepping.A)
         stages = np.linalg.solve(A, np.ones((*z.shape, len(stepping.b), 1)))[..., 0]
@@ -53,10 +53,7 @@ def growth_of(stepping, z: np.ndarray) -> np.ndarray:
 
 
 def beyond_limit(at, name: str, dt: float) -> float:
-    """How many times a step, s, of a method is beyond the last one that lets no mode of a held posture grow as it should not.
-
-    That is faster than the equations of motion have it grow, by more than a tenth.
-    """
+    """A step, s, over the largest one at which a mode of a held posture grows by at most a tenth more than it should."""
     steps = dt * np.geomspace(1e-5, 1.0, 201)
     fast = at.growth(name, steps) > 1.1 * np.exp(max(at.modes[0].real.max(), 0.0) * steps)
     return float(dt / steps[max(int(np.argmax(fast)) - 1, 0)]) if fast.any() else 1.0

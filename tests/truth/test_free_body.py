@@ -72,5 +72,5 @@ def test_the_separatrix_is_refused_and_what_lies_beside_it_is_not(away, refused)
         omega = (1, 1, mpmath.sqrt(3 + mpmath.mpf(away)))
         if not refused:
             return assert_solves(0.1, (3, 2, 1), omega)
-        with pytest.raises(ValueError, match="middle"):
+        with pytest.raises(ValueError, match="separatrix"):
             free_turning([1.0], (3, 2, 1), omega, START)

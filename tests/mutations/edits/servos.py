@@ -23,7 +23,7 @@ EDITS = (
     Edit("truth.servos", "Driven.slopes", "uncut - speeding", "uncut", "discrete has implicit what speeds up"),
     Edit("truth.servos", "Driven.sums", "not low < total[speed] < high", "False", "no sum has a range"),
     Edit("truth.servos", "Driven.descended", "left <= REST_FORCE * scale", "True", "every posture is called a rest"),
-    Edit("truth.servos", "Driven.at_rest", "found if unlimited[1] else self.descended(unlimited[0], u)", "found",
+    Edit("truth.servos", "Driven.at_rest", "rest if unlimited[1] else self.descended(unlimited[0], u)", "rest",
          "from where forces are on their ranges no way leads back"),
     Edit("mujoco.acting", "Acting.along", "moments[outputs]", "moments[: len(outputs)]",
          "every actuator has one output"),
