@@ -8,8 +8,6 @@ and actuators are implicit: P = 4 M + 2 dt D + dt^2 (2 S - K), with D + dt S ins
 positive semidefinite. In all other cases the eigenvalues of the step decide.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,7 +15,6 @@ import numpy as np
 
 from tmt import METHODS
 
-from ..robots.actuators import Rows
 from .deviations import SYMMETRIC, VANISHING, Deviations
 from .linear import NEUTRAL
 from .steps import growth_of
@@ -31,9 +28,6 @@ SPLIT = 1e-6  # the distance from 1 of a factor that counts as 1
 SAME_SHAPE = 0.9  # of the largest overlap: modes of one shape
 POLE = 2.0  # largest stable dt over the time constant of a filter
 POLE_RK4 = 2.7852935634052816  # the same for RK4
-NEARLY = 0.3  # of the limit with rigid constraints: from there on steps with soft constraints are tried one by one
-COARSELY = 1e-6  # the relative accuracy of a limit with soft constraints
-DEPENDENT = 1e-8  # of the largest singular value of the Jacobian of constraints: less is zero
 
 
 class Limit(NamedTuple):
@@ -230,86 +224,3 @@ def bisected(holds, low: float, high: float, refined: float = REFINED) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return float(low)
-
-
-# constraints
-
-
-@dataclass(frozen=True)
-class Rigid(Small):
-    """Small deviations in the coordinates that rigid constraints leave free."""
-
-    soft: "Coupled | None" = None
-
-    def braking(self, integrator):
-        N = self.soft.meeting
-        return N.T @ self.soft.braking(integrator) @ N
-
-
-@dataclass(frozen=True)
-class Coupled(Small):
-    """Small deviations with equalities, or limits at which joints rest: MuJoCo's soft constraints. K includes their rotation.
-
-    Modes, growth and drift are those of rigid constraints. A step is MuJoCo's: the force of the soft constraints is computed
-    without the implicit part of an integrator (discrete: with it), so that its limit differs from that of rigid ones.
-    couple: the Rows at a step size and an integrator, of all these speeds.
-    """
-
-    couple: Callable[[float, str], Rows] | None = None
-    is_coupled = True
-    refined = COARSELY
-
-    @cached_property
-    def meeting(self) -> np.ndarray:
-        """Movements that the constraints allow, x = N y, (nv, m)."""
-        jacobian = self.couple(1e-3, "Euler").jacobian
-        _, sizes, directions = np.linalg.svd(jacobian)
-        return directions[int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum()) :].T
-
-    @cached_property
-    def rigid(self) -> "Rigid":
-        """The same in these coordinates: N' M N y'' + N' D N y' + N' K N y = 0."""
-        N = self.meeting
-        square = {name: N.T @ getattr(self, name) @ N for name in ("M", "K", "D", "springs")}
-        names, base = tuple(map(str, range(N.shape[1]))), tuple(np.flatnonzero(N[list(self.base)].any(axis=0)).tolist())
-        return Rigid(**of_small(self) | square | {"names": names, "base": base}, soft=self)
-
-    def of_all(self, moves: np.ndarray) -> np.ndarray:
-        """Movements of `rigid` in the units of its M as those of all speeds in the units of M."""
-        return self.root.T @ self.meeting @ self.rigid.unrooted.T @ moves
-
-    @cached_property
-    def modes(self):
-        values, moves = self.rigid.modes
-        return values, self.of_all(moves)
-
-    @cached_property
-    def growing(self):
-        growing = self.rigid.growing if self.meeting.size else None
-        return growing and (growing[0], self.of_all(growing[1]))
-
-    @cached_property
-    def drifts(self):
-        return bool(self.meeting.size) and self.rigid.drifts
-
-    def steps_tried(self, integrator):
-        """A few up to well below the limit of rigid constraints, as each takes a forward pass and eigenvalues; then all."""
-        near = NEARLY * (self.rigid.limit(integrator).dt or LIMIT_UP_TO)
-        return np.concatenate([np.geomspace(near / 100.0, near, 5)[:-1], upwards(near)])
-
-    def has_closed_form(self, integrator):
-        return False
-
-    def constrained(self, integrator, dt, stiff, damped, matrix):
-        rows = self.couple(dt, integrator)
-        J, metric = rows.jacobian @ self.unrooted.T, matrix if integrator == "discrete" else np.eye(len(self.M))
-        eased = np.linalg.solve(metric, J.T).T
-        pull = np.linalg.solve(eased @ J.T + np.diag(rows.softness), J).T
-        stiff = stiff - pull @ (eased @ stiff - rows.stiffness[:, None] * J)
-        damped = damped - pull @ (eased @ damped - rows.damping[:, None] * J)
-        return stiff, damped, np.eye(len(self.M)) - pull @ eased
-
-
-def of_small(small: Small) -> dict:
-    """The fields of Deviations by name."""
-    return {field.name: getattr(small, field.name) for field in fields(Deviations)}

@@ -15,11 +15,11 @@ from ...judge.scale import EPS, FACTOR, gravity_scale
 from ...robots import Robot
 from ...robots.case import Case
 
-DRIFT_DURATION = 1.0  # s: short enough for the order to show, long enough to move
+DRIFT_DURATION = 1.0  # s: short enough to measure the order, long enough to move
 DRIFT_STEPS = {1: (2048, 4096, 8192), 4: (256, 512, 1024)}  # by the order of the method
 FEW_DRIFT_STEPS = DRIFT_STEPS | {1: (512, 1024, 2048)}
 OF_EULER = 1e-3  # of Euler's drift: RK4's is below, with fewer steps
-DRIFT_ROUNDED = 10 * FACTOR * EPS  # of the terms of a quantity: a drift below is not that of the method alone
+DRIFT_ROUNDED = 10 * FACTOR * EPS  # of the terms of a quantity: a smaller drift may be rounding
 
 
 def measure_drift(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[int, tuple]) -> Result:
@@ -111,7 +111,7 @@ def is_rounding(engines: dict, allowed: float | None) -> bool:
 
 
 def largest_drift(quantity: Callable, path: tuple) -> float:
-    """How far a quantity of the state goes from its start along a run; NaN if the run has diverged."""
+    """The largest change of a quantity along a run; NaN if the run has diverged."""
     if not np.isfinite(path).all():
         return np.nan
     values = quantity(*path)
@@ -119,16 +119,16 @@ def largest_drift(quantity: Callable, path: tuple) -> float:
 
 
 def drift_order(values: Sequence[float]) -> float:
-    """The order at which the last two drifts fall, the last with half the step; NaN where nothing drifts."""
+    """The order of the drift from the last two step sizes, the last with half the step; NaN if nothing drifts."""
     ratio = drift_ratio(values[-2], values[-1])
     return float(np.log2(ratio)) if ratio > 0.0 else np.nan
 
 
-def drift_ratio(one: float, other: float) -> float:
+def drift_ratio(drift: float, other: float) -> float:
     """One drift over another; NaN if that is zero, or a run has diverged."""
-    return one / other if other > 0.0 else np.nan
+    return drift / other if other > 0.0 else np.nan
 
 
 def momentum_along(tree: tmt.Tree, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Momentum of the first joint, which hangs on the world, along a run: N m s about a hinge, N s along a slide."""
+    """Momentum of the first joint, which connects to the world, along a run: N m s of a hinge, N s of a slide."""
     return np.einsum("sj,sj->s", literal.mass_matrix(q, tree)[:, 0], v)

@@ -1,4 +1,4 @@
-"""Runs of the same scheme with many digits: which engine carries the rounding."""
+"""Runs of the same scheme with 50 digits: the rounding error of each engine by itself."""
 
 from collections.abc import Iterable, Sequence
 
@@ -47,7 +47,7 @@ def distance_of(case: Case, q: np.ndarray, exact: np.ndarray) -> np.ndarray:
 
 
 def check_digits(result: Result, where: str, off: dict, band: np.ndarray, dt: float) -> None:
-    """The state of each engine's run that comes closest to the band of rounding, {engine: distances in rad, (states,)}."""
+    """The state of each engine's run closest to the band of rounding. off: {engine: distances, rad, (states,)}."""
     for label, apart in (("TMT", off["tmt"]), ("MuJoCo", off["mujoco"])):
         (k,) = closest(apart, band)
         at = f"t = {k * dt:.3f} s"
@@ -68,6 +68,6 @@ def exact_run(case: Case, scheme: str, steps: int, dt: float) -> np.ndarray:
         for _ in range(steps):
             q, v = one_step(METHODS[scheme], case.tree, q, v, tau, dt)
             path.append(q)
-            if max(map(abs, v)) > TOO_FAST:  # diverged: its sines would ask for millions of digits of pi
+            if max(map(abs, v)) > TOO_FAST:  # diverged: its sines would need millions of digits of pi
                 break
     return np.array(path, dtype=object)

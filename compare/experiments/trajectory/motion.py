@@ -15,8 +15,8 @@ from ...robots.case import Case, Coordinates
 from ...robots.stick import as_seen, stick_figure
 from .true_motion import SCHEMES_OF_RK4, initial_accelerations, predicted_departure
 
-FRAMES = 128  # of a scene, at most about, its start excepted
-SEEN_AFTER = 0.1  # of a scene's duration: so long a motion is shown after the posture is left
+FRAMES = 128  # of a scene, about, without its start
+SEEN_AFTER = 0.1  # of a scene's duration: the time that is shown after the departure
 SUFFIXES = {  # of a joint's columns: of its positions, of its speeds
     "hinge": (["_rad"], ["_rad_per_s"]),
     "slide": (["_m"], ["_m_per_s"]),
@@ -25,9 +25,9 @@ SUFFIXES = {  # of a joint's columns: of its positions, of its speeds
 
 
 def at_equal_times(case: Case, t: np.ndarray, q: np.ndarray, v: np.ndarray, ended: float | None) -> tuple | None:
-    """t (65,) s, and all joints' positions and speeds, (65, nq + nv), of a run; NaN from where it has diverged, `ended` s, on.
+    """t (65,) s, and all joints' positions and speeds, (65, nq + nv), of a run; NaN from its divergence, `ended` s, on.
 
-    None where 64 equal times are no whole number of its steps each.
+    None if the number of its steps is not a multiple of 64.
     """
     every, left = divmod(len(t) - 1, GRID)
     if left:
@@ -90,19 +90,19 @@ class Drawn(NamedTuple):
     t: np.ndarray  # (frames,) s
     points: dict  # of each engine (frames, points, 2): to the right and up, m; NaN from where it has diverged on
     links: list  # pairs of points that a stick joins
-    apart: np.ndarray  # (frames,): the largest distance of the engines in any joint; NaN where one has diverged
+    apart: np.ndarray  # (frames,): the largest difference of the engines in any joint; NaN if one has diverged
     unit: str  # of that
-    ended: dict  # of each engine: when it diverged, s, or None
-    left: dict  # of each engine: when a held robot left its posture, s, or None
-    seen: Finding  # what is to be seen, with its numbers
+    ended: dict  # of each engine: time of divergence, s, or None
+    left: dict  # of each engine: time when a held robot left its posture, s, or None
+    seen: Finding  # departures, the largest difference, divergence
     fixed: bool  # whether the first point does not move, as the first joint only turns
 
 
 def drawn_motion(case: Case, engines: Mapping[str, Engine], runs: Mapping[tuple, dict]) -> Drawn | None:
-    """The motion of a case by RK4, which may be any scheme of RK4; None where there is no such run.
+    """The motion of a case by RK4; None if there is no such run.
 
-    What is held is shown by the scene's own step, as when it leaves depends on the step; else by the finest that was run. Where
-    only one engine has left its posture at the scene's end, both are followed on until both have, for as long again at most.
+    A held scene is drawn with its own step, as the departure depends on the step; others with the finest one. If only one
+    engine has left its posture at the end, both runs go on until both have, for at most the same time again.
     """
     keys = [key for key in runs if key[0] == case.name and key[1] in SCHEMES_OF_RK4]
     if not keys:
@@ -135,12 +135,12 @@ def drawn_motion(case: Case, engines: Mapping[str, Engine], runs: Mapping[tuple,
 def followed_on(
     case: Case, dynamics: Mapping[str, Dynamics], methods: Mapping[str, str], curve: dict, steps: int
 ) -> tuple[np.ndarray, dict, dict, dict]:
-    """Times of a run (times,) s, and of both engines the states, when they diverged, and when a held robot left its posture.
+    """Times of a run (times,) s; of both engines the states, the times of divergence and of departure from the posture.
 
-    Those of the run; or, where only one engine has left at its end, of one with the same steps that goes on until both have.
+    The run is longer than the scene's if only one engine has left its posture by then.
     """
     t, paths, ended = curve["t"], {name: curve[name] for name in dynamics}, curve["ended"]
-    left = curve["left"] if case.is_held else dict.fromkeys(dynamics)  # what is let go has no posture to leave
+    left = curve["left"] if case.is_held else dict.fromkeys(dynamics)  # of a posture
     if len({time is None for time in left.values()}) == 1 or any(ended.values()) or case.robot.own:
         return t, paths, ended, left
     dt = case.duration / steps
@@ -158,7 +158,7 @@ def followed_on(
 
 
 def in_order(drawn: Sequence[Drawn], robot: Robot) -> list[Drawn]:
-    """Scenes in the order in which they are shown: one that is held, and left where one is; one let go from there; the others."""
+    """Scenes in the order of the page: a held one, if possible with a departure; a free one, if possible from there; the rest."""
     cases = {case.name: case for case in robot.cases}
     held = [each for each in drawn if cases[each.scene].is_held]
     first = sorted(held, key=lambda each: not any(each.left.values()))[:1]
@@ -172,9 +172,9 @@ def in_order(drawn: Sequence[Drawn], robot: Robot) -> list[Drawn]:
 def with_parts_of_steps(
     dynamics: Dynamics, path: Sequence[np.ndarray], tau: np.ndarray, dt: float, parts: int, method: str
 ) -> np.ndarray:
-    """Positions of a run, (times, nq), with those between its states: a part of a step from each, by its own method.
+    """Positions of a run, (times, nq), with intermediate ones by shorter steps of its method from each state.
 
-    dt: s, of its steps; parts: into how many each is divided.
+    dt: of its steps, s; parts: the number of parts of a step.
     """
     q, v = path
     alive = int(np.argmin(np.append(np.isfinite(np.concatenate(path, axis=1)).all(axis=1), False)))
@@ -197,7 +197,7 @@ def what_is_seen(
     apart: np.ndarray,
     parts: int,
 ) -> Finding:
-    """When and to which side each engine leaves, how far the engines are apart, which has diverged."""
+    """When and to which side each engine leaves its posture, the engines' largest difference, which has diverged."""
     leaves, sides, unit = [], None, movement_unit(case.coordinates)
     if case.is_held and any(left.values()):
         longer = case.changed(duration=2.0 * case.duration)
@@ -223,7 +223,7 @@ def what_is_seen(
 
 
 def sides_left_to(case: Case, t: np.ndarray, paths: dict, left: dict) -> dict | None:
-    """The joint that has moved most when the engines leave, by how much in each, and whether they leave to the same side."""
+    """The joint with the largest movement at the departure, its movement in each engine, and whether the sides are the same."""
     moved, coordinates = {}, case.coordinates
     for name, time in left.items():
         k = int(np.searchsorted(t, time))

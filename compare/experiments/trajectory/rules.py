@@ -1,4 +1,4 @@
-"""The rules of a run: until when it is judged, how close the engines must be, how they end; and the derivative of the bias."""
+"""Checks of a run: the time that is judged, the engines' difference, divergence; and of the derivative of the bias."""
 
 from collections.abc import Mapping
 
@@ -28,7 +28,7 @@ def ends_first(ends: Mapping[str, float | None]) -> float:
 
 
 def judged(times: np.ndarray, width: np.ndarray, ends: Mapping[str, float | None]) -> int:
-    """How many of the recorded states are judged: all before the band is wide or a run has diverged; the start always is."""
+    """The number of recorded states that are judged: those before the band is wide or a run has diverged, and the start."""
     alive = times < ends_first(ends)
     return max(1, int(np.argmin(np.append((width < NARROW) & alive, False))))
 
@@ -36,10 +36,9 @@ def judged(times: np.ndarray, width: np.ndarray, ends: Mapping[str, float | None
 def check_divergence(
     result: Result, where: str, ends: Mapping[str, float | None], dt: float, steps: int, width: np.ndarray
 ) -> None:
-    """Both diverge at the same step, if one does while the band (recorded,) is narrow: then rounding decides nothing.
+    """Both diverge at the same step, if one does while the band (recorded,) is narrow.
 
-    It is to be narrow at the first recorded state that is not before the divergence: between two states it may open wide.
-    ends: of the engine that MuJoCo is compared with, and of MuJoCo, s.
+    The band must be narrow at the first recorded state from the divergence on. ends: of MuJoCo's partner and of MuJoCo, s.
     """
     end = ends_first(ends)
     if end == np.inf:
@@ -53,7 +52,7 @@ def check_divergence(
 
 
 def check_same_bits(result: Result, where: str, integrator: str, first: list, other: list) -> None:
-    """Integrators that are one scheme here give the same bits: q and v of both."""
+    """Integrators with the same scheme give the same bits: q and v of both."""
     differ = sum(not np.array_equal(a, b, equal_nan=True) for a, b in zip(first, other))
     quantity, unit = f"the same bits as {integrator}", "arrays that differ"
     result.check(where, quantity, differ, 0.0, unit, rule="equal", about=About.PREDICTION)
@@ -69,10 +68,10 @@ def check_level(
     times: np.ndarray,
     ending: dict,
 ) -> None:
-    """A row and a check: the component and state of the recorded ones that come closest to their tolerance.
+    """A row and a check: the component and recorded state that come closest to their tolerance.
 
     about, ending: the first and the last columns of the row; difference: (states, nv) rad/s2, or (states, 2 nv) rad and rad/s;
-    tolerance: the same, or of a shape that stands for it; times: of the states, s.
+    tolerance: broadcast to it; times: of the states, s.
     """
     level, n = about["level"], coordinates.nv
     difference = np.abs(difference)
@@ -80,9 +79,8 @@ def check_level(
     k, i = closest(difference, tolerance)
     per = "/s2" if level == "derivative" else ("", "/s")[i // n]
     unit = coordinates.units[i % n] + per
-    largest_unit = " or ".join(
-        one + (per if level == "derivative" else "") for one in movement_unit(coordinates).split(" or ")
-    )
+    units = movement_unit(coordinates).split(" or ")
+    largest_unit = " or ".join(unit + (per if level == "derivative" else "") for unit in units)
     place = f"{coordinates.speeds[i % n]} at t = {times[k]:.3f} s"
     check = result.check(
         where, f"{level}, {result.label} to MuJoCo", difference[k, i], tolerance[k, i], unit, place, True
@@ -112,8 +110,8 @@ def compare_derivatives(result: Result, robot: Robot, engines: Mapping[str, Engi
     mujoco, damping = engines["mujoco"].of(case), np.diag(case.tree.damping)
     ours = [bias_rates(case.tree, *state) + damping for state in zip(q, v)]
     theirs = [-implicit_derivative(mujoco, *state) for state in zip(q, v)]
-    unit = {"rad": "N m s/rad", "m": "N s/m"}
-    units = " or ".join(unit[one] for one in movement_unit(case.coordinates).split(" or "))
+    damping_units = {"rad": "N m s/rad", "m": "N s/m"}
+    units = " or ".join(damping_units[unit] for unit in movement_unit(case.coordinates).split(" or "))
     check_derivative(result, case.tree, q, v, np.array(ours), np.array(theirs), units)
 
 
@@ -132,7 +130,7 @@ def check_derivative(
     theirs: np.ndarray,
     unit: str = "N m s/rad",
 ) -> None:
-    """The state that comes closest to 64 eps x (the largest entry of Mbar x the sum of |rates| + the largest damping).
+    """The state closest to its tolerance, 64 eps x (the largest entry of Mbar x the sum of |rates| + the largest damping).
 
     q, v: (states, nq), (states, nv); ours, theirs: (states, nv, nv) of this unit.
     """

@@ -1,4 +1,4 @@
-"""One scene by every scheme and step: a method of tmt, and the integrators of MuJoCo that do the same."""
+"""One scene by every scheme and step: a method of tmt and the integrators of MuJoCo with the same scheme."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -44,7 +44,7 @@ class TmtSide(NamedTuple):
     width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
     ended: float | None  # s: when it diverged
     states: list  # the recorded q and v before that
-    derivative: np.ndarray  # (states, nv) rad/s2
+    derivative: np.ndarray  # (states, nv) rad/s2: accelerations
     derivative_tolerance: np.ndarray  # (states,)
     stepped: list  # q and v one step from each of the states
     step_tolerance: np.ndarray  # (states, 2 nv)
@@ -130,7 +130,7 @@ def follow(
 
 
 def tmt_side(case: Case, dynamics: Dynamics, steps: int, scheme: str, entries: int = MOST_ENTRIES) -> TmtSide:
-    """TMT's side of a case, or a user's: the run, its band, and the two other levels at its recorded states."""
+    """TMT's side of a case, or a user's: the run, its band, and accelerations and single steps at its recorded states."""
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
     dt, every = case.duration / steps, steps // recorded(case)
     t, q, v, *_ = dynamics.run(*case.start, tau, dt, steps, scheme)
@@ -159,7 +159,7 @@ def perturbed(start: np.ndarray) -> np.ndarray:
 def compare_runs(
     result: Result, case: Case, dynamics: Dynamics, steps: int, methods: Sequence[Method], mine: TmtSide
 ) -> None:
-    """One side, and the integrators of MuJoCo that are the same scheme, from the same start with the same step.
+    """One side and the integrators of MuJoCo with the same scheme, from the same start with the same step.
 
     Single steps that turn a joint by more than half a turn are not compared, but counted in result.notes.
     """
@@ -200,7 +200,7 @@ def compare_runs(
             check_level(result, where, about | {"level": level}, coordinates, difference, tolerance, at, ending)
         if not slow.all():
             result.find("long_steps", run=where, fast=int(np.sum(~slow)), states=len(slow))
-        if required:  # a scene may leave it open
+        if required:  # a scene may not state it
             result.check(where, "time judged", until, required, "s", rule="at least", about=About.PREDICTION)
         check_divergence(result, where, ends, dt, steps, angle_band)
         if case.is_free and "own" not in case.scene.tags:

@@ -1,6 +1,6 @@
-"""How far each engine is from the true motion, where that is known; why a held robot leaves its posture, where rest is true.
+"""Errors of both engines against the true motion, where that is known; and why a held robot leaves its posture.
 
-A held robot that leaves: the acceleration that the torque leaves at the start, grown by RK4's own linear map.
+The prediction of a departure: the initial acceleration under the holding torque, amplified by RK4's own linear map.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,17 +19,17 @@ from ...robots.case import Case
 from ...truth import reference
 
 SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")
-SAYS_NOTHING = 100  # times the difference of the engines: an error beyond which their agreement says nothing
+SAYS_NOTHING = 100  # times the difference of the engines: their agreement says nothing about a larger error
 NO_TIME = 1e-6  # s: a step in which nothing moves
-STEADY = 1e-3  # per second: a slower growth is none in these runs
-NEAR_PREDICTION = 2  # steps: so near the time that is predicted from rounding, rounding is the cause
+STEADY = 1e-3  # per second: a slower growth has no effect in these runs
+NEAR_PREDICTION = 2  # steps: if the departure is this close to the prediction from rounding, rounding is the cause
 
 
 # errors
 
 
 def coarsest_run(runs: dict, case: Case) -> dict | None:
-    """The curve of the coarsest step of MuJoCo's RK4, whichever scheme that is here; None: there is none."""
+    """The curve of the coarsest step of MuJoCo's RK4, with either of its schemes; None: there is none."""
     curves = (runs.get((case.name, scheme, case.steps)) for scheme in SCHEMES_OF_RK4)
     return next((curve for curve in curves if curve), None)
 
@@ -77,7 +77,7 @@ def find_errors(result: Result, robot: Robot, references: Mapping[str, reference
         if is_far(errors[case.name], difference):
             far.append(case.name)
     result.curves["errors"] = errors
-    if any(line["true"] == "series" for line in lines):  # what is held has its own finding
+    if any(line["true"] == "series" for line in lines):  # held scenes have their own findings
         steps = {case.steps for case in robot.cases if case.name in errors}
         labels = [LABELS[name] for name in robot.compared]
         count = steps.pop() if len(steps) == 1 else None
@@ -100,7 +100,7 @@ def difference_while_judged(curve: dict, case: Case) -> float:
 
 
 def find_departures(result: Result, robot: Robot, engines: Mapping[str, Engine]) -> None:
-    """Of each held scene when each engine leaves the posture, and why."""
+    """When each engine leaves the posture of each held scene, and why."""
     claims = robot.claims.of_scenes if robot.claims else {}
     for case, curve in coarsest_runs(result, robot):
         if case.is_held:
@@ -112,7 +112,7 @@ def find_departures(result: Result, robot: Robot, engines: Mapping[str, Engine])
 def departures(case: Case, engines: Mapping[str, Engine], left: Mapping, farthest: Mapping) -> dict:
     """Why each engine leaves the posture of a case when it does, or stays.
 
-    left, s, and farthest, rad or m: of each engine when it left, None: it stays, and its largest movement.
+    left: of each engine the time when it left, s, None: it stays; farthest: its largest movement, rad or m.
     """
     allowed, each = allowed_acceleration(case), []
     for name, push in initial_accelerations(case, engines).items():
