@@ -1,114 +1,131 @@
-"""The table of a fleet as a page: what needs a look first, each row with the way to the file's own report."""
+"""The files of a fleet: fleet.csv, index.html, and the summary at its top."""
 
-import base64
-import html
+import platform
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
-from string import Template
 from urllib.parse import quote
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from ..judge.finding import Finding
+from ..judge.timing import vectors
+from ..report.provenance import commit
+from ..report.text import say
+from ..report.version import OURS, installed, own_version
+from ..run.reference import SOLUTION
+from .cache import write_whole
 from .models import place_of_report
-from .row import BAD_VERDICTS, ITSELF, REFUSED
+from .run import Run
+from .table import BAD_VERDICTS, ITSELF, REFUSED, VERDICTS, csv_of_fleet, order
 
 HEADS = {
-    "file": "file",
-    "verdict": "verdict",
-    "reason": "reason or cause",
-    "reference": "compared with",
-    "joints": "joints",
-    "worst_ratio": "share of tolerance",
-    "file_integrator": "integrator",
-    "file_dt_s": "step, ms",
-    "stable_at_file_dt": "stable",
-    "limit_s": "limit, ms",
-    "seconds": "processor, s",
-}
-COMPARED_WITH = {"arm": "stated numbers", "solution": "the solution", "model": "itself"}
+    "file": "file", "verdict": "verdict", "reason": "reason or cause", "reference": "compared with", "joints": "joints",
+    "worst_ratio": "share of tolerance", "file_integrator": "integrator", "file_dt_s": "step, ms",
+    "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
+}  # fmt: skip
+REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
 ROW_KINDS = dict.fromkeys(BAD_VERDICTS, "bad") | {REFUSED: "none", ITSELF: "none"}
-WHAT_COMES_FIRST = "What needs a look comes first; each name leads to the file's own report. All digits are in"
-MEANINGS = {
-    "agree": "the file and the stated numbers, or the solution, that it is compared with differ by rounding alone",
-    "self-consistent": "tmt and MuJoCo agree on the file as MuJoCo compiled it; its numbers are compared with no others, and may "
-    "be wrong",
-    "differ": "a check that compares them fails; the reason is the cause, where one is found",
-    "broke": "something did not come to its end, so that nothing can be said",
-    "unconfirmed": "the models agree; a prediction about the step is not confirmed by runs",
-    "refused": "the file cannot be compared",
-    "compared with": "what --reference says; without it the stated numbers of the arm, where a file has exactly its hinges, or "
-    "itself as MuJoCo compiled it",
-    "share of tolerance": "the largest difference, as a share of its tolerance of rounding; above 1 it is more than rounding",
-    "step, integrator": "the file's own",
-    "stable": "whether that step is, with that integrator under the file's own servos, at each posture "
-    "where this is known; empty where no actuator feeds back or nothing rests",
-    "limit": "the largest stable step with that integrator, at the posture where it is least",
-    "processor": "what was computed for the file, on whatever machine",
-}  # what is not known is left empty
+
+
+def sentence(kind: str, **values: object) -> str:
+    return say(Finding("fleet", kind, values))
+
+
+def write_table(
+    out: Path, run: Run, left_out: Sequence[tuple[str, str]], changed: Sequence[str] | None, command: str, took: float
+) -> list[str]:
+    """Write fleet.csv and index.html; the lines of the summary. changed: since an earlier fleet; None: without --since."""
+    rows, left_out = sorted(with_why_itself(run.rows), key=order), [*left_out, *run.parts]
+    summary = summary_of(rows, left_out, run)
+    origin = {
+        "command": command,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seconds": round(took, 1),
+        "workers": run.workers,
+        "this machine": f"{platform.node()}, {vectors()}",
+        "machines of the workers": ", ".join(sorted(run.machines)) or "none",
+        "commit": commit(),
+        OURS: own_version(),
+        "mujoco": installed("mujoco"),
+    }
+    write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
+    text = fleet_page("A fleet compared with MuJoCo", summary, rows, left_out, changed, origin, picture_of_steps(rows))
+    write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
+    return summary
+
+
+def with_why_itself(rows: Sequence[dict]) -> list[dict]:
+    """The rows; if some files are compared with stated numbers, with the reason why others are not."""
+    if not any(row["reference"] in ("arm", SOLUTION) for row in rows):
+        return list(rows)
+    reasons = [row["why_itself"] and sentence("why_itself", reason=row["why_itself"]) for row in rows]
+    return [row | {"reason": "; ".join(filter(None, (why, row["reason"])))} for row, why in zip(rows, reasons)]
+
+
+def picture_of_steps(rows: Sequence[dict]) -> dict | None:
+    """The figure of the page: source, caption, width, height; None: nothing to draw, or drawing failed."""
+    if not any(row["limit_s"] for row in rows):
+        return None
+    try:
+        from .figures_fleet import picture_of  # imports matplotlib
+
+        return picture_of(rows)
+    except Exception:
+        return None  # the table has the same numbers
+
+
+def summary_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: Run) -> list[str]:
+    numbers = run.verdicts()
+    lines = [sentence("verdicts", files=len(rows), numbers={v: numbers[v] for v in VERDICTS if numbers[v]})]
+    if unstable := [row["file"] for row in rows if row["stable_at_file_dt"] is False]:
+        lines.append(sentence("unstable", names=unstable))
+    if left_out:
+        lines.append(sentence("left_out", files=len(left_out)))
+    if run.no_timing:
+        lines.append(sentence("no_timing", reason=run.no_timing))
+    if numbers[ITSELF]:
+        lines.append(sentence("self_consistent"))
+    if run.files_cached or run.tasks_cached:
+        lines.append(sentence("cached", files=run.files_cached, tasks=run.tasks_cached))
+    return lines
 
 
 def fleet_page(
     title: str,
-    said: Sequence[str],
+    summary: Sequence[str],
     rows: Sequence[dict],
     left_out: Sequence[tuple[str, str]],
     changed: Sequence[str] | None,
     origin: dict,
-    picture: tuple[bytes, str, tuple[int, int]] | None = None,
+    picture: dict | None = None,
 ) -> str:
-    """The whole page. said: sentences below the title; changed: since an earlier fleet, None: that was not asked; picture: a PNG,
-    its caption, width and height."""
-    parts = []
-    if changed is not None:
-        parts.append("<h2>What has changed</h2>" + list_of(changed or ["Nothing."]))
-    head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in HEADS.values())
-    body = "\n".join(row_in_html(row) for row in rows)
-    meanings = "".join(f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>" for name, text in MEANINGS.items())
-    parts.append(
-        f'<h2 id="files">Files</h2>\n<p class="quiet">{html.escape(WHAT_COMES_FIRST)} <a href="fleet.csv">fleet.csv</a>.</p>'
-    )
-    parts.append(f"<details><summary>What the words mean</summary><dl>{meanings}</dl></details>")
-    parts.append(f'<div class="scroll" role="region" tabindex="0" aria-labelledby="files"><table class="files"><thead><tr>{head}'
-                 f"</tr></thead><tbody>\n{body}\n</tbody></table></div>")  # fmt: skip
-    if picture:
-        data, caption, (width, height) = picture
-        source = f"data:image/png;base64,{base64.b64encode(data).decode()}"
-        parts.append(f'<h2>Steps</h2>\n<figure><img src="{source}" width="{width // 2}" height="{height // 2}" '
-                     f'alt="{html.escape(caption)}"><figcaption>{html.escape(caption)}</figcaption></figure>')  # fmt: skip
-    if left_out:
-        parts.append("<h2>Left out</h2>" + list_of([f"{name}: {why}." for name, why in left_out]))
-    lines = "".join(
-        f'<tr><th scope="row">{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>'
-        for name, value in origin.items()
-    )
-    parts.append(f'<h2>Where this comes from</h2>\n<table class="origin">{lines}</table>')
-    kind = "bad" if any(row["verdict"] in BAD_VERDICTS for row in rows) else "good"
-    return Template((Path(__file__).parent / "fleet.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title), kind=kind, said="".join(f"<p>{html.escape(text)}</p>" for text in said), body="\n".join(parts)
+    """The page as HTML; the arguments are those of write_table."""
+    environment = Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined,
+        loader=FileSystemLoader(Path(__file__).parent),
+    )  # fmt: skip
+    return environment.get_template("fleet.html.jinja").render(
+        title=title, summary=summary, rows=[shown_row(row) for row in rows], left_out=left_out, changed=changed,
+        origin=origin, picture=picture, heads=HEADS, is_bad=any(row["verdict"] in BAD_VERDICTS for row in rows),
     )  # fmt: skip
 
 
-def list_of(texts: Sequence[str]) -> str:
-    return f"<ul>{''.join(f'<li>{html.escape(text)}</li>' for text in texts)}</ul>"
+def shown_row(row: dict) -> dict:
+    """A row with the text of its cells, its class and the address of its report."""
+    return row | {
+        "cells": {name: cell(name, row[name]) for name in HEADS if name != "file"},
+        "kind": "bad" if row["stable_at_file_dt"] is False else ROW_KINDS.get(row["verdict"], "good"),
+        "address": quote(f"{place_of_report(row['report_of'])}/index.html"),
+    }
 
 
-def row_in_html(row: dict) -> str:
-    """A row of the table, its file a link if there is a report."""
-    cells = [cell_in_html(name, row[name]) for name in HEADS if name != "file"]
-    name = html.escape(row["file"]).replace("/", "/<wbr>")
-    if row["has_report"]:
-        address = html.escape(quote(f"{place_of_report(row['report_of'])}/index.html"))
-        name = f'<a href="{address}">{name}</a>'
-    kind = "bad" if row["stable_at_file_dt"] is False else ROW_KINDS.get(row["verdict"], "good")
-    return f'<tr class="{kind}"><th scope="row">{name}</th>{"".join(cells)}</tr>'
-
-
-def cell_in_html(name: str, value: object) -> str:
-    """A cell; steps are shown in ms."""
-    value = COMPARED_WITH.get(value, value) if name == "reference" else value
+def cell(name: str, value: object) -> str:
+    """The text of a cell; steps are in ms."""
+    if name == "reference":
+        return REFERENCES.get(value, value)
     if isinstance(value, bool):
-        text = "yes" if value else "no"
-    elif isinstance(value, float):
-        text = f"{value:.1f}" if name == "seconds" else f"{1e3 * value:.4g}" if name.endswith("_s") else f"{value:.2g}"
-    else:
-        text = "" if value is None else str(value)
-    kind = "number" if isinstance(value, int | float) else "text"
-    return f'<td class="{kind} {name}" data-name="{HEADS[name]}">{html.escape(text)}</td>'
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.1f}" if name == "seconds" else f"{1e3 * value:.4g}" if name.endswith("_s") else f"{value:.2g}"
+    return "" if value is None else str(value)
