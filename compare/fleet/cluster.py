@@ -1,14 +1,12 @@
 """A Dask cluster: its workers run the tasks, each in a process that may crash (see process.child)."""
 
 import hashlib
-import heapq
 import logging
 import threading
 import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from itertools import count
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import NamedTuple
@@ -22,9 +20,6 @@ from .tasks import MAX_TRIES, POLLING, FleetError, Task
 CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
 REFRESH = 1.0  # s between two requests for the list of workers
 TIMING = "timing"  # resource of a worker with one thread that runs timed tasks
-AHEAD = 3  # tasks that wait at a worker, for each of its threads
-STARTED = "fleet-{}"  # topic on which workers report each task that begins; {}: id of the client
-REPORTING = 10.0  # s, time limit for that report
 LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio")
 EXTRA = "a cluster needs the extra `fleet`: python -m pip install -e '.[fleet]'"
 OTHER_VERSION = (
@@ -62,9 +57,8 @@ class Cluster:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
         warnings.filterwarnings("ignore", module="distributed")
         self.address, self.limit, self.under_way = address, limit, 0
-        self.waiting = {False: [], True: []}  # heaps, by `timed`
         self.running, self.ended, self.finished = {}, SimpleQueue(), []
-        self.workers_known, self.refreshed_at, self.number = {}, -REFRESH, count()
+        self.workers_known, self.refreshed_at = {}, -REFRESH
         self.none_since = {False: None, True: None}  # time at which no worker was left, by `timed`
         try:
             self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
@@ -120,39 +114,22 @@ class Cluster:
 
     def submit(self, task: Task) -> None:
         self.under_way += 1
-        self.wait(task, 1, None)
-        self.send_tasks()
+        self.send(task, 1)
 
-    def wait(self, task: Task, tries: int, avoided: str | None) -> None:
-        """Put a task in its queue. tries: number of the next try; avoided: the worker of the last one."""
-        order = task.rank, tries == 1, -task.weight, next(self.number)
-        heapq.heappush(self.waiting[task.timed], (*order, task, tries, avoided))
-
-    def send_tasks(self) -> None:
-        """Send enough tasks to keep the workers busy; the scheduler is slow with very many."""
-        if not any(self.waiting.values()):
-            return
-        for timed, able in ((True, len(self.timing_workers())), (False, self.workers())):
-            room = AHEAD * able - sum(submitted.task.timed == timed for submitted in self.running.values())
-            for _ in range(min(room, len(self.waiting[timed]))):
-                self.send(*heapq.heappop(self.waiting[timed])[-3:])
-
-    def send(self, task: Task, tries: int, avoided: str | None) -> None:
+    def send(self, task: Task, tries: int) -> None:
         try:
             call = task.call
         except Exception as error:  # it cannot be pickled
             self.finished.append((task, Outcome(error=described(error))))
             return
-        others = [worker for worker in self.known() if worker != avoided] if avoided else []
         with self.connected():
             shared = task.shared
             if shared:  # a Dask task of its own, which is repeated if its worker is lost
                 key = f"shared-{hashlib.sha256(shared).hexdigest()}"
                 shared = self.client.submit(identity, shared, key=key, pure=True)
             future = self.client.submit(
-                run_on_worker, task.name, call, shared, self.limit, program(), STARTED.format(self.client.id), pure=False,
-                retries=0, priority=0 if task.timed else -task.rank, resources={TIMING: 1} if task.timed else None,
-                workers=others or None, allow_other_workers=bool(others),
+                run_on_worker, call, shared, self.limit, program(), pure=False, retries=0,
+                priority=0 if task.timed else -task.rank, resources={TIMING: 1} if task.timed else None,
             )  # fmt: skip
             self.running[future.key] = Submitted(task, tries, future, shared)
             future.add_done_callback(self.ended.put)
@@ -163,11 +140,9 @@ class Cluster:
                 future = self.ended.get(timeout=POLLING)
             except Empty:
                 self.check_connection()
-                self.send_tasks()
             else:
                 if future.key in self.running:
                     self.receive(self.running.pop(future.key))
-                    self.send_tasks()
         if not self.finished:
             return None
         self.under_way -= 1
@@ -175,44 +150,32 @@ class Cluster:
 
     def receive(self, submitted: Submitted) -> None:
         """A task has come back: it is finished, or runs again."""
-        worker, outcome = self.outcome_of(submitted)
-        if outcome is None:
-            self.wait(submitted.task, submitted.tries, None)
-        elif outcome.ended and not outcome.is_late and submitted.tries < MAX_TRIES:
-            self.wait(submitted.task, submitted.tries + 1, worker)
+        outcome = self.outcome_of(submitted.future)
+        if outcome.ended and not outcome.is_late and submitted.tries < MAX_TRIES:
+            self.send(submitted.task, submitted.tries + 1)
         else:
             self.finished.append((submitted.task, outcome.tried(submitted.tries)))
 
-    def outcome_of(self, submitted: Submitted) -> tuple[str | None, Outcome | None]:
-        """The worker and the outcome of a future that is done.
-
-        Outcome None: its worker was lost before the task began; Dask reports that like a crash of the task.
-        """
-        status, error = submitted.future.status, None
-        if status not in ("finished", "error"):
+    def outcome_of(self, future) -> Outcome:
+        """The outcome of a future that is done. Dask has repeated a task on three more workers if its worker was lost."""
+        error = None
+        if future.status not in ("finished", "error"):
             self.check_connection()
         with suppress(Exception):
-            if status == "finished":
-                worker, outcome = submitted.future.result(timeout=CONNECTING)
-                if outcome is None:
-                    error = OTHER_VERSION.format(worker)
-                else:
-                    return worker, outcome
-            elif status == "error":
-                error = submitted.future.exception(timeout=CONNECTING)
+            if future.status == "finished":
+                worker, outcome = future.result(timeout=CONNECTING)
+                if outcome is not None:
+                    return outcome
+                error = OTHER_VERSION.format(worker)
+            elif future.status == "error":
+                error = future.exception(timeout=CONNECTING)
         if isinstance(error, ImportError | AttributeError):
             error = f"a worker runs a different version of compare: {described(error)}"
         if isinstance(error, str):
             raise FleetError(f"{error}; {RESUME}")
-        if type(error).__name__ != "KilledWorker":
-            return None, Outcome(error=described(error)) if error else Outcome(ended="result lost")
-        why = f"workers lost, the last one {error.last_worker.address}"
-        return None, Outcome(error=why) if self.starts_of(submitted.task) >= MAX_TRIES else None
-
-    def starts_of(self, task: Task) -> int:
-        """How many times a task has begun on a worker."""
-        with self.connected():
-            return [name for _, name in self.client.get_events(STARTED.format(self.client.id))].count(task.name)
+        if type(error).__name__ == "KilledWorker":
+            return Outcome(error=f"{MAX_TRIES} workers lost, the last one {error.last_worker.address}")
+        return Outcome(error=described(error)) if error else Outcome(ended="result lost")
 
     def check_connection(self) -> None:
         """FleetError: the scheduler is gone, or there are no workers for longer than the limit. Timed tasks may fail alone."""
@@ -221,7 +184,7 @@ class Cluster:
         now = time.monotonic()
         for timed, able in ((False, self.workers()), (True, len(self.timing_workers()))):
             keys = [key for key, submitted in self.running.items() if submitted.task.timed == timed]
-            if able or not (keys or self.waiting[timed]):
+            if able or not keys:
                 self.none_since[timed] = None
                 continue
             self.none_since[timed] = self.none_since[timed] or now
@@ -229,9 +192,7 @@ class Cluster:
                 continue
             if not timed:
                 raise FleetError(f"the scheduler {self.address} has no worker any more; {RESUME}")
-            tasks = [self.running.pop(key).task for key in keys] + [entry[-3] for entry in self.waiting[timed]]
-            self.waiting[timed].clear()
-            self.finished += [(task, Outcome(error=self.no_timing())) for task in tasks]
+            self.finished += [(self.running.pop(key).task, Outcome(error=self.no_timing())) for key in keys]
 
     def close(self) -> None:
         with suppress(ValueError):  # closed before
@@ -247,18 +208,13 @@ def identity(shared: bytes) -> bytes:
     return shared
 
 
-def run_on_worker(
-    name: str, call: bytes, shared: bytes, limit: float, expected: str, topic: str
-) -> tuple[str, Outcome | None]:
+def run_on_worker(call: bytes, shared: bytes, limit: float, expected: str) -> tuple[str, Outcome | None]:
     """The worker's address and the outcome of a task; None: this worker runs another version of the program."""
     from distributed import get_worker
-    from distributed.utils import sync
 
     worker = get_worker()
     if program() != expected:
         return worker.address, None
-    with suppress(Exception):  # wait for the answer: the task may crash this worker at once
-        sync(worker.loop, worker.scheduler.log_event, topic=topic, msg=name, callback_timeout=REPORTING)
     key = worker.get_current_task()
     with lock:
         child = idle.pop() if idle else None

@@ -28,7 +28,7 @@ class Sample:
     @cached_property
     def truths(self) -> list:
         """A tmt.exact.values.Truth for each of the first states."""
-        columns = (values[slice(self.exact_states)] for values in (self.q, self.qd, self.tau))
+        columns = (values[: self.exact_states] for values in (self.q, self.qd, self.tau))
         return [exact(self.tree, *state) for state in zip(*columns)]
 
     def truth(self, quantity: str) -> np.ndarray:
