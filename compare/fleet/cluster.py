@@ -58,7 +58,7 @@ class Cluster:
         warnings.filterwarnings("ignore", module="distributed")
         self.address, self.limit, self.under_way = address, limit, 0
         self.running, self.ended, self.finished = {}, SimpleQueue(), []
-        self.workers_known, self.refreshed_at = {}, -REFRESH
+        self.infos, self.refreshed_at = {}, -REFRESH
         self.none_since = {False: None, True: None}  # time at which no worker was left, by `timed`
         try:
             self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
@@ -75,7 +75,7 @@ class Cluster:
     def check_workers(self) -> None:
         with suppress(TimeoutError):
             self.client.wait_for_workers(1, timeout=CONNECTING)
-        if not self.known():
+        if not self.worker_infos():
             raise FleetError(f"the scheduler {self.address} has no worker")
         for worker, version in self.client.run(program, on_error="return").items():
             if version != program() and not isinstance(version, OSError):  # OSError: the worker has gone meanwhile
@@ -89,19 +89,19 @@ class Cluster:
         except Exception:
             raise FleetError(DISCONNECTED.format(self.address, RESUME)) from None
 
-    def known(self) -> dict:
+    def worker_infos(self) -> dict:
         """The workers by address, at most REFRESH s old."""
         if time.monotonic() - self.refreshed_at > REFRESH:
             with self.connected():
-                self.workers_known = self.client.scheduler_info(n_workers=-1)["workers"]
+                self.infos = self.client.scheduler_info(n_workers=-1)["workers"]
             self.refreshed_at = time.monotonic()
-        return self.workers_known
+        return self.infos
 
     def workers(self) -> int:
-        return sum(worker["nthreads"] for worker in self.known().values())
+        return sum(worker["nthreads"] for worker in self.worker_infos().values())
 
     def timing_workers(self) -> list[dict]:
-        return [worker for worker in self.known().values() if worker["resources"].get(TIMING, 0) >= 1]
+        return [worker for worker in self.worker_infos().values() if worker["resources"].get(TIMING, 0) >= 1]
 
     def no_timing(self) -> str | None:
         able = self.timing_workers()

@@ -4,7 +4,6 @@ import shutil
 import tempfile
 import threading
 import time
-from bisect import insort_right
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -30,7 +29,7 @@ class Pool:
         whole = memory_of_machine()
         self.count, self.limit = count, limit
         self.memory = memory or (int(SHARE * whole / count) if whole else None)
-        self.waiting, self.running, self.under_way = {}, {}, 0  # waiting: by rank, by group
+        self.waiting, self.running, self.under_way = [], {}, 0
         self.ended, self.closed = SimpleQueue(), False
         self.change, self.children = threading.Condition(), {}
         with interrupt.postponed():
@@ -43,8 +42,7 @@ class Pool:
     def submit(self, task: Task) -> None:
         self.under_way += 1
         with self.change:
-            groups = self.waiting.setdefault(task.rank, {})
-            insort_right(groups.setdefault(task.group, []), task, key=lambda each: -each.weight)
+            self.waiting.append(task)
             self.change.notify_all()
 
     def next(self) -> tuple[Task, Outcome] | None:
@@ -116,17 +114,12 @@ class Pool:
         running = self.running.values()
         if not self.waiting or any(task.timed for task in running):
             return None
-        least, others = min(self.waiting), {task.group for task in running}
-        groups = self.waiting[least]
-        name = min(groups, key=lambda name: (name != group, name in others, -groups[name][0].weight))
-        if groups[name][0].timed and running:
+        others = {task.group for task in running}
+        costs = [(task.rank, task.group != group, task.group in others, -task.weight) for task in self.waiting]
+        first = costs.index(min(costs))
+        if self.waiting[first].timed and running:
             return None
-        task = groups[name].pop(0)
-        if not groups[name]:
-            del groups[name]
-        if not groups:
-            del self.waiting[least]
-        return task
+        return self.waiting.pop(first)
 
     def outcome_of(self, number: int, task: Task) -> Outcome:
         try:

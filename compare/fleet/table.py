@@ -63,9 +63,9 @@ def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
     """Whether the file's step is stable with its own servos at all postures, None if unknown; the smallest limit, s."""
     rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
     own = [row for row in rows if row["integrator"] == row["file_integrator"] and row["base"] != "locked"]
-    known = [row["stable_at_file_dt"] for row in own if row["stable_at_file_dt"] is not None]
+    stable = [row["stable_at_file_dt"] for row in own if row["stable_at_file_dt"] is not None]
     limits = [row["predicted_dt_s"] for row in own if row["limit"] == "finite"]
-    return (all(known) if known else None), min(limits, default=None)
+    return (all(stable) if stable else None), min(limits, default=None)
 
 
 def order(row: dict) -> tuple:

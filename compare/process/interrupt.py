@@ -21,7 +21,7 @@ turn = threading.RLock()  # held while a thread decides how the run ends
 class Now:
     """The state of the run."""
 
-    asked = False  # an interrupt has come
+    requested = False  # an interrupt has come
     held = 0  # number of `postponed` blocks of the main thread
     settled = False  # the exit status is decided
     line = "interrupted; the earlier report is unchanged"
@@ -47,7 +47,7 @@ def postponed() -> Iterator[None]:
             yield
     finally:
         Now.held -= 1
-        if Now.asked:
+        if Now.requested:
             stay()
 
 
@@ -59,7 +59,7 @@ def settle() -> None:
 
 def stay(*_) -> None:
     """Suspend the main thread while the other thread ends the process."""
-    Now.asked = True
+    Now.requested = True
     while not (Now.held or Now.settled):
         time.sleep(1)
 

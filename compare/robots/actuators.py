@@ -164,22 +164,22 @@ class Drive:
     @property
     def refused(self) -> dict[str, str]:
         """Elements that are left out, by name, and why."""
-        return {one.name: one.refused for one in self.actuators if one.refused} | dict(self.unknown)
+        return {actuator.name: actuator.refused for actuator in self.actuators if actuator.refused} | dict(self.unknown)
 
     @property
     def feeds_back(self) -> bool:
         """Whether an actuator force depends on position or speed; if none does, there is no step limit."""
-        return any(one.acts and any((*one.bias[1:], *one.gain[1:])) for one in self.actuators)
+        return any(actuator.acts and any((*actuator.bias[1:], *actuator.gain[1:])) for actuator in self.actuators)
 
     @property
     def servos(self) -> tuple[Actuator, ...]:
         """The actuators with a target."""
-        return tuple(one for one in self.actuators if one.is_servo)
+        return tuple(actuator for actuator in self.actuators if actuator.is_servo)
 
     @property
     def without_ranges(self) -> "Drive":
         """The same without limits of forces."""
-        actuators = tuple(replace(one, force_range=None) for one in self.actuators)
+        actuators = tuple(replace(actuator, force_range=None) for actuator in self.actuators)
         return replace(self, actuators=actuators, ranges={}, tendon_ranges={})
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
@@ -189,7 +189,9 @@ class Drive:
         """
         stated = self.controls.get(posture, (None,) * len(self.actuators))
         triples = zip(self.actuators, stated, lengths)
-        return np.array([one.target(length) if u is None else one.clamped(u) for one, u, length in triples])
+        return np.array(
+            [actuator.target(length) if u is None else actuator.clamped(u) for actuator, u, length in triples]
+        )
 
 
 class Controller(NamedTuple):
@@ -223,25 +225,25 @@ def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray
     of a ball any numbers; targets: (nv,) rad or m, shift of the targets: the target length of a servo by |J| @ targets.
     """
     moved, n = np.broadcast_to(targets, len(q)), len(q)
-    moments = [np.zeros(n) if one.moment is None else np.array(one.moment) for one in drive.actuators]
+    moments = [np.zeros(n) if actuator.moment is None else np.array(actuator.moment) for actuator in drive.actuators]
     stated = drive.control(posture if isinstance(posture, str) else "", [moment @ q for moment in moments])
     torque, position_gain, speed_gain = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
-    controls, left_out = {one.name: None for one in drive.actuators}, {}
-    for one, moment, u in zip(drive.actuators, moments, stated):
-        if why := reason(one, u):
-            left_out[one.name] = why
+    controls, left_out = {actuator.name: None for actuator in drive.actuators}, {}
+    for actuator, moment, u in zip(drive.actuators, moments, stated):
+        if why := reason(actuator, u):
+            left_out[actuator.name] = why
             continue
-        u = controls[one.name] = moved_target(one, float(u), float(np.abs(moment) @ moved))
-        torque += moment * one.force(u, 0.0)
-        position_gain += np.outer(moment, moment) * one.stiffness(u)
-        speed_gain += np.outer(moment, moment) * one.damping(u)
+        u = controls[actuator.name] = moved_target(actuator, float(u), float(np.abs(moment) @ moved))
+        torque += moment * actuator.force(u, 0.0)
+        position_gain += np.outer(moment, moment) * actuator.stiffness(u)
+        speed_gain += np.outer(moment, moment) * actuator.damping(u)
     return Controller(tuple(controls.values()), left_out, torque, position_gain, speed_gain)
 
 
-def moved_target(one: Actuator, u: float, by: float) -> float:
+def moved_target(actuator: Actuator, u: float, by: float) -> float:
     """The control that moves the target of a servo by a length; other actuators: u."""
-    stiffness = one.stiffness(u)
+    stiffness = actuator.stiffness(u)
     if not (by and stiffness):
         return u
-    unlimited = replace(one, control_range=None, activation_range=None)
-    return unlimited.target(one.force(u, 0.0) / stiffness + by)
+    unlimited = replace(actuator, control_range=None, activation_range=None)
+    return unlimited.target(actuator.force(u, 0.0) / stiffness + by)

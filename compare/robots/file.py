@@ -9,9 +9,7 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.equations.composite import (
-    mass_matrix_and_bias,  # the sum over bodies would take minutes for hundreds of joints
-)
+from tmt.equations.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.model.tree import GAINS
 
 from . import Robot
@@ -152,13 +150,18 @@ def servo_scenes(
     driven = replace(tree, **{name: getattr(acting, name) for name in GAINS})
     count, least = coarsest(driven, inverse, dt, duration=SERVOS_ACT), SERVOS_ACT * max(fastest_rates(driven, inverse))
     free = bool(free_bodies(Coordinates(tree.hinge_names, tree.kind)))
-    given = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
+    settings = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
     moved = tuple(MOVED_TARGETS[kind] for kind, _, by in joints for _ in range(by.start, by.stop))
     followed = ("speed",) if least <= count else ()
     return [
-        Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **given),
+        Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **settings),
         Scene(
-            f"{start}, step of the servos", start, "servos", targets=moved, tags=("own", "servos", *followed), **given
+            f"{start}, step of the servos",
+            start,
+            "servos",
+            targets=moved,
+            tags=("own", "servos", *followed),
+            **settings,
         ),
     ]
 

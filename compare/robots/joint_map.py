@@ -143,9 +143,9 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
     if text in kinds:
         return Joint(text)
     rest, unit = text, ""
-    for known in PER_UNIT:
-        if known and rest.endswith(f" in {known}"):
-            rest, unit = rest.removesuffix(f" in {known}").rstrip(), known
+    for name in PER_UNIT:
+        if name and rest.endswith(f" in {name}"):
+            rest, unit = rest.removesuffix(f" in {name}").rstrip(), name
             break
     sign, zero = 1.0, 0.0
     if rest not in kinds and rest.startswith("-"):

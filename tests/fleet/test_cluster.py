@@ -75,7 +75,7 @@ def with_workers(cluster, count):
 
     def there():
         cluster.refreshed_at = -module.REFRESH
-        return len(cluster.known()) == count
+        return len(cluster.worker_infos()) == count
 
     assert soon(there)
     return cluster

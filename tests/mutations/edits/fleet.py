@@ -6,7 +6,7 @@ EDITS = (
     Edit("fleet.table", "row_of_file", 'outcome, reason = DIFFER, str(differing[0])',
          'outcome, reason = AGREE, ""', "a file that differs agrees"),
     Edit("fleet.table", "row_of_file", "outcome, reason = BROKE, _1", 'outcome, reason = AGREE, ""', "what broke off agrees"),
-    Edit("fleet.table", "own_step", "all(known)", "any(known)", "one posture at which the step is stable is enough"),
+    Edit("fleet.table", "own_step", "all(stable)", "any(stable)", "one posture at which the step is stable is enough"),
     Edit("fleet.table", "own_step", "min(limits, default=None)", "max(limits, default=None)", "the largest of the limits"),
     Edit("fleet.table", "own_step", 'row["integrator"] == row["file_integrator"]', "True", "limits of any integrator"),
     Edit("fleet.table", "order", "VERDICTS.index", "VERDICTS[::-1].index", "what agrees comes first"),
@@ -24,6 +24,6 @@ EDITS = (
          'result.check("", ENDS, 0.0, *_1)',
          "an experiment that gave nothing counts for nothing"),
     Edit("fleet.pool", "Pool.choice", "any(task.timed for task in running)", "False", "others begin beside a timed task"),
-    Edit("fleet.pool", "Pool.choice", "groups[name][0].timed and running", "False", "a timed task begins beside others"),
+    Edit("fleet.pool", "Pool.choice", "self.waiting[first].timed and running", "False", "a timed task begins beside others"),
     Edit("fleet.pool", "Pool.work", "range(1, MAX_TRIES + 1)", "range(1, 2)", "nothing is tried again"),
 )  # fmt: skip
