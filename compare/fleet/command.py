@@ -109,10 +109,9 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     from .cluster import Cluster
     from .file_tasks import FleetOptions
     from .models import found_models
-    from .page import write_table
     from .pool import Pool
     from .run import Run
-    from .table import changes, earlier
+    from .table import changes, earlier, write_table
 
     terminal, out = Terminal(), Path(options.out)
     before = earlier(options.since) if options.since else None

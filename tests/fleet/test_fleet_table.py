@@ -11,7 +11,6 @@ from urllib.parse import unquote
 import pytest
 
 from compare.fleet.models import place_of_report
-from compare.fleet.page import fleet_page, write_table
 from compare.fleet.table import (
     AGREE,
     BROKE,
@@ -23,8 +22,10 @@ from compare.fleet.table import (
     changes,
     csv_of_fleet,
     earlier,
+    fleet_page,
     order,
     row_of_file,
+    write_table,
 )
 from compare.judge.check import AT_OWN_STEP, ENDS, About, Result
 from compare.report.verdict import Section
