@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def fleet(arguments: Sequence[str]) -> int:
     """Carry out what is asked of many files; the exit status."""
     from .fleet import command  # what is imported takes its time
-    from .fleet.piece import FleetError
+    from .fleet.tasks import FleetError
 
     try:
         return command.fleet_status(arguments)
@@ -92,7 +92,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     from .engines.mujoco import ModelError
     from .engines.own.own_file import OwnFileError
     from .fleet.calls import door_opened
-    from .fleet.piece import FleetError
+    from .fleet.tasks import FleetError
     from .process.workers import WorkerEnded, load_modules, start_workers
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal

@@ -7,9 +7,8 @@ import pytest
 from models import PATHS
 
 from compare.engines.mujoco import read
-from compare.robots.actuators import Actuator, Drive, Tendon
+from compare.robots.actuators import Actuator, Drive, Tendon, controller, reason
 from compare.robots.case import rates_at
-from compare.robots.controller import controller, reason
 from compare.robots.file import robot_of
 from compare.robots.given import WrongField
 

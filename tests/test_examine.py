@@ -14,7 +14,7 @@ from compare import __main__ as entry
 from compare.__main__ import main
 from compare.cli import command_line
 from compare.experiments import EXPERIMENTS, Experiment
-from compare.fleet.file_pieces import Here
+from compare.fleet.file_tasks import Here
 from compare.judge.check import Result
 from compare.report.terminal import Terminal
 from compare.report.text import environment

@@ -1,1 +1,1 @@
-"""Many files: pieces of work, a pool or a cluster that carries them out, what is done already, and the table."""
+"""A fleet: many model files, compared one by one by a pool of processes or a cluster, and listed in one table."""

@@ -1,21 +1,22 @@
-"""Calls of one function that go through a door: what an experiment needs of it for a long list of its own."""
+"""Calls of one function by an executor, for an experiment with a long list of its own."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from ..process.child import Outcome
 from ..process.workers import WorkerEnded
-from .piece import LONGEST_PIECE, Door, FleetError, Outcome, Piece, outcomes
+from .tasks import DEFAULT_LIMIT, Executor, FleetError, Task, outcomes
 
 
 class Calls:
-    """A door as an experiment sees it."""
+    """An executor as an experiment uses it."""
 
-    def __init__(self, door: Door):
-        self.door = door
+    def __init__(self, executor: Executor):
+        self.executor = executor
 
     def no_timing(self) -> str | None:
-        """Why nothing can be timed behind the door, or None."""
-        return self.door.no_timing()
+        """Why timed tasks cannot run, or None."""
+        return self.executor.no_timing()
 
     def outcomes(
         self,
@@ -24,32 +25,32 @@ class Calls:
         timed: bool = False,
         progress: Callable[[int], object] = lambda done: None,
     ) -> list[Outcome]:
-        """What becomes of a function of a module for each item, in their order.
+        """The outcomes of a function of a module for each item, in their order.
 
-        timed: each call takes a worker for itself; progress: gets to know how many have ended. WorkerEnded: the door is gone.
+        timed: each call has a worker for itself; progress: called with the number that have ended. WorkerEnded: the
+        executor has failed.
         """
-        pieces = [Piece(function.__name__, function, (item,), timed=timed) for item in items]
+        tasks = [Task(function.__name__, function, (item,), timed=timed) for item in items]
         try:
-            return outcomes(self.door, pieces, progress)
+            return outcomes(self.executor, tasks, progress)
         except FleetError as error:
-            why = str(error).partition(";")[0]  # nothing of a list is kept
-            raise WorkerEnded(f"{why}; a report that was there is unchanged") from None
+            raise WorkerEnded(f"{str(error).partition(';')[0]}; the earlier report is unchanged") from None
 
 
 @contextmanager
 def door_opened(address: str | None, workers: int | None) -> Iterator[Calls | None]:
-    """Yields the door that is asked for: a Dask cluster, by the address of its scheduler, or so many processes; None: neither.
+    """Yields an executor: the Dask cluster of a scheduler's address, or a pool of this number of processes; None: neither.
 
-    FleetError: there is no such cluster, or none that can be used.
+    FleetError: the cluster cannot be used.
     """
     if not (address or workers):
         yield None
         return
-    from .cluster import Cluster  # imports are here, for a run that asks for neither
+    from .cluster import Cluster  # imported only where it is used
     from .pool import Pool
 
-    door = Cluster(address, LONGEST_PIECE) if address else Pool(workers, LONGEST_PIECE)
+    executor = Cluster(address, DEFAULT_LIMIT) if address else Pool(workers, DEFAULT_LIMIT)
     try:
-        yield Calls(door)
+        yield Calls(executor)
     finally:
-        door.close()
+        executor.close()

@@ -1,47 +1,49 @@
-"""A Dask cluster: its workers carry out the pieces (see worker)."""
+"""A Dask cluster: its workers run the tasks, each in a process that may crash (see process.child)."""
 
 import hashlib
-import heapq
 import logging
+import threading
 import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from itertools import count
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import NamedTuple
 
 from ..process import interrupt
+from ..process.child import SHARE, Child, Outcome, memory_of_machine
 from ..process.crash import described
-from .piece import MOST_TRIES, NOTHING_NEW, FleetError, Outcome, Piece
-from .program import program
-from .worker import as_it_is, on_worker
+from .cache import RESUME, program
+from .tasks import MAX_TRIES, POLLING, FleetError, Task
 
-CONNECTING = 10.0  # s in which a scheduler answers, and its first worker is there
-FRESH = 1.0  # s for which the list of the workers is taken as it was
-TIMING = "timing"  # the resource of a worker that takes timed pieces, of one thread
-AHEAD = 3  # pieces that a worker is handed beforehand, for each of its threads
-BEGUN = "fleet-{}"  # under which the scheduler is told of each piece that begins; {}: whose pieces
+CONNECTING = 10.0  # s, time limit for the scheduler and its first worker to answer
+REFRESH = 1.0  # s between two requests for the list of workers
+TIMING = "timing"  # resource of a worker with one thread that runs timed tasks
 LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio")
-EXTRA = "the extra `fleet` is needed for a cluster: python -m pip install -e '.[fleet]'"
-OTHER = "the worker {} has not the same program and MuJoCo as this machine; the same is expected everywhere"
-GONE = "the scheduler {} is gone; what is done is kept, and the same command goes on from there"
+EXTRA = "a cluster needs the extra `fleet`: python -m pip install -e '.[fleet]'"
+OTHER_VERSION = (
+    "worker {} runs a different version of compare or MuJoCo; all workers need the same version as this machine"
+)
+DISCONNECTED = "lost the connection to the scheduler {}; {}"
+
+idle, lock = [], threading.Lock()  # of a worker: processes without a task
 
 
-class Handed(NamedTuple):
-    """A piece that was handed to the scheduler."""
+class Submitted(NamedTuple):
+    """A task at the scheduler."""
 
-    piece: Piece
-    times: int  # how often, this one among them
+    task: Task
+    tries: int  # this one included
     future: object
-    shared: object  # what it needs too, for as long as it does
+    shared: object  # future of the shared argument, kept as long as the task needs it
 
 
 class Cluster:
-    """The workers of a scheduler; see piece.Door. limit: s that a piece may take.
+    """The workers of a scheduler; see tasks.Executor. limit: s for each task.
 
-    FleetError: there is no scheduler at the address, no worker, or one with another version of the program; later, from any
-    method: the scheduler has gone, or for longer than the limit all workers.
+    FleetError: there is no scheduler or no worker, or a worker runs another version; later, from any method: the scheduler is
+    gone, or there has been no worker for longer than the limit.
     """
 
     times_alone = False
@@ -52,18 +54,17 @@ class Cluster:
         except ImportError:
             raise FleetError(EXTRA) from None
         for name in LOGGERS:
-            logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what they say is said here, in a line
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
         warnings.filterwarnings("ignore", module="distributed")
         self.address, self.limit, self.under_way = address, limit, 0
-        self.waiting = {False: [], True: []}  # heaps, of pieces that are timed and of others
-        self.running, self.ended, self.given_up = {}, SimpleQueue(), []
-        self.seen, self.seen_at, self.number = {}, -FRESH, count()
-        self.none_since = {False: None, True: None}  # s at which no worker was left, for timed pieces and for others
+        self.running, self.ended, self.finished = {}, SimpleQueue(), []
+        self.infos, self.refreshed_at = {}, -REFRESH
+        self.none_since = {False: None, True: None}  # time at which no worker was left, by `timed`
         try:
             self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
         except Exception as error:
             why = " ".join(str(error).split()) or type(error).__name__
-            raise FleetError(f"no scheduler answers at {address}: {why}") from None
+            raise FleetError(f"no answer from the scheduler {address}: {why}") from None
         interrupt.undo.append(self.close)
         try:
             self.check_workers()
@@ -74,160 +75,172 @@ class Cluster:
     def check_workers(self) -> None:
         with suppress(TimeoutError):
             self.client.wait_for_workers(1, timeout=CONNECTING)
-        if not self.known():
+        if not self.worker_infos():
             raise FleetError(f"the scheduler {self.address} has no worker")
-        for worker, found in self.client.run(program, on_error="return").items():
-            if found != program() and not isinstance(found, OSError):  # one that has gone meanwhile
-                raise FleetError(OTHER.format(worker))
+        for worker, version in self.client.run(program, on_error="return").items():
+            if version != program() and not isinstance(version, OSError):  # OSError: the worker has gone meanwhile
+                raise FleetError(OTHER_VERSION.format(worker))
 
     @contextmanager
-    def speaking(self) -> Iterator[None]:
-        """FleetError where the scheduler does not answer in this block."""
+    def connected(self) -> Iterator[None]:
+        """FleetError if the scheduler does not answer in this block."""
         try:
             yield
         except Exception:
-            raise FleetError(GONE.format(self.address)) from None
+            raise FleetError(DISCONNECTED.format(self.address, RESUME)) from None
 
-    def known(self) -> dict:
-        """The workers, by their addresses, as the scheduler knows them, or did a second ago."""
-        if time.monotonic() - self.seen_at > FRESH:
-            with self.speaking():
-                self.seen = self.client.scheduler_info(n_workers=-1)["workers"]
-            self.seen_at = time.monotonic()
-        return self.seen
+    def worker_infos(self) -> dict:
+        """The workers by address, at most REFRESH s old."""
+        if time.monotonic() - self.refreshed_at > REFRESH:
+            with self.connected():
+                self.infos = self.client.scheduler_info(n_workers=-1)["workers"]
+            self.refreshed_at = time.monotonic()
+        return self.infos
 
     def workers(self) -> int:
-        return sum(worker["nthreads"] for worker in self.known().values())
+        return sum(worker["nthreads"] for worker in self.worker_infos().values())
 
     def timing_workers(self) -> list[dict]:
-        return [worker for worker in self.known().values() if worker["resources"].get(TIMING, 0) >= 1]
+        return [worker for worker in self.worker_infos().values() if worker["resources"].get(TIMING, 0) >= 1]
 
     def no_timing(self) -> str | None:
         able = self.timing_workers()
         if not able:
-            return f"no worker of the cluster has the resource {TIMING} (dask worker ... --nthreads 1 --resources '{TIMING}=1')"
+            return f"no worker has the resource {TIMING} (dask worker ... --nthreads 1 --resources '{TIMING}=1')"
         threads = max(worker["nthreads"] for worker in able)
         if threads > 1:
-            return f"a worker with the resource {TIMING} has {threads} threads; one, which times alone, is expected"
+            return f"a worker with the resource {TIMING} has {threads} threads; expected 1"
         return None
 
-    def submit(self, piece: Piece) -> None:
+    def submit(self, task: Task) -> None:
         self.under_way += 1
-        self.wait(piece, 1, None)
-        self.hand_out()
+        self.send(task, 1)
 
-    def wait(self, piece: Piece, times: int, avoided: str | None) -> None:
-        """A piece waits here until it is handed out for the so-manieth time; avoided: the worker on which it ended."""
-        order = piece.rank, times == 1, -piece.weight, next(self.number)
-        heapq.heappush(self.waiting[piece.timed], (*order, piece, times, avoided))
-
-    def hand_out(self) -> None:
-        """Hand out as many pieces as keep the workers busy: what waits here costs the scheduler nothing."""
-        if not any(self.waiting.values()):
-            return
-        for timed, able in ((True, len(self.timing_workers())), (False, self.workers())):
-            room = AHEAD * able - sum(handed.piece.timed == timed for handed in self.running.values())
-            for _ in range(min(room, len(self.waiting[timed]))):
-                self.hand(*heapq.heappop(self.waiting[timed])[-3:])
-
-    def hand(self, piece: Piece, times: int, avoided: str | None) -> None:
+    def send(self, task: Task, tries: int) -> None:
         try:
-            call = piece.call
-        except Exception as error:  # it cannot be sent
-            self.given_up.append((piece, Outcome(error=described(error))))
+            call = task.call
+        except Exception as error:  # it cannot be pickled
+            self.finished.append((task, Outcome(error=described(error))))
             return
-        others = [worker for worker in self.known() if worker != avoided] if avoided else []
-        with self.speaking():
-            shared = piece.shared
-            if shared:  # a task of its own, that can be done again where its worker is lost
+        with self.connected():
+            shared = task.shared
+            if shared:  # a Dask task of its own, which is repeated if its worker is lost
                 key = f"shared-{hashlib.sha256(shared).hexdigest()}"
-                shared = self.client.submit(as_it_is, shared, key=key, pure=True)
+                shared = self.client.submit(identity, shared, key=key, pure=True)
             future = self.client.submit(
-                on_worker, piece.name, call, shared, self.limit, program(), BEGUN.format(self.client.id), pure=False,
-                retries=0, priority=0 if piece.timed else -piece.rank, resources={TIMING: 1} if piece.timed else None,
-                workers=others or None, allow_other_workers=bool(others),
+                run_on_worker, call, shared, self.limit, program(), pure=False, retries=0,
+                priority=0 if task.timed else -task.rank, resources={TIMING: 1} if task.timed else None,
             )  # fmt: skip
-            self.running[future.key] = Handed(piece, times, future, shared)
+            self.running[future.key] = Submitted(task, tries, future, shared)
             future.add_done_callback(self.ended.put)
 
-    def next(self) -> tuple[Piece, Outcome] | None:
-        if not self.given_up:
+    def next(self) -> tuple[Task, Outcome] | None:
+        if not self.finished:
             try:
-                future = self.ended.get(timeout=NOTHING_NEW)
+                future = self.ended.get(timeout=POLLING)
             except Empty:
-                self.look_after()
-                self.hand_out()
+                self.check_connection()
             else:
                 if future.key in self.running:
-                    self.came(self.running.pop(future.key))
-                    self.hand_out()
-        if not self.given_up:
+                    self.receive(self.running.pop(future.key))
+        if not self.finished:
             return None
         self.under_way -= 1
-        return self.given_up.pop(0)
+        return self.finished.pop(0)
 
-    def came(self, handed: Handed) -> None:
-        """A piece has come back: it is done, or runs again."""
-        worker, outcome = self.outcome_of(handed)
-        if outcome is None:
-            self.wait(handed.piece, handed.times, None)
-        elif outcome.ended and not outcome.is_late and handed.times < MOST_TRIES:
-            self.wait(handed.piece, handed.times + 1, worker)
+    def receive(self, submitted: Submitted) -> None:
+        """A task has come back: it is finished, or runs again."""
+        outcome = self.outcome_of(submitted.future)
+        if outcome.ended and not outcome.is_late and submitted.tries < MAX_TRIES:
+            self.send(submitted.task, submitted.tries + 1)
         else:
-            self.given_up.append((handed.piece, outcome.tried(handed.times)))
+            self.finished.append((submitted.task, outcome.tried(submitted.tries)))
 
-    def outcome_of(self, handed: Handed) -> tuple[str | None, Outcome | None]:
-        """The outcome of a future that is done, and the worker that is to be avoided then.
-
-        None: it only waited on workers that others took down; Dask does not know them apart.
-        """
-        status, error = handed.future.status, None
-        if status not in ("finished", "error"):
-            self.look_after()
+    def outcome_of(self, future) -> Outcome:
+        """The outcome of a future that is done. Dask has repeated a task on three more workers if its worker was lost."""
+        error = None
+        if future.status not in ("finished", "error"):
+            self.check_connection()
         with suppress(Exception):
-            if status == "finished":
-                worker, outcome = handed.future.result(timeout=CONNECTING)
-                if outcome is None:
-                    error = OTHER.format(worker)
-                else:
-                    return worker, outcome
-            elif status == "error":
-                error = handed.future.exception(timeout=CONNECTING)
+            if future.status == "finished":
+                worker, outcome = future.result(timeout=CONNECTING)
+                if outcome is not None:
+                    return outcome
+                error = OTHER_VERSION.format(worker)
+            elif future.status == "error":
+                error = future.exception(timeout=CONNECTING)
         if isinstance(error, ImportError | AttributeError):
-            error = f"a worker has not the same program as this machine, {described(error)}"
+            error = f"a worker runs a different version of compare: {described(error)}"
         if isinstance(error, str):
-            raise FleetError(f"{error}; what is done is kept")
-        if type(error).__name__ != "KilledWorker":
-            return None, Outcome(error=described(error)) if error else Outcome(ended="its result was lost")
-        why = f"its workers were lost, the last one {error.last_worker.address}"
-        return None, Outcome(error=why) if self.begun(handed.piece) >= MOST_TRIES else None
+            raise FleetError(f"{error}; {RESUME}")
+        if type(error).__name__ == "KilledWorker":
+            return Outcome(error=f"{MAX_TRIES} workers lost, the last one {error.last_worker.address}")
+        return Outcome(error=described(error)) if error else Outcome(ended="result lost")
 
-    def begun(self, piece: Piece) -> int:
-        """How many times a piece has begun on a worker."""
-        with self.speaking():
-            return [name for _, name in self.client.get_events(BEGUN.format(self.client.id))].count(piece.name)
-
-    def look_after(self) -> None:
-        """FleetError: the scheduler has gone, or its last worker, and with it hope. Timed pieces may be without hope alone."""
+    def check_connection(self) -> None:
+        """FleetError: the scheduler is gone, or there are no workers for longer than the limit. Timed tasks may fail alone."""
         if self.client.status != "running":
-            raise FleetError(GONE.format(self.address))
+            raise FleetError(DISCONNECTED.format(self.address, RESUME))
         now = time.monotonic()
         for timed, able in ((False, self.workers()), (True, len(self.timing_workers()))):
-            mine = [key for key, handed in self.running.items() if handed.piece.timed == timed]
-            if able or not (mine or self.waiting[timed]):
+            keys = [key for key, submitted in self.running.items() if submitted.task.timed == timed]
+            if able or not keys:
                 self.none_since[timed] = None
                 continue
             self.none_since[timed] = self.none_since[timed] or now
             if now - self.none_since[timed] <= self.limit:
                 continue
             if not timed:
-                raise FleetError(f"the scheduler {self.address} has no worker any more; what is done is kept")
-            pieces = [self.running.pop(key).piece for key in mine] + [entry[-3] for entry in self.waiting[timed]]
-            self.waiting[timed].clear()
-            self.given_up += [(piece, Outcome(error=self.no_timing())) for piece in pieces]
+                raise FleetError(f"the scheduler {self.address} has no worker any more; {RESUME}")
+            self.finished += [(self.running.pop(key).task, Outcome(error=self.no_timing())) for key in keys]
 
     def close(self) -> None:
-        with suppress(ValueError):  # it is closed already
+        with suppress(ValueError):  # closed before
             interrupt.undo.remove(self.close)
         with suppress(Exception):
             self.client.close(timeout=1)
+
+
+# on a worker
+
+
+def identity(shared: bytes) -> bytes:
+    return shared
+
+
+def run_on_worker(call: bytes, shared: bytes, limit: float, expected: str) -> tuple[str, Outcome | None]:
+    """The worker's address and the outcome of a task; None: this worker runs another version of the program."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    if program() != expected:
+        return worker.address, None
+    key = worker.get_current_task()
+    with lock:
+        child = idle.pop() if idle else None
+    if child is not None and not child.alive:  # killed between two tasks
+        child.close()
+        child = None
+    try:
+        child = child or Child(Path(worker.local_directory), memory_of(worker))
+    except OSError as error:
+        return worker.address, Outcome(error=f"cannot start a process on {worker.address}: {error.strerror}")
+    outcome = child.call(call, shared, limit, lambda: is_wanted(worker, key))
+    if child.is_spent(outcome):
+        child.close()
+    else:
+        with lock:
+            idle.append(child)
+    return worker.address, outcome
+
+
+def is_wanted(worker, key: str) -> bool:
+    """Whether the scheduler still waits for a task; it does not after the fleet was interrupted."""
+    task = worker.state.tasks.get(key)
+    return task is not None and task.state == "executing"
+
+
+def memory_of(worker) -> int | None:
+    """Memory limit of a task, bytes: that of the worker in Dask, or its share of the machine's."""
+    limit = worker.memory_manager.memory_limit or memory_of_machine()
+    return int(SHARE * limit / worker.state.nthreads) if limit else None

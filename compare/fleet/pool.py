@@ -1,27 +1,26 @@
-"""The pool: processes on this machine, one for each worker. A process that ends is replaced, and its piece runs again."""
+"""Processes on this machine, one for each worker. If a process crashes, its task runs again in a new one."""
 
 import shutil
 import tempfile
 import threading
 import time
-from bisect import insort_right
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from ..process import interrupt
+from ..process.child import SHARE, Child, Outcome, memory_of_machine
 from ..process.crash import described
-from .child import SHARE, Child, memory_of_machine
-from .piece import MOST_TRIES, NOTHING_NEW, Outcome, Piece
+from .tasks import MAX_TRIES, POLLING, Task
 
-ATTEMPTS = 20  # to delete the folder of processes that are about to end and still write
+ATTEMPTS = 20  # to delete the folder while killed processes may still write
 
 
 class Pool:
-    """So many processes; see piece.Door. limit: s that a piece may take; memory: bytes, None: a share of the machine's.
+    """A number of processes; see tasks.Executor. limit: s for each task; memory: bytes, None: a share of the machine's.
 
-    A timed piece begins when nothing else is under way, and nothing begins before it ends. Of pieces of one rank a process takes
-    those of the group that it had before, then those of a group that no other has.
+    A timed task begins when no other task runs, and none begins before it ends. Within a rank a process prefers the group of
+    its last task, then a group that no other process has.
     """
 
     times_alone = True
@@ -30,7 +29,7 @@ class Pool:
         whole = memory_of_machine()
         self.count, self.limit = count, limit
         self.memory = memory or (int(SHARE * whole / count) if whole else None)
-        self.waiting, self.running, self.under_way = {}, {}, 0  # waiting: by rank, by group
+        self.waiting, self.running, self.under_way = [], {}, 0
         self.ended, self.closed = SimpleQueue(), False
         self.change, self.children = threading.Condition(), {}
         with interrupt.postponed():
@@ -40,16 +39,15 @@ class Pool:
         for thread in self.threads:
             thread.start()
 
-    def submit(self, piece: Piece) -> None:
+    def submit(self, task: Task) -> None:
         self.under_way += 1
         with self.change:
-            groups = self.waiting.setdefault(piece.rank, {})
-            insort_right(groups.setdefault(piece.group, []), piece, key=lambda each: -each.weight)
+            self.waiting.append(task)
             self.change.notify_all()
 
-    def next(self) -> tuple[Piece, Outcome] | None:
+    def next(self) -> tuple[Task, Outcome] | None:
         try:
-            done = self.ended.get(timeout=NOTHING_NEW)
+            done = self.ended.get(timeout=POLLING)
         except Empty:
             return None
         self.under_way -= 1
@@ -64,7 +62,7 @@ class Pool:
     def close(self) -> None:
         with interrupt.postponed():
             self.stop()
-            with suppress(ValueError):  # it is closed already
+            with suppress(ValueError):  # closed before
                 interrupt.undo.remove(self.stop)
         with self.change:
             self.change.notify_all()
@@ -72,7 +70,7 @@ class Pool:
             thread.join()
 
     def stop(self) -> None:
-        """End all processes. It waits for nobody: whoever else is at work here may stand still already."""
+        """Kill all processes, without a lock: after an interrupt the other threads may be suspended."""
         self.closed = True
         for child in list(self.children.values()):
             child.kill()
@@ -85,53 +83,48 @@ class Pool:
     # in the thread of a worker
 
     def work(self, number: int) -> None:
-        """Take pieces and have them carried out, until the pool is closed."""
+        """Run tasks until the pool is closed."""
         group = ""
-        while (piece := self.take(number, group)) is not None:
-            group = piece.group
-            for times in range(1, MOST_TRIES + 1):
-                outcome = self.carried_out(number, piece).tried(times)
+        while (task := self.take(number, group)) is not None:
+            group = task.group
+            for tries in range(1, MAX_TRIES + 1):
+                outcome = self.outcome_of(number, task).tried(tries)
                 if self.closed or not outcome.ended or outcome.is_late:
                     break
             with self.change:
                 del self.running[number]
                 self.change.notify_all()
-            self.ended.put((piece, outcome))
+            self.ended.put((task, outcome))
         if number in self.children:
             self.children.pop(number).close()
 
-    def take(self, number: int, group: str) -> Piece | None:
-        """The next piece, as soon as one may begin; None: the pool is closed."""
+    def take(self, number: int, group: str) -> Task | None:
+        """Wait for the next task; None: the pool is closed."""
         with self.change:
             while not self.closed:
-                piece = self.choice(group)
-                if piece is not None:
-                    self.running[number] = piece
-                    return piece
+                task = self.choice(group)
+                if task is not None:
+                    self.running[number] = task
+                    return task
                 self.change.wait()
         return None
 
-    def choice(self, group: str) -> Piece | None:
-        """What begins now, of those that wait; it waits no longer."""
+    def choice(self, group: str) -> Task | None:
+        """Remove a task from the queue if one may begin now."""
         running = self.running.values()
-        if not self.waiting or any(piece.timed for piece in running):
+        if not self.waiting or any(task.timed for task in running):
             return None
-        least, others = min(self.waiting), {piece.group for piece in running}
-        groups = self.waiting[least]
-        name = min(groups, key=lambda name: (name != group, name in others, -groups[name][0].weight))
-        if groups[name][0].timed and running:
+        others = {task.group for task in running}
+        costs = [(task.rank, task.group != group, task.group in others, -task.weight) for task in self.waiting]
+        first = costs.index(min(costs))
+        if self.waiting[first].timed and running:
             return None
-        found = groups[name].pop(0)
-        if not groups[name]:
-            del groups[name]
-        if not groups:
-            del self.waiting[least]
-        return found
+        return self.waiting.pop(first)
 
-    def carried_out(self, number: int, piece: Piece) -> Outcome:
+    def outcome_of(self, number: int, task: Task) -> Outcome:
         try:
-            call = piece.call
-        except Exception as error:  # it cannot be sent
+            call = task.call
+        except Exception as error:  # it cannot be pickled
             return Outcome(error=described(error))
         try:
             child = self.child(number)
@@ -139,18 +132,18 @@ class Pool:
             return Outcome(error=f"cannot start a process: {error.strerror}")
         if child is None:
             return Outcome(ended="the pool is closed")
-        outcome = child.ask(call, piece.shared, self.limit)
+        outcome = child.call(call, task.shared, self.limit)
         if child.is_spent(outcome):
             del self.children[number]
             child.close()
         return outcome
 
     def child(self, number: int) -> Child | None:
-        """The process of a worker, a new one where it has none that lives; None: the pool is closed."""
-        with interrupt.turn:  # an early end waits, and ends it too
+        """The process of a worker, a new one if it has none; None: the pool is closed."""
+        with interrupt.turn:  # an interrupt waits, then kills this process too
             if self.closed:
                 return None
-            if number in self.children and not self.children[number].alive:  # it was ended between two pieces
+            if number in self.children and not self.children[number].alive:  # killed between two tasks
                 self.children.pop(number).close()
             if number not in self.children:
                 self.children[number] = Child(self.scratch, self.memory)

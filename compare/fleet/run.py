@@ -1,4 +1,4 @@
-"""A fleet is run: what is missing is handed out, what comes back is kept, and each file's report follows."""
+"""Run a fleet: submit what the cache does not have, store the results, write a report for each file."""
 
 import pickle
 from bisect import insort
@@ -8,249 +8,229 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..experiments import EXPERIMENTS, TIMED
-from .file_pieces import Asked, Known, findings, read_file, reported, untimed_part
-from .kept import Kept, write_report
+from ..process.child import Outcome
+from .cache import Cache, write_report
+from .file_tasks import FileInfo, FleetOptions, read_file, reported, result_of, untimed_part
 from .models import Model, bundle, place_of_report
-from .piece import Door, Outcome, Piece
-from .row import BROKE, DIFFER, REFUSED
-from .standing import Standing
-from .task import Task, Waiting
+from .progress import FileState, Progress, QueuedStep
+from .table import BROKE, DIFFER, REFUSED
+from .tasks import Executor, Task
 
-TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks: what comes first
-UNTIMED = ", untimed"  # of a timed experiment, the step before it
-# pieces that are handed out beforehand, for each worker and besides: they are in memory
-AHEAD_FOR_EACH, AHEAD_FOR_ALL = 4, 16
-MARK = ".fleet"  # the file in a report that says from what it was made
+TO_READ, TO_COMPUTE, TO_TIME, TO_REPORT = range(4)  # ranks
+UNTIMED = ", untimed"  # suffix of the step before a timed experiment
+AHEAD_PER_WORKER, AHEAD = 4, 16  # tasks that are submitted in advance; they are in memory
+MARK = ".fleet"  # file in a report with its cache key
 
 
-def tasks_of(models: Sequence[Model]) -> list[Task]:
-    """The files that are computed, each with those that have the same content."""
-    tasks, by_content = [], {}
+def files_of(models: Sequence[Model]) -> list[FileState]:
+    """The files to compute, each with its copies."""
+    files, by_content = [], {}
     for model in models:
         same = [] if model.included_by or not model.sha256 else by_content.setdefault(model.sha256, [])
         try:
-            first = next((task for task in same if model.is_copy_of(task.model)), None)
+            first = next((file for file in same if model.is_copy_of(file.model)), None)
         except OSError:
             first = None
         if first:
             first.copies.append(model)
         else:
-            tasks.append(Task(model))
-            same.append(tasks[-1])
-    return tasks
+            files.append(FileState(model))
+            same.append(files[-1])
+    return files
 
 
-class Run(Standing):
-    """A fleet under way. After it `rows` has a row for each model, and `parts` the files that are only included by others."""
+class Run(Progress):
+    """A running fleet. After carry_out `rows` has a row for each model."""
 
     def __init__(
         self,
         models: Sequence[Model],
-        asked: Asked,
-        door: Door,
-        kept: Kept,
+        options: FleetOptions,
+        executor: Executor,
+        cache: Cache,
         out: Path,
         sent: Mapping = MappingProxyType({}),
     ):
-        """sent: the files of a solution, which are sent with each model; see Asked."""
-        super().__init__(tasks_of(models))
-        self.sent = dict(sent)
-        self.asked, self.door, self.kept, self.out = asked, door, kept, out
+        """sent: the files of a solution, added to the bundle of each model; see FleetOptions."""
+        super().__init__(files_of(models))
+        self.options, self.executor, self.cache, self.out, self.sent = options, executor, cache, out, dict(sent)
         self.waiting, self.timed, self.under_way, self.count = [], [], {}, 0
-        self.no_timing = door.no_timing()
-        self.workers = max(1, door.workers())
-        self.most = AHEAD_FOR_EACH * self.workers + AHEAD_FOR_ALL
+        self.no_timing = executor.no_timing()
+        self.workers = max(1, executor.workers())
+        self.ahead = AHEAD_PER_WORKER * self.workers + AHEAD
 
     def carry_out(self, progress: Callable[[], object]) -> None:
-        """All of it. progress is called when something has changed."""
-        for task in self.tasks:
-            self.begin(task)
-            self.hand_out()
+        """Run to the end. progress is called after each change."""
+        for file in self.files:
+            self.begin(file)
+            self.submit_waiting()
             progress()
-        while self.door.under_way:
+        while self.executor.under_way:
             progress()
-            if done := self.door.next():
-                piece, outcome = done
-                task, step = self.under_way.pop(piece.name)
-                task.in_door -= 1
-                self.took.setdefault(step, []).append((task.joints or 0, outcome.wall))
+            if done := self.executor.next():
+                task, outcome = done
+                file, step = self.under_way.pop(task.name)
+                file.submitted -= 1
+                self.walls[task.timed].append(outcome.wall)
                 self.machines |= {outcome.machine} - {""}
-                task.seconds += outcome.seconds
-                self.came(task, step, outcome)
-            self.hand_out()
+                file.seconds += outcome.seconds
+                self.receive(file, step, outcome)
+            self.submit_waiting()
         progress()
 
-    def begin(self, task: Task) -> None:
-        """The file is read, if that is not known."""
+    def begin(self, file: FileState) -> None:
+        """Read a file, unless the cache has its properties."""
         try:
-            task.keys["read"] = self.key(task, "read", self.asked)
+            file.keys["read"] = self.key(file, "read", self.options)
         except OSError as error:
-            self.ended(task, REFUSED, f"it cannot be read: {error.strerror}")
+            self.end_file(file, REFUSED, f"not readable: {error.strerror}")
             return
-        known = self.kept.get(task.keys["read"])
-        if known is None:
-            self.ask(task, "read", TO_READ)
+        info = self.cache.get(file.keys["read"])
+        if info is None:
+            self.queue(file, "read", TO_READ)
         else:
-            self.was_read(task, known)
+            self.begin_experiments(file, info)
 
-    def key(self, task: Task, *what: object) -> str:
-        return self.kept.key(task.model.hash, task.model.sha256, task.model.shown, *what)
+    def key(self, file: FileState, *inputs: object) -> str:
+        return self.cache.key(file.model.hash, file.model.sha256, file.model.shown, *inputs)
 
-    def ask(self, task: Task, step: str, rank: int) -> None:
-        """A piece waits until it is handed out."""
+    def queue(self, file: FileState, step: str, rank: int) -> None:
         self.count += 1
-        weight = inf if step == "report" else task.joints or 0  # what ends a file comes before what begins another
-        insort(
-            self.timed if step in TIMED else self.waiting,
-            Waiting(rank, -weight, self.count, task, step),
-        )
+        weight = inf if step == "report" else file.joints or 0  # finish a file before the next one begins
+        insort(self.timed if step in TIMED else self.waiting, QueuedStep(rank, -weight, self.count, file, step))
 
-    def hand_out(self) -> None:
-        """As many pieces as keep the workers busy; timed ones of a pool at the end, for all others wait meanwhile."""
-        of_timed = sum(step in TIMED for _, step in self.under_way.values())
-        while self.waiting and len(self.under_way) - of_timed < self.most:
-            self.hand(self.waiting.pop(0))
+    def submit_waiting(self) -> None:
+        """Submit enough tasks to keep the workers busy; a pool runs timed tasks at the end, because all others wait meanwhile."""
+        timed = sum(step in TIMED for _, step in self.under_way.values())
+        while self.waiting and len(self.under_way) - timed < self.ahead:
+            self.submit(self.waiting.pop(0))
         first = self.waiting[0].rank if self.waiting else TO_REPORT
-        while self.timed and of_timed < self.workers and (first > TO_TIME or not self.door.times_alone):
-            of_timed += self.hand(self.timed.pop(0))
+        while self.timed and timed < self.workers and (first > TO_TIME or not self.executor.times_alone):
+            timed += self.submit(self.timed.pop(0))
 
-    def hand(self, entry: Waiting) -> bool:
-        """Hand out a piece, if its file is still what it was when the fleet began."""
-        rank, _, _, task, step = entry
-        if task.row is not None:
+    def submit(self, entry: QueuedStep) -> bool:
+        """Submit a task, unless its file has changed since the fleet began."""
+        rank, _, _, file, step = entry
+        if file.row is not None:
             return False
         try:
-            task.packed = task.packed or pickle.dumps(bundle(task.model) | self.sent)
+            file.packed = file.packed or pickle.dumps(bundle(file.model) | self.sent)
         except OSError as error:
-            self.ended(task, BROKE, error.strerror)
+            self.end_file(file, BROKE, error.strerror)
             return False
-        function, arguments = {
-            "read": lambda: (read_file, (task.model.shown, self.asked)),
-            "report": lambda: (reported, (self.found(task), task.left_out, task.seconds, task.model.shown, self.asked)),
-        }.get(step, lambda: self.computing(task, step))()
-        piece = Piece(
-            f"{step} of {task.model.shown}", function, arguments, task.model.hash, rank, -entry.lighter,
-            step in TIMED, task.packed,
-        )  # fmt: skip
-        self.under_way[piece.name] = task, step
-        task.in_door += 1
-        self.door.submit(piece)
+        name, options = file.model.shown, self.options
+        if step == "read":
+            function, arguments = read_file, (name, options)
+        elif step == "report":
+            function, arguments = reported, (self.results(file), file.left_out, file.seconds, name, options)
+        elif step.endswith(UNTIMED):
+            function, arguments = untimed_part, (step.removesuffix(UNTIMED), name, options)
+        else:
+            work = self.cache.get(file.keys[step + UNTIMED]) if step in TIMED else None
+            function, arguments = result_of, (step, work and work[0], name, options)
+        task = Task(
+            f"{step} of {name}", function, arguments, file.model.hash, rank, -entry.lighter, step in TIMED, file.packed
+        )
+        self.under_way[task.name] = file, step
+        file.submitted += 1
+        self.executor.submit(task)
         return True
 
-    def computing(self, task: Task, step: str) -> tuple[Callable, tuple]:
-        """The call of an experiment, or of what of it is no timing."""
-        about = task.model.shown, self.asked
-        if step.endswith(UNTIMED):
-            return untimed_part, (step.removesuffix(UNTIMED), *about)
-        work = self.kept.get(task.keys[step + UNTIMED]) if step in TIMED else None
-        return findings, (step, work and work[0], *about)
+    def results(self, file: FileState) -> dict:
+        """The results of the experiments of a file, or why one broke off."""
+        names = [name for name in EXPERIMENTS if name in file.keys and name not in file.lost]
+        values = {name: self.cache.get(file.keys[name]) for name in names}
+        return file.lost | {name: value[0] if value else "lost from the cache" for name, value in values.items()}
 
-    def found(self, task: Task) -> dict:
-        """What the experiments of a file found, or in words why one gave nothing."""
-        names = [name for name in EXPERIMENTS if name in task.keys and name not in task.lost]
-        kept = {name: self.kept.get(task.keys[name]) for name in names}
-        return task.lost | {
-            name: value[0][0] if value else "what was kept of it is gone" for name, value in kept.items()
-        }
-
-    def came(self, task: Task, step: str, outcome: Outcome) -> None:
-        """What a piece has found is kept, and what follows from it begins."""
-        if task.in_door == 0:
-            task.packed = b""
-        if task.row is not None:
+    def receive(self, file: FileState, step: str, outcome: Outcome) -> None:
+        """Store an outcome and queue the steps that depend on it."""
+        if file.submitted == 0:
+            file.packed = b""
+        if file.row is not None:
             return
         if outcome.broke and step in ("read", "report"):
-            self.ended(task, BROKE, f"{step}: {outcome.broke}")
+            self.end_file(file, BROKE, f"{step}: {outcome.broke}")
         elif outcome.broke:
             name = step.removesuffix(UNTIMED)
-            task.lost[name] = outcome.broke
-            self.has_ended(task, name)
+            file.lost[name] = outcome.broke
+            self.end_experiment(file, name)
         elif step == "read":
-            self.kept.put(task.keys[step], outcome.returned)
-            self.was_read(task, outcome.returned)
+            self.cache.put(file.keys[step], outcome.returned)
+            self.begin_experiments(file, outcome.returned)
         elif step == "report":
             row, written = outcome.returned
-            write_report(self.out / place_of_report(task.model.shown), written | {MARK: task.keys[step].encode()})
-            if not task.lost:
-                self.kept.put(task.keys[step], row)
-            self.ended(task, **row)
+            write_report(self.out / place_of_report(file.model.shown), written | {MARK: file.keys[step].encode()})
+            if not file.lost:
+                self.cache.put(file.keys[step], row)
+            self.end_file(file, **row)
         else:
-            self.kept.put(task.keys[step], (outcome.returned, outcome.seconds))
-            self.go_on(task, step, outcome.returned)
+            self.cache.put(file.keys[step], (outcome.returned, outcome.seconds))
+            if step.endswith(UNTIMED):
+                self.queue_experiment(file, step.removesuffix(UNTIMED))
+            else:
+                self.end_experiment(file, step)
 
-    def was_read(self, task: Task, known: Known) -> None:
-        """Its experiments are asked for, except for those that are known; a file without a model of its own is left out."""
-        task.known = known
-        if known.refused and task.model.included_by:
-            task.row = {}
-            self.parts.append((task.model.shown, f"no model of its own, and included by {task.model.included_by}"))
+    def begin_experiments(self, file: FileState, info: FileInfo) -> None:
+        """Queue the experiments of a file that the cache does not have."""
+        file.info = info
+        if info.refused and file.model.included_by:
+            file.row = {}
+            self.parts.append((file.model.shown, f"not a complete model; included by {file.model.included_by}"))
             return
-        if known.refused:
-            self.ended(task, REFUSED, known.refused)
+        if info.refused or info.differs:
+            self.end_file(file, *((REFUSED, info.refused) if info.refused else (DIFFER, info.differs)))
             return
-        if known.differs:
-            self.ended(task, DIFFER, known.differs)
-            return
-        timed = [name for name in known.experiments if name in TIMED] if self.no_timing else []
-        task.left_out = [*known.reasons, *((name, f"it measures time: {self.no_timing}") for name in timed)]
-        names = [name for name in known.experiments if name not in timed]
+        timed = [name for name in info.experiments if name in TIMED] if self.no_timing else []
+        file.left_out = [*info.reasons, *((name, f"it measures time: {self.no_timing}") for name in timed)]
+        names = [name for name in info.experiments if name not in timed]
         if not names:
-            self.ended(task, REFUSED, f"nothing can be compared: {'; '.join(map(': '.join, task.left_out))}")
+            self.end_file(file, REFUSED, f"no experiment applies: {'; '.join(map(': '.join, file.left_out))}")
             return
-        for name in names:
-            if name != "diagnosis":  # it is made with the report, if something fails
-                task.keys[name] = self.key(task, name, *self.asked.alike)
-                task.keys[name + UNTIMED] = self.key(task, name + UNTIMED, *self.asked.alike)
-        task.keys["report"] = self.key(task, "report", self.asked, names, task.left_out)
-        row = self.kept.get(task.keys["report"])
-        if row is not None and self.is_written(task):
-            self.done_before += task.files
-            self.ended(task, **row)
+        computed = [name for name in names if name != "diagnosis"]  # it is part of the report, if a check fails
+        for name in computed:
+            for step in (name, name + UNTIMED):
+                file.keys[step] = self.key(file, step, *self.options.key)
+        file.keys["report"] = self.key(file, "report", self.options, names, file.left_out)
+        row = self.cache.get(file.keys["report"])
+        if row is not None and self.is_written(file):
+            self.files_cached += file.files
+            self.end_file(file, **row)
             return
-        for name in (name for name in names if name in task.keys):
+        for name in computed:
             steps = [name + UNTIMED, name] if name in TIMED else [name]
-            have = {step: value[1] for step in steps if (value := self.kept.get(task.keys[step]))}
-            task.seconds += sum(have.values())
-            self.pieces_before += len(have)
-            if name not in have:
-                task.expected.add(name)
-                self.ask_next(task, next(step for step in steps if step not in have))
-        self.has_ended(task, "")
+            seconds = {step: value[1] for step in steps if (value := self.cache.get(file.keys[step]))}
+            file.seconds += sum(seconds.values())
+            self.tasks_cached += len(seconds)
+            if name not in seconds:
+                file.expected.add(name)
+                self.queue_experiment(file, next(step for step in steps if step not in seconds))
+        self.end_experiment(file, "")
 
-    def ask_next(self, task: Task, step: str) -> None:
-        """A step of an experiment is asked for."""
-        when_timed = TO_TIME if self.door.times_alone else TO_READ
-        self.ask(task, step, when_timed if step in TIMED else TO_COMPUTE)
+    def queue_experiment(self, file: FileState, step: str) -> None:
+        rank = TO_COMPUTE if step not in TIMED else TO_TIME if self.executor.times_alone else TO_READ
+        self.queue(file, step, rank)
 
-    def go_on(self, task: Task, step: str, value: object) -> None:
-        """After what of an experiment is no timing come its times; after the last one the report."""
-        if step.endswith(UNTIMED):
-            self.ask_next(task, step.removesuffix(UNTIMED))
-            return
-        self.differs(task, value[1])
-        self.has_ended(task, step)
-
-    def is_written(self, task: Task) -> bool:
-        """Whether the report of a file that is there is the one that is asked for."""
+    def is_written(self, file: FileState) -> bool:
+        """Whether the report in the folder is up to date."""
         try:
-            return (self.out / place_of_report(task.model.shown) / MARK).read_bytes() == task.keys["report"].encode()
+            return (self.out / place_of_report(file.model.shown) / MARK).read_bytes() == file.keys["report"].encode()
         except OSError:
             return False
 
-    def has_ended(self, task: Task, name: str) -> None:
-        """An experiment has come back; after the last one comes the report, but not between timed ones that all wait for."""
-        task.expected.discard(name)
-        if not task.expected:
-            after_timed = self.door.times_alone and any(name in TIMED for name in task.keys)
-            self.ask(task, "report", TO_REPORT if after_timed else TO_COMPUTE)
+    def end_experiment(self, file: FileState, name: str) -> None:
+        """Queue the report after the last experiment, but not between timed tasks during which all others wait."""
+        file.expected.discard(name)
+        if not file.expected:
+            after_timed = self.executor.times_alone and any(name in TIMED for name in file.keys)
+            self.queue(file, "report", TO_REPORT if after_timed else TO_COMPUTE)
 
-    def still(self) -> list[tuple[Task, str]]:
-        """The pieces that have not ended, as far as they are known: a file that is not read has all of them."""
-        asked = [*self.under_way.values(), *((entry.task, entry.step) for entry in [*self.waiting, *self.timed])]
-        asked = [(task, step) for task, step in asked if task.row is None]
-        asked += [(task, step.removesuffix(UNTIMED)) for task, step in asked if step.endswith(UNTIMED)]
-        reports = {id(task) for task, step in asked if step == "report"}
-        for task in (task for task in self.tasks if task.row is None):
-            asked += [(task, name) for name in self.asked.names if task.known is None and name != "diagnosis"]
-            asked += [(task, "report")] * (id(task) not in reports)
-        return asked
+    def tasks_left(self) -> dict[bool, int]:
+        """The number of tasks to run, by `timed`; a file that is not read counts with all experiments."""
+        steps = [*self.under_way.values(), *((entry.file, entry.step) for entry in [*self.waiting, *self.timed])]
+        names = [step for file, step in steps if file.row is None and step != "report"]
+        names += [step.removesuffix(UNTIMED) for step in names if step.endswith(UNTIMED)]
+        files = [file for file in self.files if file.row is None]  # each has a report to come
+        for file in files:
+            names += self.options.names if file.info is None else ()
+        timed = sum(name in TIMED for name in names)
+        return {True: timed, False: len(names) - timed + len(files)}

@@ -1,64 +1,95 @@
-"""The table of a fleet: fleet.csv, index.html, and its sentences."""
+"""The table of a fleet: rows, fleet.csv, index.html with its summary, changes since an earlier fleet."""
 
 import csv
 import io
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from urllib.parse import quote
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from ..judge.check import ENDS, About, Check
+from ..judge.finding import Finding
 from ..judge.timing import vectors
+from ..process.streams import in_one_line
 from ..report.provenance import commit
+from ..report.text import say
+from ..report.verdict import Section, failures, unconfirmed_in_words, unstable_in_words, worst
 from ..report.version import OURS, installed, own_version
-from ..run.reference import SOLUTION
-from .kept import write_whole
-from .page import fleet_page
-from .row import AGREE, BROKE, DIFFER, FLEET_COLUMNS, ITSELF, REFUSED, UNCONFIRMED, VERDICTS, order
-from .run import Run
-from .times import time_of_workers
+from ..run.reference import SOLUTION, Reference
+from .cache import write_whole
+from .models import place_of_report
+from .tasks import FleetError
 
-VERDICT_WORDS = {DIFFER: ("differs", "differ"), BROKE: ("broke off", "broke off"), REFUSED: ("was refused", "were refused"),
-         AGREE: ("agrees", "agree"), UNCONFIRMED: ("has a prediction that is not confirmed",
-         "have predictions that are not confirmed"), ITSELF: ("is self-consistent", "are self-consistent")}  # fmt: skip
-
-
-def write_table(
-    out: Path, run: Run, left_out: Sequence[tuple[str, str]], changed: Sequence[str] | None, command: str, took: float
-) -> list[str]:
-    """Write fleet.csv and index.html; the sentences at the top. changed: since an earlier fleet, None: that was not asked."""
-    rows, left_out = sorted(with_why_itself(run.rows), key=order), [*left_out, *run.parts]
-    spent = time_of_workers(run.took, run.workers, took, run.door.times_alone)
-    said = sentences_of(rows, left_out, run)
-    origin = {
-        "command": command,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "seconds": round(took, 1),
-        "workers": run.workers,
-        "their time": spent.words(run.workers, took),
-        "machine of the command": f"{platform.node()}, {vectors()}",
-        "machines of the workers": ", ".join(sorted(run.machines)) or "none was needed",
-        "commit": commit(),
-        OURS: own_version(),
-        "mujoco": installed("mujoco"),
-    }
-    write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
-    text = fleet_page("A fleet compared with MuJoCo", said, rows, left_out, changed, origin, picture_of_steps(rows))
-    write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
-    return [*said, spent.words(run.workers, took)] if round(spent.computing, 2) else said
+FLEET_COLUMNS = (
+    "file", "sha256", "verdict", "reason", "joints", "worst_ratio",
+    "file_integrator", "file_dt_s", "stable_at_file_dt", "limit_s", "seconds",
+)  # fmt: skip
+AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
+UNCONFIRMED, ITSELF = "unconfirmed", "self-consistent"
+VERDICTS = (DIFFER, BROKE, UNCONFIRMED, REFUSED, ITSELF, AGREE)  # in the order of the table
+BAD_VERDICTS = (DIFFER, BROKE, UNCONFIRMED)  # exit status 1
+MOVED = 0.01  # relative change of a step limit that is reported
+HEADS = {
+    "file": "file", "verdict": "verdict", "reason": "reason or cause", "reference": "compared with", "joints": "joints",
+    "worst_ratio": "share of tolerance", "file_integrator": "integrator", "file_dt_s": "step, ms",
+    "stable_at_file_dt": "stable", "limit_s": "limit, ms", "seconds": "processor, s",
+}  # fmt: skip
+REFERENCES = {"arm": "stated numbers", SOLUTION: "the solution", "model": "itself"}
+ROW_KINDS = dict.fromkeys(BAD_VERDICTS, "bad") | {REFUSED: "none", ITSELF: "none"}
 
 
-def with_why_itself(rows: Sequence[dict]) -> list[dict]:
-    """The rows; beside files that are compared with stated numbers those that are not have the reason for that."""
-    if not any(row["reference"] in ("arm", SOLUTION) for row in rows):
-        return list(rows)
-    reasons = [
-        f"{row['why_itself']}: compared with its own compiled model only" if row["why_itself"] else "" for row in rows
-    ]
-    return [row | {"reason": "; ".join(filter(None, (why, row["reason"])))} for row, why in zip(rows, reasons)]
+def row_of_file(sections: Sequence[Section], causes: Sequence[dict], lost: Sequence[str], reference: Reference) -> dict:
+    """Verdict and reason, largest share of a tolerance, step. lost: parts of the report that broke off.
+
+    An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
+    """
+    differing, broke, unstable, unconfirmed = failures(sections)
+    top = worst(sections)
+    stable, limit = own_step(sections)
+    if differing:
+        outcome, reason = DIFFER, str(differing[0])
+        if causes:
+            reason = causes[0]["text"] + (f", and {len(causes) - 1} more" if len(causes) > 1 else "")
+    elif broke or lost:
+        outcome, reason = BROKE, exception_of(broke[0]) if broke else lost[0]
+    elif not any(check.about == About.MODELS for section in sections for check in section.result.checks):
+        outcome, reason = REFUSED, "no comparison was possible"
+    else:
+        outcome = UNCONFIRMED if unconfirmed else ITSELF if reference.kind == "model" else AGREE
+        reasons = [unconfirmed_in_words(unconfirmed)] if unconfirmed else []
+        reasons += [unstable_in_words(unstable)] if unstable else []
+        reason = "; ".join(reasons)
+    return {
+        "verdict": outcome, "reason": "; ".join(filter(None, (reason, reference.matched))),
+        "worst_ratio": None if top is None else top.over_tolerance, "stable_at_file_dt": stable, "limit_s": limit,
+    }  # fmt: skip
+
+
+def exception_of(check: Check) -> str:
+    quantity = "" if check.quantity == ENDS else f": {check.quantity}:"
+    return f"{check.experiment}{quantity} {check.note}"
+
+
+def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
+    """Whether the file's step is stable with its own servos at all postures, None if unknown; the smallest limit, s."""
+    rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
+    own = [row for row in rows if row["integrator"] == row["file_integrator"] and row["base"] != "locked"]
+    stable = [row["stable_at_file_dt"] for row in own if row["stable_at_file_dt"] is not None]
+    limits = [row["predicted_dt_s"] for row in own if row["limit"] == "finite"]
+    return (all(stable) if stable else None), min(limits, default=None)
+
+
+def order(row: dict) -> tuple:
+    """Sort key: verdict, unstable steps, largest share of a tolerance."""
+    rank = VERDICTS.index(row["verdict"])
+    return rank, row["stable_at_file_dt"] is not False, -(row["worst_ratio"] or 0.0), row["file"]
 
 
 def csv_of_fleet(rows: Sequence[dict]) -> str:
-    """The table with all digits, true and false in small letters, empty what is not known."""
+    """The table with all digits; an unknown value is empty."""
     text = io.StringIO()
     table = csv.DictWriter(text, FLEET_COLUMNS, extrasaction="ignore", lineterminator="\n")
     table.writeheader()
@@ -67,40 +98,159 @@ def csv_of_fleet(rows: Sequence[dict]) -> str:
     return text.getvalue()
 
 
-def picture_of_steps(rows: Sequence[dict]) -> tuple[bytes, str, tuple[int, int]] | None:
-    """The picture of the page, see figures_fleet; None: there is nothing to draw, or it could not be drawn."""
+def earlier(folder: str) -> dict[str, dict]:
+    """The rows of an earlier fleet by file name, `limit_s` a number or None. FleetError if they cannot be read."""
+    path = Path(folder) / "fleet.csv"
+    shown = in_one_line(str(path))
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            table = csv.DictReader(file)
+            rows = list(table)
+            if not set(FLEET_COLUMNS) <= set(table.fieldnames or ()):
+                raise FleetError(f"{shown} is not a table of a fleet: expected the columns {', '.join(FLEET_COLUMNS)}")
+            return {row["file"]: row | {"limit_s": float(row["limit_s"]) if row["limit_s"] else None} for row in rows}
+    except FleetError:
+        raise
+    except (OSError, ValueError, csv.Error) as error:
+        why = getattr(error, "strerror", None) or "not a table of a fleet"
+        raise FleetError(f"cannot read {shown}: {why}; expected the folder of an earlier fleet") from None
+
+
+def changes(before: Mapping[str, dict], rows: Sequence[dict]) -> list[str]:
+    """The changes since an earlier fleet, one line for each file: verdict, step, limit; new and removed files."""
+    lines = []
+    for row in rows:
+        old = before.get(row["file"])
+        parts = [f"new, {row['verdict']}"] if old is None else changed_parts(old, row)
+        if parts:
+            is_other = old is not None and old["sha256"] != row["sha256"]
+            lines.append(f"{row['file']}: {'; '.join(parts)}{' (the file has changed)' * is_other}")
+    names = {row["file"] for row in rows}
+    return lines + [f"{name}: removed, was {old['verdict']}" for name, old in before.items() if name not in names]
+
+
+def changed_parts(old: dict, row: dict) -> list[str]:
+    parts, stable = [], {None: "", True: "true", False: "false"}[row["stable_at_file_dt"]]
+    if old["verdict"] != row["verdict"]:
+        parts.append(f"{old['verdict']} -> {row['verdict']}" + (f": {row['reason']}" if row["reason"] else ""))
+    if old["stable_at_file_dt"] != stable:
+        states = {"true": "stable", "false": "unstable"}
+        was, now = (states.get(value, "unknown") for value in (old["stable_at_file_dt"], stable))
+        parts.append(f"at its own step: {was} -> {now}")
+    before, after = old["limit_s"], row["limit_s"]
+    has_both = before is not None and after is not None
+    if abs(after - before) > MOVED * abs(before) if has_both else before != after:
+        in_ms = ["none" if dt is None else f"{1e3 * dt:.4g} ms" for dt in (before, after)]
+        parts.append(f"step limit: {' -> '.join(in_ms)}")
+    return parts
+
+
+# the files of a fleet
+
+
+def sentence(kind: str, **values: object) -> str:
+    return say(Finding("fleet", kind, values))
+
+
+def write_table(
+    out: Path,
+    run: object,
+    left_out: Sequence[tuple[str, str]],
+    changed: Sequence[str] | None,
+    command: str,
+    took: float,
+) -> list[str]:
+    """Write fleet.csv and index.html; the lines of the summary. run: a run.Run; changed: lines of --since, None: without it."""
+    rows, left_out = sorted(with_why_itself(run.rows), key=order), [*left_out, *run.parts]
+    summary = summary_of(rows, left_out, run)
+    origin = {
+        "command": command,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seconds": round(took, 1),
+        "workers": run.workers,
+        "this machine": f"{platform.node()}, {vectors()}",
+        "machines of the workers": ", ".join(sorted(run.machines)) or "none",
+        "commit": commit(),
+        OURS: own_version(),
+        "mujoco": installed("mujoco"),
+    }
+    write_whole(out / "fleet.csv", csv_of_fleet(rows).encode("utf-8", "backslashreplace"))
+    text = fleet_page("A fleet compared with MuJoCo", summary, rows, left_out, changed, origin, picture_of_steps(rows))
+    write_whole(out / "index.html", text.encode("utf-8", "backslashreplace"))
+    return summary
+
+
+def with_why_itself(rows: Sequence[dict]) -> list[dict]:
+    """The rows; if some files are compared with stated numbers, with the reason why others are not."""
+    if not any(row["reference"] in ("arm", SOLUTION) for row in rows):
+        return list(rows)
+    reasons = [row["why_itself"] and sentence("why_itself", reason=row["why_itself"]) for row in rows]
+    return [row | {"reason": "; ".join(filter(None, (why, row["reason"])))} for row, why in zip(rows, reasons)]
+
+
+def picture_of_steps(rows: Sequence[dict]) -> dict | None:
+    """The figure of the page: source, caption, width, height; None: nothing to draw, or drawing failed."""
     if not any(row["limit_s"] for row in rows):
         return None
     try:
-        from .figures_fleet import picture_of  # what draws takes its time to be imported
+        from .figures_fleet import picture_of  # imports matplotlib
 
         return picture_of(rows)
     except Exception:
-        return None  # the table says the same
+        return None  # the table has the same numbers
 
 
-def sentences_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: Run) -> list[str]:
-    """How many have which verdict; whose own step is not stable; what is left out; what is known from before."""
-    counted = run.verdicts()
-    many = [f"{counted[v]} {VERDICT_WORDS[v][counted[v] > 1]}" for v in VERDICTS if counted[v]]
-    said = [f"{len(rows)} file{'s' if len(rows) != 1 else ''}: {', '.join(many)}."]
-    unstable = [row["file"] for row in rows if row["stable_at_file_dt"] is False]
-    if unstable:
-        more = f" and {len(unstable) - 3} more" if len(unstable) > 3 else ""
-        whose = "their" if len(unstable) > 1 else "its"
-        said.append(f"Not stable at {whose} own step: {', '.join(unstable[:3])}{more}.")
+def summary_of(rows: Sequence[dict], left_out: Sequence[tuple[str, str]], run: object) -> list[str]:
+    numbers = run.verdicts()
+    lines = [sentence("verdicts", files=len(rows), numbers={v: numbers[v] for v in VERDICTS if numbers[v]})]
+    if unstable := [row["file"] for row in rows if row["stable_at_file_dt"] is False]:
+        lines.append(sentence("unstable", names=unstable))
     if left_out:
-        said.append(
-            f"Left out: {len(left_out)} file{'s' if len(left_out) != 1 else ''}, each with its reason in index.html."
-        )
+        lines.append(sentence("left_out", files=len(left_out)))
     if run.no_timing:
-        said.append(f"Experiments that measure time are left out: {run.no_timing}.")
-    if counted[ITSELF]:
-        said.append(
-            "Self-consistent: compared with the own compiled model only, not with stated numbers; --reference compares "
-            "all files with the arm or a solution."
-        )
-    known = (run.done_before, "file", ""), (run.pieces_before, "piece", " of others")
-    if before := [f"{many} {what}{'s' * (many != 1)}{of}" for many, what, of in known if many]:
-        said.append(f"Known from before: {' and '.join(before)}.")
-    return said
+        lines.append(sentence("no_timing", reason=run.no_timing))
+    if numbers[ITSELF]:
+        lines.append(sentence("self_consistent"))
+    if run.files_cached or run.tasks_cached:
+        lines.append(sentence("cached", files=run.files_cached, tasks=run.tasks_cached))
+    return lines
+
+
+def fleet_page(
+    title: str,
+    summary: Sequence[str],
+    rows: Sequence[dict],
+    left_out: Sequence[tuple[str, str]],
+    changed: Sequence[str] | None,
+    origin: dict,
+    picture: dict | None = None,
+) -> str:
+    """The page as HTML; the arguments are those of write_table."""
+    environment = Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined,
+        loader=FileSystemLoader(Path(__file__).parent),
+    )  # fmt: skip
+    return environment.get_template("fleet.html.jinja").render(
+        title=title, summary=summary, rows=[shown_row(row) for row in rows], left_out=left_out, changed=changed,
+        origin=origin, picture=picture, heads=HEADS, is_bad=any(row["verdict"] in BAD_VERDICTS for row in rows),
+    )  # fmt: skip
+
+
+def shown_row(row: dict) -> dict:
+    """A row with the text of its cells, its class and the address of its report."""
+    return row | {
+        "cells": {name: cell(name, row[name]) for name in HEADS if name != "file"},
+        "kind": "bad" if row["stable_at_file_dt"] is False else ROW_KINDS.get(row["verdict"], "good"),
+        "address": quote(f"{place_of_report(row['report_of'])}/index.html"),
+    }
+
+
+def cell(name: str, value: object) -> str:
+    """The text of a cell; steps are in ms."""
+    if name == "reference":
+        return REFERENCES.get(value, value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.1f}" if name == "seconds" else f"{1e3 * value:.4g}" if name.endswith("_s") else f"{value:.2g}"
+    return "" if value is None else str(value)

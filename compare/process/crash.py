@@ -1,23 +1,23 @@
-"""What is said of an exception that nobody foresaw: one line, in an experiment's check or on the terminal."""
+"""An unexpected exception in one line, for a check or the terminal."""
 
 import traceback
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-LONGEST = 300  # characters of a message
+MAX_MESSAGE = 300  # characters of a message
 
 
 def described(error: BaseException, with_place: bool = True) -> str:
     """An exception in one line: "ValueError: message (compare/mass.py:12)"."""
     message = " ".join(str(error).split())
-    message = message if len(message) <= LONGEST else message[: LONGEST - 3] + "..."
+    message = message if len(message) <= MAX_MESSAGE else message[: MAX_MESSAGE - 3] + "..."
     where = place(error) if with_place else ""
     return type(error).__name__ + (f": {message}" if message else "") + (f" ({where})" if where else "")
 
 
 def place(error: BaseException) -> str:
-    """The last line of this project that an exception came through, "compare/mass.py:12"; "" if there is none."""
-    if getattr(error, "place", ""):  # it comes from another process, which knew
+    """The last line of this project in the traceback, "compare/mass.py:12"; "" if there is none."""
+    if getattr(error, "place", ""):  # set by the process that raised it
         return error.place
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         path = Path(frame.filename)

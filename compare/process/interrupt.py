@@ -1,7 +1,7 @@
-"""Ctrl-C, SIGTERM and SIGHUP end a run with status 2 within a second, whatever it is doing.
+"""Ctrl-C, SIGTERM and SIGHUP end a run with status 2 within a second.
 
-A handler in Python waits until C code returns, which a compilation or a run in MuJoCo does after seconds. So the part of it that
-is in C writes a byte to a socket, and a thread that waits for it ends the process. Only `python -m compare` asks for that.
+A Python signal handler waits until C code returns, for seconds in a compilation or a run in MuJoCo. So the wakeup fd of the
+signal module is a socket, and a thread that reads from it ends the process. Only `python -m compare` uses this.
 """
 
 import os
@@ -14,21 +14,21 @@ from contextlib import contextmanager, suppress
 
 NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
-undo = []  # what is to be done before an early end, the last first: each a function without arguments
-turn = threading.RLock()  # who has it decides how the run ends
+undo = []  # functions to call before an interrupt ends the process, last first
+turn = threading.RLock()  # held while a thread decides how the run ends
 
 
 class Now:
-    """How far the run is."""
+    """The state of the run."""
 
-    asked = False  # an interrupt has come
-    held = 0  # the main thread is in so many blocks of `held`
-    settled = False  # how the run ends is decided
-    line = "interrupted; a report that was there is unchanged"
+    requested = False  # an interrupt has come
+    held = 0  # number of `postponed` blocks of the main thread
+    settled = False  # the exit status is decided
+    line = "interrupted; the earlier report is unchanged"
 
 
 def listen() -> None:
-    """From now on an interrupt ends the process. What is ignored (behind nohup, in a script's background) stays so."""
+    """From now on an interrupt ends the process. Ignored signals (nohup, background of a script) stay ignored."""
     receiver, sender = socket.socketpair()
     sender.setblocking(False)
     signal.set_wakeup_fd(sender.fileno(), warn_on_full_buffer=False)
@@ -40,32 +40,32 @@ def listen() -> None:
 
 @contextmanager
 def postponed() -> Iterator[None]:
-    """An interrupt that comes in this block is answered at its end."""
+    """An interrupt in this block takes effect at its end."""
     Now.held += 1
     try:
         with turn:
             yield
     finally:
         Now.held -= 1
-        if Now.asked:
+        if Now.requested:
             stay()
 
 
 def settle() -> None:
-    """How the run ends is decided: an interrupt no longer changes it."""
+    """From now on an interrupt does not change the exit status."""
     with postponed():
         Now.settled = True
 
 
 def stay(*_) -> None:
-    """The main thread's part of an interrupt: to do nothing more, and not to be in the other thread's way."""
-    Now.asked = True
+    """Suspend the main thread while the other thread ends the process."""
+    Now.requested = True
     while not (Now.held or Now.settled):
         time.sleep(1)
 
 
 def end_when_asked(receiver, _sender) -> None:
-    """The other thread's part: to wait, and to end the process."""
+    """Wait for an interrupt, in the other thread."""
     while True:
         number = receiver.recv(1)[0]
         with turn:
@@ -74,10 +74,10 @@ def end_when_asked(receiver, _sender) -> None:
 
 
 def end() -> None:
-    """End the process without another look at the main thread."""
+    """End the process, whatever the main thread does."""
     for act in reversed(undo):
         with suppress(Exception):
             act()
     with suppress(OSError):
-        os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # over what a terminal shows of Ctrl-C
+        os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # overwrites ^C on a terminal
     os._exit(2)

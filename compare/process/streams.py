@@ -1,13 +1,13 @@
-"""stdin, stdout and stderr, whatever they are: closed, a full disk, a reader who has gone, an encoding without umlauts."""
+"""stdin, stdout and stderr that never fail: closed, full disk, closed pipe, limited encoding."""
 
 import os
 import sys
 
 
 class Stream:
-    """A text stream that swallows what cannot be written."""
+    """A text stream that ignores errors of writing."""
 
-    silent = False  # all of them: the process is about to end
+    silent = False  # set for all streams before the process ends
 
     def __init__(self, stream):
         self.stream = stream
@@ -22,14 +22,14 @@ class Stream:
     def act(self, name, *arguments):
         try:
             getattr(self.stream, name)(*arguments)
-        except (OSError, ValueError, AttributeError):  # full, gone, closed, or there was none
+        except (OSError, ValueError, AttributeError):  # full, closed or missing
             self.stream = None
 
     def isatty(self) -> bool:
         return self.columns() is not None
 
     def columns(self) -> int | None:
-        """The terminal's width; None if it is no terminal."""
+        """The width of the terminal; None if the stream is not a terminal."""
         try:
             return os.get_terminal_size(self.stream.fileno()).columns or 80
         except (OSError, ValueError, AttributeError):
@@ -41,22 +41,22 @@ class Stream:
 
 
 def readable(text: str) -> str:
-    """Text that can be written anywhere: what the locale could not read of a file's name is UTF-8, or is shown as numbers."""
+    """Text without surrogates: bytes that the locale could not decode are read as UTF-8 or escaped."""
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def in_one_line(text: str) -> str:
-    """Readable text without line ends and other signs that a terminal would obey: these are shown as numbers."""
+    """Readable text in which control characters are escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in readable(text))
 
 
 def prepare() -> None:
-    """Make stdin, stdout and stderr such that they can be used: one that is closed leads nowhere, none refuses a letter."""
+    """Open closed standard streams on os.devnull, and let them accept every character."""
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            # else the next file that is opened gets this number, and is written to
+            # otherwise the next opened file gets this number
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:

@@ -1,4 +1,4 @@
-"""Two further processes: they draw the figures of an experiment while the next one computes, and follow scenes."""
+"""Two worker processes of a run, for figures and scenes."""
 
 import importlib
 import logging
@@ -19,14 +19,13 @@ from .crash import described, place
 
 
 class WorkerEnded(RuntimeError):
-    """One of the processes is no longer there."""
+    """A worker process was killed."""
 
 
 class Workers(ThreadPoolExecutor):
-    """At most so many processes, each started when the others are busy, and a thread for each that hands it its calls.
+    """At most `count` processes, started when the others are busy, with a thread each. Its clock records processor times.
 
-    Without multiprocessing's locks, which an early end would leave behind in the system. Its clock knows for which task a call
-    was made, and what it took.
+    It has no locks of multiprocessing, because an interrupt would leave their semaphores behind.
     """
 
     def __init__(self, count):
@@ -36,7 +35,6 @@ class Workers(ThreadPoolExecutor):
         interrupt.undo.append(self.kill)
 
     def start(self) -> None:
-        """One more process."""
         context = get_context("spawn")
         with interrupt.postponed(), deaf():
             here, there = context.Pipe()
@@ -53,14 +51,13 @@ class Workers(ThreadPoolExecutor):
         return self.futures[-1]
 
     def ask(self, task, *call):
-        """What a call for a task returns or raises in one of the processes."""
+        """The result or exception of a call in one of the processes."""
         connection = self.idle.get()
         try:
             connection.send(call)
             returned, value, seconds = connection.recv()
         except (EOFError, OSError):
-            text = "a process that computes beside was ended from outside; a report that was there is unchanged"
-            raise WorkerEnded(text) from None
+            raise WorkerEnded("a worker process was killed; the earlier report is unchanged") from None
         finally:
             self.idle.put(connection)
         self.clock.add(task, seconds)
@@ -69,7 +66,7 @@ class Workers(ThreadPoolExecutor):
         raise value
 
     def quiet(self):
-        """Wait until all that was submitted is done: a timing needs the machine for itself."""
+        """Wait until all calls are done, before times are measured."""
         wait(self.futures)
 
     def kill(self):
@@ -79,7 +76,6 @@ class Workers(ThreadPoolExecutor):
 
 @contextmanager
 def start_workers() -> Iterator[Workers]:
-    """Yields a pool of two processes."""
     pool = Workers(2)
     try:
         yield pool
@@ -93,13 +89,13 @@ def start_workers() -> Iterator[Workers]:
 
 @contextmanager
 def deaf() -> Iterator[None]:
-    """Processes that are started in this block hear no Ctrl-C: that is the business of the one that started them."""
+    """Processes that are started in this block ignore Ctrl-C; the main process kills them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, interrupt.NUMBERS)
     try:
-        resource_tracker.ensure_running()  # a process too, whose start ends the blocking
+        resource_tracker.ensure_running()  # also starts a process, and unblocks the signals
         signal.pthread_sigmask(signal.SIG_BLOCK, interrupt.NUMBERS)
         yield
     finally:
@@ -110,14 +106,14 @@ def deaf() -> Iterator[None]:
 
 
 def load_modules(*modules: str) -> None:
-    """Load modules before they are needed."""
+    """Import modules in advance."""
     for name in modules:
         importlib.import_module(name)
 
 
 def serve(connection) -> None:
-    """Answer one call after the other: whether it returned, its value or what it raised, seconds of the processor."""
-    logging.getLogger("tmt").setLevel(logging.ERROR)  # what the main process says too
+    """Answer calls with (whether it returned, value or exception, processor time)."""
+    logging.getLogger("tmt").setLevel(logging.ERROR)  # the main process has the same warnings
     threading.Thread(target=end_with_parent, daemon=True).start()
     while True:
         began = time.process_time()
@@ -134,18 +130,18 @@ def serve(connection) -> None:
             connection.send((*answer, taken))
         except BrokenPipeError:
             return
-        except Exception as error:  # a value that cannot be sent
+        except Exception as error:  # the value cannot be pickled
             connection.send((False, portable(error), taken))
 
 
 def end_with_parent() -> None:
-    """End with the main process, however that ends."""
+    """End this process when the main process has ended."""
     parent_process().join()
     os._exit(1)
 
 
 def portable(error: Exception) -> Exception:
-    """An exception that can be sent, and knows where it was raised."""
+    """An exception that can be pickled, with the attribute `place`."""
     error.place = place(error)
     try:
         pickle.loads(pickle.dumps(error))

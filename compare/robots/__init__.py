@@ -1,4 +1,4 @@
-"""What is known of one robot. Everything that only the assignment's arm has is in arm.py."""
+"""The description of a robot. All that is specific to the assignment's arm is in arm.py."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ from .case import Case, Coordinates, Scene
 
 
 class Printed(NamedTuple):
-    """One printed answer."""
+    """A printed result."""
 
     item: str
     quantity: str  # "holding torque", "qdd" or "Mbar"
@@ -22,14 +22,14 @@ class Printed(NamedTuple):
     values: tuple
     unit: str
     half_digit: float  # half a unit of the last printed digit
-    torque: str = "none"  # or the item whose answer acts: the torque that holds its posture
-    is_rounding: bool = False  # zero except for rounding: compared with the exact value, not with what is printed
-    to_every_digit: tuple = ()  # who meets the digits of what is rounding alone, of "exact", "tmt"
-    sizes: tuple = ()  # the joints whose component exact arithmetic shares in its size alone
+    torque: str = "none"  # or the item whose result is applied
+    is_rounding: bool = False  # zero except for rounding: compared with the exact value
+    to_every_digit: tuple = ()  # "exact", "tmt": computations that reproduce the digits of rounding
+    sizes: tuple = ()  # joints whose component agrees with exact arithmetic only in size
 
 
 class Question(NamedTuple):
-    """One question of an assignment, and where its answer is found."""
+    """A question of the assignment, and where the report answers it."""
 
     part: str
     asked: str
@@ -38,65 +38,59 @@ class Question(NamedTuple):
 
 
 class Claims(NamedTuple):
-    """What is claimed of a robot that is held at a posture with the torque that balances gravity there, by RK4."""
+    """Claims about RK4 runs of a robot that is held at a posture by the torque that balances gravity."""
 
-    dt: float  # s, the step of the claims
-    duration: float  # s, of a run of the claims
-    left: str  # the posture that is left, because of rounding
+    dt: float  # s
+    duration: float  # s
+    left: str  # posture that the robot leaves because of rounding
     left_after: float  # s, about
-    kept: str  # the posture that is not left
-    end: str  # the posture at which a run from `kept` is said to end
-    printed_torque: str  # the item of the torque at `left` as it is printed
-    of_scenes: Mapping[str, str]  # what is claimed of a scene, in words, by the scene's name
-    figures: Mapping[str, int]  # the number of the figure that shows a scene, by the scene's name
+    kept: str  # posture that it keeps
+    end: str  # claimed last posture of a run from `kept`
+    printed_torque: str  # item of the printed torque at `left`
+    of_scenes: Mapping[str, str]  # the claim in words, by scene
+    figures: Mapping[str, int]  # number of the printed figure, by scene
 
 
 class Conditioning(NamedTuple):
-    """Where the condition number of Mbar is said to be largest: two joints by name, their angles, deg; the others at 0."""
+    """The claimed maximum of the condition number of Mbar: two joints and their angles, deg; all others are 0."""
 
     joints: tuple
-    worst: tuple  # and, mirrored, with the other sign of the first
+    worst: tuple  # also with the opposite sign of the first
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """One robot: a file, the numbers that are stated of it, and what is asked of it.
+    """A robot: a file for MuJoCo, the numbers that are compared with it, and scenes.
 
-    Scenes may have tags: "full only": a quick run leaves it out; "digits": compared with many digits of its own scheme (a small
-    run takes the last of them); "speed": followed by every method; "regular": errors fall regularly there from coarse steps on;
-    "fewer joints": some of its joints never move; "falls": a free body falls and nothing else moves; "own": a user's, or one
-    made for a file, of which nothing is expected but agreement. A scene without tags is part of every run.
+    Tags of scenes: "full only": not in a quick run; "digits": compared with many digits (a small run: only the last one);
+    "speed": every method is run; "regular": errors are regular from large steps on; "fewer joints": some joints never move;
+    "falls": a free body falls and nothing else moves; "own": of a user or a file, only agreement is expected.
     """
 
     name: str
     mjcf: Path  # the file that MuJoCo runs
     tree: tmt.Tree  # the stated numbers
-    postures: Mapping[
-        str, tuple
-    ]  # deg (of a slide m, of a ball a quaternion), by name; the joints in the order of the Tree
+    postures: Mapping[str, tuple]  # by name, deg (m, quaternion), joints in the order of the Tree
     scenes: tuple[Scene, ...]
-    positions: Mapping[str, tuple] = field(default_factory=dict)  # further postures, as q of the Tree (rad, m), by name
-    ranges: tuple = ()  # of each joint (low, high), rad or m, or None; (): none has one
+    positions: Mapping[str, tuple] = field(default_factory=dict)  # further postures as q (rad, m), by name
+    ranges: tuple = ()  # (low, high) or None for each joint, rad or m; (): no ranges
     described: str = ""  # in a sentence: "a human arm"
-    symbols: Mapping[str, str] = field(default_factory=dict)  # how a joint's name is written in a figure
-    # centre, saddle, marginal: the posture that stands for it; resonant: a centre at which a swing of three steps grows
+    symbols: Mapping[str, str] = field(default_factory=dict)  # of joints, for figures
+    # example postures of a centre, a saddle, a marginal equilibrium, and a centre where a swing of three steps grows (resonant)
     kinds: Mapping[str, str] = field(default_factory=dict)
-    landmarks: Callable | None = None  # q (n,) rad -> {name: point in m}, drawn as a chain; None: the joints' origins
-    sketched: tuple[str, ...] = ()  # the postures of the sketch; none: the first two
-    axes: tuple[str, str, str] = ("x", "y", "z")  # of the inertial frame, as they are written there
+    landmarks: Callable | None = None  # q (n,) rad -> {name: point, m}, drawn as a chain; None: origins of the joints
+    sketched: tuple[str, ...] = ()  # postures of the sketch; (): the first two
+    axes: tuple[str, str, str] = ("x", "y", "z")  # labels of the inertial frame
     printed: tuple[Printed, ...] = ()
     claims: Claims | None = None
     conditioning: Conditioning | None = None
     questions: tuple[Question, ...] = ()
-    remarks: Callable | None = None  # (answers by item, dynamics by engine) -> sentences on what is printed
-    # what a file has and how it is treated, see engines.mujoco.inventory; then the numbers are those that MuJoCo compiled
-    features: tuple = ()
-    drive: Drive = field(default_factory=Drive)  # actuators and what else acts beside gravity and springs
-    stated_in: str = ""  # the solution, another file, whose numbers are stated of this one; "": none is
+    remarks: Callable | None = None  # (answers by item, dynamics by engine) -> Findings about the printed results
+    features: tuple = ()  # of a file, see engines.mujoco.inventory; its numbers are those that MuJoCo compiled
+    drive: Drive = field(default_factory=Drive)  # forces other than gravity and springs of joints
+    stated_in: str = ""  # another file, the solution, with the numbers for this one; "": none
     features_stated: tuple = ()  # of the solution, as `features`
-    own: tuple[
-        str, ...
-    ] = ()  # what a user's own equations give, "mass_matrix" ..., where they are compared; (): tmt's are
+    own: tuple[str, ...] = ()  # functions of a user's equations, "mass_matrix" ...; (): tmt's are compared
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -109,17 +103,17 @@ class Robot:
 
     @property
     def is_read(self) -> bool:
-        """Whether its numbers are those of a file, as MuJoCo compiled it; else they are stated here."""
+        """Whether its numbers are from a file that MuJoCo compiled."""
         return bool(self.features)
 
     @property
     def is_stated(self) -> bool:
-        """Whether its numbers are stated apart from the file that MuJoCo runs: here, or in a solution."""
+        """Whether its numbers are independent of the file that MuJoCo runs: stated here or in a solution."""
         return not self.is_read or bool(self.stated_in)
 
     @property
     def noun(self) -> str:
-        """What a sentence calls it: a file may have any name."""
+        """Its name in sentences; a file may have any name."""
         return "robot" if self.is_read else self.name
 
     @property
@@ -127,7 +121,7 @@ class Robot:
         return Coordinates(self.joints, self.tree.kind)
 
     def posture(self, posture: str | tuple = ()) -> np.ndarray:
-        """A posture by its name, or of angles in deg, lengths in m and quaternions (none: the reference): rad, (nq,)."""
+        """q (nq,), rad, of a posture: its name, or numbers in deg, m and quaternions; (): all zero."""
         if isinstance(posture, str) and posture in self.positions:
             return np.array(self.positions[posture], dtype=float)
         posture = self.postures[posture] if isinstance(posture, str) else posture
@@ -135,7 +129,7 @@ class Robot:
 
     @property
     def poses(self) -> dict[str, np.ndarray]:
-        """The named postures, rad, (nq,) each; all joints at zero if there are none."""
+        """The named postures, rad, (nq,) each; if there are none, all joints at zero."""
         named = {name: self.posture(name) for name in (*self.postures, *self.positions)}
         return named or {"all joints at zero": self.posture()}
 
@@ -145,20 +139,18 @@ class Robot:
 
     @property
     def cases(self) -> tuple[Case, ...]:
-        """Its scenes."""
         return tuple(Case(self, scene) for scene in self.scenes)
 
     @property
     def cases_of_torque(self) -> tuple[Case, ...]:
-        """Those under constant torque, in which its own actuators do not act."""
+        """The cases without its own actuators."""
         return tuple(case for case in self.cases if not case.controller)
 
     def with_scenes(self, scenes: tuple[Scene, ...]) -> "Robot":
-        """The same robot with more scenes."""
         return replace(self, scenes=self.scenes + scenes)
 
     def with_joints(self, names: Sequence[str]) -> "Robot":
-        """The same robot whose joints are called otherwise. names: of all, in the order of the Tree."""
+        """The same robot with other names of its joints, in the order of the Tree."""
         called = dict(zip(self.joints, names, strict=True))
 
         def renamed(joints: Sequence[str]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What drives a robot beside gravity and the springs of its joints: actuators, tendons, gravity compensation; plain numbers.
+"""Actuators, tendons and gravity compensation of a robot.
 
 The law of an actuator is MuJoCo's: force = (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot, along the length l of its transmission,
 with u its control, or its activation. MuJoCo documentation, computation, actuation model.
@@ -10,64 +10,64 @@ from typing import NamedTuple
 
 import numpy as np
 
-ON_EDGE = 1e-9  # m or rad: so near the end of a dead band a tendon is on its edge
+ON_EDGE = 1e-9  # m or rad, distance from the edge of a dead band that counts as on the edge
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """One actuator, at a joint, a tendon, or whatever MuJoCo knows the length of.
+    """An actuator at a joint, a tendon or another transmission of MuJoCo.
 
-    moment: what its force is multiplied with, (nv,), where that is dl/dq and the same at every posture (a joint of one number, a
-    fixed tendon), else None: then both are asked of MuJoCo. Forces are N or N m, times the gear.
+    moment: dl/dq, (nv,), if it is the same at every posture (a hinge, a slide, a fixed tendon), else None: then MuJoCo computes
+    it. Forces are N or N m, times the gear.
     """
 
     name: str
-    joint: str  # at which it acts, the first of several; "": at none
+    joint: str  # the first joint on which it acts; "": none
     moment: tuple | None
     gain: tuple = (0.0, 0.0, 0.0)  # g0, g1, g2
     bias: tuple = (0.0, 0.0, 0.0)  # b0, b1, b2
-    dynamics: str = "none"  # or integrator, filter, filterexact: then u is the activation, else the control
+    dynamics: str = "none"  # or integrator, filter, filterexact: then u is the activation
     time_constant: float = 0.0  # s, of a filter
     control_range: tuple | None = None  # (low, high)
     activation_range: tuple | None = None
     force_range: tuple | None = None  # N or N m
-    tendon: int = -1  # along which it pulls, by its number in the model; -1: none
-    off: str = ""  # why it exerts nothing; "": it does
-    refused: str = ""  # why its law is not known here; "": it is
+    tendon: int = -1  # index of its tendon; -1: none
+    off: str = ""  # why it exerts no force; "": it does
+    refused: str = ""  # why its law is not supported; "": it is
 
     @property
     def acts(self) -> bool:
-        """Whether it exerts a force that is known."""
+        """Whether it exerts a force by a supported law."""
         return not (self.off or self.refused)
 
     @property
     def is_servo(self) -> bool:
-        """Whether its force depends on the length: it has a target."""
+        """Whether its force depends on the length, so that it has a target."""
         return self.acts and bool(self.bias[1] or self.gain[1])
 
     @property
     def holds_speed(self) -> bool:
-        """Whether its control is a speed that it holds: one number is its gain of both."""
+        """Whether its control is a target of the speed."""
         return self.gain[0] == -self.bias[2] != 0.0 and not any((*self.gain[1:], *self.bias[:2]))
 
     def target(self, length: float) -> float:
-        """The u at which a servo is without force at a length, in its range; of any other actuator 0, in its range."""
+        """The u, within its range, for which a servo has force 0 at this length; other actuators: 0."""
         gain = self.gain[0] + self.gain[1] * length
         wanted = -(self.bias[0] + self.bias[1] * length) / gain if self.bias[1] and gain else 0.0
         return self.clamped(wanted)
 
     def clamped(self, u: float) -> float:
-        """The u that acts, by the range of the control, and of the activation."""
+        """u within the ranges of the control and of the activation."""
         for limits in (self.control_range, self.activation_range if self.dynamics != "none" else None):
             u = u if limits is None else min(max(u, limits[0]), limits[1])
         return float(u)
 
     def force(self, u: float, length: float) -> float:
-        """At rest, before the force range cuts it."""
+        """The force at rest, without the force range."""
         return (self.gain[0] + self.gain[1] * length) * u + self.bias[0] + self.bias[1] * length
 
     def largest(self, u: float, length: float) -> float:
-        """Of what the force is summed from: rounding is relative to it."""
+        """The largest term of the force; rounding is relative to it."""
         return max(abs(self.gain[0] * u), abs(self.gain[1] * length * u), abs(self.bias[0]), abs(self.bias[1] * length))
 
     def stiffness(self, u: float) -> float:
@@ -79,27 +79,27 @@ class Actuator:
         return -(self.gain[2] * u + self.bias[2])
 
     def is_cut(self, force: float) -> bool:
-        """Whether the force range cuts a force: then it depends on nothing."""
+        """Whether the force range limits a force, which is then constant."""
         return self.force_range is not None and not self.force_range[0] < force < self.force_range[1]
 
 
 @dataclass(frozen=True)
 class Cut:
-    """What ranges cut at a posture: it stays what it is there, N or N m."""
+    """Forces at a posture that ranges limit, N or N m; they are constant near it."""
 
-    forces: Mapping[int, float]  # of actuators by number
-    sums: Mapping[int, float]  # of all actuators at a speed, by its number
+    forces: Mapping[int, float]  # by index of the actuator
+    sums: Mapping[int, float]  # of all actuators, by index of the speed
 
 
 UNCUT = Cut({}, {})
 
 
 class Tendon(NamedTuple):
-    """A tendon that pulls by itself: a spring that is without force from `low` to `high`, and a damper."""
+    """A tendon with a spring, whose force is 0 from `low` to `high`, and a damper."""
 
     name: str
-    number: int  # in the model
-    moment: tuple | None  # (nv,), as an Actuator's
+    number: int  # index in the model
+    moment: tuple | None  # (nv,), see Actuator
     stiffness: float  # N/m, or as its length is measured
     damping: float
     low: float
@@ -109,20 +109,19 @@ class Tendon(NamedTuple):
         return self.stiffness * (min(self.high - length, 0.0) + max(self.low - length, 0.0))
 
     def largest(self, length: float) -> float:
-        """Of what the force is summed from."""
+        """The largest term of the force."""
         return self.stiffness * max(abs(length), abs(self.low), abs(self.high)) if self.pulls(length) else 0.0
 
     def pulls(self, length: float) -> bool:
-        """Whether its spring does something at a length; on the edge of its dead band it does, to one side."""
+        """Whether its spring acts at a length; on the edge of the dead band it acts on one side."""
         return not self.low + ON_EDGE < length < self.high - ON_EDGE
 
 
 class Rows(NamedTuple):
-    """c constraints of MuJoCo near a posture at rest, J qdd + R f = aref, aref = -damping J qd - stiffness r + that at rest.
+    """c constraints of MuJoCo near a posture at rest: J qdd + R f = aref, aref = -damping J qd - stiffness r + aref at rest.
 
-    jacobian: J (c, nv); forces: f at rest, (c,) N m or N, of which J' f acts on the speeds; damping (c,), 1/s; stiffness (c,),
-    1/s2, of a further violation r, with what the change of R does to f; softness: R (c,); limits: the joints of the model at
-    whose limits some of the rows are.
+    jacobian: J (c, nv); forces: f at rest, (c,) N m or N, generalized force J' f; damping (c,), 1/s; stiffness (c,), 1/s2, per
+    violation r, includes the effect of the change of R on f; softness: R (c,); limits: joints at whose limits rows are.
     """
 
     jacobian: np.ndarray
@@ -134,18 +133,18 @@ class Rows(NamedTuple):
 
     @property
     def springs(self) -> np.ndarray:
-        """J' (-df/dr) J, (nv, nv): at rest they are springs."""
+        """J' (-df/dr) J, (nv, nv): the stiffness at rest."""
         return (self.jacobian.T * (self.stiffness / self.softness)) @ self.jacobian
 
 
 @dataclass(frozen=True)
 class Drive:
-    """All that drives a robot, see Actuator and Tendon.
+    """The actuators, tendons and gravity compensation of a robot.
 
-    controls: by the name of a posture what its keyframe states: u of each actuator, or None. compensation: of each body of the
-    Tree, what part of its weight is taken away; lifted: the speeds at which that is an actuator's force, unlifted: at which it is
-    left out. damping: of each speed, by the actuators themselves. ranges: of the sum of the actuators' forces at a speed, and
-    tendon_ranges: along a tendon, (low, high) by number. unknown: what else acts and is left out, and why, by name.
+    controls: by posture, u of each actuator in its keyframe, or None. compensation: of each body of the Tree, the part of its
+    weight that is compensated; lifted: speeds where that counts as an actuator force; unlifted: where it is left out.
+    damping: of each speed, by the actuators. ranges, tendon_ranges: (low, high) of the sum of the actuator forces, by index of
+    the speed or tendon. unknown: other elements that are left out, and why, by name.
     """
 
     actuators: tuple[Actuator, ...] = ()
@@ -158,40 +157,93 @@ class Drive:
     lifted: tuple[int, ...] = ()
     unlifted: tuple[int, ...] = ()
     unknown: Mapping[str, str] = field(default_factory=dict)
-    # the file's solver is PGS, with which MuJoCo's discrete has springs and damping of joints implicit and no more (measured)
+    # with the solver PGS, MuJoCo's discrete treats only springs and damping of joints implicitly (measured)
     joints_alone: bool = False
-    explicit_damping: bool = False  # the file switches off that Euler has the damping of joints implicit
+    explicit_damping: bool = False  # the file disables EULERDAMP
 
     @property
     def refused(self) -> dict[str, str]:
-        """What is left out, by name, and why."""
-        return {one.name: one.refused for one in self.actuators if one.refused} | dict(self.unknown)
+        """Elements that are left out, by name, and why."""
+        return {actuator.name: actuator.refused for actuator in self.actuators if actuator.refused} | dict(self.unknown)
 
     @property
     def feeds_back(self) -> bool:
-        """Whether an actuator's force depends on position or speed; motors alone have no step of their own."""
-        return any(one.acts and any((*one.bias[1:], *one.gain[1:])) for one in self.actuators)
+        """Whether an actuator force depends on position or speed; if none does, there is no step limit."""
+        return any(actuator.acts and any((*actuator.bias[1:], *actuator.gain[1:])) for actuator in self.actuators)
 
     @property
     def servos(self) -> tuple[Actuator, ...]:
-        """The actuators that have a target."""
-        return tuple(one for one in self.actuators if one.is_servo)
+        """The actuators with a target."""
+        return tuple(actuator for actuator in self.actuators if actuator.is_servo)
 
     @property
     def without_ranges(self) -> "Drive":
-        """With forces of any size."""
-        actuators = tuple(replace(one, force_range=None) for one in self.actuators)
+        """The same without limits of forces."""
+        actuators = tuple(replace(actuator, force_range=None) for actuator in self.actuators)
         return replace(self, actuators=actuators, ranges={}, tendon_ranges={})
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
-        """u of each actuator at a posture: what its keyframe states, else the targets that are the posture; in their ranges.
+        """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.
 
         lengths: of the transmissions there.
         """
         stated = self.controls.get(posture, (None,) * len(self.actuators))
+        triples = zip(self.actuators, stated, lengths)
         return np.array(
-            [
-                one.target(length) if u is None else one.clamped(u)
-                for one, u, length in zip(self.actuators, stated, lengths)
-            ]
+            [actuator.target(length) if u is None else actuator.clamped(u) for actuator, u, length in triples]
         )
+
+
+class Controller(NamedTuple):
+    """Actuators with constant controls: generalized force torque - position_gain @ q - speed_gain @ qd."""
+
+    controls: tuple  # u of each actuator; None: left out
+    left_out: dict  # by name, why
+    torque: np.ndarray  # (nv,) N m or N
+    position_gain: np.ndarray  # (nv, nv) N m/rad
+    speed_gain: np.ndarray  # (nv, nv) N m s/rad
+
+
+def reason(actuator: Actuator, u: float) -> str:
+    """Why an actuator is left out of a Controller; "" if it is not.
+
+    With negative stiffness MuJoCo's `discrete` uses another scheme.
+    """
+    if actuator.off or actuator.refused:
+        return actuator.off or actuator.refused
+    if actuator.moment is None:
+        return "its moment depends on the posture"
+    if not any(actuator.moment):
+        return "it moves no joint"
+    return "it pushes away from its target" if actuator.stiffness(u) < 0.0 else ""
+
+
+def controller(drive: Drive, posture: object, q: np.ndarray, targets: np.ndarray | float = 0.0) -> Controller:
+    """The controller at a posture: its torque is sum of J' ((g0 u + b0) + (g1 u + b1) J q + (g2 u + b2) J qd), l = J q.
+
+    The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers; q: (nv,) rad or m,
+    of a ball any numbers; targets: (nv,) rad or m, shift of the targets: the target length of a servo by |J| @ targets.
+    """
+    moved, n = np.broadcast_to(targets, len(q)), len(q)
+    moments = [np.zeros(n) if actuator.moment is None else np.array(actuator.moment) for actuator in drive.actuators]
+    stated = drive.control(posture if isinstance(posture, str) else "", [moment @ q for moment in moments])
+    torque, position_gain, speed_gain = np.zeros(n), np.zeros((n, n)), np.zeros((n, n))
+    controls, left_out = {actuator.name: None for actuator in drive.actuators}, {}
+    for actuator, moment, u in zip(drive.actuators, moments, stated):
+        if why := reason(actuator, u):
+            left_out[actuator.name] = why
+            continue
+        u = controls[actuator.name] = moved_target(actuator, float(u), float(np.abs(moment) @ moved))
+        torque += moment * actuator.force(u, 0.0)
+        position_gain += np.outer(moment, moment) * actuator.stiffness(u)
+        speed_gain += np.outer(moment, moment) * actuator.damping(u)
+    return Controller(tuple(controls.values()), left_out, torque, position_gain, speed_gain)
+
+
+def moved_target(actuator: Actuator, u: float, by: float) -> float:
+    """The control that moves the target of a servo by a length; other actuators: u."""
+    stiffness = actuator.stiffness(u)
+    if not (by and stiffness):
+        return u
+    unlimited = replace(actuator, control_range=None, activation_range=None)
+    return unlimited.target(actuator.force(u, 0.0) / stiffness + by)

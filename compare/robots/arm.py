@@ -1,4 +1,4 @@
-"""The assignment's arm: its names, postures and scenes, and what the assignment prints and claims."""
+"""The assignment's arm: names, postures, scenes, printed results, claims."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,6 +7,7 @@ import numpy as np
 
 import tmt
 
+from ..judge.finding import Finding
 from . import Claims, Conditioning, Printed, Question, Robot
 from .case import Scene
 
@@ -45,8 +46,8 @@ QUESTIONS = (
     Question("d", "angular velocities in body axes", "kinematics", ("largest", "kinematics", "omega_b", {})),
     Question("e", "equations of motion by TMT", "mass, acceleration",
              ("largest", "mass", "Mbar", {}, "acceleration", "bias", {})),
-    Question("f", "accelerations from rest that can be foreseen", "published", ("printed", "f1", "f2", "f3", "f4")),
-    Question("g", "Mbar at the zero posture, by rows", "published, mass", ("printed", "g")),
+    Question("f", "accelerations from rest that can be predicted", "published", ("printed", "f1", "f2", "f3", "f4")),
+    Question("g", "Mbar at the zero posture", "published, mass", ("printed", "g")),
     Question("h", "torques that hold ball catch", "published, gravity", ("printed", "h")),
     Question("i", "five seconds of motion by RK4", "trajectory",
              ("largest", "trajectory", "RK4, angles", {"level": "open loop", "twin": "rk4"})),
@@ -60,8 +61,8 @@ CLAIMS = Claims(
     end="hanging",
     printed_torque="h",
     of_scenes={
-        "ball catch, held": "held at ball catch with dt = 5/64 s, the arm leaves after about 4.5 s, by rounding in an "
-        "unstable posture",
+        "ball catch, held": "held at ball catch with dt = 5/64 s, the arm leaves the unstable posture after about 4.5 s, "
+        "because of rounding",
         "bent, held": "held at bent, the arm does not move",
     },
     figures={"ball catch, held": 2, "bent, held": 3},
@@ -74,41 +75,24 @@ def landmarks(q: np.ndarray) -> dict:
     return {name: np.array([float(c) for c in point]) for name, point in zip(("shoulder", "elbow", "hand"), points)}
 
 
-def remarks(answers: Mapping, dynamics: Mapping) -> list[str]:
-    """The slips of the original, with what is right.
-
-    answers: by item, what TMT (`.tmt`) and MuJoCo (`.mujoco`) find; dynamics: of the arm, by engine.
-    """
+def remarks(answers: Mapping, dynamics: Mapping) -> list[Finding]:
+    """Errors in the printed solution. answers: by item, those of TMT (`.tmt`) and MuJoCo (`.mujoco`); dynamics: by engine."""
     q, qd = ARM.posture("ball catch"), np.ones(3)
     c, s = np.cos(q[1]), np.sin(q[1])
-    texts = {
+    right = {
+        label: dynamics[name].angular_velocities(q, qd)[0] for label, name in (("TMT", "tmt"), ("MuJoCo", "mujoco"))
+    }
+    stated = {
         "text": np.array([qd[1], c * qd[0], s * qd[0]]),  # (bd, 0, 0) + Rb (0, ad, 0)
-        "matrix": np.array([[0.0, 1.0, 0.0], [c, 0.0, 0.0], [-s, 0.0, 0.0]]) @ qd,  # B_1 as it is stated
+        "matrix": np.array([[0.0, 1.0, 0.0], [c, 0.0, 0.0], [-s, 0.0, 0.0]]) @ qd,  # B_1
     }
-    names = {"TMT": "tmt", "MuJoCo": "mujoco"}
-    right = {label: dynamics[name].angular_velocities(q, qd)[0] for label, name in names.items()}
-    off = {
-        name: ", ".join(f"{np.abs(values - omega).max():.1e} rad/s from {of}'s" for of, omega in right.items())
-        for name, values in texts.items()
+    differences = {
+        name: {label: float(np.abs(values - omega).max()) for label, omega in right.items()}
+        for name, values in stated.items()
     }
-    ours, theirs = answers["c"].tmt, answers["c"].mujoco
-    printed = PRINTED[0].values[0]
-    signs = ["the sign" if printed * value > 0.0 else "not the sign" for value in (ours[0], theirs[0])]
-    return [
-        "The text writes omega_1 = (bd, 0, 0) + Rb (0, ad, 0), and the same for omega_2; body components need the "
-        f"transposes Rb' and Rg'. At ball catch with unit rates the text's omega_1 is {off['text']}; that of the stated "
-        f"B_1 is {off['matrix']}.",
-        "The stacked T carries alpha, beta, gamma as three more rows with zero mass: no effect, not needed.",
-        "The equation for Qbar omits the transpose of T_b; the one for Mbar carries a stray qdd; the first line of "
-        "virtual power has the gyroscopic term with the wrong sign; the second derivative of x is bracketed wrongly; "
-        "two parts are called g.",
-        "The program leaves an unused inertia matrix with mixed axes; states are listed with five entries where six are "
-        "meant; the caption of Figure 3 repeats 'ball catch' and the number 2.",
-        f"The sign of (c): the printed {printed} has {signs[0]} of the torque that holds TMT's arm ({ours[0]:+.5f} N m) and "
-        f"{signs[1]} of MuJoCo's qfrc_bias at rest ({theirs[0]:+.5f} N m); the original's formula gives the opposite of what it "
-        "prints. Its program flips gravity in the torque function and adds the result, and that function is right only at "
-        "rest: the convective sign is wrong and the Euler part is missing.",
-    ]
+    sign = {"printed": PRINTED[0].values[0], "tmt": answers["c"].tmt[0], "mujoco": answers["c"].mujoco[0]}
+    findings = {"transposes": differences, "stacked_transform": {}, "equations": {}, "program": {}, "sign": sign}
+    return [Finding("arm", kind, values) for kind, values in findings.items()]
 
 
 ARM = Robot(

@@ -1,4 +1,4 @@
-"""A case: a robot with what a scene changes."""
+"""Scenes and cases: a scene states changes, a case is a robot with a scene."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -12,63 +12,144 @@ from tmt import literal
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import GAINS
 
-from .controller import Controller, controller
+from .actuators import Controller, controller
+from .coordinates import KINDS as KINDS
 from .coordinates import Coordinates
 from .coordinates import fastest_rates as fastest_rates
 from .coordinates import rates_at as rates_at
-from .given import some
-from .scene import TORQUES as TORQUES
-from .scene import Scene as Scene
+from .given import WrongField, are_numbers, is_number, some
 
 SEED = 10  # of every random number in a report
+MAX_STEPS = 10_000_000  # of a run
+TORQUES = ("free", "hold", "servos")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A motion of any robot under constant torque, or under constant controls of its actuators.
+
+    It states changes of the model ("no gravity", "additional damping", "these joints locked"), never absolute values that would
+    hide those of the file. Raises WrongField for values that no robot can have.
+    """
+
+    name: str
+    posture: str | tuple = ()  # name, or one number per joint, deg (m, quaternion); (): all zero
+    torque: str | tuple = "free"  # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
+    speed: tuple = ()  # deg/s (m/s) at the start; (): at rest
+    damping: float | tuple = 0.0  # N m s/rad (N s/m), added to that of all joints, or of each speed
+    targets: float | tuple = 0.0  # deg (m), shift of the targets of the servos, of all joints or each speed
+    gravity: bool = True  # that of the model, or none
+    locked: tuple = ()  # names of joints that keep their position
+    duration: float = 5.0  # s
+    dt: float = 5.0 / 64  # s, the largest step; all others divide it
+    judged: float | None = None  # s during which the band of rounding must be narrow; None: always
+    tags: tuple = ()  # see robots.Robot
+
+    def __post_init__(self):
+        self.require("name", is_text(self.name), "a text in one line, not empty")
+        self.set(
+            "posture", isinstance(self.posture, str) or are_numbers(self.posture), "the name of a posture, or numbers"
+        )
+        is_torque = self.torque in TORQUES if isinstance(self.torque, str) else are_numbers(self.torque)
+        self.set("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
+        self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
+        for name in ("duration", "dt"):
+            self.set(name, is_number(getattr(self, name)) and getattr(self, name) > 0.0, "a time in s above 0")
+        accepted = "a number of at least 0 N m s/rad, or one for each joint"
+        self.set("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
+        self.set("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
+        self.require("targets", not np.any(self.targets) or self.torque == "servos", 'torque = "servos"')
+        self.require("gravity", isinstance(self.gravity, bool | np.bool_), "true or false")
+        object.__setattr__(self, "gravity", bool(self.gravity))
+        accepted = f"a step that divides {self.duration:g} s into at most {MAX_STEPS:,}"
+        self.require("dt", self.duration / self.dt <= MAX_STEPS, accepted)
+        left = abs(self.steps * self.dt - self.duration)
+        self.require("dt", self.steps >= 1 and left <= 1e-9 * self.duration, accepted)
+        if self.judged is not None:
+            is_time = is_number(self.judged) and 0.0 <= self.judged <= self.duration
+            self.set("judged", is_time, f"a time in s of at most {self.duration:g}")
+        for name in ("locked", "tags"):
+            value = getattr(self, name)
+            is_names = isinstance(value, tuple | list) and all(isinstance(part, str) for part in value)
+            self.require(name, is_names, "a list of names")
+            object.__setattr__(self, name, tuple(dict.fromkeys(value)))
+
+    def require(self, name: str, is_right: bool, accepted: str) -> None:
+        """Raise WrongField for a field unless it is right."""
+        if not is_right:
+            raise WrongField(self.name, name, getattr(self, name), accepted)
+
+    def set(self, name: str, is_right: bool, accepted: str) -> None:
+        """Require that a field is right, and store its numbers as floats."""
+        self.require(name, is_right, accepted)
+        value = getattr(self, name)
+        if not isinstance(value, str):
+            object.__setattr__(self, name, tuple(map(float, value)) if np.ndim(value) else float(value))
+
+    @property
+    def steps(self) -> int:
+        """The number of steps of length dt."""
+        return round(self.duration / self.dt)
+
+
+def is_text(value: object) -> bool:
+    return isinstance(value, str) and bool(value.strip()) and value.isprintable()
+
+
+def is_each(value: object) -> bool:
+    """Whether a value is a number, or a sequence of numbers that is not empty."""
+    return is_number(value) or (are_numbers(value) and len(value) > 0)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A robot with what a scene changes. Raises ValueError, in one line, for what cannot be a scene of this robot."""
+    """A robot with a scene. Raises WrongField if this robot cannot have the scene."""
 
     robot: object  # a robots.Robot
     scene: Scene
 
     def __post_init__(self):
         names, scene, whole = self.robot.joints, self.scene, self.robot.coordinates
-        sizes = {"posture": whole.nq, "torque": whole.nv, "speed": whole.nv}
-        of_kinds = {"hinge": "deg", "slide": "m", "ball": "a quaternion"}
-        units = ", ".join(of_kinds[kind] for kind in dict.fromkeys(whole.all_kinds))
+        kinds = list(dict.fromkeys(whole.all_kinds))
+        units = ", ".join({"ball": "a quaternion"}.get(kind, KINDS[kind].position_given) for kind in kinds)
+
+        def require_each(name: str, count: int, each: tuple, unit: str, or_none: bool = False) -> None:
+            value = getattr(scene, name)
+            accepted = f"{count} numbers, one per joint ({some(each)}), in {unit}"
+            scene.require(name, len(value) == count or (or_none and value == ()), accepted)
+
         if isinstance(scene.posture, str):
-            count = f"{whole.nq} numbers, one per joint ({some(whole.positions)})"
+            count = f"{whole.nq} numbers, one per joint ({some(whole.positions)}), in {units}"
             named = self.robot.postures or self.robot.positions
             postures = [name for name, q in self.robot.poses.items() if len(q) == whole.nq and named]
-            accepted = f"{', '.join(postures)} or {count}, in {units}" if postures else f"{count}, in {units}"
-            scene.refuse("posture", scene.posture not in postures, accepted)
-        for name, unit in (("posture", units), ("torque", "N m"), ("speed", "deg/s")):
-            value = getattr(scene, name)
-            left_out = name != "torque" and value == ()
-            known = isinstance(value, str) or len(value) == sizes[name] or left_out
-            each = whole.positions if name == "posture" else whole.speeds
-            scene.refuse(name, not known, f"{sizes[name]} numbers, one per joint ({some(each)}), in {unit}")
-        if not isinstance(scene.posture, str) and scene.posture:
-            for joint in whole.places.balls:
-                wrong = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) > CLOSE_TO_ONE
-                scene.refuse("posture", wrong, "a quaternion w, x, y, z of length 1 for each ball")
-        known = not isinstance(scene.damping, tuple) or len(scene.damping) == whole.nv
-        scene.refuse("damping", not known, f"one number, or {whole.nv}, one per joint ({some(whole.speeds)}),")
-        one, kinds = not isinstance(scene.targets, tuple), {*whole.all_kinds} - {"ball"}
-        known = scene.targets == 0.0 or len(kinds) < 2 if one else len(scene.targets) == whole.nv
-        scene.refuse("targets", not known, f"{whole.nv} numbers, one per joint ({some(whole.speeds)}), in {units},")
+            accepted = f"{', '.join(postures)} or {count}" if postures else count
+            scene.require("posture", scene.posture in postures, accepted)
+        else:
+            require_each("posture", whole.nq, whole.positions, units, or_none=True)
+            for joint in whole.places.balls if scene.posture else ():
+                is_unit = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) <= CLOSE_TO_ONE
+                scene.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
+        if not isinstance(scene.torque, str):
+            require_each("torque", whole.nv, whole.speeds, "N m")
+        require_each("speed", whole.nv, whole.speeds, "deg/s", or_none=True)
+        if isinstance(scene.damping, tuple):
+            require_each("damping", whole.nv, whole.speeds, "N m s/rad")
+        if isinstance(scene.targets, tuple) or (scene.targets and len({*kinds} - {"ball"}) > 1):
+            is_right = isinstance(scene.targets, tuple) and len(scene.targets) == whole.nv
+            scene.require("targets", is_right, f"{whole.nv} numbers, one per joint ({some(whole.speeds)}), in {units}")
         if scene.torque == "servos":
-            idle = all(u is None for u in self.controller.controls)
-            scene.refuse("torque", idle, "free, hold or numbers, as no actuator of this robot takes part,")
-            scene.refuse("locked", scene.locked, "no locked joint where servos act")
-        unknown = [name for name in scene.locked if name not in names]
-        most = f"a tuple of at most {len(names) - 1} of {some(names)}"
-        scene.refuse("locked", unknown or len(scene.locked) >= len(names), most)
-        moving = [
-            name
-            for name, joint in zip(names, whole.places.joints)
-            if name in scene.locked and any(scene.speed[joint.qd])
-        ]
-        scene.refuse("speed", moving, f"no speed of a locked joint ({', '.join(scene.locked)})")
+            acts = any(u is not None for u in self.controller.controls)
+            scene.require("torque", acts, "free, hold or numbers: this robot has no actuator that takes part")
+            scene.require("locked", not scene.locked, "no locked joint together with servos")
+        is_right = set(scene.locked) <= set(names) and len(scene.locked) < len(names)
+        scene.require("locked", is_right, f"at most {len(names) - 1} of {some(names)}")
+        moving = any(any(scene.speed[self.places[name].qd]) for name in scene.locked) if scene.speed else False
+        scene.require("speed", not moving, f"speed 0 for locked joints ({', '.join(scene.locked)})")
+
+    @cached_property
+    def places(self) -> dict:
+        """The kind of each joint of the robot and its indices in q and v, by name."""
+        return dict(zip(self.robot.joints, self.robot.coordinates.places.joints))
 
     @property
     def name(self) -> str:
@@ -80,17 +161,16 @@ class Case:
 
     @property
     def steps(self) -> int:
-        """The number of the coarsest steps."""
+        """The number of steps of length dt."""
         return self.scene.steps
 
     @property
     def is_free(self) -> bool:
-        """Whether no torque acts."""
         return self.scene.torque == "free"
 
     @property
     def is_held(self) -> bool:
-        """Whether it starts at rest under the torque that holds it: its true motion is rest."""
+        """Whether the exact motion is rest."""
         return self.scene.torque == "hold" and not any(self.scene.speed)
 
     @property
@@ -100,14 +180,11 @@ class Case:
 
     @property
     def coordinates(self) -> Coordinates:
-        kinds = tuple(
-            kind for name, kind in zip(self.robot.joints, self.robot.tree.kind) if name not in self.scene.locked
-        )
-        return Coordinates(self.joints, kinds)
+        return Coordinates(self.joints, tuple(self.places[name].kind for name in self.joints))
 
     @cached_property
     def controller(self) -> Controller | None:
-        """What the robot's own actuators do, if they act."""
+        """The robot's own actuators, if they act."""
         if self.scene.torque != "servos":
             return None
         whole = self.robot.coordinates
@@ -117,10 +194,7 @@ class Case:
 
     @cached_property
     def whole(self) -> tmt.Tree:
-        """The robot's Tree with the scene's damping added, its actuators, and without gravity if the scene has none.
-
-        No joint is locked.
-        """
+        """The robot's Tree with the damping, actuators and gravity of the scene; no joint is locked."""
         tree, scene = self.robot.tree, self.scene
         gravity = tree.gravity if scene.gravity else (0.0, 0.0, 0.0)
         gains = {name: getattr(self.controller, name) for name in GAINS} if self.controller else {}
@@ -128,13 +202,9 @@ class Case:
 
     @property
     def locked(self) -> Mapping[str, float | tuple]:
-        """The positions of the locked joints, rad or m, of a ball its quaternion, by their names."""
-        held = {}
-        for name, (kind, at, _) in zip(self.robot.joints, self.robot.coordinates.places.joints):
-            if name in self.scene.locked:
-                values = tuple(map(float, self.posture[at]))
-                held[name] = values if kind == "ball" else values[0]
-        return held
+        """The positions of the locked joints by name, rad or m; of a ball its quaternion."""
+        values = {name: tuple(map(float, self.posture[place.q])) for name, place in self.places.items()}
+        return {name: q if len(q) > 1 else q[0] for name, q in values.items() if name in self.scene.locked}
 
     @cached_property
     def tree(self) -> tmt.Tree:
@@ -159,7 +229,6 @@ class Case:
 
     @property
     def start(self) -> tuple[np.ndarray, np.ndarray]:
-        """q and v."""
         return self.q, self.v
 
     @cached_property
@@ -178,33 +247,31 @@ class Case:
 
     @property
     def added_damping(self) -> np.ndarray:
-        """What the scene adds to the damping of the free joints, N m s/rad, (nv,)."""
-        return np.broadcast_to(self.scene.damping, self.robot.coordinates.nv)[self._free("qd")]
+        """The damping that the scene adds to the free joints, N m s/rad, (nv,)."""
+        return self.free(np.broadcast_to(self.scene.damping, self.robot.coordinates.nv))
 
     def free(self, values: np.ndarray) -> np.ndarray:
-        """Of one value for each speed of all joints, (nv,), those of the free ones."""
+        """The entries of the free joints, of values for all speeds, (nv,)."""
         return values[self._free("qd")]
 
     def whole_positions(self, q: np.ndarray) -> np.ndarray:
-        """Positions of all joints, (..., nq), where the free ones are at q, (..., their nq)."""
+        """Positions of all joints, (..., nq), from those of the free joints, (..., nq)."""
         return self._whole(self.posture, q, "q")
 
     def whole_speeds(self, v: np.ndarray) -> np.ndarray:
-        """Speeds of all joints, (..., nv), where the free ones have v, (..., their nv)."""
+        """Speeds of all joints, (..., nv), from those of the free joints, (..., nv)."""
         return self._whole(np.zeros(self.robot.coordinates.nv), v, "qd")
 
     def _whole(self, locked, values, which):
-        """Values of the free joints among those of the locked ones."""
         whole = np.tile(locked, (*np.shape(values)[:-1], 1))
         whole[..., self._free(which)] = values
         return whole
 
     def _free(self, which):
-        """The places of the free joints in q or qd of all."""
-        whole = self.robot.coordinates.places
-        places = [getattr(joint, which) for name, joint in zip(self.robot.joints, whole.joints) if name in self.joints]
-        return [i for place in places for i in range(place.start, place.stop)]
+        """The indices of the free joints in q or qd of all."""
+        slices = [getattr(self.places[name], which) for name in self.joints]
+        return [i for at in slices for i in range(at.start, at.stop)]
 
     def changed(self, **changes) -> "Case":
-        """The same robot in a scene with other values."""
+        """The same robot; the scene with other values."""
         return Case(self.robot, dataclasses.replace(self.scene, **changes))

@@ -1,4 +1,4 @@
-"""The coordinates of a model's joints: positions, movements and speeds, and what is done with them."""
+"""The joints of a robot: their kinds and units, positions and speeds."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,18 +11,37 @@ from tmt.equations.composite import mass_matrix_and_bias
 from tmt.model import coordinates
 
 
+class Kind(NamedTuple):
+    """A kind of joint: its nouns and units."""
+
+    plural: str
+    speeds: int  # number of speeds
+    unit: str  # of a movement; speeds: per s
+    force: str  # unit
+    position_given: str  # unit in scenes
+    speed_given: str
+    movement_given: str
+
+
+KINDS = {
+    "hinge": Kind("hinges", 1, "rad", "N m", "deg", "deg/s", "deg"),
+    "slide": Kind("slides", 1, "m", "N", "m", "m/s", "m"),
+    "ball": Kind("balls", 3, "rad", "N m", "quaternions", "deg/s", "deg"),
+}
+
+
 class Coordinates(NamedTuple):
-    """The coordinates of a model's joints: positions q, nq numbers, and movements and speeds, nv numbers.
+    """Positions q, nq numbers, and speeds, nv numbers, of a number of joints.
 
     A hinge has an angle in rad, a slide a length in m, a ball a quaternion (w, x, y, z) and three speeds in its own axes.
     """
 
     names: tuple[str, ...]  # of the joints
-    kinds: tuple[str, ...] = ()  # of each "hinge", "slide" or "ball"; (): all are hinges
+    kinds: tuple[str, ...] = ()  # "hinge", "slide" or "ball" for each joint; (): all are hinges
 
     @property
     def places(self) -> coordinates.Coordinates:
-        """Where each joint stands in q and v, as tmt has it."""
+        """The indices of each joint in q and v."""
         return coordinates.coordinates_of(self.all_kinds)
 
     @property
@@ -43,19 +62,17 @@ class Coordinates(NamedTuple):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Of the movements, (nv,); those of the speeds are the same per s."""
-        return tuple(
-            unit for kind in self.all_kinds for unit in {"slide": ("m",), "ball": ("rad",) * 3}.get(kind, ("rad",))
-        )
+        """The units of a movement, (nv,); of the speeds: the same per s."""
+        return tuple(unit for kind in self.all_kinds for unit in [KINDS[kind].unit] * KINDS[kind].speeds)
 
     @property
     def speeds(self) -> tuple[str, ...]:
-        """A name for each movement and speed: that of the joint, of a ball with its axis."""
+        """The names of the speeds: the joint; for a ball "name x"."""
         return self._named("xyz")
 
     @property
     def positions(self) -> tuple[str, ...]:
-        """A name for each number of a position: that of the joint, of a ball with the part of its quaternion."""
+        """The names of the numbers of a position: the joint; for a ball "name w"."""
         return self._named("wxyz")
 
     def _named(self, parts):
@@ -65,7 +82,7 @@ class Coordinates(NamedTuple):
         )
 
     def difference(self, q1: np.ndarray, q0: np.ndarray) -> np.ndarray:
-        """From q0 to q1 as a movement, (..., nq) -> (..., nv); of a ball the shortest, in its own axes."""
+        """The movement from q0 to q1, (..., nq) -> (..., nv); for a ball the shortest rotation vector in its own axes."""
         if not self.has_balls:
             return np.subtract(q1, q0)
         q1, q0 = np.broadcast_arrays(q1, q0)
@@ -81,23 +98,23 @@ class Coordinates(NamedTuple):
         return np.stack(moved, axis=-1)
 
     def random(self, rng: np.random.Generator, count: int, ranges: Sequence = ()) -> np.ndarray:
-        """Random positions, (count, nq): within the range of each joint, (low, high) or None.
+        """Random positions, (count, nq), within the range of each joint, (low, high) or None.
 
-        Without a range a whole turn of a hinge, 1 m of a slide; of a ball any turn.
+        Without a range: a full turn of a hinge, 1 m of a slide. A ball: uniform over all rotations.
         """
         if not ranges and set(self.all_kinds) == {"hinge"}:
             return rng.uniform(-np.pi, np.pi, (count, self.nq))
         q = np.empty((count, self.nq))
-        for (kind, at, _), known in zip(self.places.joints, ranges or (None,) * len(self.names)):
+        for (kind, at, _), limits in zip(self.places.joints, ranges or (None,) * len(self.names)):
             if kind == "ball":
                 turns = rng.normal(size=(count, 4))
                 q[:, at] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
             else:
-                q[:, at.start] = rng.uniform(*(known or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[kind]), count)
+                q[:, at.start] = rng.uniform(*(limits or {"hinge": (-np.pi, np.pi), "slide": (-0.5, 0.5)}[kind]), count)
         return q
 
     def from_degrees(self, values: ArrayLike, positions: bool) -> np.ndarray:
-        """Positions (nq,) or speeds (nv,) with angles in deg, as they are given in scenes, in rad; else as they are."""
+        """Positions (nq,) or speeds (nv,) in SI units; angles of scenes are in deg."""
         values = np.array(values, dtype=float)
         for kind, at, by in self.places.joints:
             if kind == "hinge" or (kind == "ball" and not positions):
@@ -107,17 +124,17 @@ class Coordinates(NamedTuple):
 
 
 def rates_at(tree: Tree, q: np.ndarray) -> tuple[float, float]:
-    """The fastest rates of decay by damping and of a swing by springs at positions q (nq,), 1/s."""
+    """The fastest decay rate by damping and the fastest frequency by springs at q (nq,), 1/s."""
     inertia, _ = mass_matrix_and_bias(tree, q.tolist(), [0.0] * tree.coordinates.nv)
     return fastest_rates(tree, np.linalg.pinv(np.array(inertia), hermitian=True))
 
 
 def fastest_rates(tree: Tree, inverse: np.ndarray, added: tuple = ()) -> tuple[float, float]:
-    """The fastest rate of decay by the joints' own damping and what is added, and that of a swing by the springs, 1/s.
+    """The fastest decay rate by damping and the fastest frequency by springs, 1/s.
 
-    inverse: of Mbar, (nv, nv).
+    inverse: of Mbar, (nv, nv); added: damping in addition to that of the joints.
     """
-    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(3 if kind == "ball" else 1)]
+    of_speeds = [k for kind, k in zip(tree.kind, tree.stiffness) for _ in range(KINDS[kind].speeds)]
     damped, stiff = np.diag(np.add(tree.damping, added or 0.0)), np.diag(of_speeds)
     if tree.has_gains:
         damped, stiff = (

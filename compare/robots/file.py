@@ -1,4 +1,4 @@
-"""A robot that is read from a file: its postures, and the scenes that any robot can play."""
+"""A robot that is read from a file: its postures and scenes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,29 +9,26 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.equations.composite import (
-    mass_matrix_and_bias,  # the sum over bodies would take minutes for hundreds of joints
-)
+from tmt.equations.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.model.tree import GAINS
 
 from . import Robot
-from .actuators import Drive
-from .case import Coordinates, Scene, fastest_rates
-from .controller import controller
+from .actuators import Drive, controller
+from .case import KINDS, Coordinates, Scene, fastest_rates
 
-DURATION = 1.0  # s: a robot that swings freely is chaotic, and is not judged much longer
-LEAST_STEPS, MOST_STEPS_OF_A_FILE = 64, 8192  # of a scene, by its coarsest step
-COARSER = 4  # than the file's own step
+DURATION = 1.0  # s; longer free motions are chaotic
+MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
+COARSER = 4  # largest step / step of the file
 OWN_POSTURES = "qpos0", "middle"  # their names
-SERVOS_ACT = 0.25  # s: a servo has answered then, and its fast modes ask for short steps
+SERVOS_ACT = 0.25  # s, duration of scenes with servos; their fast modes need short steps
 MOVED_TARGETS = {"hinge": 6.0, "slide": 0.02, "ball": 0.0}  # deg or m, in a step response
-STILL = 1e-6  # rad/s2 or m/s2: what accelerates less where it is let go stays
+STILL = 1e-6  # rad/s2 or m/s2, acceleration that counts as rest
 THROWN_UP, TUMBLING = 2.0, (120.0, 60.0, -90.0)  # m/s, and deg/s about a free body's own axes
 SET_GOING = {"hinge": 60.0, "slide": 0.2, "ball": 60.0}  # deg/s or m/s
 
 
 class Reading(Protocol):
-    """What a file was read as, see engines.mujoco.reading."""
+    """A file as it was read, see engines.mujoco.reading."""
 
     name: str
     source: Path | str
@@ -45,19 +42,19 @@ class Reading(Protocol):
 
 
 def robot_of(reading: Reading, shown: str) -> Robot:
-    """The robot of a file that a report calls `shown`: its numbers are those that MuJoCo compiled."""
+    """The robot of a file, called `shown` in reports, with the numbers that MuJoCo compiled."""
     keys = names_of_keys(reading)
-    found = named_positions(reading, keys)
-    start = next(name for name in found if name != "qpos0" or len(found) == 1)
+    positions = named_positions(reading, keys)
+    start = next(name for name in positions if name != "qpos0" or len(positions) == 1)
     drive = replace(reading.drive, controls={keys[name]: u for name, u in reading.drive.controls.items()})
     return Robot(
         name=reading.name or Path(shown).stem or shown,
         mjcf=reading.source if isinstance(reading.source, Path) else Path(shown),
         tree=reading.tree,
         postures={},
-        positions=found,
+        positions=positions,
         ranges=tuple(reading.ranges),
-        scenes=scenes_from(reading.tree, start, np.array(found[start]), reading.dt, drive),
+        scenes=scenes_from(reading.tree, start, np.array(positions[start]), reading.dt, drive),
         described=Path(shown).name or shown,
         features=tuple(reading.features),
         drive=drive,
@@ -67,10 +64,9 @@ def robot_of(reading: Reading, shown: str) -> Robot:
 def robot_of_solution(
     reading: Reading, shown: str, solution: Reading, whose: str, names: Sequence[str]
 ) -> tuple[Robot, Reading]:
-    """The robot of a file whose numbers are stated in a solution, called `whose`, and that as it is compared.
+    """The robot of a file with the numbers, postures and scenes of a solution, called `whose`; and that solution.
 
-    names: of the file's joints, in the order of the solution's. Postures and scenes are the solution's. Actuators do not act:
-    they may be others.
+    names: of the file's joints, in the order of the solution's. Actuators do not act: those of the file may differ.
     """
     solution = replace(solution, tree=replace(solution.tree, hinge_names=tuple(names)), drive=Drive())
     robot = replace(
@@ -84,41 +80,37 @@ def robot_of_solution(
 
 
 def names_of_keys(reading: Reading) -> dict[str, str]:
-    """What the posture of each keyframe is called: as the keyframe, or apart from postures that have a name here."""
+    """The name of the posture of each keyframe: that of the keyframe, different from OWN_POSTURES."""
     names = {}
     for name in reading.keyframes:
-        apart = name
-        while apart in OWN_POSTURES or (
-            apart != name and apart in reading.keyframes
-        ):  # no key may take another's place
-            apart = f"key {apart}"
-        names[name] = apart
+        unique = name
+        while unique in OWN_POSTURES or (unique != name and unique in reading.keyframes):
+            unique = f"key {unique}"
+        names[name] = unique
     return names
 
 
 def named_positions(reading: Reading, names: Mapping[str, str]) -> dict[str, tuple]:
-    """Postures by their names, (nq,) each: the keyframes, qpos0, and the middle of the ranges; of equal ones the first."""
+    """Postures by name, (nq,) each: keyframes, qpos0, the middle of the ranges; of equal postures only the first."""
     coordinates = Coordinates(reading.tree.hinge_names, reading.tree.kind)
     middle = np.array(reading.qpos0, dtype=float)
-    for (kind, at, _), known in zip(coordinates.places.joints, reading.ranges):
-        if known and kind != "ball":
-            middle[at] = np.mean(known)
+    for (kind, at, _), limits in zip(coordinates.places.joints, reading.ranges):
+        if limits and kind != "ball":
+            middle[at] = np.mean(limits)
     own = dict(zip(OWN_POSTURES, (reading.qpos0, middle)))
-    found = {}
+    positions = {}
     for name, q in ({names[key]: q for key, q in reading.keyframes.items()} | own).items():
-        if not any(np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in found.values()):
-            found[name] = tuple(map(float, q))
-    return found
+        if not any(np.abs(coordinates.difference(q, np.array(other))).max() < 1e-9 for other in positions.values()):
+            positions[name] = tuple(map(float, q))
+    return positions
 
 
 def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive | None = None) -> tuple[Scene, ...]:
-    """The scenes: held at a posture by what balances gravity and springs, a free body thrown, let go, let go with damping.
+    """The scenes of a robot: held, let go, let go with damping; a free body is thrown too; with servos see servo_scenes.
 
-    And, if it has servos, held by these, and their step response.
-
-    Of each nothing is expected but agreement, for as long as rounding allows. What rests where it is let go is set going. A free
-    body that is let go may only fall, and none of its joints moves: it is thrown where errors are to be seen.
-    start, q: the posture, its name and position (nq,); dt: s, of the file; drive: its actuators.
+    Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial speed. Methods are
+    compared on a thrown free body, because one that is let go may only fall.
+    start, q: the posture, name and (nq,); dt: step of the file, s; drive: its actuators.
     """
     coordinates = Coordinates(tree.hinge_names, tree.kind)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
@@ -126,7 +118,7 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Dri
     accelerations = inverse @ -(weight + literal.spring_torque(q, tree))
     added = added_damping(inverse, accelerations)
     rests = np.abs(accelerations).max() < STILL
-    going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * (3 if kind == "ball" else 1))}
+    going = {"speed": tuple(v for kind in tree.kind for v in [SET_GOING[kind]] * KINDS[kind].speeds)}
     how, speed = ("set going", going) if rests else ("let go", {})
     timing = {"duration": DURATION, "dt": DURATION / coarsest(tree, inverse, dt), "judged": 0.0}
     damped = timing | {"dt": DURATION / coarsest(tree, inverse, dt, added)}
@@ -146,10 +138,9 @@ def scenes_from(tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Dri
 def servo_scenes(
     tree: tmt.Tree, start: str, q: np.ndarray, dt: float, drive: Drive, inverse: np.ndarray
 ) -> list[Scene]:
-    """The scenes in which a robot's own actuators act, if some of these are servos: held, and their targets moved.
+    """The scenes with the robot's own servos, if it has some: held, and step response.
 
-    A robot with a free body has no rest under gravity, and none here. A robot whose servos are too fast for the finest of the
-    coarsest steps of a file is not followed by every method.
+    A robot with a free body has no gravity in them. If a servo is too fast for MAX_STEPS_OF_A_FILE, methods are not compared.
     """
     joints = tree.coordinates.joints
     positions = np.array([q[at.start] for _, at, by in joints for _ in range(by.start, by.stop)])
@@ -159,42 +150,46 @@ def servo_scenes(
     driven = replace(tree, **{name: getattr(acting, name) for name in GAINS})
     count, least = coarsest(driven, inverse, dt, duration=SERVOS_ACT), SERVOS_ACT * max(fastest_rates(driven, inverse))
     free = bool(free_bodies(Coordinates(tree.hinge_names, tree.kind)))
-    given = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
+    settings = {"gravity": not free, "duration": SERVOS_ACT, "dt": SERVOS_ACT / count, "judged": 0.0}
     moved = tuple(MOVED_TARGETS[kind] for kind, _, by in joints for _ in range(by.start, by.stop))
     followed = ("speed",) if least <= count else ()
     return [
-        Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **given),
+        Scene(f"{start}, held by servos", start, "servos", tags=("own", "full only"), **settings),
         Scene(
-            f"{start}, step of the servos", start, "servos", targets=moved, tags=("own", "servos", *followed), **given
+            f"{start}, step of the servos",
+            start,
+            "servos",
+            targets=moved,
+            tags=("own", "servos", *followed),
+            **settings,
         ),
     ]
 
 
 def added_damping(inverse: np.ndarray, accelerations: np.ndarray) -> tuple[float, ...]:
-    """Damping for each speed, (nv,) N m s/rad or N s/m, that lets a robot sink and not swing.
+    """Damping of each speed, (nv,) N m s/rad or N s/m, with which a robot sinks without swinging.
 
-    A joint that the others give way to has the inertia 1 / (Mbar^-1)_ii; with it every joint decays at the same rate: twice that
-    of a swing whose largest acceleration, at 1 rad or 1 m, is the one of letting go, at least 1 rad/s2.
+    Every joint, with its inertia 1 / (Mbar^-1)_ii, decays at the same rate: twice the frequency of a swing of 1 rad or 1 m with
+    the initial acceleration, at least 1 rad/s2.
     """
     rate = 2.0 * np.sqrt(max(1.0, np.abs(accelerations).max()))
     return tuple(float(rate / ease) for ease in np.diag(inverse))
 
 
 def coarsest(tree: tmt.Tree, inverse: np.ndarray, dt: float, added: tuple = (), duration: float = DURATION) -> int:
-    """Into how many steps a scene is divided: 64, 128 ... 8192, of four times the file's own dt, s, as finer runs divide them.
+    """The number of steps of a scene, 64, 128 ... 8192: about four times the step of the file.
 
-    No step is longer than 1 over the fastest rate, 1/s, of the joints' own damping, what is added, springs and servos.
-    inverse: of Mbar, (nv, nv); duration: s, of the scene.
+    No step is longer than 1 / the fastest rate of damping, added damping, springs and servos. inverse: of Mbar, (nv, nv).
     """
     least = duration * max(1.0 / (COARSER * dt), *fastest_rates(tree, inverse, added))
-    count = LEAST_STEPS
-    while count < min(0.999 * least, MOST_STEPS_OF_A_FILE):
+    count = MIN_STEPS
+    while count < min(0.999 * least, MAX_STEPS_OF_A_FILE):
         count *= 2
     return count
 
 
 def thrown(coordinates: Coordinates) -> tuple[float, ...]:
-    """Speeds, (nv,) m/s and deg/s, of free bodies that are thrown up and tumble; () if there are none."""
+    """Speeds, (nv,) m/s and deg/s, of tumbling free bodies; () if there are none."""
     speed, free = np.zeros(coordinates.nv), free_bodies(coordinates)
     for slides, turn in free:
         speed[slides[-1]] = THROWN_UP
@@ -203,10 +198,7 @@ def thrown(coordinates: Coordinates) -> tuple[float, ...]:
 
 
 def free_bodies(coordinates: Coordinates) -> list[tuple[list[int], slice]]:
-    """Where the speeds of each free body stand: of its three slides, and of its turn.
-
-    A free body is three slides and a ball in a row.
-    """
+    """The indices of the speeds of each free body (three slides and a ball): of the slides, of the ball."""
     kinds, joints = coordinates.all_kinds, coordinates.places.joints
     free = [i for i in range(3, len(kinds)) if kinds[i - 3 : i + 1] == ("slide", "slide", "slide", "ball")]
     return [([joints[k].qd.start for k in range(i - 3, i)], joints[i].qd) for i in free]

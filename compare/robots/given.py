@@ -1,4 +1,4 @@
-"""What is given for a scene: whether it is made of numbers, and what is said of what cannot be."""
+"""Validation of what users give for a scene."""
 
 from collections.abc import Sequence
 
@@ -6,16 +6,16 @@ import numpy as np
 
 
 class WrongField(ValueError):
-    """A field that cannot be one of a scene: which, and what is accepted."""
+    """A field of a scene has a wrong value. accepted: what is expected instead."""
 
     def __init__(self, scene: object, field: str, value: object, accepted: str):
-        named, found = (shorten(" ".join(repr(part).split())) for part in (scene, value))
-        super().__init__(f"scene {named}: {field} is {found}; {accepted} is expected")
+        named, shown = (shorten(" ".join(repr(part).split())) for part in (scene, value))
+        super().__init__(f"scene {named}: {field} is {shown}; expected {accepted}")
         self.field, self.accepted = field, accepted
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is one finite real number; neither text nor true and false."""
+    """Whether a value is a finite real number; texts and booleans are not."""
     try:
         number = np.asarray(value)
     except (TypeError, ValueError, OverflowError):
@@ -24,17 +24,17 @@ def is_number(value: object) -> bool:
 
 
 def are_numbers(values: object) -> bool:
-    """Whether the values are such numbers in a row."""
+    """Whether a value is a sequence of finite real numbers."""
     row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
     return row and all(is_number(value) for value in values)
 
 
 def some(names: Sequence[str], most: int = 6) -> str:
-    """Names in a sentence: the first ones, and how many more there are."""
+    """The first names, and the number of the others."""
     more = len(names) - most
     return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def shorten(text: str, length: int = 60) -> str:
-    """A text that may stand in one line."""
+    """A text of limited length."""
     return text if len(text) <= length else text[: length - 4] + " ..."

@@ -1,19 +1,21 @@
-"""How equations of one's own name, order, turn, zero and measure the joints of a model.
+"""The joints of a user's equations: their order, sense, zero and units compared with those of the model; joints of two files.
 
-A joint of one's own is stated as "knee", "-knee" (the other sense), "knee+90deg", "knee-0.1rad", "slider+0.2m" (its own zero:
-own position = position of the model + 90 deg), "knee in deg" (positions in deg and speeds in deg/s), "knee in deg, rad/s"
-(positions alone), or several of these: "-knee+90deg in deg". They stand in the order in which one's own equations take them.
-Mbar and h of one's own are per rad and in N m in each of them, whatever the unit of the arguments.
+A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg", "knee-0.1rad", "slider+0.2m",
+another zero (own position = position of the model + 90 deg); "knee in deg", positions in deg and speeds in deg/s; "knee in deg,
+rad/s", positions only; and combinations: "-knee+90deg in deg". Mbar and h are always per rad and in N m.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+import tmt
+
 from ..judge.words import listed
 from .coordinates import Coordinates
+from .given import some
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 STATED = re.compile(r"(?P<name>.+?)(?P<offset>[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<measure>deg|rad|m)")
@@ -21,11 +23,11 @@ FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
 class JointsError(ValueError):
-    """A statement of joints that does not fit the model; the message is one line."""
+    """The stated joints do not match the model; the message is one line."""
 
 
 class Joint(NamedTuple):
-    """A joint as one's own equations have it: own position = sign x position of the model + zero, in its unit."""
+    """A joint of a user's equations: own position = sign x position of the model + zero, in its unit."""
 
     name: str  # of the model
     sign: float = 1.0
@@ -44,7 +46,7 @@ class Joint(NamedTuple):
 
 
 class JointMap:
-    """Between positions q (..., nq), speeds (..., nv), Mbar and forces of a model and those of one's own equations."""
+    """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and a user's equations (`own`)."""
 
     def __init__(self, coordinates: Coordinates, joints: Sequence[Joint]):
         places = dict(zip(coordinates.names, coordinates.places.joints))
@@ -64,18 +66,15 @@ class JointMap:
 
     @property
     def is_same(self) -> bool:
-        """Whether one's own joints are the model's."""
+        """Whether the joints are those of the model."""
         same = self.sign.min() == self.of_q.min() == self.of_q.max() == 1.0 and not self.zero.any()
         return bool(same and (self.of_v == 1.0).all() and (self.q == np.arange(len(self.q))).all())
 
-    def after(self, found: "JointMap", coordinates: Coordinates) -> "JointMap | None":
-        """The map from a model to one's own joints, where what this map takes for the model's joints are those of `found`.
-
-        None where it cannot be stated, as of degrees of degrees.
-        """
+    def after(self, first: "JointMap", coordinates: Coordinates) -> "JointMap | None":
+        """The composition: first, then this map. None if it cannot be stated, for example degrees of degrees."""
         places, joints = {name: i for i, name in enumerate(coordinates.names)}, []
         for stated in self.joints:
-            inner = found.joints[places[stated.name]]
+            inner = first.joints[places[stated.name]]
             if stated.unit and inner.unit:
                 return None
             zero = stated.sign * inner.zero + stated.zero / PER_UNIT[inner.unit][0]
@@ -90,14 +89,13 @@ class JointMap:
         return np.asarray(v)[..., self.v] * self.sense * self.of_v
 
     def own_forces(self, tau: np.ndarray) -> np.ndarray:
-        """Forces at the model's joints, at those of one's own; also accelerations, which are per s2 in rad."""
+        """Forces at the own joints; also accelerations, in rad/s2 whatever the unit."""
         return np.asarray(tau)[..., self.v] * self.sense
 
     def own_mass_matrix(self, M: np.ndarray) -> np.ndarray:
         return np.asarray(M)[..., self.v[:, None], self.v] * self.sense[:, None] * self.sense
 
     def positions(self, own: np.ndarray) -> np.ndarray:
-        """Of the model."""
         return put((np.asarray(own) / self.of_q - self.zero) * self.sign, self.q)
 
     def speeds(self, own: np.ndarray) -> np.ndarray:
@@ -112,44 +110,42 @@ class JointMap:
 
 
 def within_a_turn(zero: float, slides: bool) -> float:
-    """The zero of a hinge between -180 and 180 deg, 0 if only rounding is left of it; that of a slide as it is."""
+    """A zero; of a hinge between -180 and 180 deg, rounding errors removed."""
     turned = zero if slides else (zero + np.pi) % (2.0 * np.pi) - np.pi
     return 0.0 if abs(turned) < 1e-9 else float(turned)
 
 
 def put(values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values in one's own order, in the model's."""
+    """Values of the own order in that of the model."""
     return np.asarray(values)[..., np.argsort(at)]
 
 
 def joint_map(coordinates: Coordinates, stated: Sequence[str] | None) -> JointMap:
-    """Of joints as they are stated; None: those of the model. JointsError says what does not fit."""
+    """The JointMap of stated joints; None: those of the model."""
     if stated is None:
         return JointMap(coordinates, [Joint(name) for name in coordinates.names])
     if isinstance(stated, str) or not all(isinstance(text, str) for text in stated):
-        raise JointsError(f"joints is {stated!r}; a list of names such as {FORMS} is expected")
+        raise JointsError(f"joints is {stated!r}; expected a list of names such as {FORMS}")
     joints = [read_joint(text.strip(), coordinates) for text in stated]
     names = [joint.name for joint in joints]
     twice = [name for name in names if names.count(name) > 1]
     missing = [name for name in coordinates.names if name not in names]
     if twice:
-        raise JointsError(f"joints name {twice[0]!r} twice")
+        raise JointsError(f"joint {twice[0]!r} is stated twice")
     if missing:
-        raise JointsError(
-            f"joints do not name {listed(missing)}; all {len(coordinates.names)} of the model are expected"
-        )
+        raise JointsError(f"joints without {listed(missing)}; expected all {len(coordinates.names)} of the model")
     return JointMap(coordinates, joints)
 
 
 def read_joint(text: str, coordinates: Coordinates) -> Joint:
-    """One joint as it is stated; a joint of that very name comes first."""
+    """A stated joint; a joint with exactly this name has priority."""
     kinds = dict(zip(coordinates.names, (joint.kind for joint in coordinates.places.joints)))
     if text in kinds:
         return Joint(text)
     rest, unit = text, ""
-    for known in PER_UNIT:
-        if known and rest.endswith(f" in {known}"):
-            rest, unit = rest.removesuffix(f" in {known}").rstrip(), known
+    for name in PER_UNIT:
+        if name and rest.endswith(f" in {name}"):
+            rest, unit = rest.removesuffix(f" in {name}").rstrip(), name
             break
     sign, zero = 1.0, 0.0
     if rest not in kinds and rest.startswith("-"):
@@ -158,14 +154,100 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
         rest, value = match["name"], float(match["offset"])
         zero = np.radians(value) if match["measure"] == "deg" else value
         if rest in kinds and (match["measure"] == "m") != (kinds[rest] == "slide"):
-            raise JointsError(f"joint {text!r}: {rest} is a {kinds[rest]}, whose zero is not in {match['measure']}")
+            raise JointsError(f"joint {text!r}: {rest} is a {kinds[rest]}, its zero cannot be in {match['measure']}")
     name, measured, measure = rest.rpartition(" in ")
     if rest not in kinds and measured and name.removeprefix("-") in kinds:
-        raise JointsError(f"joint {text!r}: the unit {measure!r} is not known; {', '.join(filter(None, PER_UNIT))} are")
+        raise JointsError(f"joint {text!r}: unknown unit {measure!r}; known: {', '.join(filter(None, PER_UNIT))}")
     if rest not in kinds:
-        raise JointsError(f"there is no joint {text!r}; {listed(coordinates.names)} are known, stated as {FORMS}")
+        raise JointsError(f"unknown joint {text!r}; known: {listed(coordinates.names)}, stated as {FORMS}")
     if kinds[rest] == "ball" and (sign, zero, unit) != (1.0, 0.0, ""):
-        raise JointsError(f"joint {text!r}: {rest} is a ball, of which only the name can be stated")
+        raise JointsError(f"joint {text!r}: {rest} is a ball, only its name can be stated")
     if kinds[rest] == "slide" and unit:
-        raise JointsError(f"joint {text!r}: {rest} is a slide, whose unit is m")
+        raise JointsError(f"joint {text!r}: {rest} is a slide, its unit is m")
     return Joint(rest, sign, float(zero), unit, kinds[rest] == "slide")
+
+
+# joints of two files
+
+OTHER_TYPE = 1e6  # cost of joints of different kinds, which are never matched
+# cost of a match: 1 - |cos| of the axes, depth in the tree, distance / size of the robot, opposite axis, order (breaks ties)
+OF_AXIS, OF_DEPTH, OF_PLACE, OF_SENSE, OF_ORDER = 4.0, 1.5, 1.0, 0.5, 1e-3
+
+
+class Unmatched(ValueError):
+    """Some joints have no counterpart; the message names them."""
+
+
+class Matched(NamedTuple):
+    """The joints of a file."""
+
+    names: tuple[str, ...]  # in the order of the reference's joints
+    renamed: tuple[str, ...]  # "wrist as hand": not matched by name
+
+
+def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
+    """The joints of a tree for those of the reference, called `whose`: by name, else by place, axis and type. See Unmatched."""
+    from scipy.optimize import linear_sum_assignment  # slow import
+
+    pairs = same_names(reference.hinge_names, tree.hinge_names)
+    left = [i for i in range(len(reference.hinge_names)) if i not in pairs]
+    free = [j for j in range(len(tree.hinge_names)) if j not in pairs.values()]
+    costs = costs_of(reference, tree)
+    rows, columns = linear_sum_assignment(costs[np.ix_(left, free)])
+    pairs |= {left[i]: free[j] for i, j in zip(rows, columns) if costs[left[i], free[j]] < OTHER_TYPE}
+    refuse_unmatched(reference, tree, pairs, whose)
+    names = tuple(tree.hinge_names[pairs[i]] for i in range(len(reference.hinge_names)))
+    other = [f"{name} as {right}" for name, right in zip(names, reference.hinge_names) if name != right]
+    return Matched(names, tuple(other))
+
+
+def same_names(reference: Sequence[str], names: Sequence[str]) -> dict[int, int]:
+    """Joints of the same name, also with other capital letters: {index: index}."""
+    pairs = {i: names.index(name) for i, name in enumerate(reference) if name in names}
+    small, right = [name.casefold() for name in names], [name.casefold() for name in reference]
+    for i, name in enumerate(right):
+        if i not in pairs and small.count(name) == right.count(name) == 1 and small.index(name) not in pairs.values():
+            pairs[i] = small.index(name)
+    return pairs
+
+
+def costs_of(reference: tmt.Tree, tree: tmt.Tree) -> np.ndarray:
+    """The costs of matching a joint of the reference (row) with a joint of the tree (column)."""
+    (anchors, depths, axes), (other_anchors, other_depths, other_axes) = map(places_of, (reference, tree))
+    along = np.einsum("id,jd->ij", axes, other_axes)
+    apart = np.linalg.norm(anchors[:, None] - other_anchors, axis=-1)
+    costs = (
+        OF_AXIS * (1.0 - np.abs(along))
+        + OF_SENSE * (along < 0.0)
+        + OF_DEPTH * np.abs(np.subtract.outer(depths, other_depths))
+    )
+    costs += OF_PLACE * apart / max(np.ptp(anchors, axis=0).max(), np.ptp(other_anchors, axis=0).max(), 1e-9)
+    costs += OF_ORDER * np.abs(np.subtract.outer(np.arange(len(depths)), np.arange(len(other_depths))))
+    return np.where(np.array(reference.kind)[:, None] == np.array(tree.kind), costs, OTHER_TYPE)
+
+
+def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The anchor of each joint in the world, m (n, 3), its depth in the tree (n,), its first axis (n, 3)."""
+    anchors, depths = [], []
+    for parent, offset in zip(tree.parent, tree.offset):
+        anchors.append(np.add(offset, anchors[parent] if parent >= 0 else 0.0))
+        depths.append(depths[parent] + 1 if parent >= 0 else 0)
+    axes = [tree.axis[by.start] for _, _, by in tree.coordinates.joints]
+    return np.array(anchors), np.array(depths), np.array(axes)
+
+
+def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, int], whose: str) -> None:
+    """Unmatched, if a joint is missing, additional, or of another kind."""
+    ours, theirs = (dict(zip(one.hinge_names, one.kind)) for one in (reference, tree))
+    pairs_of_names = [(reference.hinge_names[i], tree.hinge_names[j]) for i, j in sorted(pairs.items())]
+    wrong = [
+        f"joint {name} is a {theirs[name]}, expected a {ours[expected]} as in {whose}"
+        for expected, name in pairs_of_names
+        if ours[expected] != theirs[name]
+    ]
+    missing = [f"{name} ({kind})" for i, (name, kind) in enumerate(ours.items()) if i not in pairs]
+    extra = [f"{name} ({kind})" for j, (name, kind) in enumerate(theirs.items()) if j not in pairs.values()]
+    wrong += [f"missing joints: {some(missing)}"] if missing else []
+    wrong += [f"additional joints: {some(extra)}"] if extra else []
+    if wrong:
+        raise Unmatched("; ".join(wrong))

@@ -1,6 +1,6 @@
-"""An industrial arm of six hinges as a Tree, with rotors: where faults are made that the assignment's arm is too small for.
+"""An industrial arm with six hinges and rotors as a Tree, for tests of faults.
 
-Its numbers are those of the model arm6 of the tests, rounded.
+Its numbers are those of tests/models/arm6.xml, rounded.
 """
 
 import tmt

@@ -1,27 +1,24 @@
-"""The states at which engines are compared: the named postures, and random ones."""
+"""The states at which engines are compared: named postures and random states."""
 
 from functools import cached_property
 
 import numpy as np
 
-from tmt.equations.composite import (
-    mass_matrix_and_bias,  # the sum over bodies would take minutes for hundreds of joints
-)
+from tmt.equations.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 from tmt.exact.values import exact
 
 from . import Robot
 from .case import SEED
 
-SECONDS_OF_EXACT = 5.0  # of all exact values of a report, about
-SHOWN_NUMBERS = 8  # of a position, in a sentence
-MOST_NUMBERS = 2_000_000  # in T_b of all random states together
+SECONDS_OF_EXACT = 5.0  # for all exact values of a report, about
+SHOWN_NUMBERS = 8  # maximum size of q in a sentence
+MOST_NUMBERS = 2_000_000  # maximum size of T_b of all random states
 
 
 class Sample:
-    """States at which engines are compared, with the exact values of the first `exact_states`.
+    """States q (states, nq) rad, qd rad/s and tau N m (states, nv), with exact values for the first `exact_states`.
 
-    tree: the stated numbers. q: (states, nq), qd, tau: (states, nv), rad, rad/s, N m. states: their names, if they have any.
-    notes: sentences on what is left out.
+    states: their names, if they have any; notes: sentences about what is left out.
     """
 
     def __init__(self, tree, name, q, qd, tau, exact_states, states=(), notes=()):
@@ -31,62 +28,62 @@ class Sample:
     @cached_property
     def truths(self) -> list:
         """A tmt.exact.values.Truth for each of the first states."""
-        known = slice(self.exact_states)
-        return [exact(self.tree, *state) for state in zip(self.q[known], self.qd[known], self.tau[known])]
+        columns = (values[: self.exact_states] for values in (self.q, self.qd, self.tau))
+        return [exact(self.tree, *state) for state in zip(*columns)]
 
     def truth(self, quantity: str) -> np.ndarray:
-        """One of its fields, of mpmath numbers: (exact_states, ...)."""
+        """A field of the exact values, (exact_states, ...) mpmath numbers."""
         return np.array([getattr(truth, quantity) for truth in self.truths])
 
     def describe(self, i: int) -> str:
-        """Where state i is, for a reader who wants to see it again."""
+        """The name of state i, or its q."""
         if self.states:
             return self.states[i]
-        if len(self.q[i]) > SHOWN_NUMBERS:  # all of them are in the table
+        if len(self.q[i]) > SHOWN_NUMBERS:
             return f"state {i}"
         unit = " rad" if set(self.tree.kind) == {"hinge"} else ""
         return f"state {i}: q = ({', '.join(f'{a:.4f}' for a in self.q[i])}){unit}"
 
     def first(self, count: int) -> "Sample":
-        """Its first states."""
+        """The first states, without exact values."""
         if count >= len(self.q):
             return self
         return Sample(self.tree, self.name, *(a[:count] for a in (self.q, self.qd, self.tau)), 0, self.states[:count])
 
     def each(self) -> list["Sample"]:
-        """One sample for each state, by its own name."""
+        """A sample for each named state."""
         singles = []
         for i, name in enumerate(self.states):
-            known = int(i < self.exact_states)
-            single = Sample(self.tree, name, *(a[i : i + 1] for a in (self.q, self.qd, self.tau)), known, (name,))
+            exact_states = int(i < self.exact_states)
+            values = (a[i : i + 1] for a in (self.q, self.qd, self.tau))
+            single = Sample(self.tree, name, *values, exact_states, (name,))
             single.truths = self.truths[i : i + 1]
             singles.append(single)
         return singles
 
 
 def named(robot: Robot) -> Sample:
-    """The named postures, or the reference if there are none; with random speeds and torques where those are asked for."""
+    """The named postures, or all joints at zero, with random speeds and torques."""
     rng, q = np.random.default_rng([SEED, 1]), np.array(list(robot.poses.values()))
     most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, len(q), robot.coordinates.nv))
     name = "named postures" if robot.postures or robot.positions else "a posture"
-    known, notes = of_named(robot), ()
-    if known < len(q):
-        notes = (
-            f"Exact values are known of {known} of the {len(q)} {name}: one of them takes about {seconds(robot):.1g} s.",
-        )
-    return Sample(robot.tree, name, q, speeds, torques, known, tuple(robot.poses), notes)
+    exact_states = of_named(robot)
+    notes = (f"Exact values: {exact_states} of {len(q)} {name} ({seconds(robot):.1g} s each).",)
+    notes = notes if exact_states < len(q) else ()
+    return Sample(robot.tree, name, q, speeds, torques, exact_states, tuple(robot.poses), notes)
 
 
 def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sample:
-    """Random states: positions within the joints' ranges, speeds and torques within `largest_speeds_and_torques`."""
-    rng, asked, exact_asked = np.random.default_rng(seed), states, exact_states
-    states = min(asked, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
-    exact_states = min(exact_asked, states, affordable(robot) - of_named(robot))
-    notes = [f"{states:,} random states in place of {asked:,}: so many bodies and joints take long."] * (states < asked)
-    if exact_states < min(exact_asked, states):
-        left = f"{exact_states} random states in place of {exact_asked}"
-        notes.append(f"Exact values are known of {left}: one takes about {seconds(robot):.1g} s.")
+    """Random states: positions within the ranges of the joints; see `largest_speeds_and_torques`. Large robots have fewer."""
+    rng, wanted, exact_wanted = np.random.default_rng(seed), states, exact_states
+    states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * robot.coordinates.nv)))
+    exact_states = min(exact_wanted, states, affordable(robot) - of_named(robot))
+    notes = [f"{states:,} random states in place of {wanted:,}: the robot is large."] * (states < wanted)
+    if exact_states < min(exact_wanted, states):
+        notes.append(
+            f"Exact values: {exact_states} random states in place of {exact_wanted} ({seconds(robot):.1g} s each)."
+        )
     q = robot.coordinates.random(rng, states, robot.ranges)
     most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, states, robot.coordinates.nv))
@@ -94,31 +91,31 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
 
 
 def seconds(robot: Robot) -> float:
-    """What one exact state takes, s, about: of 3 to 35 speeds it was within a third of this."""
+    """Duration of an exact state, s; measured for 3 to 35 speeds, within a third."""
     return 3e-3 + 3.4e-5 * robot.coordinates.nv**2 * len(robot.tree.mass)
 
 
 def affordable(robot: Robot) -> int:
-    """How many exact states there are time for."""
+    """The number of exact states in SECONDS_OF_EXACT."""
     return int(SECONDS_OF_EXACT / seconds(robot))
 
 
 def of_named(robot: Robot) -> int:
-    """How many of the named postures have exact values: all, or as many as half of the time allows."""
+    """The number of named postures with exact values, in at most half of that time."""
     return min(len(robot.poses), affordable(robot) // 2)
 
 
 def largest_speeds_and_torques(robot: Robot) -> np.ndarray:
-    """The largest random speeds, rad/s, and torques, N m, (2, nv).
+    """The largest random speeds, rad/s, and torques, N m, (2, nv): 10 each for a robot without ranges.
 
-    Without stated ranges 10 of each. Else a speed goes through the joint's range in 1 s (a turn, 1 m without one), and a torque
-    gives the joint 10 rad/s2 at the reference, if the others are held.
+    Else a speed passes the range of its joint in 1 s (a turn, 1 m without range), and a torque gives the joint 10 rad/s2 at
+    q = 0 if the others are locked.
     """
     if not robot.ranges:
         return np.full((2, robot.coordinates.nv), 10.0)
     speeds = []
-    for (kind, _, by), known in zip(robot.coordinates.places.joints, robot.ranges):
-        low, high = known if known and kind != "ball" else (0.0, 1.0 if kind == "slide" else 2.0 * np.pi)
+    for (kind, _, by), limits in zip(robot.coordinates.places.joints, robot.ranges):
+        low, high = limits if limits and kind != "ball" else (0.0, 1.0 if kind == "slide" else 2.0 * np.pi)
         speeds += [high - low] * (by.stop - by.start)
     mass_matrix, _ = mass_matrix_and_bias(robot.tree, robot.tree.zero, [0.0] * robot.coordinates.nv)
     return np.array([speeds, 10.0 * np.diag(mass_matrix)])

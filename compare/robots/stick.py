@@ -1,4 +1,4 @@
-"""The stick figure of a robot: its points in the world at any positions, the sticks between them, and how they are seen."""
+"""The stick figure of a robot: points, sticks and the view."""
 
 from collections.abc import Iterable
 
@@ -10,17 +10,17 @@ from tmt.equations import method
 
 from . import Robot
 
-ELEVATION, AZIMUTH = 20.0, -70.0  # deg, from where it is seen
+ELEVATION, AZIMUTH = 20.0, -70.0  # deg, of the camera
 _E, _A = np.radians([ELEVATION, AZIMUTH])
-RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of who sees it
+RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of the camera
 UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
 def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Its points, (times, points, 3) m in the world, at positions q (times, nq), and the pairs of points that a stick joins.
+    """Points in the world, (times, points, 3) m, at positions q (times, nq), and the pairs of points with a stick.
 
-    Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move: the
-    slides of a free joint are no points. crosses: a ball with no further joint has its axes too, so that its turn is seen.
+    The landmarks; else the joints, and the centres of mass after the last joints; the slides of a free joint are left out.
+    crosses: with the axes of balls at the end of a chain, to show their rotation.
     """
     if robot.landmarks:
         points = np.array([list(robot.landmarks(one).values()) for one in q])
@@ -33,33 +33,34 @@ def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np
     for body, joint in enumerate(tree.body_hinge):
         if joint >= 0 and joint not in tree.parent:
             ends = [coms[:, body]]
-            if crosses and tree.kind[joint] == "ball":  # as long as the radius of a full ball of this mass and inertia
+            if crosses and tree.kind[joint] == "ball":  # radius of a solid sphere of this mass and inertia
                 radius = np.sqrt(np.trace(tree.inertia[body]) / (1.2 * tree.mass[body]))
                 ends += [points[joint] + radius * along_run(axis, q) for axis in frames[joint].axes]
             links += [(joint, len(points) + k) for k in range(len(ends))]
             points += ends
     joined = sorted({point for link in links for point in link})
-    found = np.stack([points[k] for k in joined], axis=1).astype(float)
-    return found, [(joined.index(one), joined.index(other)) for one, other in links]
+    return np.stack([points[k] for k in joined], axis=1).astype(float), [
+        (joined.index(one), joined.index(other)) for one, other in links
+    ]
 
 
 def along_run(vector: Iterable, q: np.ndarray) -> np.ndarray:
-    """A vector whose parts are numbers or one for each position, (times, 3)."""
+    """A vector whose parts are numbers or arrays (times,), as (times, 3)."""
     return np.stack([np.broadcast_to(part, len(q)) for part in vector], axis=-1)
 
 
 def as_seen(points: np.ndarray) -> np.ndarray:
-    """Points in the world, (..., 3) m, as they are seen: to the right and up, (..., 2) m."""
+    """Points in the world, (..., 3) m, in the view: right and up, (..., 2) m."""
     return points @ np.stack([RIGHTWARD, UPWARD], axis=1)
 
 
 def free_parts(tree: tmt.Tree) -> list[bool]:
-    """Of each joint whether it is one of the four of a free joint."""
-    found = [False] * len(tree.kind)
+    """Whether each joint is one of the four of a free joint."""
+    is_free = [False] * len(tree.kind)
     for i in range(3, len(tree.kind)):
         row = range(i - 2, i + 1)
         if tree.kind[i - 3 : i + 1] == ("slide", "slide", "slide", "ball") and all(
             tree.parent[k] == k - 1 and not any(tree.offset[k]) for k in row
         ):
-            found[i - 3 : i + 1] = [True] * 4
-    return found
+            is_free[i - 3 : i + 1] = [True] * 4
+    return is_free

@@ -21,8 +21,7 @@ from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
 from ..robots.given import some
-from ..robots.joint_map import JointsError, joint_map
-from ..robots.matching import Unmatched, matched_joints
+from ..robots.joint_map import JointsError, Unmatched, joint_map, matched_joints
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file

@@ -1,4 +1,4 @@
-"""A Dask cluster of real processes: pieces get the outcomes that the pool gives them, whatever becomes of the workers."""
+"""A Dask cluster of real processes: tasks get the outcomes that the pool gives them, whatever becomes of the workers."""
 
 import json
 import os
@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 import runs
-import toy_pieces as toy
-from toy_pieces import gone_soon, notes, soon
+import toy_tasks as toy
+from toy_tasks import gone_soon, notes, soon
 
 pytest.importorskip("distributed")
 
 from compare.fleet import cluster as module
 from compare.fleet.cluster import Cluster
-from compare.fleet.piece import FleetError, Piece, outcomes
+from compare.fleet.tasks import FleetError, Task, outcomes
 from compare.process import interrupt
 
 HERE = Path(__file__).resolve().parent
@@ -48,7 +48,7 @@ class Machines:
         return run
 
     def worker(self, *options, threads=1):
-        """One more worker, without a nanny where that is not asked for."""
+        """One more worker, without a nanny where that is not tasks for."""
         local = self.folder / f"local-{len(self.processes)}"
         local.mkdir()
         options = [*(options or ["--no-nanny"]), "--nthreads", str(threads), "--local-directory", str(local)]
@@ -74,26 +74,26 @@ def with_workers(cluster, count):
     """The cluster, as soon as it has this number of workers."""
 
     def there():
-        cluster.seen_at = -module.FRESH
-        return len(cluster.known()) == count
+        cluster.refreshed_at = -module.REFRESH
+        return len(cluster.worker_infos()) == count
 
     assert soon(there)
     return cluster
 
 
 @pytest.mark.slow
-def test_what_becomes_of_a_piece_and_what_is_timed_goes_to_the_worker_for_it(machines, tmp_path):
+def test_outcomes_and_timed_tasks_go_to_the_worker_for_them(machines, tmp_path):
     timing, _ = machines.worker("--no-nanny", "--resources", "timing=1"), machines.worker("--nanny")
     for name in ("timed", "ended"):
         (tmp_path / name).mkdir()
     with closing(with_workers(Cluster(machines.address, toy.LIMIT), 2)) as cluster:
         toy.check_all(cluster, tmp_path)
-        asked = [Piece("", toy.waits, (str(tmp_path / "timed"), os.devnull), timed=True) for _ in range(4)]
-        asked += [Piece("", abs, (k,)) for k in range(8)]
-        assert cluster.no_timing() is None and not any(found.broke for found in outcomes(cluster, asked))
+        tasks = [Task("", toy.waits, (str(tmp_path / "timed"), os.devnull), timed=True) for _ in range(4)]
+        tasks += [Task("", abs, (k,)) for k in range(8)]
+        assert cluster.no_timing() is None and not any(found.broke for found in outcomes(cluster, tasks))
         assert [int(owner) for _, owner in notes(tmp_path / "timed", 4)] == [timing.pid] * 4
         cluster.submit(
-            Piece("", toy.for_ever, (str(tmp_path / "ended"),))
+            Task("", toy.for_ever, (str(tmp_path / "ended"),))
         )  # a fleet that is ended is ended on the workers
         (pids,) = notes(tmp_path / "ended")
     assert gone_soon(*pids) and cluster.close not in interrupt.undo
@@ -101,7 +101,7 @@ def test_what_becomes_of_a_piece_and_what_is_timed_goes_to_the_worker_for_it(mac
 
 @pytest.mark.slow
 def test_a_worker_is_killed_with_all_that_it_had(machines, tmp_path):
-    """Its piece runs on another one, with what it shares with others, and its process does not live on."""
+    """Its task runs on another one, with what it shares with others, and its process does not live on."""
     workers, folder, opened = [machines.worker("--nanny"), machines.worker()], tmp_path / "notes", tmp_path / "opened"
     folder.mkdir()
 
@@ -115,14 +115,14 @@ def test_a_worker_is_killed_with_all_that_it_had(machines, tmp_path):
     with closing(with_workers(Cluster(machines.address, 60.0), 2)) as cluster:
         thread = threading.Thread(target=kill)
         thread.start()
-        asked = [Piece("", toy.waits, (str(folder), str(opened)), shared=b"s" * 10**7) for _ in range(4)]
-        assert [found.returned for found in outcomes(cluster, asked)] == [10**7] * 4
+        tasks = [Task("", toy.waits, (str(folder), str(opened)), shared=b"s" * 10**7) for _ in range(4)]
+        assert [found.returned for found in outcomes(cluster, tasks)] == [10**7] * 4
         thread.join()
         assert len(list(folder.iterdir())) == 5
-        machines.kill(workers[1])  # now there is none: the next piece waits until one comes
+        machines.kill(workers[1])  # now there is none: the next task waits until one comes
         thread = threading.Timer(1.5, machines.worker)
         thread.start()
-        assert outcomes(cluster, [Piece("", abs, (-4,))])[0].returned == 4
+        assert outcomes(cluster, [Task("", abs, (-4,))])[0].returned == 4
         thread.join()
 
 
@@ -132,14 +132,14 @@ def test_workers_that_do_not_come_back_and_a_scheduler_that_is_gone_end_a_fleet(
     with closing(with_workers(Cluster(machines.address, 0.5), 2)) as cluster:
         machines.kill(timing)
         with_workers(cluster, 1)
-        found = outcomes(cluster, [Piece("", abs, (2,), timed=k < 5) for k in range(6)])
+        found = outcomes(cluster, [Task("", abs, (2,), timed=k < 5) for k in range(6)])
         assert ["timing" in each.broke for each in found] == [True] * 5 + [False]
         machines.kill(plain)
         with pytest.raises(FleetError, match=f"{machines.address} has no worker"):
-            outcomes(cluster, [Piece("", abs, (2,))])
+            outcomes(cluster, [Task("", abs, (2,))])
         machines.kill(machines.scheduler)
-        with pytest.raises(FleetError, match=f"{machines.address} is gone"):
-            outcomes(cluster, [Piece("", abs, (2,))])
+        with pytest.raises(FleetError, match=f"lost .* {machines.address}"):
+            outcomes(cluster, [Task("", abs, (2,))])
 
 
 @pytest.mark.slow
@@ -148,9 +148,9 @@ def test_a_worker_with_another_program_is_refused(machines, monkeypatch):
     with closing(with_workers(Cluster(machines.address, 60.0), 1)) as cluster:
         assert "2 threads" in cluster.no_timing() and cluster.workers() == 2
         monkeypatch.setattr(module, "program", os.getpid)  # which is another one there
-        with pytest.raises(FleetError, match="same program"):
-            outcomes(cluster, [Piece("", abs, (2,))])
-    with pytest.raises(FleetError, match="same program"):
+        with pytest.raises(FleetError, match="different version"):
+            outcomes(cluster, [Task("", abs, (2,))])
+    with pytest.raises(FleetError, match="different version"):
         Cluster(machines.address, 60.0)
 
 

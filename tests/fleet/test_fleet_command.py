@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 import runs
-from toy_pieces import soon
+from toy_tasks import soon
 
 from compare.__main__ import main
-from compare.fleet.piece import FleetError
-from compare.fleet.row import FLEET_COLUMNS
+from compare.fleet.table import FLEET_COLUMNS
+from compare.fleet.tasks import FleetError
 
 NAME = "a b#ü.xml" if sys.getfilesystemencoding() == "utf-8" else "a b#u.xml"  # of a file that agrees
 MODELS = runs.ROOT / "tests" / "models"
@@ -69,8 +69,8 @@ def test_the_status_is_1_where_a_file_differs_or_broke_off_and_what_has_changed_
     said = []
 
     def carry_out(self, progress):
-        for task in self.tasks:
-            self.ended(task, said[-1], "no reason")
+        for file in self.files:
+            self.end_file(file, said[-1], "no reason")
 
     monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
@@ -150,16 +150,16 @@ def test_the_key_ctrl_c(temporary, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_signal_and_the_same_command_again(temporary, tmp_path, number):
-    def kept():
-        return {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "kept").glob("*/[!.]*")}
+    def cached():
+        return {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "cache").glob("*/[!.]*")}
 
     run = runs.started(*runs.command(*WORDS), cwd=tmp_path)
-    assert soon(kept)
+    assert soon(cached)
     end = runs.ended(run, number)
     assert number == signal.SIGKILL or (end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0])
     assert soon(lambda: not is_left_at_work(temporary))
-    known = kept()
+    known = cached()
     run = runs.compare(*WORDS, cwd=tmp_path)  # nobody has the lock
     assert (run.returncode, run.stderr) == (0, ""), run.stdout
-    assert {path: when for path, when in kept().items() if path in known} == known  # not computed again
-    assert len(kept()) == 6 > len(known)  # of each file: what was read, an experiment, the report
+    assert {path: when for path, when in cached().items() if path in known} == known  # not computed again
+    assert len(cached()) == 6 > len(known)  # of each file: what was read, an experiment, the report

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 
+from compare.fleet.cache import Cache
 from compare.fleet.command import with_reference
-from compare.fleet.file_pieces import Asked, Known
-from compare.fleet.kept import Kept
+from compare.fleet.file_tasks import FileInfo, FleetOptions
 from compare.fleet.models import found_models, place_of_report
-from compare.fleet.piece import Outcome
-from compare.fleet.row import AGREE, BROKE, DIFFER, ITSELF, REFUSED
-from compare.fleet.run import AHEAD_FOR_ALL, AHEAD_FOR_EACH, Run
+from compare.fleet.run import AHEAD, AHEAD_PER_WORKER, Run
+from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED
+from compare.process.child import Outcome
 from compare.process.crash import described
 
 PENDULUM = ("<mujoco><worldbody><body name='b'><joint name='j' axis='0 1 0'/><inertial pos='0 0 {}' mass='1' "
@@ -22,34 +22,34 @@ NONE = Outcome(error="none")
 
 
 class Inside:
-    """A door to this process: pieces are carried out one after the other, those of the lowest rank first."""
+    """An executor in this process: tasks run one after the other, the lowest rank first."""
 
     count = 1
 
-    def __init__(self, before=lambda piece: None, times_alone=True, no_timing=None):
+    def __init__(self, before=lambda task: None, times_alone=True, no_timing=None):
         self.before, self.times_alone, self.no_timing = before, times_alone, lambda: no_timing
-        self.pieces, self.most, self.names, self.done = [], 0, [], []
+        self.tasks, self.most, self.names, self.done = [], 0, [], []
 
     @property
     def under_way(self):
-        return len(self.pieces)
+        return len(self.tasks)
 
-    def submit(self, piece):
-        self.pieces.append(piece)
-        self.names.append(piece.name)
+    def submit(self, task):
+        self.tasks.append(task)
+        self.names.append(task.name)
         self.most = max(self.most, self.under_way)
 
     def next(self):
-        piece = min(self.pieces, key=lambda piece: piece.rank)
-        self.pieces.remove(piece)
-        self.done.append(piece.name)
-        if outcome := self.before(piece):
-            return piece, outcome
+        task = min(self.tasks, key=lambda task: task.rank)
+        self.tasks.remove(task)
+        self.done.append(task.name)
+        if outcome := self.before(task):
+            return task, outcome
         try:
-            value = piece.function(*piece.arguments, *([piece.shared] if piece.shared else []))
-            return piece, Outcome(pickle.dumps(value), seconds=1.0, wall=1.0, machine="here")
+            value = task.function(*task.arguments, *([task.shared] if task.shared else []))
+            return task, Outcome(pickle.dumps(value), seconds=1.0, wall=1.0, machine="here")
         except Exception as error:
-            return piece, Outcome(error=described(error))
+            return task, Outcome(error=described(error))
 
     def workers(self):
         return 1
@@ -60,18 +60,18 @@ def fleet(tmp_path, monkeypatch):
     """fleet(files, names of experiments): a fleet of files in a folder, run to its end."""
     monkeypatch.chdir(tmp_path)
 
-    def run(files, names=("mass",), door=None, found=None, is_quick=True, reference=None):
+    def run(files, names=("mass",), executor=None, found=None, is_quick=True, reference=None):
         for name, text in files.items():
             (tmp_path / "m" / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / "m" / name).write_text(text)
-        kept, door = Kept(tmp_path / "out"), door or Inside()
+        cache, executor = Cache(tmp_path / "out"), executor or Inside()
         try:
-            asked, sent = with_reference(Asked(tuple(names), is_quick), reference)
-            of = Run((found or found_models(["m"])).models, asked, door, kept, tmp_path / "out", sent)
+            asked, sent = with_reference(FleetOptions(tuple(names), is_quick), reference)
+            of = Run((found or found_models(["m"])).models, asked, executor, cache, tmp_path / "out", sent)
             of.carry_out(lambda: None)
         finally:
-            kept.close()
-        return SimpleNamespace(of=of, door=door, rows={os.path.basename(row["file"]): row for row in of.rows})
+            cache.close()
+        return SimpleNamespace(of=of, executor=executor, rows={os.path.basename(row["file"]): row for row in of.rows})
 
     return run
 
@@ -102,69 +102,69 @@ def test_files_agree_or_are_refused_with_the_reason_and_parts_are_left_out(fleet
     assert fleet(ONE, ["published"]).rows["a.xml"]["verdict"] == REFUSED  # which serves the arm alone
 
 
-def answered(piece):
-    """What a piece returns, without computing it: an experiment the piece's name."""
-    name = piece.name.encode()
-    names = piece.arguments[1].names if step_of(piece.name) == "read" else ()
+def answered(task):
+    """What a task returns, without computing it: an experiment the task's name."""
+    name = task.name.encode()
+    names = task.arguments[1].names if step_of(task.name) == "read" else ()
     values = {
         "speed, untimed": name,
-        "read": Known("", names, (("gravity", "no reason"),), 1, "Euler", 0.002),
+        "read": FileInfo("", names, (("gravity", "no reason"),), 1, "Euler", 0.002),
         "report": ({"verdict": AGREE, "reason": "", "seconds": 1.0}, {"index.html": name}),
     }
-    return Outcome(pickle.dumps(values.get(step_of(piece.name), (name, ""))), seconds=1.0, wall=2.0, machine="far")
+    return Outcome(pickle.dumps(values.get(step_of(task.name), name)), seconds=1.0, wall=2.0, machine="far")
 
 
 def answers(names=("mass", "speed"), **more):
     """What `fleet` is given, so that nothing is computed."""
-    return {"names": names, "door": Inside(before=answered)} | more
+    return {"names": names, "executor": Inside(before=answered)} | more
 
 
 def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
     every = ["read", "mass", "speed, untimed", "speed", "report"]
     first, second = fleet(TWO, **answers()), fleet(TWO, **answers())
-    assert len(first.door.names) == 10 and second.door.names == [] and second.of.done_before == 2
+    assert len(first.executor.names) == 10 and second.executor.names == [] and second.of.files_cached == 2
     assert second.rows == first.rows
     third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, **answers())
-    assert set(third.door.names) == {f"{step} of m/{name}" for name in ("b.xml", "b/a.xml") for step in every}
+    assert set(third.executor.names) == {f"{step} of m/{name}" for name in ("b.xml", "b/a.xml") for step in every}
     for is_quick, names, computed in (
         (False, ("mass", "speed"), every),
         (True, ("mass", "speed"), ["report"]),
         (True, ("gravity",), ["read", "gravity", "report"]),
     ):
         found = fleet({}, found=found_models(["m/a.xml"]), is_quick=is_quick, **answers(names))
-        assert [step_of(name) for name in found.door.names] == computed
+        assert [step_of(name) for name in found.executor.names] == computed
     for solution, computed in ((PENDULUM.format(0.1), 5), (PENDULUM.format(0.1), 0), (PENDULUM.format(0.2), 5)):
         (tmp_path / "solution.xml").write_text(solution)
         found = fleet({}, found=found_models(["m/a.xml"]), reference="solution.xml", **answers())
-        assert len(found.door.names) == computed
+        assert len(found.executor.names) == computed
 
 
 def test_each_file_is_timed_and_reported_with_what_was_found_of_itself(fleet):
     asked = {}
 
-    def before(piece):
-        asked[piece.name] = piece
-        return answered(piece)
+    def before(task):
+        asked[task.name] = task
+        return answered(task)
 
-    fleet(TWO, **answers(door=Inside(before=before)))
+    fleet(TWO, **answers(executor=Inside(before=before)))
     for name in ("m/a.xml", "m/b.xml"):
         assert asked[f"speed of {name}"].arguments[:3] == ("speed", f"speed, untimed of {name}".encode(), name)
         have, left_out, seconds = asked[f"report of {name}"].arguments[:3]
         assert have == {step: f"{step} of {name}".encode() for step in ("mass", "speed")}
         assert (left_out, seconds) == ([("gravity", "no reason")], 4.0)
-    assert {name for name, piece in asked.items() if piece.timed} == {"speed of m/a.xml", "speed of m/b.xml"}
-    door = Inside(before, no_timing="nobody may")
-    fleet(ONE, **answers(door=door))
+    assert {name for name, task in asked.items() if task.timed} == {"speed of m/a.xml", "speed of m/b.xml"}
+    executor = Inside(before, no_timing="nobody may")
+    fleet(ONE, **answers(executor=executor))
     name, why = asked["report of m/a.xml"].arguments[1][-1]
-    assert name == "speed" and "nobody may" in why and "speed of m/a.xml" not in door.names
+    assert name == "speed" and "nobody may" in why and "speed of m/a.xml" not in executor.names
 
 
 @pytest.mark.parametrize("times_alone", [True, False])
-def test_timed_pieces_of_a_pool_come_after_all_others_and_those_of_a_cluster_at_once(times_alone, fleet):
+def test_timed_tasks_of_a_pool_come_after_all_others_and_those_of_a_cluster_at_once(times_alone, fleet):
     outcomes = {"read": None, "speed, untimed": Outcome(pickle.dumps(b"work"))}
-    door = Inside(times_alone=times_alone, before=lambda piece: outcomes.get(step_of(piece.name), NONE))
-    found = fleet(TWO, ["mass", "speed", "gravity"], door)
-    done = [step_of(name) for name in door.done]
+    executor = Inside(times_alone=times_alone, before=lambda task: outcomes.get(step_of(task.name), NONE))
+    found = fleet(TWO, ["mass", "speed", "gravity"], executor)
+    done = [step_of(name) for name in executor.done]
     assert done[:2] == ["read"] * 2 and all(row["verdict"] == BROKE for row in found.rows.values())
     if times_alone:
         assert done[-4:] == ["speed"] * 2 + ["report"] * 2
@@ -173,42 +173,40 @@ def test_timed_pieces_of_a_pool_come_after_all_others_and_those_of_a_cluster_at_
 
 
 def test_a_file_that_changes_or_goes_while_the_fleet_runs_breaks_off_alone(fleet, tmp_path):
-    def before(piece):
-        if piece.name == "read of m/a.xml":
+    def before(task):
+        if task.name == "read of m/a.xml":
             (tmp_path / "m" / "b.xml").write_text(PENDULUM.format(0.4))
             (tmp_path / "m" / "c.xml").unlink()
-        return answered(piece)
+        return answered(task)
 
-    found = fleet(TWO | {"c.xml": PENDULUM.format(0.3)}, door=Inside(before=before))
+    found = fleet(TWO | {"c.xml": PENDULUM.format(0.3)}, executor=Inside(before=before))
     assert verdicts(found) == {"a.xml": AGREE, "b.xml": BROKE, "c.xml": BROKE} and not found.of.is_good
 
 
 def test_an_experiment_that_breaks_off_is_in_the_report_and_tried_again(fleet, tmp_path):
     killed = Outcome(ended="ended by SIGKILL")
-    door = Inside(before=lambda piece: killed if step_of(piece.name) == "parameters" else None)
-    found = fleet(ONE, ["parameters"], door)
+    executor = Inside(before=lambda task: killed if step_of(task.name) == "parameters" else None)
+    found = fleet(ONE, ["parameters"], executor)
     reason = found.rows["a.xml"]["reason"]
     assert verdicts(found) == {"a.xml": BROKE} and "parameters" in reason and "SIGKILL" in reason
     assert "SIGKILL" in (report(tmp_path, "a.xml") / "report.md").read_text() and not found.of.is_good
     again = fleet(ONE, ["parameters"])
     assert (
-        again.door.names == ["parameters of m/a.xml", "report of m/a.xml"]
+        again.executor.names == ["parameters of m/a.xml", "report of m/a.xml"]
         and again.of.is_good
         and again.rows["a.xml"]["has_report"]
     )
     late = Outcome(ended="took longer than 1 s", is_late=True)
-    door = Inside(before=lambda piece: late if step_of(piece.name) == "report" else answered(piece))
-    row = fleet({"a.xml": PENDULUM.format(0.2)}, door=door).rows["a.xml"]
+    executor = Inside(before=lambda task: late if step_of(task.name) == "report" else answered(task))
+    row = fleet({"a.xml": PENDULUM.format(0.2)}, executor=executor).rows["a.xml"]
     assert row["verdict"] == BROKE and late.ended in row["reason"] and not row["has_report"]  # there is an earlier one
 
 
-def test_few_pieces_and_their_models_are_in_memory_at_a_time_and_reports_do_not_wait_for_other_files(fleet):
-    door = Inside(before=lambda piece: None if step_of(piece.name) == "read" else NONE)
-    found = fleet(
-        {f"{k}.xml": PENDULUM.format(0.1 + k) for k in range(2 * AHEAD_FOR_ALL)}, ["parameters", "mass"], door
-    )
-    assert door.most == AHEAD_FOR_ALL + AHEAD_FOR_EACH and not any(task.packed for task in found.of.tasks)
-    done = [step_of(name) for name in door.done]
+def test_few_tasks_and_their_models_are_in_memory_at_a_time_and_reports_do_not_wait_for_other_files(fleet):
+    executor = Inside(before=lambda task: None if step_of(task.name) == "read" else NONE)
+    found = fleet({f"{k}.xml": PENDULUM.format(0.1 + k) for k in range(2 * AHEAD)}, ["parameters", "mass"], executor)
+    assert executor.most == AHEAD + AHEAD_PER_WORKER and not any(file.packed for file in found.of.files)
+    done = [step_of(name) for name in executor.done]
     assert done.index("report") < len(done) - 1 - done[::-1].index("mass")  # of the last file
 
 
@@ -240,4 +238,4 @@ def test_files_of_one_content_are_computed_once_if_what_they_load_is_the_same(fl
     found = fleet(parts | {f"{name}/scene.xml": text for name in "abc"}, **answers())
     scenes = {row["file"]: row["reason"] for row in found.of.rows if "scene" in row["file"]}
     assert [scenes[f"m/{name}/scene.xml"] != "" for name in "abc"] == [False, True, False]
-    assert "m/a/scene.xml" in scenes["m/b/scene.xml"] and not any("m/b/scene" in name for name in found.door.names)
+    assert "m/a/scene.xml" in scenes["m/b/scene.xml"] and not any("m/b/scene" in name for name in found.executor.names)

@@ -11,7 +11,7 @@ from mujoco import MjModel
 from PIL import Image
 
 from compare.fleet.models import bundle, found_models, place_of_report, unpacked
-from compare.fleet.piece import FleetError
+from compare.fleet.tasks import FleetError
 
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 

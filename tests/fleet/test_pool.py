@@ -1,4 +1,4 @@
-"""The pool: whatever a piece does, it gets an outcome, and the others theirs."""
+"""The pool: every task gets an outcome, whatever the others do."""
 
 import math
 import os
@@ -6,14 +6,14 @@ import platform
 from contextlib import closing
 from itertools import pairwise
 
-import toy_pieces as toy
+import toy_tasks as toy
 
 from compare.fleet.calls import door_opened
-from compare.fleet.piece import Piece, outcomes
 from compare.fleet.pool import Pool
+from compare.fleet.tasks import Task, outcomes
 
 
-def test_what_becomes_of_a_piece(tmp_path):
+def test_outcomes(tmp_path):
     with closing(Pool(2, toy.LIMIT, toy.MEMORY)) as pool:
         toy.check_all(pool, tmp_path)
 
@@ -22,12 +22,12 @@ def test_nothing_runs_beside_what_is_timed(tmp_path):
     places = {timed: tmp_path / str(timed) for timed in (True, False)}
     for folder in places.values():
         folder.mkdir()
-    asked = [
-        Piece("", toy.in_time, (str(places[k % 3 == 0]), 0.02 * (1 + k % 4)), timed=k % 3 == 0, rank=k % 2)
+    tasks = [
+        Task("", toy.in_time, (str(places[k % 3 == 0]), 0.02 * (1 + k % 4)), timed=k % 3 == 0, rank=k % 2)
         for k in range(12)
     ]
     with closing(Pool(2, 60.0)) as pool:
-        assert not any(found.broke for found in outcomes(pool, asked))
+        assert not any(found.broke for found in outcomes(pool, tasks))
     timed, others = ([tuple(map(int, note)) for note in toy.notes(places[kind])] for kind in (True, False))
     assert (len(timed), len(others)) == (4, 8)
     assert all(end <= begin for (_, end), (begin, _) in pairwise(timed))
@@ -45,10 +45,10 @@ def test_calls_have_their_outcomes_in_order_and_none_is_lost_with_another():
         assert door is None
 
 
-def test_a_process_that_is_killed_between_two_pieces_costs_no_try(tmp_path):
+def test_a_process_that_is_killed_between_two_tasks_costs_no_try(tmp_path):
     with closing(Pool(1, 60.0)) as pool:
-        (found,) = outcomes(pool, [Piece("", os.getpid)])
+        (found,) = outcomes(pool, [Task("", os.getpid)])
         os.kill(found.returned, 9)
         assert toy.gone_soon(found.returned)
-        (found,) = outcomes(pool, [Piece("", toy.killed, (3, str(tmp_path)))])
+        (found,) = outcomes(pool, [Task("", toy.killed, (3, str(tmp_path)))])
     assert found.returned == "at last" and len(list(tmp_path.iterdir())) == 4

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from ...robots.controller import Controller
+from ...robots.actuators import Controller
 from .actuators import control_of
 from .dynamics import MujocoDynamics
 from .flags import bit

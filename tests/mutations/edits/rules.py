@@ -40,7 +40,7 @@ EDITS = (
     Edit("judge.check", "Result.agree", "list(apart)[1:]", "list(apart)[2:]", "TMT is not compared with the exact values"),
     Edit("judge.check", "Result.agree", "in_eps[f'{self.label} to exact'].max() if len(known) else None",
          "in_eps['MuJoCo to exact'].max() if len(known) else None", "the distances from the exact values are exchanged"),
-    Edit("states", "Sample.truths", "slice(self.exact_states)", "slice(1)", "one state is compared with its exact value"),
+    Edit("states", "Sample.truths", "self.exact_states", "1", "one state is compared with its exact value"),
     Edit("states", "random", "robot.coordinates.random(rng, states, robot.ranges)",
          "np.zeros((states, len(robot.joints)))",
          "every random state is zero"),

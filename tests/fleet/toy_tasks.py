@@ -1,4 +1,4 @@
-"""Pieces that do what a piece can do, and what is to become of each; for test_pool, test_cluster, test_fleet_command."""
+"""Tasks that return, raise, crash or hang, with the outcome of each; for test_pool, test_cluster, test_fleet_command."""
 
 import math
 import os
@@ -10,15 +10,15 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-from compare.fleet.piece import Piece, outcomes
+from compare.fleet.tasks import Task, outcomes
 
-LIMIT = 3.0  # s that a piece may take here
-MEMORY = 10**9  # bytes that it may have
+LIMIT = 3.0  # s, of a task
+MEMORY = 10**9  # bytes, limit of a task
 SOON = 60.0  # s, far more than anything here takes
 
 
 def noted(folder, what=""):
-    """A mark in a folder that a piece began; how many there are."""
+    """Note in a folder that a task began; the number of notes."""
     place = Path(folder)
     (place / f"{time.time_ns()}-{os.getpid()}").write_text(what)
     return len(list(place.iterdir()))
@@ -66,7 +66,7 @@ def waits(folder, opened, shared=b""):
 
 
 class Fault(NamedTuple):
-    """A piece, and what becomes of it."""
+    """A task and its outcome."""
 
     function: object
     arguments: tuple = ()
@@ -89,14 +89,14 @@ FAULTS = {
 }
 
 
-def check_all(door, folder):
-    """Whether through a door what is to become of each piece does. folder: where they take notes of when they begin."""
-    asked = []
+def check_all(executor, folder):
+    """Run all FAULTS and check their outcomes. folder: for the notes of the tasks."""
+    tasks = []
     for name, fault in FAULTS.items():
         (folder / name).mkdir()
         arguments = (*fault.arguments, str(folder / name)) if fault.tries else fault.arguments
-        asked.append(Piece(name, fault.function, arguments, shared=fault.shared))
-    for (name, fault), found in zip(FAULTS.items(), outcomes(door, asked), strict=True):
+        tasks.append(Task(name, fault.function, arguments, shared=fault.shared))
+    for (name, fault), found in zip(FAULTS.items(), outcomes(executor, tasks), strict=True):
         if fault.value is None:
             assert all(word in found.broke for word in fault.words), f"{name}: {found.broke}"
         else:
@@ -128,6 +128,6 @@ def gone_soon(*pids):
 
 
 def notes(folder, count=1):
-    """What pieces have noted, as soon as this number of them have."""
+    """The notes of tasks, as soon as there are this many."""
     assert soon(lambda: sum(bool(note.read_text()) for note in Path(folder).iterdir()) >= count)
     return [note.read_text().split() for note in sorted(Path(folder).iterdir())]
