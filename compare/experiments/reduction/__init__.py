@@ -72,12 +72,10 @@ def untimed(setup: Setup, cases: Sequence[Case] | None = None, timed: bool = Tru
     cases = cases or [case for case in robot.cases_of_torque if timed or "fewer joints" in case.scene.tags]
     angles = setup.of(10, 1 if robot.is_read else 3, 1) if timed else 1
     integrators = TWO_INTEGRATORS if timed else TWO_INTEGRATORS[-1:]
-    few = () if timed else (exact_motion.AMPLITUDES[-2:], exact_motion.LESS_FINE)
     try:
         sub_blocks.compare_blocks(result, setup, angles)
         models = [model for case in cases for model in of_case(result, case, setup, integrators)]
         exact_motion.swings(result, setup, cases)
-        exact_motion.small_oscillations(result, setup, *few)
     except ModelError as error:
         add_not_lockable(result, robot, error)
         return result, None
@@ -102,5 +100,3 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(figures_reduction.draw_needs, result, robot)
     for scene in result.curves["swings"]:
         yield partial(figures_reduction.draw_swing, result, scene)
-    if "small" in result.curves:
-        yield partial(figures_reduction.draw_small_oscillations, result, robot)

@@ -1,20 +1,16 @@
-"""Both engines compared with exact motions: swings of a single free hinge, small oscillations about an equilibrium."""
+"""Both engines compared with an exact motion: the swing of a single free hinge, a physical pendulum."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-import tmt
-from tmt import literal
 from tmt.exact.values import DIGITS, distance
 
 from ...engines import LABELS
 from ...judge.check import About, Result
 from ...judge.run import MOVES, ORDER_MARGIN
-from ...judge.scale import EPS, FACTOR, gravity_scale, mass_scale
-from ...robots import Robot
-from ...robots.case import SEED, Case
-from ...truth.linear import held, modes, small_oscillation
+from ...judge.scale import EPS, FACTOR
+from ...robots.case import Case
 from ...truth.pendulum import exact_swing, pendulum, swing
 from ..setup import Setup
 from .times import TWO_INTEGRATORS, method_of
@@ -25,12 +21,6 @@ MOST_SWING_STEPS = 2**20  # finer steps show rounding and no order
 DIGITS_AT = 32  # equal times at which the elliptic function is compared with that of many digits
 ROUNDED = 1e-11  # rad: smaller errors contain rounding
 MUCH, NO_FORCE = 0.1, 1e-9  # shares of the largest torque of a swing: more, or less, at the start
-AMPLITUDES = (0.16, 0.08, 0.04, 0.02, 0.01)  # rad
-OSCILLATION, MOST_TURNED = 5.0, 60.0  # s; rad that the fastest mode may turn in that time
-MOST_MODES = 12  # hinges: runs of more take long
-OSCILLATION_STEPS, LESS_FINE = 8192, 1024  # with which the error of RK4 is far below that of the linear modes
-
-# a single free hinge
 
 
 def swings(result: Result, setup: Setup, cases: Sequence[Case]) -> None:
@@ -140,83 +130,3 @@ def check_falling(
         name = f"order of the error against the elliptic function, from {order}"
         result.check(where, name, off, ORDER_MARGIN, "", about=About.PREDICTION)
     return orders
-
-
-# an equilibrium
-
-
-def small_oscillations(
-    result: Result, setup: Setup, amplitudes: Sequence[float] = AMPLITUDES, steps: int = OSCILLATION_STEPS
-) -> None:
-    """The robot released near an equilibrium: the relative distance from the linear modes falls with the amplitude squared."""
-    robot, tree = setup.robot, setup.robot.tree
-    posture = equilibrium(robot)
-    if posture is None:
-        result.find("no_modes", noun=robot.noun, reason=not_linear(tree) or "unstable", joints=len(tree.axis))
-        return
-    q, rest, away = robot.posture(posture), np.zeros(len(robot.joints)), np.ones(len(robot.joints))
-    frequencies, _ = modes(tree, q)
-    duration = min(OSCILLATION, MOST_TURNED / frequencies[-1])
-    sides, dt = (1.0,) if odd(tree, q) else (1.0, -1.0), duration / steps
-    off = {"tmt": [], "mujoco": []}
-    for amplitude in amplitudes:
-        linear = small_oscillation(dt * np.arange(steps + 1), tree, q, amplitude * away)
-        for engine, dynamics in setup.compared().items():
-            method = method_of(setup.engines, "RK4", engine)
-            starts = [q + side * amplitude * away for side in sides]
-            paths = [dynamics.run(start, rest, rest, dt, steps, method).q for start in starts]
-            path = paths[0] if len(paths) == 1 else q + (paths[0] - paths[1]) / 2.0
-            off[engine].append(float(np.abs(path - linear).max() / amplitude))
-    powers = check_modes(result, posture, off)
-    result.curves["small"] = {
-        "posture": posture, "amplitude": np.array(amplitudes), "off": off, "frequencies": frequencies, "powers": powers,
-        "duration": duration, "sides": len(sides),
-    }  # fmt: skip
-
-
-def equilibrium(robot: Robot) -> str | None:
-    """The named posture of least potential energy that is stable without a torque; None if there is none, or no linear mode."""
-    tree = robot.tree
-    if not_linear(tree):
-        return None
-    names = [*robot.postures, *robot.positions]
-    torques = {name: np.abs(literal.gravity_balance(robot.posture(name), tree)).max() for name in names}
-    rest = [name for name, torque in torques.items() if torque <= FACTOR * EPS * gravity_scale(tree)]
-    stable = [name for name in rest if held(robot, name).kind == "centre"]
-    return min(stable, key=lambda name: float(literal.potential_energy(robot.posture(name), tree)), default=None)
-
-
-def not_linear(tree: tmt.Tree) -> str | None:
-    """Why small oscillations of a Tree are not compared with its linear modes, or None."""
-    if any(tree.damping):
-        return "damped"
-    if set(tree.kind) != {"hinge"} or tree.has_springs:
-        return "not_hinges"
-    return "many_joints" if len(tree.axis) > MOST_MODES else None
-
-
-def odd(tree: tmt.Tree, q: np.ndarray) -> bool:
-    """Whether motions that start on opposite sides of q, (n,) rad, are mirror images of each other.
-
-    That is, whether Mbar is equal and the torque of gravity opposite there, at random places. If not, the distance from the
-    linear modes has a term linear in the amplitude, which half the difference of the two motions does not have.
-    """
-    away = np.random.default_rng(SEED).uniform(-1.0, 1.0, (3, len(q)))
-    masses, torques = (
-        [f(q + side * away, tree) for side in (1, -1)] for f in (literal.mass_matrix, literal.gravity_balance)
-    )
-    same = np.abs(masses[0] - masses[1]).max(axis=(1, 2)) <= FACTOR * EPS * mass_scale(tree, q + away)
-    opposite = np.abs(torques[0] + torques[1]).max(axis=1) <= FACTOR * EPS * gravity_scale(tree)
-    return bool(same.all() and opposite.all())
-
-
-def check_modes(result: Result, posture: str, off: Mapping[str, Sequence[float]]) -> dict:
-    """Half the amplitude divides the relative distance from the linear modes by 4. off, and the powers returned: by engine."""
-    powers = {}
-    for engine, values in off.items():
-        with np.errstate(divide="ignore", invalid="ignore"):
-            powers[engine] = float(np.log2(np.divide(values[-2], values[-1])))
-        name = "power of the amplitude with which the distance from the linear modes falls, from 2"
-        where, distance_from_2 = f"{posture}, {LABELS[engine]}", abs(powers[engine] - 2.0)
-        result.check(where, name, distance_from_2, ORDER_MARGIN, "", about=About.PREDICTION)
-    return powers

@@ -1,4 +1,4 @@
-"""Figures of reduction: the joints that each scene needs and the time of a step; exact swings; small oscillations."""
+"""Figures of reduction: the joints that each scene needs and the time of a step; exact swings."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -132,23 +132,3 @@ def draw_swing(result: Result, scene: str) -> tuple:
         for integrator in SWING_LINES
     ]
     return file_name("reduction", scene), fig, result.finding("swing", scene=capital(scene), lines=lines)
-
-
-def draw_small_oscillations(result: Result, robot: Robot) -> tuple:
-    """Relative distance of small oscillations from the linear modes, over their amplitude."""
-    small = result.curves["small"]
-    fig = Figure(figsize=(WIDTH, 2.8), layout="constrained")
-    ax = fig.subplots()
-    amplitude, off = small["amplitude"], small["off"]
-    marks = {"marker": "o", "linestyle": "none", "mfc": "none", "markersize": 8, "markeredgewidth": 1.5}
-    ax.loglog(amplitude, off["tmt"], color=BLUE, label="TMT")
-    ax.loglog(amplitude, off["mujoco"], **marks, color=ORANGE, label="MuJoCo")
-    squared = 0.4 * off["tmt"][-1] * (amplitude / amplitude[-1]) ** 2
-    ax.loglog(amplitude, squared, ":", color=GREY, label="amplitude squared")
-    ax.set(xlabel="amplitude, rad", ylabel="distance / amplitude")
-    ax.set_xticks(amplitude, [f"{a:g}" for a in amplitude])
-    ax.minorticks_off()
-    fig.legend(loc="outside upper center", ncols=3)
-    engines = [{"label": LABELS[name], "power": small["powers"][name], "off": off[name][-1]} for name in off]
-    values = {name: small[name] for name in ("posture", "frequencies", "duration", "sides")}
-    return "reduction_modes", fig, result.finding("modes", **values, engines=engines, amplitude=amplitude[-1])

@@ -25,6 +25,7 @@ EXPERIMENT = Experiment(order=90, serves_own=False, options=("--scenes",), timed
 COLUMNS = ["scene", "engine", "method", "dt_s", "tolerance", "steps", "evaluations", "seconds", "error_rad", "worst_error_rad",
            "energy_error_J", "diverged", "why_not"]  # fmt: skip
 HEADLINE_ERROR = 1e-6  # rad or m
+ORDER_OF_RK4 = 4
 
 
 def claim_values(robot: Robot) -> dict:
@@ -70,9 +71,9 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     falling = [case.name for case in cases if not case.controller] if whole else [regular.name]
     complete = (whole or not timed) and not setup.robot.is_read
     result.tables["speed_orders"] = orders.orders(result, falling, fixed, complete)
-    if timed and setup.robot.coordinates.has_balls:
-        result.tables["speed_orders"] += orders.orders_on_a_body(result, setup.engines)
     mujoco = setup.engines["mujoco"]
+    if timed and mujoco.methods["RK4"].order < ORDER_OF_RK4:  # with ball joints
+        result.find("lower_order", order=mujoco.methods["RK4"].order)
     schemes = {c.name: {m.name: m.scheme for m in methods_in(mujoco, c).values()} for c in cases}
     accuracy.check_same_schemes(result, floors, schemes, unit)
     accuracy.check_smallest_errors(result, floors, unit)
@@ -144,5 +145,3 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     for scene in result.curves["floors"]:
         yield partial(figures_speed.draw_times, result, scene, beginning=scene_begins(scene, robot))
     yield partial(figures_speed.draw_evaluations, result)
-    yield partial(figures_speed.draw_energy, result)
-    yield partial(figures_speed.draw_cost, result, robot.name)

@@ -8,15 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt.compiled import evaluator, runner
+from tmt.compiled import evaluator
 
 from ...judge import timing
 from ...judge.check import Result
-from ...robots.case import SEED, Case, Coordinates
+from ...robots.case import SEED, Coordinates
 from ..setup import Setup
 from .implementations import EACH, FORWARD, IN_LANES, NAMES_IN_TMT, RK4_STEP, WAITING, of_many_states, of_one_state
 from .peers import Peers
-from .settings import coarsest_steps, regular_of
 
 STATES = (1, 1000, 1_000_000)
 CALLS = 10_000  # states that a timed call evaluates at least
@@ -81,8 +80,6 @@ def costs(result: Result, setup: Setup, made: Evaluations) -> list[dict]:
         times = timing.in_turns([call for call, _ in calls.values()], rounds=setup.of(12, 5, 2))
     ns = per_state({key: count for key, (_, count) in calls.items()}, times)
     find_ratios(result, ns, setup.robot.name)
-    call, loop, steps = simulate_overhead(regular_of(setup.robot))
-    result.find("simulate_overhead", steps=steps, call_us=1e6 * call, loop_us=1e6 * loop)
     operations = {quantity: evaluator(setup.robot.tree, name).operations for quantity, name in NAMES_IN_TMT.items()}
     of_compiled = {(q, name): count for q, count in operations.items() for name in (IN_LANES, EACH, WAITING)}
     return evaluation_rows(ns, of_compiled, made.absent)
@@ -149,18 +146,3 @@ def counted(loop: Callable[[int], object]) -> tuple[Callable, int]:
     (once,) = timing.in_turns([lambda: loop(4)], 5)
     count = min(max(1, int(CALL_SECONDS / (min(once) / 4))), MOST_CALLS)
     return lambda: loop(count), count
-
-
-def simulate_overhead(case: Case) -> tuple[float, float, int]:
-    """Seconds of tmt.simulate with the coarsest steps of a scene, of its compiled loop alone, and the number of steps."""
-    steps = coarsest_steps(case)
-    dt, paths = case.duration / steps, [np.zeros((1, steps + 1, len(part))) for part in case.start]
-    for path, part in zip(paths, case.start):
-        path[0, 0] = part
-    run = runner(case.tree, "rk4")
-    calls = {
-        "call": lambda: tmt.simulate(*case.start, case.tau, dt, steps, model=case.tree),
-        "loop": lambda: run(*paths, case.tau[None], dt),
-    }
-    times = timing.fastest(calls, 50)
-    return times["call"], times["loop"], steps

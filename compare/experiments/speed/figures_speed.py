@@ -1,18 +1,14 @@
-"""Figures of speed: error against time, against evaluations, energy error against time; the cost of one evaluation."""
-
-from collections.abc import Callable
+"""Figures of speed: error against time, error against evaluations."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from ...engines import LABELS
 from ...judge.check import Result
 from ...judge.units import value
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name, name_ends, plain
-from .evaluations import FORWARD, WHOLE
 
 COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
 LINES = {"mujoco": ("-", 1.6), "tmt": ("-", 1.0), "scipy": ("--", 1.0), "heyoka": ("-.", 1.0)}  # dash, width
@@ -26,7 +22,7 @@ MARKED = (  # the methods of each group in the order of the marks
 COARSE_END, FINE_END = 3.0, 3e-16  # rad: ends of the axis of errors
 NO_RESULT = 1.0  # rad: a larger error is not on the Pareto front
 DIVERGED_AT, COLUMN = 30.0, 2.0  # rad: where diverged runs are drawn, and the ratio to the next method's place
-MOST_ENERGY, LEAST_ENERGY = 10.0, 1e-15  # J: ends of the axis of energy errors
+FEWEST_AT = 1e-9  # rad: the error for which the caption names the number of evaluations
 
 
 def runs_of(result: Result, scene: str) -> list[dict]:
@@ -161,51 +157,9 @@ def draw_diverged(ax: Axes, by_method: dict) -> tuple[float, list]:
 
 
 def draw_evaluations(result: Result) -> tuple:
-    """Worst error against evaluations of the equations of motion, which does not depend on the machine."""
-
-    def numbers(rows: list[dict]) -> tuple:
-        good = [row for row in in_range(rows) if row["evaluations"]]
-        return errors_drawn(good), [row["evaluations"] for row in good]
-
-    unit, regular = result.curves.get("unit", "rad"), result.curves.get("regular")
-    fig, of_labels = panels(result, numbers, (COARSE_END * 2, 1e-19), f"worst error, {unit}", "evaluations")
-    rows = [row for scene in result.curves["floors"] for row in runs_of(result, scene) if row["evaluations"]]
-    fewest = {method: fewest_evaluations(result, regular, method) for method in ("rk4", "dopri8")}
-    values = {"scene": regular, "target": FEWEST_AT, "unit": unit, "fewest": fewest if all(fewest.values()) else None}
-    caption = result.finding("evaluations", **values, beyond=beyond_range(rows), end=COARSE_END, of_labels=of_labels)
-    return "speed_evaluations", fig, caption
-
-
-FEWEST_AT = 1e-9  # rad: the error for which the caption names the number of evaluations
-
-
-def fewest_evaluations(result: Result, scene: str, method: str, target: float = FEWEST_AT) -> int | None:
-    """The evaluations of the coarsest run of a method of tmt within an error; None: no run is."""
-    rows = curves(result, scene).get(("tmt", method), [])
-    good = [row["evaluations"] for row in rows if not row["diverged"] and value(row, "worst_error") <= target]
-    return min(good, default=None)
-
-
-def draw_energy(result: Result) -> tuple:
-    """Energy error against time."""
-
-    def numbers(rows: list[dict]) -> tuple:
-        good = [row for row in rows if not row["diverged"] and row["energy_error_J"] <= MOST_ENERGY]
-        return np.maximum([row["energy_error_J"] for row in good], LEAST_ENERGY), [1e3 * row["seconds"] for row in good]
-
-    rows = [row for scene in result.curves["floors"] for row in runs_of(result, scene)]
-    upward = f"time for {durations(rows)} of motion, ms"
-    fig, of_labels = panels(result, numbers, (20, 1e-19), "largest energy error, J", upward)
-    beyond = sum(not row["diverged"] and row["energy_error_J"] > MOST_ENERGY for row in rows)
-    return "speed_energy", fig, result.finding("energy", beyond=beyond, end=MOST_ENERGY, of_labels=of_labels)
-
-
-def panels(result: Result, numbers: Callable, limits: tuple, across: str, upward: str) -> tuple[Figure, str | None]:
-    """One panel for each scene, a curve for each method; and the panel with the methods' names, if there are several.
-
-    numbers(rows): errors and costs of a method's rows; limits: of the errors; across, upward: names of the axes.
-    """
-    scenes = list(result.curves["floors"])
+    """Worst error against evaluations of the equations of motion, independent of the machine; a panel for each scene."""
+    scenes, regular = list(result.curves["floors"]), result.curves.get("regular")
+    unit = result.curves.get("unit", "rad")
     columns = 2 if len(scenes) > 1 else 1
     lines = max(1, -(-len(scenes) // columns))
     height = 0.9 + 3.1 * lines
@@ -214,62 +168,40 @@ def panels(result: Result, numbers: Callable, limits: tuple, across: str, upward
     axes = fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     for ax in axes.flat[len(scenes) :]:
         ax.set_visible(False)
-    regular = result.curves.get("regular")
-    labelled, engines = regular if regular in scenes else next(iter(scenes), None), {}
+    labelled, engines, beyond = regular if regular in scenes else next(iter(scenes), None), {}, 0
     for ax, scene in zip(axes.flat, scenes):
         ends = []
         for (engine, method), rows in curves(result, scene).items():
-            errors, costs = numbers(rows)
-            label = label_of(engine, method)
-            if not len(errors) or label is None:
+            rows, label = [row for row in rows if row["evaluations"]], label_of(engine, method)
+            beyond += beyond_range(rows)
+            rows = in_range(rows)
+            if not rows or label is None:
                 continue
             engines[engine] = None
+            errors, counts = errors_drawn(rows), [row["evaluations"] for row in rows]
             wide = {"linewidth": 2.5} if engine == "mujoco" else {}  # visible below the same scheme of tmt
             size = 3 + (engine == "mujoco")
-            ax.plot(errors, costs, marker=marker(method), markersize=size, **line_of(engine) | wide, label=label)
+            ax.plot(errors, counts, marker=marker(method), markersize=size, **line_of(engine) | wide, label=label)
             k = int(np.argmin(errors))
-            ends.append((errors[k], costs[k], label, colour_of(engine)))
-        ax.set(xscale="log", yscale="log", title=plain(scene), xlim=limits)
+            ends.append((errors[k], counts[k], label, colour_of(engine)))
+        ax.set(xscale="log", yscale="log", title=plain(scene), xlim=(COARSE_END * 2, 1e-19))
         ax.set_xticks([10.0**k for k in range(0, -16, -3)])
         ax.minorticks_off()
         if scene == labelled:
             axes_of_labels = ax, ends
     if labelled:
         name_ends(*axes_of_labels, size=7.5)
-    fig.supxlabel(f"{across} (finer to the right)", fontsize=9)
-    fig.supylabel(upward, fontsize=9)
+    fig.supxlabel(f"worst error, {unit} (finer to the right)", fontsize=9)
+    fig.supylabel("evaluations of the equations of motion", fontsize=9)
     fig.legend(handles=legend_lines(engines), loc="upper center", ncols=4)
-    return fig, labelled if len(scenes) > 1 else None
+    fewest = {method: fewest_evaluations(result, regular, method) for method in ("rk4", "dopri8")}
+    values = {"scene": regular, "target": FEWEST_AT, "unit": unit, "fewest": fewest if all(fewest.values()) else None}
+    panel = labelled if len(scenes) > 1 else None
+    return "speed_evaluations", fig, result.finding("evaluations", **values, beyond=beyond, end=COARSE_END, panel=panel)
 
 
-def draw_cost(result: Result, name: str) -> tuple:
-    """The time of one evaluation of the forward dynamics by each implementation; name: of the robot."""
-    rows = [row for row in result.tables["evaluations"] if row["quantity"] == FORWARD and row["ns_per_state"]]
-    fig = Figure(figsize=(WIDTH, 0.9 + 0.24 * len(rows)), layout="constrained")
-    ax = fig.subplots()
-    labels = [
-        f"{row['implementation']}, {row['states']:,} state{'s' * (row['states'] > 1)}"
-        + f", {row['threads']} threads" * (row["threads"] > 1)
-        for row in rows
-    ]
-    times = [row["ns_per_state"] for row in rows]
-    engines = {"MuJoCo": ORANGE, "heyoka": GREY, "Pinocchio": GREY}
-    colours = [engines.get(row["implementation"].split(",")[0], BLUE) for row in rows]
-    ax.barh(range(len(rows)), times, color=colours, height=0.7)
-    for k, time in enumerate(times):
-        ax.text(time * 1.1, k, f"{time:,.0f}" if time >= 100 else f"{time:.1f}", va="center", fontsize=8)
-    ax.set_yticks(range(len(rows)), labels, fontsize=8)
-    ax.set(xscale="log", xlabel="ns per state")
-    ax.grid(axis="y", visible=False)
-    ax.margins(y=0.01)
-    handles = [
-        Patch(color=colour, label=label)
-        for colour, label in ((BLUE, "tmt"), (ORANGE, "MuJoCo"), (GREY, "others"))
-        if colour in colours
-    ]
-    if handles:
-        ax.set_xlim(min(times) / 2, max(times) * 16)  # room for the number of the longest bar
-        fig.legend(handles=handles, loc="outside upper center", ncols=3)
-    ends = [(times[k], labels[k]) for k in (np.argmax(times), np.argmin(times))] if rows else None
-    whole = next((row["ns_per_state"] for row in rows if row["implementation"] == WHOLE), None)
-    return "speed_evaluation_cost", fig, result.finding("evaluation_cost", robot=name, ends=ends, whole=whole)
+def fewest_evaluations(result: Result, scene: str, method: str, target: float = FEWEST_AT) -> int | None:
+    """The evaluations of the coarsest run of a method of tmt within an error; None: no run is."""
+    rows = curves(result, scene).get(("tmt", method), [])
+    good = [row["evaluations"] for row in rows if not row["diverged"] and value(row, "worst_error") <= target]
+    return min(good, default=None)

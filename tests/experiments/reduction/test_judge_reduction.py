@@ -1,21 +1,15 @@
 """Reduction: its rules just inside and just outside, motions that are known exactly, and whose number stands where."""
 
-import dataclasses
-from pathlib import Path
-
 import numpy as np
 import pytest
 from edited import XML
-from trees import mjcf
 
-import tmt
 from compare.engines.mujoco import parse
 from compare.experiments.reduction import exact_motion, figures_reduction, needs, sub_blocks, times
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.judge.check import Result
 from compare.judge.scale import EPS
-from compare.robots import Robot
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
 
@@ -81,12 +75,6 @@ def test_errors_fall_at_the_order_of_the_method(errors, passed):
     assert list(found.values()) == passed
 
 
-@pytest.mark.parametrize("power, passes", [(2.149, True), (2.151, False), (1.851, True), (1.849, False)])
-def test_the_distance_from_the_modes_falls_with_the_amplitude_squared(power, passes):
-    found = verdicts(exact_motion.check_modes, "hanging", {"mujoco": [1e-2, 2.0**power * 1e-3, 1e-3]})
-    assert list(found.values()) == [passes]
-
-
 def swings(engines, **scene) -> Result:
     """Of one scene, or of all the arm's."""
     result = Result("reduction", curves={"apart": {}, "swings": {}})
@@ -125,42 +113,6 @@ def test_euler_has_order_2_where_a_swing_begins_without_force_and_none_where_the
     result = swings(engines, posture=(0, 0, start), speed=(0, 0, 100))
     assert result.curves["swings"]["mine"]["stated"] == {"RK4": 4, "Euler": order}
     assert failed(result) == [] and len(result.checks) == (5 if order else 3)
-
-
-def oscillations(tree, theirs=None) -> Result:
-    """What is found of a robot that hangs down, MuJoCo with its own numbers or others."""
-    result, robot = Result("reduction"), Robot("double", Path("none.xml"), tree, {"down": DOWN}, ())
-    few = exact_motion.AMPLITUDES[-2:], exact_motion.LESS_FINE
-    exact_motion.small_oscillations(result, Setup.small(robot, engines_of(parse(mjcf(theirs or tree), tree))), *few)
-    return result
-
-
-CHAIN = dataclasses.replace(  # hangs straight down; the same on either side
-    tmt.ARM, axis=((1, 0, 0), (0, 1, 0), (0, 1, 0)), com=((0, 0, -0.15), (0, 0, -0.1)), hinge_names=("a", "b", "c")
-)
-SKEW = dataclasses.replace(CHAIN, axis=((1, 0, 0), (0, 0.6, 0.8), (0, 1, 0)))
-CROSS = dataclasses.replace(CHAIN, body_hinge=(0, 2))  # with the first body up the others may hang, stable but higher
-DOWN = (0, 0, 0)
-
-
-@pytest.mark.parametrize(
-    "tree, postures, found",
-    [
-        (CHAIN, {"up": (180, 0, 0), "bent": (0, 20, 0), "down": DOWN}, "down"),
-        (CROSS, {"flipped": (180, 180, 0), "down": DOWN}, "down"),
-        (dataclasses.replace(CHAIN, stiffness=(1.0, 0.0, 0.0)), {"down": DOWN}, None),
-    ],
-)
-def test_the_equilibrium_is_the_lowest_that_is_stable(tree, postures, found):
-    assert exact_motion.equilibrium(Robot("double", Path("none.xml"), tree, postures, ())) == found
-
-
-@pytest.mark.parametrize("tree, sides", [(CHAIN, 1), (SKEW, 2)])
-def test_a_motion_is_mirrored_or_half_the_difference_of_two_is_taken_and_a_wrong_frequency_is_no_mode(tree, sides):
-    right, wrong = oscillations(tree), oscillations(tree, dataclasses.replace(tree, mass=(1.9, 1.6)))
-    assert failed(right) == [] and failed(wrong) == ["down, MuJoCo"] and right.curves["small"]["sides"] == sides
-    without = oscillations(dataclasses.replace(tree, damping=(0, 0.1, 0)))
-    assert without.checks == [] and "small" not in without.curves and len(without.notes) == 1
 
 
 # whose number stands where

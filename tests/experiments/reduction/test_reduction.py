@@ -36,7 +36,7 @@ def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
     assert 0 < planar["operations"] < whole["operations"] and planar["ns_per_step"] > 0
     assert rows["bent, held", "none", "mujoco", "RK4"]["ns_per_step"] is None
     drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, ARM))}
-    assert list(drawn) == ["reduction_needs", "reduction_elbow_swing", "reduction_modes"]
+    assert list(drawn) == ["reduction_needs", "reduction_elbow_swing"]
     assert not any("nan" in say(caption) for caption in drawn.values())
 
 
