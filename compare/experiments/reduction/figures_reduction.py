@@ -19,7 +19,6 @@ KINDS_OF_JOINT = {
     "declared locked": {"marker": "x", "color": GREY},
     "not decided": {"marker": "d", "color": ORANGE, "mfc": "none"},
 }
-LABEL_WIDTH = 10.0  # on the axis of times, as a ratio
 TIME_MARKS = {"tmt": (-0.15, {"marker": "o", "color": GREEN}), "mujoco": (0.15, {"marker": "s", "color": ORANGE})}
 SWING_LINES = {"RK4": (GREEN, "-"), "Euler": (BLUE, "--")}
 
@@ -81,7 +80,6 @@ def kind_of_joint(joint: str, need: dict) -> str:
 
 def mark_times(ax: Axes, result: Result, scene: str, y: float) -> None:
     """The time of a step of each engine in a scene, of the whole and of the smallest model."""
-    idle = []  # the whole models of scenes that need no run
     for engine, (offset, style) in TIME_MARKS.items():
         place = (scene, engine, "RK4")
         rows = [row for row in result.rows if (row["scene"], row["engine"], row["integrator"]) == place]
@@ -90,17 +88,13 @@ def mark_times(ax: Axes, result: Result, scene: str, y: float) -> None:
         whole, smallest = rows[0]["ns_per_step"], rows[-1]["ns_per_step"]
         ax.plot(whole, y + offset, mfc="none", **style)
         if smallest is None:
-            idle.append((whole, y + offset))
+            look = {"ha": "right", "va": "center", "fontsize": 8, "transform": ax.get_yaxis_transform()}
+            ax.text(0.98, y, "no run needed", **look)
             continue
         ax.plot([smallest, whole], [y + offset] * 2, color=style["color"], linewidth=1)
         ax.plot(smallest, y + offset, markersize=3.5, **style)
         if len(rows) > 1:
             ax.text(smallest / 1.15, y + offset, f"×{whole / smallest:.2f}", ha="right", va="center", fontsize=8)
-    if len(idle) == 2 and max(idle)[0] < LABEL_WIDTH * min(idle)[0]:  # two labels would overlap
-        ax.text(min(idle)[0] / 1.4, y, "no run needed", ha="right", va="center", fontsize=8)
-        return
-    for x, height in idle:
-        ax.text(x * 1.25, height, "no run needed", va="center", fontsize=8)
 
 
 def largest_gain(rows: list[dict], nv: int) -> dict | None:

@@ -1,11 +1,9 @@
 """Locked joints: Mbar and the bias of the reduced model compared with the sub-blocks of the whole model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
-
-import tmt
 
 from ...judge.check import Result, closest, worst_of_each
 from ...judge.entries import scales
@@ -13,7 +11,6 @@ from ...judge.scale import EPS, FACTOR
 from ...robots.case import SEED, Case, Coordinates
 from ...robots.states import seconds
 from ..setup import Setup
-from .times import operations
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
 ALL_SUBSETS, RANDOM_SUBSETS = (
@@ -34,7 +31,6 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
     if robot.is_read and seconds(robot) > MOST_TO_LOCK:
         result.find("no_subsets", bodies=len(robot.tree.mass))
         return
-    counted = setup.of(True, not robot.is_read, True) and not many  # tracing takes half of the time
     sets, states = subsets(robot.joints), STATES_OF_SUBSET
     if many:
         large = coordinates.nv > LARGE
@@ -50,12 +46,9 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
             case = robot.case(scene_name(locked), posture=posture_of(coordinates, q[0]), locked=locked)
             for quantity, pair, apart, scale in sub_block_differences(setup, case, q, v):
                 pairs.setdefault((quantity, pair), []).append((apart, scale))
-        trees = robot.tree, robot.tree.lock(at_zero(robot.tree, locked)), case.tree
-        names = "operations_whole", "operations_locked_at_zero", "operations_locked_at_angles"
-        counts = {name: operations(tree) if counted else None for name, tree in zip(names, trees)}
         units = UNITS_WITH_SLIDES if "slide" in coordinates.all_kinds else UNITS
         for (quantity, pair), arrays in pairs.items():
-            check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), counts, units[quantity])
+            check_blocks(result, locked, quantity, pair, *np.concatenate(arrays, axis=1), units[quantity])
 
 
 def subsets(joints: Sequence[str]) -> list[tuple[str, ...]]:
@@ -78,15 +71,6 @@ def posture_of(coordinates: Coordinates, q: np.ndarray) -> tuple[float, ...]:
     return tuple(posture)
 
 
-def at_zero(tree: tmt.Tree, names: Sequence[str]) -> dict[str, float | tuple]:
-    """The reference positions of some joints of a Tree by their names."""
-    places = dict(zip(tree.hinge_names, tree.coordinates.joints))
-    return {
-        name: tree.zero[places[name].q] if places[name].kind == "ball" else tree.zero[places[name].q.start]
-        for name in names
-    }
-
-
 def scene_name(locked: Sequence[str]) -> str:
     return f"{' and '.join(locked)} locked"
 
@@ -98,18 +82,17 @@ def check_blocks(
     pair: str,
     apart: np.ndarray,
     scale: np.ndarray,
-    counts: Mapping[str, int | None],
-    unit: str | None = None,
+    unit: str,
 ) -> None:
     """A check of the state that comes closest to its tolerance, 64 eps x scale, and a row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
     (worst,) = closest(apart, tolerance)
-    unit, name = unit or UNITS[quantity], f"{quantity}, {pair}"
+    name = f"{quantity}, {pair}"
     check = result.check(scene_name(locked), name, apart[worst], tolerance[worst], unit, rounding=True)
     row = {"locked": " ".join(locked), "quantity": quantity, "parties": pair, "states": len(apart)}
     row["largest_difference"] = float(apart.max()) if np.isfinite(apart).all() else None
     row |= {"unit": unit, "difference_over_bar": check.over_tolerance}
-    result.tables["reduction_subsets"].append(row | counts)
+    result.tables["reduction_subsets"].append(row)
 
 
 def sub_block_differences(

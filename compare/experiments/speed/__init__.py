@@ -87,20 +87,15 @@ def rows(setup: Setup, timed: bool = True) -> Result:
 
 def find_references(result: Result, references: Mapping[str, Reference], floors: accuracy.Floors, unit: str) -> None:
     """How accurate the reference of each scene is, and the error that rounding leaves in it."""
-    of_pairs = [
-        {"scene": scene, "floor": floors[scene], "apart": reference.apart, "expected": LOST * floors[scene] / EPS}
-        for scene, reference in references.items()
-        if not reference.why
-    ]
-    of_doubles = [
-        {"scene": scene, "apart": reference.apart, "steps": reference.steps, "why": reference.why}
-        for scene, reference in references.items()
-        if reference.why
-    ]
-    if of_pairs:
-        result.find("references", runs=of_pairs, unit=unit, lost=LOST)
-    if of_doubles:
-        result.find("references_in_doubles", runs=of_doubles, unit=unit)
+    for kind, in_doubles in (("references", False), ("references_in_doubles", True)):
+        runs = [
+            {"scene": scene, "floor": floors[scene], "expected": LOST * floors[scene] / EPS}
+            | {"apart": reference.apart, "steps": reference.steps, "why": reference.why}
+            for scene, reference in references.items()
+            if bool(reference.why) is in_doubles
+        ]
+        if runs:
+            result.find(kind, runs=runs, unit=unit)
 
 
 def add_times(result: Result, setup: Setup, rows_of: Mapping[str, list[dict]]) -> None:

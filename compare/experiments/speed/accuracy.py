@@ -70,6 +70,7 @@ def errors_of(rows: list[dict], scene: str, engine: str, method: str, finest: fl
 
 
 def rows_of_method(rows: list[dict], scene: str, engine: str, method: str) -> list[dict]:
+    """The rows of a method in a scene, from coarse to fine."""
     return [row for row in rows if (row["scene"], row["engine"], row["method"]) == (scene, engine, method)]
 
 

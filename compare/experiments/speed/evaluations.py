@@ -1,7 +1,6 @@
 """What one evaluation of the dynamics costs: MuJoCo's calls, the ways of tmt, and other engines."""
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -23,16 +22,8 @@ CALL_SECONDS = 1e-3  # a timed call repeats the evaluation for about so long
 MOST_CALLS = 100_000  # repetitions in a timed call
 MOST_RESULTS = 10_000_000  # numbers that the results of many states may have
 WHOLE, EQUAL, MJ_STEP = "MuJoCo, mj_forward", "MuJoCo, equal work", "MuJoCo, mj_step"
-COLUMNS = (
-    "quantity",
-    "implementation",
-    "states",
-    "threads",
-    "ns_per_state",
-    "operations",
-    "operations_per_ns",
-    "why_not",
-)
+COLUMNS = ["quantity", "implementation", "states", "threads", "ns_per_state", "operations", "operations_per_ns",
+           "why_not"]  # fmt: skip
 
 
 class Evaluations(NamedTuple):
@@ -40,7 +31,6 @@ class Evaluations(NamedTuple):
 
     loops: Mapping[tuple, Callable]  # {key: loop(count)} of one state
     of_many: Mapping[tuple, tuple[Callable, int]]  # {key: (call, states in it)}
-    pool: ThreadPoolExecutor  # of two threads
     absent: Mapping[tuple, str]  # {(quantity, implementation): why it is not timed}
 
 
@@ -64,20 +54,19 @@ def compiled_evaluations(setup: Setup) -> Evaluations:
         loops |= {(quantity, name, 1, 1): loop for quantity, name, loop in implementations}
     for loop in loops.values():
         loop(1)  # warm up
-    pool, of_many = ThreadPoolExecutor(2), {}
+    of_many = {}
     for count in numbers:
-        for key, call in of_many_states(tree, [a[:count] for a in states], pool).items():
+        for key, call in of_many_states(tree, [a[:count] for a in states]).items():
             of_many[key] = repeated(call, CALLS // count, count)
     for key, call in (peers.of_many_states(states) if peers else {}).items():
         of_many[key] = repeated(call, key[2] // 1000, key[2])
-    return Evaluations(loops, of_many, pool, absent)
+    return Evaluations(loops, of_many, absent)
 
 
 def costs(result: Result, setup: Setup, made: Evaluations) -> list[dict]:
     """The rows of evaluations.csv, and findings about them."""
     calls = {key: counted(loop) for key, loop in made.loops.items()} | made.of_many
-    with made.pool:
-        times = timing.in_turns([call for call, _ in calls.values()], rounds=setup.of(12, 5, 2))
+    times = timing.in_turns([call for call, _ in calls.values()], rounds=setup.of(12, 5, 2))
     ns = per_state({key: count for key, (_, count) in calls.items()}, times)
     find_ratios(result, ns, setup.robot.name)
     operations = {quantity: evaluator(setup.robot.tree, name).operations for quantity, name in NAMES_IN_TMT.items()}

@@ -1,7 +1,6 @@
 """The implementations of the dynamics in tmt, each ready to be timed: from plain Python to several states side by side."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -51,7 +50,7 @@ def calling(function: Callable, *arguments) -> Callable:
     return loop
 
 
-def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoolExecutor) -> dict:
+def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict:
     """{(quantity, implementation, states, threads): run} for many states, (N, nq and nv); nothing for one state."""
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
     count, n = qd.shape
@@ -62,14 +61,8 @@ def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoo
         compiled = evaluator(tree, name)
         out = np.ones((count, compiled.size))
         wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
-        halves = [[np.ascontiguousarray(part) for part in np.array_split(a, 2, axis=1)] for a in wide]
-
-        def both(compiled=compiled, halves=halves):
-            list(pool.map(compiled.lanes, *halves))
-
         runs[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
         runs[quantity, IN_LANES, count, 1] = lambda compiled=compiled, wide=wide: compiled.lanes(*wide)
-        runs[quantity, IN_LANES, count, 2] = both
     runs[FORWARD, CALLED, count, cores()] = lambda: tmt.acceleration(q, qd, tau, tree)
     if count <= 1000 and n <= IN_PYTHON:
         runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: literal.acceleration(q, qd, tau, tree)

@@ -7,7 +7,7 @@ import numpy as np
 from ...engines import Method
 from ...judge.check import About, Result
 from ...judge.run import ORDER_MARGIN
-from .accuracy import NEAR_ROUNDING
+from .accuracy import NEAR_ROUNDING, rows_of_method
 
 EARLY = 1.0  # s: until then chaos has not grown, and errors fall regularly
 REGULAR, CLEAR = 3e-2, 2e-12  # rad: an error up to EARLY between these falls with its order, far above rounding
@@ -25,7 +25,8 @@ def orders(result: Result, scenes: Sequence[str], methods: Sequence[Method], com
         # the error of rounding, or of a reference in doubles, differs from robot to robot
         clear = max(CLEAR, NEAR_ROUNDING * result.curves["floors"][scene]) if of_file else CLEAR
         for method in methods:
-            regular = [row for row in early_runs(result, scene, method) if clear < row["early"] < REGULAR]
+            runs = rows_of_method(result.rows, scene, method.engine, method.name)
+            regular = [row for row in runs if clear < row["early"] < REGULAR]
             if len(regular) < 2:
                 continue
             if of_file and method.order not in LEAST_ORDER and not has_settled(regular):
@@ -62,14 +63,9 @@ def has_settled(rows: Sequence[dict]) -> bool:
 
 def near_rounding(result: Result, scenes: Sequence[str], method: Method) -> bool:
     """Whether half the coarsest steps of a method would already show rounding."""
-    firsts = [runs[0]["early"] for scene in scenes if (runs := early_runs(result, scene, method))]
+    runs = (rows_of_method(result.rows, scene, method.engine, method.name) for scene in scenes)
+    firsts = [of_scene[0]["early"] for of_scene in runs if of_scene]
     return bool(firsts) and all(first < CLEAR * 2.0**method.order for first in firsts)
-
-
-def early_runs(result: Result, scene: str, method: Method) -> list[dict]:
-    """The rows of a method in a scene, from coarse to fine."""
-    place = (scene, method.engine, method.name)
-    return [row for row in result.rows if (row["scene"], row["engine"], row["method"]) == place]
 
 
 def check_order(result: Result, where: str, order: int, measured: float) -> None:

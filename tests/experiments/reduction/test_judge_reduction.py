@@ -25,7 +25,7 @@ def verdicts(check, *arguments):
 def test_sub_blocks_agree_within_64_eps(apart, passes):
     scale = np.array([2.0, 1e-3, 5.0])
     off = np.array([0.0, apart * EPS * 1e-3, 0.0])  # in the state with the small scale
-    found = verdicts(sub_blocks.check_blocks, ("beta",), "Mbar", "reduced, TMT to MuJoCo", off, scale, {})
+    found = verdicts(sub_blocks.check_blocks, ("beta",), "Mbar", "reduced, TMT to MuJoCo", off, scale, "kg m2")
     assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
 
 
