@@ -57,6 +57,8 @@ def compiled_evaluations(setup: Setup) -> Evaluations:
     of_many = {}
     for count in numbers:
         for key, call in of_many_states(tree, [a[:count] for a in states]).items():
+            if count == STATES[1]:
+                call()  # its code is compiled, or loaded, on the first call
             of_many[key] = repeated(call, CALLS // count, count)
     for key, call in (peers.of_many_states(states) if peers else {}).items():
         of_many[key] = repeated(call, key[2] // 1000, key[2])
