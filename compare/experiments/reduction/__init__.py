@@ -25,7 +25,7 @@ NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
 def claim_values(robot: Robot) -> dict:
-    """What the claim and the tolerance name beside the robot."""
+    """Values of the macros claim and tolerance."""
     pendulums = exact_motion.pendulums(robot.cases_of_torque)
     return {
         "joint": joint_word(robot.coordinates),
@@ -41,7 +41,7 @@ def claim_values(robot: Robot) -> dict:
 
 
 def begin(setup: Setup) -> None:
-    """Begin with all that is not timed, beside other work."""
+    """Start everything that is not timed, in parallel with other work."""
     alone = replace(setup, map=map, quiet=nothing, progress=nothing, background={}, reading=None)
     setup.background["reduction"] = setup.map(untimed, [alone])
 

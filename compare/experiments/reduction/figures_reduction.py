@@ -89,7 +89,8 @@ def mark_times(ax: Axes, result: Result, scene: str, y: float) -> None:
         ax.plot(whole, y + offset, mfc="none", **style)
         if smallest is None:
             look = {"ha": "right", "va": "center", "fontsize": 8, "transform": ax.get_yaxis_transform()}
-            ax.text(0.98, y, "no run needed", **look)
+            if engine == "tmt":  # once for both
+                ax.text(0.98, y, "no run needed", **look)
             continue
         ax.plot([smallest, whole], [y + offset] * 2, color=style["color"], linewidth=1)
         ax.plot(smallest, y + offset, markersize=3.5, **style)

@@ -65,14 +65,14 @@ def joint_rows(case: Case, need: Needed) -> list[dict]:
     """A row for each joint of the robot: whether the case needs it, and why."""
     rows = []
     for name in case.robot.joints:
-        finding, why = "needed", need.moves.get(name, "")
+        status, why = "needed", need.moves.get(name, "")
         if name in case.scene.locked:
-            finding = "declared locked"
+            status = "declared locked"
         elif name in need.stays:
-            finding = "never moves"
+            status = "never moves"
         elif name in need.undecided:
-            finding, why = "not decided", why_not_decided(case)
-        rows.append({"scene": case.name, "joint": name, "found": finding, "why": why})
+            status, why = "not decided", why_not_decided(case)
+        rows.append({"scene": case.name, "joint": name, "found": status, "why": why})
     return rows
 
 

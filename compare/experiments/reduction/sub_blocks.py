@@ -13,12 +13,10 @@ from ...robots.states import seconds
 from ..setup import Setup
 
 STATES_OF_SUBSET = 20  # of the free joints, for each choice of the locked angles
-ALL_SUBSETS, RANDOM_SUBSETS = (
-    6,
-    20,
-)  # joints up to which all subsets are locked; above, each alone and so many at random
+ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, each joint alone
+RANDOM_SUBSETS = 20  # and this number of random subsets
 MOST_TO_LOCK = 2.0  # s that an exact state may take
-LARGE = 12  # nv above which fewer states are taken, and fewer subsets in a run that is not full
+LARGE = 12  # nv above which there are fewer states, and fewer subsets in a run that is not full
 UNITS = {"Mbar": "kg m2", "bias": "N m"}
 UNITS_WITH_SLIDES = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}
 

@@ -15,7 +15,10 @@ from ...robots.case import Case
 from ..setup import Setup
 
 TWO_INTEGRATORS = ("Euler", "RK4")  # of MuJoCo, and the same schemes of tmt
-TIMED_STEPS = {"tmt": 1024, "mujoco": 128}  # of a timed run, short beside the interruptions of a busy machine
+TIMED_STEPS = {
+    "tmt": 1024,
+    "mujoco": 128,
+}  # of a timed run, which is shorter than the interruptions of a busy machine are apart
 FINER_RUNS = 16  # steps of a run for each of the case's own, which are coarse except for a robot from a file
 MOST_TRACED = 12  # nv up to which operations are counted
 

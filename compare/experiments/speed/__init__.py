@@ -29,7 +29,7 @@ ORDER_OF_RK4 = 4
 
 
 def claim_values(robot: Robot) -> dict:
-    """What the claim and the tolerance name beside the robot."""
+    """Values of the macros claim and tolerance."""
     values = {"unit": movement_unit(robot.coordinates), "times": GRID + 1, "eps": FACTOR, "lost": LOST}
     return values | {"doubles": DOUBLES}
 
@@ -42,7 +42,7 @@ def skipped(robot: Robot) -> Finding | str | None:
 
 
 def begin(setup: Setup) -> None:
-    """Measure all errors beside other work: they are not timed."""
+    """Start measuring all errors, in parallel with other work: they are not timed."""
     setup.background["speed"] = measured(setup, followed(setup.robot, setup.size))
 
 

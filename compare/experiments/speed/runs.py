@@ -20,9 +20,9 @@ from . import accuracy
 from .orders import EARLY
 from .settings import coarsest_steps, methods, settings_of, too_long_next
 
-GROWTH_STEPS = 16  # of the run along which the growth is taken, between two of the times at which a run is read
+GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
 EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
-FIRST_STEPS = 4096  # a longer run of MuJoCo is timed over so many steps
+FIRST_STEPS = 4096  # a longer run of MuJoCo is timed over its first steps only
 
 
 def measured(setup: Setup, cases: Sequence[Case], which: str = "all") -> tuple[Sequence[Case], Iterator[tuple]]:
