@@ -5,7 +5,7 @@ import pytest
 
 import tmt
 from compare.engines.mujoco import read
-from compare.experiments.speed.floors import floor
+from compare.experiments.speed.runs import floor
 from compare.experiments.speed.settings import scenes_of
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of

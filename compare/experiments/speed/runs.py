@@ -1,4 +1,4 @@
-"""The runs of speed's scenes without their times: of each method by each of its settings, how far it is from the true motion."""
+"""The runs of each scene by each method and setting: their errors, their times, and the error that rounding leaves."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -6,101 +6,135 @@ from functools import partial
 import numpy as np
 
 from tmt import literal
+from tmt.methods import METHODS, amplification
 
-from ...engines import Engine, Method, Setting
+from ...engines import GRID, Dynamics, Engine, Method, Setting
+from ...judge import timing
+from ...judge.rounding import growth
 from ...judge.run import diverged_at
+from ...judge.scale import EPS
 from ...robots.case import Case
 from ...truth.reference import Reference, references
-from ...truth.smallest import reduced
 from ..setup import Setup
-from . import accuracy, advice
-from .floors import floor
-from .settings import methods, settings_of, too_long_next
+from . import accuracy
+from .orders import EARLY
+from .settings import coarsest_steps, methods, settings_of, too_long_next
 
-# who follows the smaller model of a scene too, where there is one
-SMALLER, SMALLER_STEPS = (("mujoco", "RK4"), ("tmt", "rk4"), ("tmt", "dopri8")), 1024
+GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
+EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step; above, that of one in GROWTH_STEPS
+FIRST_STEPS = 4096  # a longer run of MuJoCo is timed over its first steps only
 
 
 def measured(setup: Setup, cases: Sequence[Case], which: str = "all") -> tuple[Sequence[Case], Iterator[tuple]]:
-    """The scenes, and for each what `scene` returns. Those of unlike models come first: side by side they compile other code."""
+    """The scenes, and `rows_of_scene` of each. Different trees come first: their code compiles in parallel."""
     trees = [case.tree for case in cases]
-    unlike_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
-    return cases, setup.map(partial(scene, engines=setup.engines, size=setup.size, which=which), unlike_first)
+    different_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
+    return cases, setup.map(partial(scene, engines=setup.engines, size=setup.size, which=which), different_first)
 
 
 def scene(case: Case, engines: Mapping[str, Engine], size: str, which: str) -> tuple:
-    """The name of a scene, its reference, its rows without times, and the error that rounding leaves in it, rad."""
-    known = references([case])
-    return case.name, known[case.name], *rows_of_scene(case, engines, known, size, which)
+    """Name, reference, rows without times, and error of rounding (rad) of a scene."""
+    reference = references([case])[case.name]
+    return case.name, reference, *rows_of_scene(case, engines, reference, size, which)
 
 
 def rows_of_scene(
-    case: Case, engines: Mapping[str, Engine], known: Mapping[str, Reference], size: str, which: str
+    case: Case, engines: Mapping[str, Engine], reference: Reference, size: str, which: str
 ) -> tuple[list[dict], float]:
-    """The rows of one scene without times; and the error that rounding leaves in it, rad."""
-    reference = known[case.name]
-    # beyond the digits of the reference nothing is known
-    found, left = [], max(floor(case, engines["tmt"].of(case)), reference.apart)
-    taking, energy = methods(engines, size, which, case.robot, case), true_energy(case, reference)
-    for method in taking:
+    """The rows of a scene without times, and the error that rounding or the reference leaves in it, rad."""
+    rows, left = [], max(floor(case, engines["tmt"].of(case)), reference.apart)
+    nq = case.coordinates.nq
+    energy = literal.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+    for method in methods(engines, size, which, case.robot, case):
         best, last = np.inf, 0
         for setting in settings_of(method, case, size, which):
-            found.append(row_of_run(case, case, engines, method, setting, reference, left, energy))
-            now, work = accuracy.error(found[-1]), found[-1]["evaluations"] or found[-1]["steps"]
-            if accuracy.gained_nothing(now, work, best, last, left) or too_long_next(method, case, work, size):
+            rows.append(row_of_run(case, engines, method, setting, reference, energy, left))
+            error, work = accuracy.error(rows[-1]), rows[-1]["evaluations"] or rows[-1]["steps"]
+            if accuracy.gained_nothing(error, work, best, last, left) or too_long_next(method, case, work, size):
                 break
-            best, last = min(best, now), work
-    smaller = None if case.robot.is_read else reduced(case)
-    few = [method for method in taking if smaller and (method.engine, method.name) in SMALLER]
-    setting = Setting(case.duration, SMALLER_STEPS)
-    runs = [row_of_run(smaller, case, engines, method, setting, reference, energy=energy) for method in few]
-    return found + runs, left
-
-
-def true_energy(case: Case, reference: Reference) -> np.ndarray:
-    """The energy of the reference of a scene at its times, J, (times,)."""
-    nq = case.coordinates.nq
-    return literal.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+            best, last = min(best, error), work
+    return rows, left
 
 
 def row_of_run(
     case: Case,
-    whole: Case,
     engines: Mapping[str, Engine],
     method: Method,
     setting: Setting,
     reference: Reference,
+    energy: np.ndarray,
     left: float = 0.0,
-    energy: np.ndarray | None = None,
 ) -> dict:
-    """A row: one run of a scene, or of the smaller model that has the motion of the whole one.
+    """The row of one run.
 
-    left: the least error that a reference in doubles shows; a smaller one is not known, and has this value. energy: that of the
-    reference, J, (times,), where it is known.
+    energy: of the reference, J, (times,); left: the least error that a reference in doubles resolves, rad; smaller ones are
+    set to it.
     """
-    joints, tree = [whole.joints.index(name) for name in case.joints], whole.tree
-    places, nq = whole.coordinates.places, whole.coordinates.nq
-    free = [[k for i in joints for k in range(*getattr(places.joints[i], part).indices(size))]
-            for part, size in (("q", nq), ("qd", places.nv))]  # fmt: skip
-    true = reference.high[:, :nq], reference.high[:, nq:]
-    energy = true_energy(whole, reference) if energy is None else energy
     run, read = engines[method.engine].of(case).prepare(*case.start, case.tau, setting, method.name)
     with np.errstate(all="ignore"):
         motion = read(run())
         ended = diverged_at(case, reference.t, motion.q, motion.v) is not None
-        error = reference.error(motion.q, joints)
+        error = reference.error(motion.q, range(len(case.joints)))
         error = np.maximum(error, left) if reference.why else error
-        states = [part.copy() for part in true]
-        for state, part, own in zip(states, (motion.q, motion.v), free):
-            if not ended:  # a run that diverged has no quaternions of length 1
-                state[:, own] = part
-        off = np.abs(literal.energy(*states, tree) - energy).max()
+        off = 0.0 if ended else np.abs(literal.energy(motion.q, motion.v, case.tree) - energy).max()
     return {
         "scene": case.name, "engine": method.engine, "method": method.name,
         "dt_s": setting.duration / setting.steps if setting.steps else None, "tolerance": setting.tolerance,
         "steps": motion.steps, "evaluations": motion.evaluations, "seconds": None,
         "error_rad": None if ended else float(error[-1]), "worst_error_rad": None if ended else float(error.max()),
         "energy_error_J": None if ended else float(off), "diverged": ended,
-        "early": float(error[reference.t <= advice.EARLY].max()), "run": (case, method, setting),
-        "whole": None if case is whole else whole.name,
+        "early": float(error[reference.t <= EARLY].max()), "run": (case, method, setting),
     }  # fmt: skip
+
+
+def floor(case: Case, dynamics: Dynamics) -> float:
+    """Error of the angles that rounding leaves: eps times the largest growth of a small difference up to each time, rad.
+
+    dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; ValueError if the run diverges.
+    """
+    first = GROWTH_STEPS * GRID * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // (GROWTH_STEPS * GRID)))
+    for steps in (first, 4 * first, 16 * first):
+        dt = case.duration / steps
+        motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
+        if np.isfinite(motion.q).all():
+            growth_of = growth if case.coordinates.nv <= EACH_STEP else sampled_growth
+            growths = growth_of(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS)
+            return float(EPS * 10.0 ** growths.max() * max(1.0, np.abs(motion.q).max()))
+    raise ValueError(f"scene {case.name!r}: RK4 with {steps} steps does not reach its end; a shorter one is expected")
+
+
+def sampled_growth(stepping, tree, q, qd, tau, dt, every) -> np.ndarray:
+    """`growth`, with the Jacobian of one step in `every` for all of these."""
+    product, scale, result = np.eye(2 * qd.shape[1]), 0.0, [0.0]
+    jacobians = amplification(stepping, tree, q[:-1:every], qd[:-1:every], tau, dt)
+    for J in np.linalg.matrix_power(jacobians, every):
+        product = J @ product
+        size = np.linalg.norm(product, 2)
+        product, scale = product / size, scale + np.log10(size)
+        result.append(scale)
+    return np.array(result)
+
+
+def prepared(rows: list[dict], setup: Setup) -> list[tuple]:
+    """(call, factor) of the rows of one scene: a run takes factor times as long as the call."""
+    runs = []
+    for case, method, setting in (row["run"] for row in rows):
+        part = setting
+        if method.engine == "mujoco" and setting.steps > FIRST_STEPS:  # each of its steps costs the same
+            part = Setting(setting.duration * FIRST_STEPS / setting.steps, FIRST_STEPS)
+        run, _ = setup.engines[method.engine].of(case).prepare(*case.start, case.tau, part, method.name)
+        runs.append((run, setting.duration / part.duration))
+    return runs
+
+
+def take_times(runs: Sequence[tuple], setup: Setup) -> list[list[float]]:
+    """Seconds of the runs of one scene, see `prepared`, in turns."""
+    times = timing.in_turns([run for run, _ in runs], rounds=setup.of(5, 2, 2))
+    return [[factor * seconds for seconds in of_run] for (_, factor), of_run in zip(runs, times)]
+
+
+def fill_in(rows: list[dict], times: Sequence[Sequence[float]]) -> list[float]:
+    """Set the seconds of each row to the least of its times; return median / least of rows with several times."""
+    for row, of_row in zip(rows, times):
+        row["seconds"] = min(of_row)
+    return [float(np.median(of_row)) / min(of_row) for of_row in times if len(of_row) > 1]

@@ -1,18 +1,18 @@
-"""The whole experiment: a small run, joints that are locked in both engines, what each scene needs, and what additions cost."""
+"""The whole experiment: a small run, joints that are locked in both engines, what each scene needs."""
 
 import dataclasses
 
-import numpy as np
 import pytest
 from edited import XML, setup_of
 from models import PATHS, chain
 
 import tmt
-from compare.engines.mujoco import ModelError, Mujoco, additions, engine, read
+from compare.engines.mujoco import Mujoco, engine, read
 from compare.experiments import reduction
-from compare.experiments.reduction import cost, needs, sub_blocks, times
+from compare.experiments.reduction import needs, sub_blocks, times
 from compare.experiments.setup import Setup, engines
 from compare.judge.check import Result
+from compare.report.text import say
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from compare.truth.smallest import needed, reduced
@@ -36,8 +36,8 @@ def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
     assert 0 < planar["operations"] < whole["operations"] and planar["ns_per_step"] > 0
     assert rows["bent, held", "none", "mujoco", "RK4"]["ns_per_step"] is None
     drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, ARM))}
-    names = ["reduction_needs", "reduction_elbow_swing", "reduction_modes", "reduction_cost_in_mujoco"]
-    assert list(drawn) == names and not any("nan" in caption for caption in drawn.values())
+    assert list(drawn) == ["reduction_needs", "reduction_elbow_swing"]
+    assert not any("nan" in say(caption) for caption in drawn.values())
 
 
 def test_a_model_whose_joints_cannot_be_locked_fails():
@@ -48,13 +48,13 @@ def test_a_model_whose_joints_cannot_be_locked_fails():
 
 def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
     log = []
-    for name, said in (("untimed", "computed"), ("time_models", "timed"), ("measure_costs", "measured")):
+    for name, said in (("untimed", "computed"), ("time_models", "timed")):
         given = Result("reduction"), []
-        monkeypatch.setattr(reduction, name, lambda *_, said=said, given=given: log.append(said) or given)
+        monkeypatch.setattr(reduction, name, lambda *_, said=said, given=given, **__: log.append(said) or given)
     setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"), background={})
     reduction.begin(setup)
     reduction.rows(setup)
-    assert log == ["computed", "quiet", "timed", "measured"] and setup.background == {}
+    assert log == ["computed", "quiet", "timed"] and setup.background == {}
 
 
 # locked joints
@@ -100,7 +100,7 @@ def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
     result = reduction.rows(of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"), timed=False)
-    assert any("aligned" in note for note in result.notes) and failed(result) == []
+    assert any(note.kind == "not_lockable" for note in result.notes) and failed(result) == []
 
 
 # what a scene needs
@@ -140,44 +140,3 @@ def test_a_robot_that_falls_does_not_bend():
     need = needed(case)
     assert set(need.moves) == {"root z"} and len(need.undecided) == 15
     assert sum(row["found"] == "not decided" for row in needs.joint_rows(case, need)) == 15
-
-
-# what additions cost
-
-
-def changing(mujoco, case) -> set:
-    """The additions with which the motion of a case has other bits."""
-    engines = additions.with_additions(mujoco, *cost.sizes(case.robot.tree))
-    paths = {name: e.of(case).run(*case.start, case.tau, 1 / 200, 400, "Euler").q for name, e in engines.items()}
-    return {name for name, path in paths.items() if not np.array_equal(path, paths[additions.MINIMAL])}
-
-
-def test_additions_are_there_and_only_a_touched_floor_changes_the_motion(mujoco):
-    engines, case = additions.with_additions(mujoco, *cost.sizes(ARM.tree)), ARM.case("falls", posture="bent")
-    models = {name: engine.of(case) for name, engine in engines.items()}
-    sizes = {name: (d.model.ngeom, d.model.nsensor, d.model.nu) for name, d in models.items()}
-    assert sizes[additions.MINIMAL] == (0, 0, 0) and sizes["two capsules"] == (2, 0, 0)
-    assert sizes["6 sensors"] == (0, 6, 0) and sizes["a motor"] == (0, 0, 1) and sizes[additions.ON_FLOOR] == (3, 0, 0)
-    assert changing(mujoco, case) == {additions.ON_FLOOR}
-    run = *case.start, case.tau, 1 / 200, 400, "Euler"
-    many, pushed = additions.contacts(models[additions.ON_FLOOR], *run)
-    assert many > 0.1 and pushed and additions.contacts(models[additions.CAPSULES], *run) == (0.0, False)
-    with pytest.raises(ModelError, match="beta"):
-        engines[additions.ON_FLOOR].of(ARM.case("locked", locked=("beta",)))
-
-
-def test_a_body_that_falls_with_its_centre_of_mass_at_its_base_has_a_size_and_reaches_any_floor():
-    reading = read('<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>')
-    radius, near, far = cost.sizes(reading.tree)
-    assert radius == pytest.approx(np.sqrt(0.4) * 0.1 / 15, rel=1e-5) and near < 0.0 and far is None
-    assert additions.OFF_FLOOR not in additions.with_additions(engine(reading), radius, near, far)
-
-
-def test_what_is_added_takes_nothing_from_the_default_classes_of_the_file():
-    """A motor that were a servo would push, and geoms that may not touch would never do."""
-    reading = read(
-        '<mujoco><default><position kp="80"/><geom contype="0" conaffinity="0" margin="9"/></default><worldbody><body>'
-        '<joint name="j" axis="0 1 0"/><inertial pos="0.2 0 0" mass="1" diaginertia=".01 .01 .01"/></body></worldbody></mujoco>'
-    )
-    robot = robot_of(reading, "robot.xml")
-    assert changing(engine(reading), robot.case("let go")) == {additions.ON_FLOOR}

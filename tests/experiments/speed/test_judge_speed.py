@@ -9,14 +9,13 @@ import pytest
 import tmt
 from compare.engines import Method, Setting
 from compare.experiments import speed
-from compare.experiments.speed import accuracy, advice, evaluations, figures_panels, peers, times
+from compare.experiments.speed import accuracy, advice, evaluations, figures_speed, orders, peers, runs
 from compare.experiments.speed.evaluations import FORWARD, MJ_STEP, RK4_STEP, WHOLE
-from compare.experiments.speed.figures_times import draw_times
 from compare.judge.check import Result
 from compare.robots.arm import ARM
 
 RK4 = Method("tmt", "rk4", 4, "rk4")
-BESIDE = "smallest error of MuJoCo's RK4, beside that of tmt's rk4"
+COMPARED = "smallest error of MuJoCo's RK4, compared with tmt's rk4"
 STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 
 
@@ -25,7 +24,7 @@ def row(engine, method, error, steps=64, seconds=1e-3, **more):
     return {
         "scene": "bent, free", "engine": engine, "method": method, "dt_s": 5.0 / steps, "tolerance": None, "steps": steps,
         "evaluations": 4 * steps, "seconds": seconds, "error_rad": error, "worst_error_rad": error, "energy_error_J": error,
-        "diverged": error is None, "why_not": None, "early": error, "whole": None,
+        "diverged": error is None, "why_not": None, "early": error,
     } | more  # fmt: skip
 
 
@@ -49,7 +48,7 @@ def judged(check, rows, *arguments):
     return {check.quantity: check.passed for check in result.checks}
 
 
-def runs(engine, method, errors):
+def rows_of(engine, method, errors):
     """A row for each error, from coarse to fine."""
     return [row(engine, method, error, 64 << k) for k, error in enumerate(errors)]
 
@@ -66,21 +65,21 @@ def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
 
 @pytest.mark.parametrize("theirs, ours, left, found", [
     # errors that have stopped are of the size of rounding
-    ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 63, {STOPPED: True, BESIDE: True}),
-    ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 65, {STOPPED: False, BESIDE: True}),
+    ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 63, {STOPPED: True, COMPARED: True}),
+    ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 65, {STOPPED: False, COMPARED: True}),
     # MuJoCo comes as near as tmt
-    ([2e-9 + 63e-14], [1e-9], 1e-14, {BESIDE: True}), ([2e-9 + 65e-14], [1e-9], 1e-14, {BESIDE: False}),
-    ([None], [1e-9], 1e-14, {BESIDE: False}), ([63e-14], [None], 1e-14, {BESIDE: True}),
-    ([65e-14], [None], 1e-14, {BESIDE: False}),
+    ([2e-9 + 63e-14], [1e-9], 1e-14, {COMPARED: True}), ([2e-9 + 65e-14], [1e-9], 1e-14, {COMPARED: False}),
+    ([None], [1e-9], 1e-14, {COMPARED: False}), ([63e-14], [None], 1e-14, {COMPARED: True}),
+    ([65e-14], [None], 1e-14, {COMPARED: False}),
     # where tmt has a step as coarse, and one of them ends
     ([1e-3, 1e-5], [], 1e-16, {}), ([None, None], [None, None, 1e-9], 1e-16, {}),
     # where MuJoCo's steps end before its errors stop, tmt's are no finer
-    ([1e-6, 1.99e-7], [1e-6, 1e-7, 1e-8], 1e-20, {BESIDE: True}),
-    ([1e-6, 2.01e-7], [1e-6, 1e-7, 1e-8], 1e-20, {BESIDE: False}),
-    ([1e-6, 1.99e-7, 1e-6], [1e-6, 1e-7, 1e-8], 1e-20, {STOPPED: False, BESIDE: False}),
+    ([1e-6, 1.99e-7], [1e-6, 1e-7, 1e-8], 1e-20, {COMPARED: True}),
+    ([1e-6, 2.01e-7], [1e-6, 1e-7, 1e-8], 1e-20, {COMPARED: False}),
+    ([1e-6, 1.99e-7, 1e-6], [1e-6, 1e-7, 1e-8], 1e-20, {STOPPED: False, COMPARED: False}),
 ])  # fmt: skip
 def test_smallest_errors(theirs, ours, left, found):
-    rows = runs("mujoco", "RK4", theirs) + runs("tmt", "rk4", ours)
+    rows = rows_of("mujoco", "RK4", theirs) + rows_of("tmt", "rk4", ours)
     assert judged(accuracy.check_smallest_errors, rows, {"bent, free": left}) == found
 
 
@@ -99,7 +98,7 @@ def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
 )  # fmt: skip
 def test_the_order_is_measured_within_its_margin(order, measured, passes):
     result = Result("speed")
-    advice.check_order(result, "bent, free, tmt rk4", order, measured)
+    orders.check_order(result, "bent, free, tmt rk4", order, measured)
     assert [check.passed for check in result.checks] == [passes]
 
 
@@ -116,22 +115,22 @@ def test_the_order_is_measured_within_its_margin(order, measured, passes):
     ([], True, [], [False]),  # it did not run
 ])  # fmt: skip
 def test_an_order_is_measured_where_errors_fall_regularly(errors, complete, measured, passed):
-    result = Result("speed", rows=runs("tmt", "rk4", errors))
-    table = advice.orders(result, ["bent, free"], [RK4], complete)
+    result = Result("speed", rows=rows_of("tmt", "rk4", errors))
+    table = orders.orders(result, ["bent, free"], [RK4], complete)
     assert [line["measured_order"] for line in table] == pytest.approx(measured)
     assert [check.passed for check in result.checks] == passed
 
 
-@pytest.mark.parametrize("orders, floor, asked", [
+@pytest.mark.parametrize("measured, floor, checked", [
     ([4.298, 4.149], 1e-16, True), ([4.302, 4.151], 1e-16, False),  # where it has settled
     ([4.0, 4.0], 1.29e-8, True), ([4.0, 4.0], 1.31e-8, False),  # 30 times as far as rounding
     ([4.0], 1e-16, False),  # seen once
 ])  # fmt: skip
-def test_an_order_of_a_file_is_asked_where_it_has_settled(orders, floor, asked):
-    rows = runs("tmt", "rk4", 1e-4 / 2.0 ** np.cumsum([0.0, *orders]))
+def test_an_order_of_a_file_is_checked_where_it_has_settled(measured, floor, checked):
+    rows = rows_of("tmt", "rk4", 1e-4 / 2.0 ** np.cumsum([0.0, *measured]))
     result = Result("speed", rows=rows, curves={"floors": {"bent, free": floor}, "of_file": True})
-    table = advice.orders(result, ["bent, free"], [RK4], complete=False)
-    assert bool(table) is bool(result.checks) is asked
+    table = orders.orders(result, ["bent, free"], [RK4], complete=False)
+    assert bool(table) is bool(result.checks) is checked
 
 
 def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
@@ -146,16 +145,18 @@ def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
     assert table[1e-12]["mujoco"] is None and "3.1e-07" in table[1e-12]["why_not"]
 
 
-def test_what_to_use_for_a_step_response_is_of_the_error_asked_for():
-    line = {"scene": "step", "target_rad": 1e-3, "mujoco": "RK4", "mujoco_dt_s": 1 / 512, "mujoco_ms": 0.4, "tmt": None}
-    table = [line, line | {"target_rad": 1e-6, "mujoco": "Euler"}, line | {"scene": "let go"}]
-    (said,) = advice.step_response_in_words(table, ["step"])
-    assert said.index("step: RK4") < said.index("let go: RK4") and "Euler" not in said
+def test_the_headline_has_the_cheapest_setting_and_that_of_mujoco():
+    table = advice.advice(known_rows(), ["bent, free"], {"bent, free": 1e-16})
+    found = {target: advice.headline_values(table, "bent, free", target) for target in (1e-3, 1e-12)}
+    first, second = found[1e-3]["settings"]
+    assert (first[0], second[0]) == ("scipy DOP853, 500 steps", "mujoco RK4, 256 steps") and first[2] < second[2]
+    assert [setting for setting, *_ in found[1e-12]["settings"]] == ["tmt dopri8, 1024 steps"]
+    assert advice.headline_values(table, "another", 1e-3) is None
 
 
 def test_a_row_gets_the_least_of_its_times():
     rows = [row("tmt", "rk4", 1.0), row("mujoco", "RK4", 1.0)]
-    assert times.fill_in(rows, [[3e-3, 2e-3, 5e-3], [0.4]]) == [pytest.approx(1.5)]
+    assert runs.fill_in(rows, [[3e-3, 2e-3, 5e-3], [0.4]]) == [pytest.approx(1.5)]
     assert [r["seconds"] for r in rows] == [2e-3, 0.4]
 
 
@@ -167,8 +168,8 @@ def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
     def call():
         now[0] += 0.5
 
-    ready = [(call, longer) for _, longer in times.prepared(rows, setup)]
-    assert times.take_times(ready, setup) == [[pytest.approx(2.0)], [pytest.approx(0.5)]]
+    ready = [(call, longer) for _, longer in runs.prepared(rows, setup)]
+    assert runs.take_times(ready, setup) == [[pytest.approx(2.0)], [pytest.approx(0.5)]]
 
 
 def test_nanoseconds_of_a_state():
@@ -179,9 +180,9 @@ def test_nanoseconds_of_a_state():
 def test_nothing_is_timed_before_all_else_has_ended(setup, monkeypatch):
     log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
     monkeypatch.setattr(speed, "take_times", lambda runs, setup: log.append("timed") or [])
-    monkeypatch.setattr(speed.evaluations, "made_ways", lambda setup: log.append("made"))
-    monkeypatch.setattr(speed.evaluations, "costs", lambda setup, ways: ([], []))
-    speed.add_times(Result("speed", curves={"floors": {}}), setup, {"a": []})
+    monkeypatch.setattr(speed.evaluations, "compiled_evaluations", lambda setup: log.append("made"))
+    monkeypatch.setattr(speed.evaluations, "costs", lambda *_: [])
+    speed.add_times(Result("speed", curves={"floors": {}, "unit": "rad"}), setup, {"a": []})
     assert log == ["made", "quiet", "timed"]
 
 
@@ -200,17 +201,15 @@ class Off:
 def test_accelerations_that_differ_by_more_than_rounding_are_not_timed(rng):
     states = list(rng.uniform(-2.0, 2.0, (3, 40, 3)))
     assert peers.difference(Off(0.0), states) == 0.0
-    assert peers.differs_in_words(0.999) is None and peers.differs_in_words(1.1)
-    assert peers.differs_in_words(peers.difference(Off(1e-6), states))
+    assert peers.differs(0.999) is None and peers.differs(1.1)
+    assert peers.differs(peers.difference(Off(1e-6), states))
 
 
-def test_the_fewest_evaluations_are_those_of_the_coarsest_step_that_is_near_enough():
-    result = Result("speed", rows=known_rows())
-    assert "rk4 needs 1024, dopri8 256" in figures_panels.fewest(result, "bent, free", 1e-3)
-
-
-def test_the_caption_of_times_says_how_many_times_as_long_mujoco_takes():
+def test_the_captions_have_the_fewest_evaluations_and_the_ratios_of_times():
     result = Result("speed", rows=known_rows(), curves={"floors": {"bent, free": 1e-15}, "regular": "bent, free"})
     result.tables["what_should_i_use"] = advice.advice(result.rows, ["bent, free"], {"bent, free": 1e-15})
-    *_, caption = draw_times(result, "bent, free")
-    assert "20 times as long for 1e-02" in caption and "40 times as long for 1e-03 rad" in caption
+    of_methods = [figures_speed.fewest_evaluations(result, "bent, free", name, 1e-3) for name in ("rk4", "dopri8")]
+    assert of_methods == [1024, 256]
+    *_, caption = figures_speed.draw_times(result, "bent, free")
+    ratios = {line["target"]: line["ratio"] for line in caption.values["ratios"]}
+    assert (ratios[1e-2], ratios[1e-3]) == pytest.approx((20.0, 40.0)) and caption.values["diverged"] == 1

@@ -1,7 +1,6 @@
 """Speed against accuracy: who takes part, with which steps; runs and what they are measured against; orders on a free body."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -17,8 +16,7 @@ from compare.engines.scipy import Scipy
 from compare.experiments import speed
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
-from compare.experiments.speed import accuracy, floors, runs, settings, tumbling
-from compare.judge.check import Result
+from compare.experiments.speed import orders, runs, settings
 from compare.judge.rounding import growth
 from compare.robots.arm import ARM
 from compare.robots.case import Scene
@@ -62,7 +60,8 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
         assert [case.name for case in settings.followed(MINE, size)] == expected
     # held scenes of a file are not followed
     assert [case.name for case in settings.followed(GRIPPER, "full")] == ["open, let go", "open, step of the servos"]
-    assert speed.skipped(ARM) is None and "bare" in speed.skipped(dataclasses.replace(ARM, scenes=(), name="bare"))
+    assert speed.skipped(ARM) is None
+    assert speed.skipped(dataclasses.replace(ARM, scenes=())).kind == "no_scene"
 
 
 def test_methods_are_those_of_the_engines_that_are_there_or_the_same_schemes_of_both(engines):
@@ -117,34 +116,34 @@ def test_every_method_follows_the_scene(engines, known_reference):
     for method in settings.methods(engines, "full"):
         steps = None if method.adaptive else 2**13 if method.order == 1 else 1024
         setting = Setting(5.0, steps, 1e-5 if method.adaptive else None)
-        row = runs.row_of_run(BENT, BENT, engines, method, setting, known_reference)
+        row = runs.row_of_run(BENT, engines, method, setting, known_reference, 0.0)
         tolerance = {1: 0.6, 2: 0.03, None: 1e-3}.get(method.order, 1e-4)
         assert 0.0 < row["error_rad"] <= row["worst_error_rad"] < tolerance and not row["diverged"], method
         assert row["energy_error_J"] > 0.0 and row["dt_s"] == (5.0 / steps if steps else None)
     method = engines["tmt"].methods["explicit_euler"]
-    row = runs.row_of_run(BENT, BENT, engines, method, Setting(5.0, 64), known_reference)
+    row = runs.row_of_run(BENT, engines, method, Setting(5.0, 64), known_reference, 0.0)
     assert row["diverged"] and row["error_rad"] is row["worst_error_rad"] is row["energy_error_J"] is None
 
 
 def test_rounding_leaves_eps_times_the_growth(engines, of_gripper):
     slow = BENT.changed(posture=(), gravity=False, duration=1.0, dt=1 / 64)
-    at_rest, left = (floors.floor(case, engines["tmt"].of(case)) for case in (slow, BENT))
+    at_rest, left = (runs.floor(case, engines["tmt"].of(case)) for case in (slow, BENT))
     assert 1.0 <= at_rest / np.finfo(float).eps < 3.0 and left > 10 * at_rest
     fast = BENT.changed(speed=(1e7, 1e7, 1e7))
     with pytest.raises(ValueError, match="scene 'bent, free'"):
-        floors.floor(fast, engines["tmt"].of(fast))
+        runs.floor(fast, engines["tmt"].of(fast))
     dt = FREE.duration / 1024
     motion = of_gripper["tmt"].of(FREE).run(*FREE.start, FREE.tau, dt, 1024, "rk4")
     given = tmt.METHODS["rk4"], FREE.tree, motion.q, motion.v, FREE.tau, dt, 16
-    assert np.abs(growth(*given) - floors.sampled_growth(*given)).max() < 0.1
+    assert np.abs(growth(*given) - runs.sampled_growth(*given)).max() < 0.1
 
 
 def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_gripper, known_reference, monkeypatch):
     truth, method = reference.in_doubles(FREE)._replace(why="too stiff"), of_gripper["tmt"].methods["dopri8"]
-    row = runs.row_of_run(FREE, FREE, of_gripper, method, settings.halvings(method, FREE)[1], truth, 1e-11)
+    row = runs.row_of_run(FREE, of_gripper, method, settings.halvings(method, FREE)[1], truth, 0.0, 1e-11)
     assert row["worst_error_rad"] == row["error_rad"] == 1e-11 and not row["diverged"]
     monkeypatch.setattr(runs, "methods", lambda *_: [])
-    known = {"bent, free": known_reference._replace(apart=1e-6)}
+    known = known_reference._replace(apart=1e-6)
     assert runs.rows_of_scene(BENT, engines, known, "small", "same schemes") == ([], 1e-6)
 
 
@@ -168,9 +167,9 @@ def test_a_small_run_takes_every_path(engines, small):
     timed = costs[costs.why_not.isna()]
     assert {"mass_matrix_and_bias", "forward_dynamics", "rk4_step"} <= set(timed.quantity)
     assert (timed.ns_per_state > 0.0).all() and costs[costs.why_not.notna()].ns_per_state.isna().all()
-    errors = accuracy.true_error(result.rows, dict.fromkeys(("zero, free", "bent, free"), 64))
-    assert errors["zero, free"] == pytest.approx((1.6, 1.6), abs=0.1)
-    assert errors["bent, free"] == pytest.approx((0.27, 0.27), abs=0.01)
+    coarse = ran[(ran.steps == 64) & ran.method.isin(("rk4", "RK4"))].set_index(["scene", "engine"]).worst_error_rad
+    assert list(coarse["zero, free"]) == pytest.approx([1.6, 1.6], abs=0.1)
+    assert list(coarse["bent, free"]) == pytest.approx([0.27, 0.27], abs=0.01)
 
 
 def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engines):
@@ -179,36 +178,39 @@ def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engine
     assert all(row["seconds"] is None for row in result.rows) and list(speed.figures(result, ARM)) == []
     checks = speed.rows(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"')), timed=False).checks
     failed = {check.quantity for check in checks if not check.passed}
-    assert {"smallest error of MuJoCo's RK4, beside that of tmt's rk4", "the same error as tmt's rk4"} <= failed
+    assert {"smallest error of MuJoCo's RK4, compared with tmt's rk4", "the same error as tmt's rk4"} <= failed
+
+
+MOMENTS, QUATERNION, END = (0.03, 0.05, 0.06), (0.5, 0.5, -0.5, 0.5), 2.0  # kg m2, of a free body that tumbles; s
 
 
 @pytest.fixture(scope="module")
 def stone():
-    """A body that tumbles, and its exact quaternions at nine times."""
-    case = tumbling.stone().case("tumbling", posture=tumbling.QUATERNION, speed=tumbling.SPEEDS)
-    times = np.linspace(0.0, tumbling.TUMBLED, tumbling.READ + 1)
-    return case, free_turning(times, tumbling.MOMENTS, case.v, case.q)[1].astype(float)
+    """A free asymmetric body on a ball joint, its exact quaternions at nine times, MuJoCo's engine of it."""
+    body = f'<inertial pos="0 0 0" mass="1" diaginertia="{" ".join(map(str, MOMENTS))}"/><joint type="ball"/>'
+    reading = read(f'<mujoco><option gravity="0 0 0"/><worldbody><body>{body}</body></worldbody></mujoco>')
+    case = robot_of(reading, "stone.xml").case("tumbling", posture=QUATERNION, speed=(480, 120, 360))
+    exact = free_turning(np.linspace(0.0, END, 9), MOMENTS, case.v, case.q)[1].astype(float)
+    return case, exact, engine(reading)
 
 
 def test_each_method_keeps_its_order_on_a_free_body(engines, stone):
-    """One claims an order that it has not."""
-    ours, theirs, result = engines["tmt"], engine(read(tumbling.mjcf())), Result("speed")
-    assert (
-        np.abs(tmt.mass_matrix(stone[0].q, stone[0].tree) - theirs.of(stone[0]).mass_matrix(stone[0].q)).max() < 1e-17
-    )
-    claims = {name: ours.methods[name] for name in ("dopri8", "semi_implicit_euler")}
-    claims["rk4"] = ours.methods["rk4"]._replace(order=5)
-    table = tumbling.orders_on_a_body(result, {"tmt": SimpleNamespace(of=ours.of, methods=claims)})
-    assert [check.scene for check in result.checks if not check.passed] == [f"{tumbling.BODY}, tmt rk4"]
-    found = {(line["engine"], line["method"]): line["measured_order"] for line in table}
-    assert found["tmt", "rk4"] == pytest.approx(4.0, abs=0.1) and found["tmt", "dopri8"] == pytest.approx(8.0, abs=0.5)
-    assert found["tmt", "semi_implicit_euler"] == pytest.approx(1.0, abs=0.05)
-    assert len(found) == 3 + len(theirs.methods)
+    """Against Jacobi's elliptic functions."""
+    case, exact, theirs = stone
+    for of_body in (engines["tmt"], theirs):
+        for method in of_body.methods.values():
+            errors = []
+            for steps in () if method.adaptive else (256 << k for k in range(6)):
+                q = of_body.of(case).run(*case.start, case.tau, END / steps, steps, method.name).q[:: steps // 8]
+                errors.append(np.abs(case.coordinates.difference(q, exact)).max())
+            regular = [error for error in errors if error > orders.CLEAR][-2:]
+            if method.order != 8 and not method.adaptive:
+                assert np.log2(regular[0] / regular[1]) == pytest.approx(method.order, abs=0.15), method
 
 
 def test_a_coarse_run_of_scipy_has_quaternions_of_length_1(stone):
-    case, exact = stone
-    motion = Scipy().of(case).run(*case.start, case.tau, tumbling.TUMBLED / 8, 8, "RK45", tolerance=1e-2)
+    case, exact, _ = stone
+    motion = Scipy().of(case).run(*case.start, case.tau, END / 8, 8, "RK45", tolerance=1e-2)
     assert np.abs(np.linalg.norm(motion.q, axis=1) - 1.0).max() < 1e-15
     assert np.abs(case.coordinates.difference(motion.q, exact)).max() > 1e-6
 

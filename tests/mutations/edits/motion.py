@@ -50,10 +50,6 @@ EDITS = (
     Edit("exact_motion", "check_falling", "np.divide(_1, _2)", "values[0] / values[1]",
          "the order is measured at the coarsest steps"),
     Edit("exact_motion", "check_falling", "clear < 2", "clear < 9", "no order is measured"),
-    Edit("exact_motion", "equilibrium", "min(stable, key=_1, default=None)", "max(stable, key=_1, default=None)",
-         "the highest equilibrium is taken"),
-    Edit("exact_motion", "odd", "bool(_1 and _2)", "True", "every motion is taken for the mirrored one on the other side"),
-    Edit("cost", "check_bits", "_1 in pushed", "changed", "whatever changes the motion may do so"),
     Edit("pendulum", "swing", "ellipj(frequency * t + _1, k * k)[0]", "np.sin(frequency * t)", "a sine as the exact swing"),
     Edit("needs", "check_smaller", "closest(_1, _2)", "(0, 0)", "the first state is judged"),
 )  # fmt: skip

@@ -62,8 +62,8 @@ EDITS = (
     Edit("figures_runs", "drift_caption", "theirs / ours if ours else np.nan", "ours / theirs if ours else np.nan",
          "the ratio of the drifts is inverted"),
     Edit("figures_runs", "over_time", "ours[:, i]", "theirs[:, i]", "MuJoCo's run is drawn as TMT's"),
-    Edit("figures_panels", "fewest", "min(good, default=None)", "max(good, default=None)",
+    Edit("figures_speed", "fewest_evaluations", "min(good, default=None)", "max(good, default=None)",
          "the most evaluations are told as fewest"),
-    Edit("figures_needs", "gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
+    Edit("figures_reduction", "largest_gain", "max(smaller, key=_1, default=None)", "min(smaller, key=_1, default=None)",
          "the least gain is told as the best"),
 )  # fmt: skip

@@ -1,7 +1,6 @@
-"""The ways in which tmt evaluates the dynamics, each ready to be timed: from plain Python to several states side by side."""
+"""The implementations of the dynamics in tmt, each ready to be timed: from plain Python to several states side by side."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -11,12 +10,10 @@ from tmt.compiled import evaluator, runner
 from tmt.compiled.cores import cores
 from tmt.equations import method
 
-MOST_CALLS = 100_000  # of the same in a call that is timed
-MOST_RESULTS = 10_000_000  # numbers, the results of many states, of a robot of many joints
-IN_PYTHON = 12  # speeds up to which the literal form is timed
-# what is evaluated
-FORWARD, TERMS, MASS_MATRIX, RK4_STEP = "forward_dynamics", "mass_matrix_and_bias", "mass_matrix", "rk4_step"
-NAMES_IN_TMT = {FORWARD: "acceleration", TERMS: TERMS}  # of tmt.compiled
+MOST_STEPS, MOST_NUMBERS = 100_000, 10_000_000  # of a timed run; of its results
+IN_PYTHON = 12  # nv up to which the literal form is timed
+FORWARD, MASS_MATRIX, RK4_STEP = "forward_dynamics", "mass_matrix", "rk4_step"
+NAMES_IN_TMT = {FORWARD: "acceleration", "mass_matrix_and_bias": "mass_matrix_and_bias"}  # of tmt.compiled
 CALLED, MASS_CALLED = "tmt.acceleration, called from Python", "tmt.mass_matrix, called from Python"
 WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "compiled, side by side"
 
@@ -24,21 +21,16 @@ WAITING, EACH, IN_LANES = "compiled, each waits for the last", "compiled", "comp
 def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     """(quantity, implementation, loop(count)) of tmt at one state."""
     (q, qd, tau), n = state, len(tree.axis)
-    floats = [a.tolist() for a in state]
-    run, most = runner(tree, "rk4"), min(MOST_CALLS, MOST_RESULTS // n)
+    run, most = runner(tree, "rk4"), min(MOST_STEPS, MOST_NUMBERS // n)
     paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
     paths[0][0, 0], paths[1][0, 0] = q, qd
-
-    def plain(count):
-        for _ in range(count):
-            method.acceleration(tree, *floats)
 
     def steps(count):
         count = min(count, most)
         run(*(path[:, : count + 1].copy() for path in paths), tau[None], 1e-4)
 
     if n <= IN_PYTHON:
-        yield FORWARD, "literal, Python floats", plain
+        yield FORWARD, "literal, Python floats", calling(method.acceleration, tree, *(a.tolist() for a in state))
     tmt.prepare(tree)
     yield FORWARD, CALLED, calling(tmt.acceleration, q, qd, tau, tree)
     yield MASS_MATRIX, MASS_CALLED, calling(tmt.mass_matrix, q, tree)
@@ -48,35 +40,29 @@ def of_one_state(tree: tmt.Tree, state: list[np.ndarray]) -> Iterator[tuple]:
     yield RK4_STEP, EACH, steps
 
 
-def calling(function: Callable, *given) -> Callable:
-    """loop(count): a function called so many times from Python."""
+def calling(function: Callable, *arguments) -> Callable:
+    """loop(count): the function called count times from Python."""
 
     def loop(count):
         for _ in range(count):
-            function(*given)
+            function(*arguments)
 
     return loop
 
 
-def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray], pool: ThreadPoolExecutor) -> dict:
-    """{(quantity, implementation, states, threads): run} for many states, (N, nq and nv); memory is bounded by them."""
+def of_many_states(tree: tmt.Tree, states: Sequence[np.ndarray]) -> dict:
+    """{(quantity, implementation, states, threads): run} for many states, (N, nq and nv); nothing for one state."""
     q, qd, tau = (np.ascontiguousarray(a) for a in states)
     count, n = qd.shape
     runs = {}
-    for quantity, name in NAMES_IN_TMT.items() if count > 1 else ():
+    if count == 1:
+        return runs
+    for quantity, name in NAMES_IN_TMT.items():
         compiled = evaluator(tree, name)
         out = np.ones((count, compiled.size))
         wide = [np.ascontiguousarray(a.T) for a in (q, qd, tau, out)]
-        halves = [[np.ascontiguousarray(part) for part in np.array_split(a, 2, axis=1)] for a in wide]
-
-        def both(compiled=compiled, halves=halves):
-            list(pool.map(compiled.lanes, *halves))
-
         runs[quantity, EACH, count, 1] = lambda compiled=compiled, out=out: compiled.each(q, qd, tau, out)
         runs[quantity, IN_LANES, count, 1] = lambda compiled=compiled, wide=wide: compiled.lanes(*wide)
-        runs[quantity, IN_LANES, count, 2] = both
-    if count == 1:  # a call from Python for one state: what it costs is the call
-        return runs
     runs[FORWARD, CALLED, count, cores()] = lambda: tmt.acceleration(q, qd, tau, tree)
     if count <= 1000 and n <= IN_PYTHON:
         runs[FORWARD, "literal, NumPy arrays", count, 1] = lambda: literal.acceleration(q, qd, tau, tree)
