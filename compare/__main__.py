@@ -122,7 +122,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 for needed in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
                     workers.submit(load_modules, *needed)
                 from .experiments.setup import Setup, engines
-                from .report import files, provenance, remaining, verdict
+                from .report import files, provenance, verdict
                 from .report.parts import Parts
                 from .robots.case import SEED
                 from .run import examine as experiment
@@ -138,8 +138,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
-                expected = remaining.plan(asked, options.quick, command, options.out)
-                terminal.tell(remaining.Remaining(workers.clock, asked, expected).words)
+                terminal.tell(partial(experiment.progress, workers.clock, asked))
                 sections, causes, needless = experiment.examine(asked, setup, folder, terminal, workers, workers.clock)
             parts, unknown = Parts(), "No verdict could be made."
             outcome = sections, len(EXPERIMENTS) - len(needless), causes, compared.compared, robot.name
@@ -153,8 +152,9 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         raise Refused(error) from None
     terminal.say()
     good = verdict.passed(sections) and not parts.broken
-    terminal.say(words, "bold green" if good else "bold red")
-    for line in report.top:
+    first, *more = words.split("\n")
+    terminal.say(first, "bold green" if good else "bold red")
+    for line in more + report.top:
         terminal.say(line)
     for line in parts.lines:
         say_error(line)

@@ -3,13 +3,14 @@
 import html
 import json
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
 import numpy as np
 
-from .engines_apart import scene_named_in
+from ..judge.words import scene_of
 from .verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page
@@ -47,7 +48,7 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
         note += f"Not in this page: {left}. "
     few = len(links) <= FEW_STICKS
     here = Path(__file__).parent
-    return Template((here / "motion.html").read_text(encoding="utf-8")).substitute(
+    text = Template((here / "motion.html").read_text(encoding="utf-8")).substitute(
         ours=html.escape(engines[0]),
         theirs=engines[1],
         width=WIDE,
@@ -63,12 +64,13 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
         data=data,
         script=(here / "motion.js").read_text(encoding="utf-8"),
     )
+    return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
 
 
 def scenes_that_differ(section: Section) -> set[str]:
     """The scenes of which a check of the two models fails."""
     names = [one.scene for one in section.result.curves["drawn"]]
-    return {scene_named_in(check.scene, names) for check in failures([section]).differing} - {None}
+    return {scene_of(check.scene, names) for check in failures([section]).differing} - {None}
 
 
 def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dict]]:

@@ -4,7 +4,9 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from ..judge.check import About, Check
+from ..judge.finding import Finding
 from ..process.crash import described
+from .text import say
 
 Made = TypeVar("Made")
 
@@ -26,7 +28,7 @@ class Parts:
     @property
     def lines(self) -> list[str]:
         """A sentence for each broken part."""
-        return [f"This report is not complete: {name} could not be made, {why}." for name, why in self.broken.items()]
+        return [say(Finding("verdict", "incomplete", {"name": name, "why": why})) for name, why in self.broken.items()]
 
     @property
     def checks(self) -> list[Check]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from .questions import answers
+from ..judge.check import Check
 from .verdict import Section
 
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7)  # of a column; else 3
@@ -43,21 +43,10 @@ def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
     return shown(pd.DataFrame(rows, columns=["rank", "place", "stated", "found", "cause"]))
 
 
-def questions(sections: Sequence[Section], robot) -> pd.DataFrame:
-    """What was asked and the answers, as a table for readers; without the parts of an assignment where there are none."""
-    table = pd.DataFrame(answers(sections, robot), columns=["part", "asked", "answered in", "answer"])
-    return table if table["part"].any() else table.drop(columns="part")
-
-
-def asked_by(robot) -> str:
-    """The heading of the questions."""
-    return "The assignment's questions" if robot.questions else "Questions"
-
-
-def failing(section: Section) -> pd.DataFrame:
-    """The checks of a section that fail, as text."""
-    failed = [check.record() for check in section.result.checks if not check.passed]
-    return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
+def records(checks: Sequence[Check]) -> pd.DataFrame:
+    """Checks as text, a row for each."""
+    names = [field for field in Check.__annotations__ if field not in ("rounding", "about")]
+    return shown(pd.DataFrame([check.record() for check in checks], columns=names))
 
 
 def closest_checks(section: Section, most: int) -> pd.DataFrame:
@@ -65,7 +54,7 @@ def closest_checks(section: Section, most: int) -> pd.DataFrame:
     checks = section.result.checks
     order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
     kept = [checks[k] for k in sorted(order[:most])]
-    return shown(pd.DataFrame([check.record() for check in kept]).drop(columns="experiment", errors="ignore"))
+    return records(kept).drop(columns="experiment")
 
 
 def heading(name: str) -> str:

@@ -14,24 +14,21 @@ from ..judge.finding import Finding
 from ..process.clock import Clock
 from ..process.crash import described
 from ..process.workers import WorkerEnded, Workers
-from ..report import overview
-from ..report.remaining import END, START
 from ..report.terminal import Terminal
 from ..report.text import block, has, say
-from ..report.verdict import Section, failures
-from .drawing import FIRST, HALVES, draw, quiet
+from ..report.verdict import STATES_CAUSES, Section, explained, failures
+from .drawing import FIRST, HALVES, draw, quiet, results_needed
 
-Found = tuple[
-    Result | None, Result | None
-]  # what an experiment found, or the failed check that stands for it where it broke off
+START, END = "start", "figures"  # tasks of the clock: what comes before the first experiment and after the last
+Found = tuple[Result | None, Result | None]  # the result of an experiment, or a failed check where it broke off
 
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers that Mbar and h follow from, as `parameters` calls them
 IN_EQUATIONS = (
-    "order", "parent", "ref", "axis", "anchor", "mass", "com", "inertia", "gravity", "armature", "flag gravity",
+    "order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature", "flag gravity",
 )  # fmt: skip
 NOTHING_FAILED = "nothing failed"
-SHOWN = 5  # checks of an experiment that fail, on the terminal
+SHOWN, SHOWN_BESIDE_CAUSE = 5, 2  # lines on the terminal about an experiment that fails; where a cause explains some
 
 
 def examine(
@@ -74,11 +71,11 @@ def examine(
                 add_problems(crash or result, own.equations.problems, said)
             sections.append(Section(name, *(asked or (name, "", "")), crash or result))
             sections[-1].result.checks += unsaid.checks if unsaid else []
-            new = new_causes(setup, sections, causes)
+            new = [{"experiment": name, **cause} for cause in new_causes(setup, sections, causes)]
             causes = new + causes
         clock.ends(name)
         with clock.of(END):
-            others = overview.results_needed(name, order, sections)
+            others = results_needed(name, order, sections)
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
             parts = [] if crash else parts_drawn(name, sections[-1], setup)
             jobs = [(sections[-1], partial(drawing, part)) for part in parts]
@@ -86,7 +83,7 @@ def examine(
                 waiting += jobs
             else:
                 drawings += [(section, job()) for section, job in jobs]
-        say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
+        say_outcome(terminal, sections[-1], clock.seconds_of(name), new, causes)
     with clock.of(END):
         setup.progress("figures")
         drawings += [(section, drawing()) for section, drawing in waiting]
@@ -102,8 +99,18 @@ def computed(name: str, experiment: ModuleType, setup: Setup) -> Found:
 
 
 def found_by(name: str, experiment: ModuleType, setup: Setup, crashed: Result | None) -> Found:
-    """What an experiment finds. crashed: its failed check, if it broke off when it was set going."""
-    return (None, crashed) if crashed else attempt(name, experiment.rows, setup)
+    """What an experiment finds, with its headline. crashed: its failed check, if it broke off when it was set going."""
+    return (
+        (None, crashed)
+        if crashed
+        else attempt(name, lambda setup: with_headline(experiment, experiment.rows(setup)), setup)
+    )
+
+
+def with_headline(experiment: ModuleType, result: Result) -> Result:
+    if result.headline is None and hasattr(experiment, "headline"):
+        result.headline = experiment.headline(result)
+    return result
 
 
 def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:
@@ -173,7 +180,11 @@ def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
     explaining = [diagnosis.record(cause) for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     if not explaining:
         return list(of_numbers)
-    return [explaining[0], *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
+    replaced = [quantity for quantity in IN_EQUATIONS if quantity in {cause["quantity"] for cause in of_numbers}]
+    return [
+        explaining[0] | {"quantity": replaced[0]},
+        *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS),
+    ]
 
 
 def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
@@ -221,7 +232,7 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
     except OSError:
         raise
     except WorkerEnded:  # what was computed is kept
-        failed = [("number 1", "the process that draws was ended from outside")]
+        failed = [("number 1", "the drawing process was killed")]
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:
@@ -238,22 +249,34 @@ def largest_share_in_words(share: float) -> str:
     return f"at most {float(f'{percent:.2g}' if percent >= 1.0 else f'{percent:.1g}'):g} % of tolerance"
 
 
-def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Sequence[dict]) -> None:
-    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks.
+def say_outcome(
+    terminal: Terminal, section: Section, seconds: float, new: Sequence[dict], causes: Sequence[dict] = ()
+) -> None:
+    """One line for an experiment; then the causes that are new, and the first failing checks that no cause explains.
 
-    seconds: of the processor, for the experiment itself.
+    seconds: of the processor, for the experiment itself; causes: all that are known.
     """
-    checks = section.result.checks
+    checks, of_cause = section.result.checks, explained(section, causes)
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
     most = largest_share_in_words(max(used)) if any(used) and not failed else ""
+    if of_cause:
+        some = f"{len(of_cause)} " if len(of_cause) < len(failed) else ""
+        most = f"{some}explained by the cause"
     word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
-    lines = [f"  CAUSE {cause['text']}" for cause in causes]
-    if not (causes and section.name in ("parameters", "diagnosis")):  # there the causes are the checks
-        lines += [f"  FAIL {check}" for check in failed]
-    for line in lines[:SHOWN]:
+    lines = [f"  CAUSE {cause['text']}" for cause in new]
+    if not (causes and section.name in STATES_CAUSES):  # there the causes are the checks
+        lines += [f"  FAIL {check}" for check in failed if check not in of_cause]
+    shown = SHOWN_BESIDE_CAUSE if of_cause else SHOWN
+    for line in lines[:shown]:
         terminal.say(line, "red")
-    if len(lines) > SHOWN:
-        terminal.say(f"  and {len(lines) - SHOWN} more: in the report", "red")
+    if len(lines) > shown:
+        terminal.say(f"  and {len(lines) - shown} more: in the report", "red")
+
+
+def progress(clock: Clock, names: Sequence[str]) -> list[str]:
+    """How far a run of these experiments is: "4 of 11", "acceleration"."""
+    number = 1 + sum(name in clock.ended for name in names)
+    return [f"{number} of {len(names)}", clock.under_way] if clock.under_way in names else []

@@ -18,6 +18,7 @@ from .. import Experiment
 from ..setup import Setup, nothing
 from . import exact_motion, sub_blocks
 from .cost import measure_costs
+from .first_screen import headline as headline
 from .needs import MOST_IN_A_BAND, of_case
 from .times import TWO_INTEGRATORS, time_models
 

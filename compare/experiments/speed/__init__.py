@@ -15,6 +15,8 @@ from .. import Experiment
 from ..setup import Setup
 from . import accuracy, advice, evaluations, tumbling
 from .accuracy import reference_in_words
+from .first_screen import best_curves, choice
+from .first_screen import headline as headline
 from .runs import measured
 from .settings import (
     absent_in_words,
@@ -118,6 +120,7 @@ def rows(setup: Setup, timed: bool = True) -> Result:
     result.notes = [said(note, unit) for note in result.notes]
     if timed:
         result.tables["what_should_i_use"] = renamed(result.tables["what_should_i_use"], unit)
+        result.curves["choice"] = choice(result)
     return result
 
 
@@ -152,3 +155,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     yield partial(figures_panels.draw_evaluations, result)
     yield partial(figures_panels.draw_energy, result)
     yield partial(figures_evaluations.draw_cost, result, robot.name)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    from .figures_overview import draw_times  # matplotlib is for the process that draws
+
+    if best_curves(results["speed"]):
+        yield partial(draw_times, results["speed"])

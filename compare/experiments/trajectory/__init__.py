@@ -1,6 +1,6 @@
 """Motion by the same scheme on both sides: a method of tmt for every integrator of MuJoCo."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 from ...engines import LABELS, one_of_each_scheme
@@ -13,6 +13,7 @@ from .. import Experiment
 from ..setup import Setup
 from . import drift, errors, horizon, leaving, motion, sentences
 from .derivative import compare_derivatives
+from .first_screen import headline as headline
 from .motion_frames import follow_and_draw, in_order
 from .own_runs import within_time
 from .runs import FEW_ENTRIES, MOST_ENTRIES
@@ -187,3 +188,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(figures_drift.draw_growth, result)
     if result.curves.get("drawn"):
         yield partial(figures_motion_gif.draw_motion, result)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    from .figures_overview import draw_scenes  # matplotlib is for the process that draws
+
+    if results["trajectory"].rows:
+        yield partial(draw_scenes, results["trajectory"], robot)
