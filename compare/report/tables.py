@@ -14,10 +14,10 @@ DIGITS |= dict.fromkeys(
 )
 
 IN_WORDS = {
-    "seconds_of": "seconds of the processor, without what was waited",
-    "ended_after_s": "seconds until each had ended",
+    "seconds_of": "CPU seconds",
+    "ended_after_s": "seconds from the start to the end",
 }
-LISTS = ("names", "hinges", "locked")  # columns with names of joints, which may be many
+LISTS = ("names", "hinges", "locked")  # columns with many names of joints
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
 
 
@@ -38,7 +38,7 @@ def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataF
 
 
 def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
-    """The causes as a table for readers: where, what is stated, what is found, and in a sentence."""
+    """The causes as text."""
     rows = [(cause["rank"], cause["place"], cause["stated"], cause["found"], cause["text"]) for cause in causes]
     return shown(pd.DataFrame(rows, columns=["rank", "place", "stated", "found", "cause"]))
 
@@ -50,7 +50,7 @@ def records(checks: Sequence[Check]) -> pd.DataFrame:
 
 
 def closest_checks(section: Section, most: int) -> pd.DataFrame:
-    """At most so many checks of a section, as text: those that fail, then those that use most of a tolerance of rounding."""
+    """The checks of a section that fail, then those with the largest share of a rounding tolerance, at most `most`, as text."""
     checks = section.result.checks
     order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
     kept = [checks[k] for k in sorted(order[:most])]
@@ -63,11 +63,11 @@ def heading(name: str) -> str:
 
 
 def origins(origin: dict) -> pd.DataFrame:
-    """Where a report comes from, as a table for readers."""
+    """The provenance as text."""
     rows = [(IN_WORDS.get(name, name), in_one_cell(value)) for name, value in origin.items()]
     return pd.DataFrame(rows, columns=["what", "value"])
 
 
 def in_one_cell(value) -> str:
-    """A value of the provenance, of several things one after the other."""
+    """A value of the provenance."""
     return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)

@@ -36,7 +36,7 @@ class Curve(NamedTuple):
 def headline(result: Result) -> Finding | None:
     """The cheapest setting within TARGET, and MuJoCo's (tmt's, if MuJoCo's is the cheapest)."""
     settings = cheapest(best_curves(result))
-    return result.finding("headline", settings=settings, **target(result)) if settings else None
+    return result.finding("best_settings", settings=settings, **target(result)) if settings else None
 
 
 def target(result: Result) -> dict:
