@@ -21,7 +21,7 @@ from .text import block, count, environment, sentence
 from .verdict import Report, Section, explained, failures, headline, outcome, passed, standing
 
 MOST_LINES = 300  # of report.md
-SIZES = 40, 24, 16, 12, 8, 6, 4, 2, 0  # rows of each table in report.md: the first with which it has so few lines
+SIZES = 40, 16, 12, 8, 4, 2, 0  # rows of each table in report.md: the first with which it has so few lines
 MOST_ROWS, MOST_OF_RUNS = 40, 60  # of a table in the page; its file has all
 FIRST_NOTES = 3  # of a section of the page that are not folded
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
@@ -241,6 +241,7 @@ def joints_of(robot) -> list[str]:
 
 
 def joined(paragraphs: Sequence[str]) -> str:
-    """Paragraphs as one text, with one empty line between them."""
+    """Paragraphs as one text, with one empty line between them, but none between the items of a list."""
     lines = "\n".join(line.rstrip() for line in "\n\n".join(paragraphs).split("\n"))
-    return re.sub(r"\n{3,}", "\n\n", lines).strip() + "\n"
+    text = re.sub(r"\n{3,}", "\n\n", lines).strip() + "\n"
+    return re.sub(r"(?m)^(- .*)\n\n(?=- )", r"\1\n", text)

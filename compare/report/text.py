@@ -37,6 +37,11 @@ def sentence(text: str) -> str:
     return begins_block + inline(text)
 
 
+def name(text: str) -> str:
+    """A text in Markdown in which nothing is markup."""
+    return "\\`".join(inline(part) for part in text.split("`"))
+
+
 def inline(text: str) -> str:
     return MARKUP.sub(lambda match: match[1] or f"\\{match[0]}", text)
 
@@ -49,6 +54,7 @@ def words(text: str) -> str:
 FILTERS = {
     "sentence": sentence,
     "words": words,
+    "name": name,
     "cell": lambda text: inline(text).replace("|", "\\|"),
     "g": lambda value, digits=3: f"{value:.{digits}g}",
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
