@@ -9,7 +9,7 @@ if __name__ == "__main__":
     streams.prepare()
     interrupt.listen()  # before anything that takes its time
     os.environ.setdefault("MUJOCO_GL", "disabled")  # nothing is rendered: no further process looks for a display
-    # the matrices are small: threads of a product would only wait for each other, beside processes that compute too
+    # the matrices are small, and other processes compute too: threads of a product would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
@@ -20,18 +20,18 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from .cli.command_line import FLEET, PROGRAM, request
+from .cli.command_line import FLEET, PROGRAM, TEXT, request
 from .experiments import EXPERIMENTS, skipped
 from .process.crash import described
 from .process.streams import in_one_line
 
 COMPUTING = ("compare.run.examine", "scipy.optimize", "tmt.compiled.machine")  # modules that take long to load
 DRAWING = ("compare.report.style", *COMPUTING)
-LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a word
+LITTLE = 1_000_000  # bytes, by which the cache folder may grow without a message
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit status. SystemExit where nothing is to be run: see command_line.request."""
+    """Run the command line; the exit status. SystemExit after help or a wrong word: see command_line.request."""
     arguments = sys.argv[1:] if arguments is None else arguments
     if arguments[:1] == [FLEET]:
         return answered(partial(fleet, arguments[1:]))
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def fleet(arguments: Sequence[str]) -> int:
-    """Carry out what is asked of many files; the exit status."""
+    """Compare many files; the exit status."""
     from .fleet import command  # what is imported takes its time
     from .fleet.tasks import FleetError
 
@@ -57,7 +57,7 @@ def fleet(arguments: Sequence[str]) -> int:
 
 
 def answered(act: Callable[[], int]) -> int:
-    """The exit status of what is carried out; 2 with a line where it cannot be."""
+    """The exit status of a request; 2, with a line, if it could not be carried out."""
     try:
         return act()
     except Refused as error:
@@ -66,7 +66,7 @@ def answered(act: Callable[[], int]) -> int:
         name = "" if error.filename is None else f"{error.filename}: "
         line = f"cannot go on: {name}{error.strerror or error}"
     except ModuleNotFoundError as error:
-        line = f"the package {error.name} is not installed; `python -m pip install -e .` brings what is needed"
+        line = f"the package {error.name} is missing; install it with `python -m pip install -e .`"
     except Exception as error:
         line = f"cannot go on: {described(error)}"
     interrupt.settle()
@@ -96,7 +96,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     from .process.workers import WorkerEnded, load_modules, start_workers
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
-    from .report.text import say
+    from .report.text import block, say
     from .robots.scene_file import SceneError, read_scenes
     from .run.reference import compared_with  # imports are here, so that --help and a wrong word answer at once
 
@@ -114,15 +114,12 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             for line in compared.lines:
                 terminal.say(line)
             if options.experiment == "stability" and reading and not reading.drive.feeds_back:
-                terminal.say(
-                    f"No actuator of {robot.name} holds a position or a speed: there is no servo whose step could be unstable. "
-                    "What follows is about the robot without its actuators."
-                )
+                terminal.say(block(TEXT, "no_servo", robot=robot.name))
             with start_workers() as workers, terminal.progress("imports"):
                 for needed in (DRAWING, COMPUTING)[: len(names)]:  # in further processes at the same time
                     workers.submit(load_modules, *needed)
                 from .experiments.setup import Setup, engines
-                from .report import files, provenance, remaining, verdict
+                from .report import files, provenance, verdict
                 from .report.parts import Parts
                 from .robots.case import SEED
                 from .run import examine as experiment
@@ -131,19 +128,17 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
                 of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference
-                of_run |= {"alone": options.experiment != "all", "asked": asked}
-                of_run |= {"door": door}
+                of_run |= {"alone": options.experiment != "all", "asked": asked, "door": door}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():
                     terminal.say(f"{name:<13} skipped: {reason}")
                 asked = [name for name in names if name not in reasons]
-                expected = remaining.plan(asked, options.quick, command, options.out)
-                terminal.tell(remaining.Remaining(workers.clock, asked, expected).words)
+                terminal.tell(partial(experiment.progress, workers.clock, asked))
                 sections, causes, needless = experiment.examine(asked, setup, folder, terminal, workers, workers.clock)
-            parts, unknown = Parts(), "No verdict could be made."
+            parts = Parts()
             outcome = sections, len(EXPERIMENTS) - len(needless), causes, compared.compared, robot.name
-            words = parts.made("the verdict", unknown, verdict.verdict, *outcome)
+            words = parts.made("the verdict", "No verdict.", verdict.verdict, *outcome)
             reasons |= needless
             origin["seconds"] = round(time.perf_counter() - started, 1)
             origin |= provenance.durations(workers.clock)
@@ -153,16 +148,16 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         raise Refused(error) from None
     terminal.say()
     good = verdict.passed(sections) and not parts.broken
-    terminal.say(words, "bold green" if good else "bold red")
-    for line in report.top:
+    first, *more = words.split("\n")
+    terminal.say(first, "bold green" if good else "bold red")
+    for line in more + report.top:
         terminal.say(line)
     for line in parts.lines:
         say_error(line)
     place = f" in place of that of `{before}`" if before not in (None, origin["command"]) else ""
     terminal.say(f"Report: {os.path.join(options.out, 'index.html')}{place} ({time.perf_counter() - started:.1f} s)")
     if (size := size_of_cache()) > kept + LITTLE:
-        folder = f"{in_home(cache_folder())}, now {size / 1e6:.0f} MB"
-        terminal.say(f"Compiled code is kept for later runs in {folder}; to clear it, delete that folder.")
+        terminal.say(block(TEXT, "cache", folder=in_home(cache_folder()), megabytes=size / 1e6))
     return 0 if good else 1
 
 

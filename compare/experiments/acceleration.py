@@ -1,6 +1,6 @@
 """Bias in motion, forward and inverse dynamics, energy and power."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,7 @@ from tmt.equations.dual import seeded
 
 from ..engines import LABELS, WHOSE
 from ..engines.tmt import Compiled
-from ..judge.check import Result
+from ..judge.check import Result, agreement_headline
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import gravity_scale
 from ..judge.words import ROWS_COMPILED, listed
@@ -22,6 +22,7 @@ from . import Experiment
 from .setup import Setup
 
 EXPERIMENT = Experiment(order=60, options=("--joints",), diagnosed=True, overview="agreement")
+headline = agreement_headline
 
 
 def claim(robot: Robot) -> str:
@@ -158,3 +159,9 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     quantities = ["bias", "qdd", "energy", "potential energy"]
     known = [quantity for quantity in quantities if quantity in result.curves["random states"]]
     yield partial(draw_distances, result, "random states", known)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    from .figures_overview import pictures_of_agreement  # matplotlib is for the process that draws
+
+    yield from pictures_of_agreement(results)

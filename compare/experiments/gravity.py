@@ -10,7 +10,7 @@ from tmt import literal
 
 from ..engines import LABELS, WHOSE
 from ..engines.tmt import Compiled
-from ..judge.check import Result
+from ..judge.check import Result, agreement_headline
 from ..judge.entries import Entries, has_own_scales, per_speed, scales, unit
 from ..judge.scale import gravity_scale, spring_scale
 from ..judge.words import ROWS_COMPILED, capital
@@ -20,6 +20,7 @@ from . import Experiment
 from .setup import Setup
 
 EXPERIMENT = Experiment(order=50, asks_of_own=("gravity", "bias", "energy"), options=("--joints",), diagnosed=True)
+headline = agreement_headline
 MOST_ENERGIES = 150_000  # of one engine, at random states
 
 

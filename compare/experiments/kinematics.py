@@ -8,7 +8,7 @@ import numpy as np
 from ..engines import LABELS
 from ..engines.mujoco.accelerations import convective_accelerations
 from ..engines.tmt import Compiled
-from ..judge.check import Result
+from ..judge.check import Result, agreement_headline
 from ..judge.entries import has_own_scales, scales, unit
 from ..judge.scale import EPS, FACTOR, reaches
 from ..judge.words import ROWS_COMPILED, listed
@@ -18,6 +18,7 @@ from . import Experiment
 from .setup import Setup
 
 EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"), options=("--joints",))
+headline = agreement_headline
 RATED, RATE_STEP = 20, 1e-6  # states at most, and step in s, of central differences of a Jacobian along the motion
 CLEARLY = 1e3  # of two ways, one is wrong if it is off by so many times more
 

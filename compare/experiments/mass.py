@@ -1,6 +1,6 @@
 """The mass matrix."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 import numpy as np
@@ -143,3 +143,9 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     yield partial(draw_distances, result, "random states")
     if robot.conditioning:
         yield partial(draw_condition, result, robot)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    from .figures_overview import pictures_of_agreement  # matplotlib is for the process that draws
+
+    yield from pictures_of_agreement(results)

@@ -11,6 +11,7 @@ from tmt.exact.values import distance, exact
 
 from ..engines import Dynamics
 from ..judge.check import Result
+from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR, acceleration_scale, gravity_scale, mass_scale
 from ..judge.words import capital, listed
 from ..robots import Printed, Robot
@@ -191,3 +192,11 @@ def digits_in_words(item: Printed, of: Answer, robot: Robot) -> str:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     yield from ()
+
+
+def headline(result: Result) -> Finding | None:
+    """How many of the printed numbers both engines meet."""
+    met = sum(
+        all(abs(row[name] - row["published"]) <= row["tolerance"] for name in ("tmt", "mujoco")) for row in result.rows
+    )
+    return result.finding("headline", met=met, numbers=len(result.rows)) if result.rows else None

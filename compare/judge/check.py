@@ -1,6 +1,6 @@
 """Checks and their rules, and what an experiment finds: rows, checks, curves and sentences."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -185,6 +185,12 @@ def agreement_headline(result: Result) -> Finding | None:
         return None
     values = {"difference": top["worst_difference"], "unit": top["unit"], "share": top["difference_over_bar"]}
     return Finding("shared", "agreement_headline", {"quantity": top["quantity"], **values})
+
+
+def largest_known(values: Sequence[float | None]) -> float | None:
+    """The largest of the values that are not None; inf where one is not a number; None if there is none."""
+    known = [float(value) for value in values if value is not None]
+    return None if not known else np.inf if np.isnan(known).any() else max(known)
 
 
 def closest(difference: np.ndarray, tolerance: np.ndarray) -> tuple[int, ...]:

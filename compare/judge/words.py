@@ -27,3 +27,8 @@ def posture_begins(name: str, robot) -> str:
 def listed(words: Sequence[str]) -> str:
     """a, b and c."""
     return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
+
+
+def scene_of(place: str, names: Sequence[str]) -> str | None:
+    """The scene of a check: the longest name with which its place begins."""
+    return max((name for name in names if f"{place},".startswith(f"{name},")), key=len, default=None)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from . import images, markdown, page
+from . import images
+from .document import Document, joined
 from .folder import files, save
 from .parts import Parts
 from .verdict import Report, passed
@@ -29,12 +30,12 @@ def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
     checks = records(parts, "check", [check.record() for check in made])
     fields = ("rank", "place", "stated", "found", "text")
     causes = records(parts, "cause", [{name: cause[name] for name in fields} for cause in report.causes])
-    paragraphs, texts = markdown.markdown_body(report, parts), page.page_body(folder, report, parts)
-    html = parts.made("index.html", None, page.page, report, texts, parts)
-    text = parts.made("the head of report.md", None, markdown.markdown, report, paragraphs, parts)
-    save(folder / "report.md", markdown.joined([*parts.lines, *paragraphs]) if text is None else text)
-    if html is not None:
-        save(folder / "index.html", html)
+    markdown, page = Document(report, parts), Document(report, parts, folder)
+    bodies = {document: parts.made(document.file, [], document.body) for document in (markdown, page)}
+    for document, body in bodies.items():
+        text = parts.made(f"the head of {document.file}", None, document.text, body)
+        if text is not None or document is markdown:
+            save(folder / document.file, joined([*parts.lines, *body]) if text is None else text)
     images.clear_webp(folder / "figures")
     reference = report.reference
     results = {

@@ -13,7 +13,7 @@ MEDIA = {".png": "image/png", ".webp": "image/webp", ".gif": "image/gif"}
 
 
 def save_figure(figure: object, path: Path) -> None:
-    """A figure of matplotlib as a PNG with a palette; beside it, until the page is written, as a WebP without loss."""
+    """A figure of matplotlib as a PNG with a palette; also, until the page is written, as a lossless WebP."""
     if path.suffix != ".png":  # a figure that writes its own files
         figure.savefig(path)
         return
@@ -24,7 +24,7 @@ def save_figure(figure: object, path: Path) -> None:
 
 
 def with_palette(image: Image.Image) -> Image.Image:
-    """An image of few colours; paper stays white beside what is nearly white."""
+    """An image of few colours in which white paper stays white."""
     whole = np.asarray(image, dtype=np.int16)
     paper = (whole == 255).all(axis=2)
     for method in (

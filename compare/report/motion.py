@@ -1,21 +1,22 @@
-"""The motion in the page: both engines' stick figures over each other, with a slider, and nothing to fetch."""
+"""The motion in the page: stick figures of both engines over each other, with a slider; it fetches nothing."""
 
 import html
 import json
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
 import numpy as np
 
-from .engines_apart import scene_named_in
-from .text import say
+from ..judge.words import scene_of
+from .text import block, say
 from .verdict import Section, failures
 
 MOST_BYTES = 280_000  # of the motion in the page
 STICK_BYTES = 48  # of a stick in the picture without script
-ONE_OF_MANY = 8  # one of so many pictures of each scene is shown before scenes are left out
+LARGEST_STRIDE = 8  # every eighth picture of each scene is shown before scenes are left out
 DRAWN_IN = "trajectory"  # the experiment whose scenes are drawn
 WIDE, HIGH, BORDER = 1000, 480, 45  # of what is drawn, in its own units
 FEW_STICKS = 6  # up to which they are drawn wide
@@ -24,10 +25,10 @@ UNDER = 0.9  # of what is shown at its own speed
 
 
 def motion_in_html(sections: Sequence[Section], robot: object) -> str:
-    """A <figure> with its style, script and data, at most 300 kB; "" where no scene is drawn. robot: whose motion it is.
+    """A <figure> with its style, script and data, at most 300 kB; "" where no scene is drawn.
 
-    It opens on a scene in which the engines differ, where there is one. Where all pictures would take more, every second,
-    fourth ... is left out, and then the last scenes: that is said.
+    It opens on a scene in which the engines differ, if there is one. To stay small, it leaves out every second, fourth ...
+    picture, then the last scenes, with a note.
     """
     section = next((section for section in sections if section.name == DRAWN_IN), None)
     drawn = section.result.curves.get("drawn") if section else None
@@ -40,15 +41,11 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
     data, stride, scenes = inlined(drawn, engines)
     links, still = scenes[0]["links"], stride * scenes[0]["still"]
     first, second = (outline(on_page(drawn[0], path)[still], links) for path in drawn[0].points.values())
-    note = f"The {robot.noun} is seen as in its sketch. "
-    if stride > 1:
-        note += f"One of {stride} pictures of each scene is in this page. "
-    if len(scenes) < len(drawn):
-        left = "; ".join(one.scene for one in drawn[len(scenes) :])
-        note += f"Not in this page: {left}. "
+    left_out = [one.scene for one in drawn[len(scenes) :]]
+    note = block("document", "motion_note", noun=robot.noun, stride=stride, left_out=left_out)
     few = len(links) <= FEW_STICKS
     here = Path(__file__).parent
-    return Template((here / "motion.html").read_text(encoding="utf-8")).substitute(
+    text = Template((here / "motion.html").read_text(encoding="utf-8")).substitute(
         ours=html.escape(engines[0]),
         theirs=engines[1],
         width=WIDE,
@@ -60,20 +57,21 @@ def motion_in_html(sections: Sequence[Section], robot: object) -> str:
         second=second,
         options="".join(f"<option>{html.escape(scene['name'])}</option>" for scene in scenes),
         seen=html.escape(scenes[0]["seen"]),
-        note=html.escape(note.strip()),
+        note=html.escape(" ".join(note.split())),
         data=data,
         script=(here / "motion.js").read_text(encoding="utf-8"),
     )
+    return re.sub(r"\n\s*\n", "\n", text)  # an empty line would end the HTML inside of Markdown
 
 
 def scenes_that_differ(section: Section) -> set[str]:
     """The scenes of which a check of the two models fails."""
     names = [one.scene for one in section.result.curves["drawn"]]
-    return {scene_named_in(check.scene, names) for check in failures([section]).differing} - {None}
+    return {scene_of(check.scene, names) for check in failures([section]).differing} - {None}
 
 
 def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dict]]:
-    """The scenes as JSON that may stand in a page; every how many pictures are in it, and the scenes as they are in it."""
+    """The scenes as JSON for a page, the stride over their pictures, and the scenes that are in it."""
     stride, count = 1, len(drawn)
     while True:
         scenes = [inlined_scene(one, stride) for one in drawn[:count]]
@@ -81,7 +79,7 @@ def inlined(drawn: Sequence, engines: Sequence[str]) -> tuple[str, int, list[dic
         text = text.replace("<", "\\u003c")
         if len(text.encode()) + STICK_BYTES * len(scenes[0]["links"]) <= MOST_BYTES:
             return text, stride, scenes
-        if stride < ONE_OF_MANY or count == 1:
+        if stride < LARGEST_STRIDE or count == 1:
             stride *= 2
         else:
             count -= 1
@@ -113,7 +111,7 @@ def inlined_scene(one: object, stride: int) -> dict:
 
 
 def on_page(one: object, path: np.ndarray) -> list:
-    """Points of an engine, (pictures, points, 2) m, as whole numbers in the drawing, a list each; None where they are NaN."""
+    """Points of an engine, (pictures, points, 2) m, in the drawing: a list of integers for each picture, None for NaN."""
     points = np.concatenate([of.reshape(-1, 2) for of in one.points.values()])
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
@@ -123,7 +121,7 @@ def on_page(one: object, path: np.ndarray) -> list:
 
 
 def shorter(pictures: Sequence, others: Sequence) -> list:
-    """Pictures with 0 for one that is as the one before, and 1 for one that is as the other engine's."""
+    """Pictures with 0 for one that equals the one before, and 1 for one that equals the other engine's."""
     found = []
     for k, picture in enumerate(pictures):
         same = k > 0 and picture == pictures[k - 1]

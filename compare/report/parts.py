@@ -1,22 +1,24 @@
-"""The parts of a report, made one after the other: one that breaks is left out and named, and the others stay."""
+"""The parts of a report: one that raises is left out and named, and the others stay."""
 
 from collections.abc import Callable
 from typing import TypeVar
 
 from ..judge.check import About, Check
+from ..judge.finding import Finding
 from ..process.crash import described
+from .text import say
 
 Made = TypeVar("Made")
 
 
 class Parts:
-    """What of a report could not be made: the parts by their names, each with why, in one line."""
+    """The parts of a report that raised, by name, each with its error in one line."""
 
     def __init__(self) -> None:
         self.broken: dict[str, str] = {}
 
     def made(self, name: str, otherwise: Made, make: Callable[..., Made], *arguments: object) -> Made:
-        """What `make` returns of these arguments; if it raises, `otherwise`, and the part is named as broken."""
+        """make(*arguments); if it raises, `otherwise`, and the part is listed as broken."""
         try:
             return make(*arguments)
         except Exception as error:
@@ -26,12 +28,12 @@ class Parts:
     @property
     def lines(self) -> list[str]:
         """A sentence for each broken part."""
-        return [f"This report is not complete: {name} could not be made, {why}." for name, why in self.broken.items()]
+        return [say(Finding("verdict", "incomplete", {"name": name, "why": why})) for name, why in self.broken.items()]
 
     @property
     def checks(self) -> list[Check]:
         """A failed check for each broken part."""
         return [
-            Check("report", "", f"{name} can be made", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
+            Check("report", "", f"{name} is complete", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
             for name, why in self.broken.items()
         ]

@@ -1,4 +1,4 @@
-"""Where a report comes from: what a reader needs to make it again."""
+"""The provenance of a report: what a reader needs to repeat it."""
 
 import hashlib
 import os
@@ -13,13 +13,13 @@ from ..process.streams import readable
 from .version import OURS, installed, own_version
 
 PACKAGES = ("mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka")
-PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # what beside them has changed is no other program
+PROGRAM_FILES = (":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml")  # changes elsewhere do not change the program
 
 
 def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
-    """What a reader needs to repeat the run: command, model, versions, machine, commit, seed; `seconds` come at its end.
+    """Command, model, versions, machine, commit and seed of a run; `seconds` follow at its end.
 
-    model: the file; shown: how the report calls it.
+    model: the file; shown: its name in the report.
     """
     return {
         "command": readable(command),
@@ -38,7 +38,7 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict:
 
 
 def durations(clock: Clock) -> dict:
-    """What each task took itself, seconds of the processor; and when it had ended, seconds from the start by a watch."""
+    """CPU seconds of each task, and when it ended, wall-clock seconds from the start."""
     return {
         "seconds_of": {task: round(clock.seconds_of(task), 2) for task in clock.ended if clock.seconds_of(task)},
         "ended_after_s": {task: round(at, 2) for task, at in clock.ended.items()},
@@ -51,10 +51,10 @@ def commit() -> str | None:
     if not (root / ".git").exists():
         return None
     try:
-        said = [
+        head, changed = [
             subprocess.run(["git", "-C", root, *words], capture_output=True, check=True).stdout.decode().strip()
             for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", *PROGRAM_FILES])
         ]
     except (OSError, ValueError, subprocess.CalledProcessError):
         return None
-    return said[0] + (" with uncommitted changes" if said[1] else "")
+    return head + (" with uncommitted changes" if changed else "")

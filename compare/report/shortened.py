@@ -1,11 +1,11 @@
-"""Which rows of a long table a reader needs: the worst of each group, by the columns that the table has."""
+"""The rows of a long table that a reader needs: the worst of each group, by the columns that the table has."""
 
 import math
 from collections.abc import Mapping, Sequence
 
 from ..judge.words import listed
 
-TOLD_APART_BY = (  # the columns that tell groups apart: the first whose columns a table has, and which gives few enough
+GROUPS = (  # columns by which rows are grouped: the first that a table has and that give few enough groups
     ("scene", "engine_integrator"),
     ("scene", "target_rad"),
     ("scene", "target"),
@@ -22,15 +22,15 @@ PREDICTED = (
     ("predicted_growth", "observed_growth"),
     ("predicted_s", "observed_s"),
 )
-RUNS = TOLD_APART_BY[0]  # a row for each of these groups is shown even where other tables are cut shorter
+RUNS = GROUPS[0]  # a row for each of these groups is shown even where other tables are cut shorter
 FEWEST = 4  # groups: fewer say too little
 
 
 def shortened(rows: Sequence[dict], most: int, most_of_runs: int | None = None) -> tuple[list[dict], str]:
-    """The rows to show, at most so many, in their order; and in words which these are ('' if all of them).
+    """The rows to show, in their order, at most `most`; and which these are, in words ('' if all of them).
 
-    most_of_runs: how many there may be where each row stands for a scene and an integrator; None: as many as of others. Of a
-    table of stated and compiled numbers that is too long, those that differ.
+    most_of_runs: the maximum where each row is for a scene and an integrator; None: `most`. Of a long table of stated and
+    compiled numbers the rows that differ.
     """
     rows = list(rows)
     if len(rows) <= most:
@@ -40,7 +40,7 @@ def shortened(rows: Sequence[dict], most: int, most_of_runs: int | None = None) 
         words = f"{len(off)} of {len(rows)} rows differ" if off else f"none of {len(rows)} rows differs"
         return off[:most], words + (f", the first {most}" if len(off) > most else "")
     size = next((size for size in MEASURES if any(size(row) is not None for row in rows)), None)
-    for columns in TOLD_APART_BY:
+    for columns in GROUPS:
         if set(columns) <= set(rows[0]):
             kept = worst_of_groups(rows, columns, size)
             words = f"{'the worst' if size else 'the first'} of each {listed([c.replace('_', ' ') for c in columns])}"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from .questions import answers
+from ..judge.check import Check
 from .verdict import Section
 
 DIGITS = dict.fromkeys(("published", "exact", "tmt", "mujoco", "stated", "compiled", "found"), 7)  # of a column; else 3
@@ -14,10 +14,10 @@ DIGITS |= dict.fromkeys(
 )
 
 IN_WORDS = {
-    "seconds_of": "seconds of the processor, without what was waited",
-    "ended_after_s": "seconds until each had ended",
+    "seconds_of": "CPU seconds",
+    "ended_after_s": "seconds from the start to the end",
 }
-LISTS = ("names", "hinges", "locked")  # columns with names of joints, which may be many
+LISTS = ("names", "hinges", "locked")  # columns with many names of joints
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
 
 
@@ -38,34 +38,23 @@ def shown(table: pd.DataFrame, columns: Sequence[str] | None = None) -> pd.DataF
 
 
 def of_causes(causes: Sequence[dict]) -> pd.DataFrame:
-    """The causes as a table for readers: where, what is stated, what is found, and in a sentence."""
+    """The causes as text."""
     rows = [(cause["rank"], cause["place"], cause["stated"], cause["found"], cause["text"]) for cause in causes]
     return shown(pd.DataFrame(rows, columns=["rank", "place", "stated", "found", "cause"]))
 
 
-def questions(sections: Sequence[Section], robot) -> pd.DataFrame:
-    """What was asked and the answers, as a table for readers; without the parts of an assignment where there are none."""
-    table = pd.DataFrame(answers(sections, robot), columns=["part", "asked", "answered in", "answer"])
-    return table if table["part"].any() else table.drop(columns="part")
-
-
-def asked_by(robot) -> str:
-    """The heading of the questions."""
-    return "The assignment's questions" if robot.questions else "Questions"
-
-
-def failing(section: Section) -> pd.DataFrame:
-    """The checks of a section that fail, as text."""
-    failed = [check.record() for check in section.result.checks if not check.passed]
-    return shown(pd.DataFrame(failed).drop(columns="passed", errors="ignore"))
+def records(checks: Sequence[Check]) -> pd.DataFrame:
+    """Checks as text, a row for each."""
+    names = [field for field in Check.__annotations__ if field not in ("rounding", "about")]
+    return shown(pd.DataFrame([check.record() for check in checks], columns=names))
 
 
 def closest_checks(section: Section, most: int) -> pd.DataFrame:
-    """At most so many checks of a section, as text: those that fail, then those that use most of a tolerance of rounding."""
+    """The checks of a section that fail, then those with the largest share of a rounding tolerance, at most `most`, as text."""
     checks = section.result.checks
     order = sorted(range(len(checks)), key=lambda k: (checks[k].passed, -(checks[k].over_tolerance or 0.0)))
     kept = [checks[k] for k in sorted(order[:most])]
-    return shown(pd.DataFrame([check.record() for check in kept]).drop(columns="experiment", errors="ignore"))
+    return records(kept).drop(columns="experiment")
 
 
 def heading(name: str) -> str:
@@ -74,11 +63,11 @@ def heading(name: str) -> str:
 
 
 def origins(origin: dict) -> pd.DataFrame:
-    """Where a report comes from, as a table for readers."""
+    """The provenance as text."""
     rows = [(IN_WORDS.get(name, name), in_one_cell(value)) for name, value in origin.items()]
     return pd.DataFrame(rows, columns=["what", "value"])
 
 
 def in_one_cell(value) -> str:
-    """A value of the provenance, of several things one after the other."""
+    """A value of the provenance."""
     return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else str(value)

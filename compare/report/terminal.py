@@ -1,4 +1,4 @@
-"""What a run says while it lasts: lines on stdout, and on a terminal what is under way."""
+"""The output of a run: lines on stdout, and on a terminal its progress on stderr."""
 
 import os
 import re
@@ -18,21 +18,21 @@ from ..process.streams import Stream, readable
 EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
 
-SILENT_FOR = 25.0  # s, at most, of a run whose progress cannot be shown
+SILENT_FOR = 25.0  # s, at most, without a line if the progress cannot be shown
 
 
 class Terminal:
-    """Says lines on stdout; where stderr is a terminal, shows there what is under way, else a line of it now and then."""
+    """Prints lines on stdout. If stderr is a terminal, it shows the progress there, else in a line now and then."""
 
     def __init__(self):
         self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
-        self.lines, self.beside = (
+        self.lines, self.screen = (
             Console(file=stream, force_terminal=stream.isatty(), width=80, height=25) for stream in (self.out, self.err)
         )
         self.status, self.text, self.how_far, self.spoke = None, "", list, time.monotonic()
 
     def say(self, text="", style="") -> None:
-        """A line; on a terminal that is narrower: its columns closed up, and broken between words."""
+        """Print a line; on a narrower terminal without wide gaps, wrapped between words."""
         text, columns = readable(text), self.out.columns()
         if columns and len(text) > columns:
             indent = " " * (len(text) - len(text.lstrip()))
@@ -45,20 +45,18 @@ class Terminal:
             self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
 
     def show(self, text: str) -> None:
-        """What is under way, in one line behind how far the run is."""
+        """Show the current text of the progress."""
         self.text = text
 
     def tell(self, how_far: Callable[[], list[str]]) -> None:
-        """From now on, how far the run is (how many, which, how long still) stands before what is under way.
-
-        It is asked anew at every moment."""
+        """Show how far the run is (count, name) before the current text; called again at every moment."""
         self.how_far = how_far
 
     @contextmanager
     def progress(self, text: str):
-        """The block's progress is shown, if that is possible; else a line says it after each 25 s without another."""
+        """Show the progress during this block, if that is possible; else print it after 25 s without a line."""
         self.show(text)
-        if not self.beside.is_terminal or self.beside.is_dumb_terminal:
+        if not self.screen.is_terminal or self.screen.is_dumb_terminal:
             ended = threading.Event()
             threading.Thread(target=self.speak_until, args=(ended,), daemon=True).start()
             try:
@@ -68,7 +66,7 @@ class Terminal:
             return
         spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
         interrupt.undo.append(wipe)
-        self.status = self.beside.status(Moving(self), spinner=spinner)
+        self.status = self.screen.status(Moving(self), spinner=spinner)
         try:
             with self.status:
                 yield
@@ -77,15 +75,15 @@ class Terminal:
             interrupt.undo.remove(wipe)
 
     def speak_until(self, ended: threading.Event) -> None:
-        """Say how far the run is and what is under way whenever no line was said for long."""
+        """Print the progress whenever no line was printed for long."""
         while not ended.wait(min(1.0, SILENT_FOR)):
             if time.monotonic() - self.spoke >= SILENT_FOR:
                 self.say("  " + ": ".join(filter(None, (", ".join(self.how_far()), self.text))))
 
     def line(self) -> str:
-        """How far the run is and what is under way, as far as there is room; a name that would stand there twice is said once."""
-        self.beside.width = max(self.err.columns() or 80, 20)
-        space = self.beside.width - 6  # the spinner, and what a terminal shows of Ctrl-C
+        """The progress, as far as there is room, no name twice."""
+        self.screen.width = max(self.err.columns() or 80, 20)
+        space = self.screen.width - 6  # the spinner, and what a terminal shows of Ctrl-C
         parts, text = self.how_far(), self.text
         if len(parts) > 2 and len(", ".join(parts)) > space:
             parts = [parts[0], *parts[2:]]
@@ -96,7 +94,7 @@ class Terminal:
 
     @contextmanager
     def paused(self):
-        """In this block nothing moves on the terminal."""
+        """Stop the animation during this block."""
         if self.status:
             self.status.stop()
         try:
@@ -107,7 +105,7 @@ class Terminal:
 
 
 class Moving:
-    """A line that is made anew whenever it is drawn."""
+    """A line that is recomputed whenever it is drawn."""
 
     def __init__(self, terminal: Terminal):
         self.terminal = terminal
@@ -117,7 +115,7 @@ class Moving:
 
 
 def wipe() -> None:
-    """Take what is in progress from the terminal, at an early end."""
+    """Remove the progress from the terminal, at an early end."""
     Stream.silent = True
     with suppress(OSError):
         os.write(2, (EMPTY_LINE + SHOW_CURSOR).encode())

@@ -4,6 +4,8 @@ Templates are found by name, NAME.md.jinja, in the folders of compare. Each is a
 the filters below or Python's `format`.
 """
 
+import html
+import re
 from functools import cache
 from math import isfinite
 from pathlib import Path
@@ -13,6 +15,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from ..judge.finding import Finding
 from ..judge.words import capital, listed
 
+MARKUP = re.compile(  # code, which stays; signs that Markdown would take for markup
+    r"(`[^`\n]*`)|\\(?=[!-/:-@\[-`{-~])|\*|(?<![^\W_])_|_(?![^\W_])|\[(?=[^\n]*\]\()|&(?=#?\w+;)|<(?=[A-Za-z/!?])|~(?=~)"
+)
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -21,11 +26,42 @@ def count(number: int, one: str, many: str = "") -> str:
     return f"{number:,} {one if number == 1 else many or f'{one}s'}"
 
 
+def rounded(value: float) -> str:
+    """A number with two digits, without an exponent where none is needed."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def sentence(text: str) -> str:
+    """A sentence in Markdown in which nothing is markup except code between backticks."""
+    begins_block = "\\" if text[:1] in ("#", ">", "+", "-", "~") else ""
+    return begins_block + inline(text)
+
+
+def name(text: str) -> str:
+    """A text in Markdown in which nothing is markup."""
+    return "\\`".join(inline(part) for part in text.split("`"))
+
+
+def inline(text: str) -> str:
+    return MARKUP.sub(lambda match: match[1] or f"\\{match[0]}", text)
+
+
+def words(text: str) -> str:
+    """A sentence in HTML in which nothing is markup except code between backticks."""
+    return re.sub("`([^`]+)`", r"<code>\1</code>", html.escape(text))
+
+
 FILTERS = {
+    "sentence": sentence,
+    "words": words,
+    "name": name,
+    "cell": lambda text: inline(text).replace("|", "\\|"),
     "g": lambda value, digits=3: f"{value:.{digits}g}",
     "percent": lambda share, digits=2: f"{100.0 * share:.{digits}g} %",
     "degrees": lambda angle, digits=4: f"{angle * 57.29577951308232:.{digits}g} deg",
     "count": count,
+    "rounded": rounded,
+    "share_of": lambda share: f"{rounded(share)} times" if share > 1.0 else f"{100.0 * share:.2g} % of",
     "listed": lambda words: listed(list(words)),
     "capital": capital,
 }

@@ -1,14 +1,23 @@
-"""The outcome of a report in words: its sections, and whether all checks pass."""
+"""The outcome of a report: its sections, which checks fail, and what explains that."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from ..experiments import EXPERIMENTS, Experiment
 from ..judge.check import ENDS, About, Check, Result
-from ..judge.words import capital, listed
-from .text import say
+from ..judge.finding import Finding
+from .text import block, say
 
-SEEKS_CAUSES = "diagnosis"  # the experiment in which nothing can agree or not: it says why others fail
+SEEKS_CAUSES = "diagnosis"  # it compares nothing of its own: it says why others fail
+STATES_CAUSES = "parameters", SEEKS_CAUSES  # experiments whose failing checks are the causes
+GEOMETRY = "order", "parent", "ref", "axis", "anchor", "com"
+# the numbers on which all quantities of an experiment depend; experiments that are not here depend on all numbers
+DEPENDS_ON = {
+    "kinematics": GEOMETRY,
+    "mass": (*GEOMETRY, "mass", "inertia", "armature"),
+    "gravity": (*GEOMETRY, "mass", "gravity", "flag gravity"),
+}
 
 
 @dataclass
@@ -40,7 +49,7 @@ class Report(NamedTuple):
     sections: Sequence[Section]
     robot: object  # a robots.Robot
     origin: dict  # see provenance
-    verdict: str  # in words
+    verdict: str  # in words, a sentence in each line
     causes: Sequence[dict] = ()  # of what fails, the gravest first
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: object | None = None  # a reference.Reference
@@ -67,25 +76,33 @@ def failures(sections: Sequence[Section]) -> Failures:
     return Failures(*([check for check in failed if check.about == kind] for kind in kinds))
 
 
+def explained(section: Section, causes: Sequence[dict]) -> list[Check]:
+    """The failing checks that a known cause explains: comparisons of the models, in and after the experiment that shows it.
+
+    A cause explains an experiment if it is one option, convention or number (rank 1 or 2) on which the experiment depends. It
+    explains nothing that broke off, no unstable step and no prediction.
+    """
+    order = EXPERIMENTS.get(section.name, Experiment(0)).order
+    for cause in causes if section.name not in STATES_CAUSES else ():
+        is_earlier = EXPERIMENTS.get(cause.get("experiment"), Experiment(0)).order <= order
+        if cause.get("rank", 3) <= 2 and is_earlier and depends_on(section.name, cause.get("quantity")):
+            return failures([section]).differing
+    return []
+
+
+def depends_on(experiment: str, quantity: str | None) -> bool:
+    """Whether a cause acts on an experiment; quantity None: the diagnosis found it in Mbar, h or the accelerations."""
+    return quantity in DEPENDS_ON.get(experiment, (quantity,)) if quantity else experiment != "kinematics"
+
+
 def unstable_in_words(unstable: Sequence[Check]) -> str:
     """What step is not stable, at which postures."""
-    worst = min(unstable, key=lambda check: check.tolerance)
-    more = (
-        f" and {len(unstable) - 1} more postures"
-        if len(unstable) > 2
-        else " and one more posture" * (len(unstable) > 1)
-    )
-    step, limit = (f"{1e3 * number:.4g} ms" for number in (worst.value, worst.tolerance))
-    times = worst.value / worst.tolerance
-    far = f", {times:.2g} times beyond the limit of {limit}" if times >= 10.0 else f": the limit is {limit}"
-    return f"not stable at its own step of {step} at {worst.scene}{more}{far} {worst.note}".rstrip()
+    return say(Finding("verdict", "unstable", {"checks": unstable}))
 
 
 def unconfirmed_in_words(unconfirmed: Sequence[Check]) -> str:
     """How many predictions no run confirms, and the first."""
-    if len(unconfirmed) == 1:
-        return f"one prediction is not confirmed by the runs: {unconfirmed[0]}"
-    return f"{len(unconfirmed)} predictions are not confirmed by the runs, first {unconfirmed[0]}"
+    return say(Finding("verdict", "unconfirmed", {"checks": unconfirmed}))
 
 
 def passed(sections: Sequence[Section]) -> bool:
@@ -106,71 +123,40 @@ def verdict(
     compared: str = "The two models",
     robot: str = "the robot",
 ) -> str:
-    """The outcome in words, with its cause or its worst figure.
+    """The outcome, a sentence in each line, with its cause or its largest share of a tolerance.
 
-    experiments: how many there are in all; compared: what agrees or does not; robot: what it is called, whose own step may be
-    unstable: that is no disagreement.
+    experiments: how many there are in all; compared: what agrees or differs; robot: its name.
     """
-    checks = [check for section in sections for check in section.result.checks]
-    empty = listed([section.name for section in sections if not section.result.checks])
-    if not checks:
-        return f"Nothing was compared in {empty}: the notes there say why."
-    sections = [section for section in sections if section.result.checks]
-    differing, broke, unstable, unconfirmed = failures(sections)
-    failing = {check.experiment for check in differing} - {SEEKS_CAUSES}
-    names = ", ".join(section.name for section in sections if not differing or section.name in failing)
-    is_whole, some = len(sections) == experiments, f"{len(sections)} of {experiments} experiments"
-    where = f" in {names}" if names else ""
-    ran = "" if is_whole else f"{where} ({some}{' ran' if differing else ''})"
-    also = [f"Broken off: {'; '.join(f'{check.experiment}, {check.note}' for check in broke)}."] * bool(broke)
-    also += [f"{capital(unconfirmed_in_words(unconfirmed))}."] if unconfirmed else []
-    also += [f"But {robot} is {unstable_in_words(unstable)}."] if unstable else []
-    which = "checks that compare them" if broke or unstable or unconfirmed else "checks"
-    comparing = [check for check in checks if check.about == About.MODELS]
-    counted = comparing if " " in which else checks
-    if differing:
-        text = f"{compared} do not agree{ran}: {len(differing)} of {len(counted)} {which} fail. "
-        if causes:
-            more = f", and {len(causes) - 1} more" if len(causes) > 1 else ""
-            others = sum(check.experiment not in ("parameters", "diagnosis") for check in differing)
-            further = "further " if len(differing) > others else ""
-            follow = f" {others} {further}checks fail as a consequence." if others else ""
-            text += f"Cause: {causes[0]['text']}{more}.{follow}"
-        else:
-            text += f"First: {differing[0]}."
-        return " ".join([text, *also])
-    if not comparing:
-        return " ".join(["Nothing was compared.", *also])
-    if broke:
-        left = "" if is_whole else f" ({some})"
-        return " ".join([f"Not everything could be compared{left}; all {len(comparing)} {which} pass.", *also])
-    text = f"{compared} agree{ran}: all {len(counted)} {which} pass."
-    text += f" In {empty} nothing was compared." * bool(empty)
-    if also:
-        return " ".join([text, *also])
-    top = worst(sections)
-    if top is None or top.value == 0.0:
-        return text
-    where = f"{top.quantity}, {top.scene}" + (f", {top.note}" if top.note else "")
-    return (
-        f"{text} The difference that comes closest to its rounding tolerance is {top.value:.2g} {top.unit}".rstrip()
-        + f", {100 * top.over_tolerance:.2g} % of it ({top.experiment}: {where})."
+    checked = [section for section in sections if section.result.checks]
+    also = failures(checked)
+    checks = [check for section in checked for check in section.result.checks]
+    top = worst(checked)
+    named = {check.experiment for check in also.differing} - {SEEKS_CAUSES}
+    names = [section.name for section in checked if not also.differing or section.name in named]
+    lines = block(
+        "verdict",
+        "verdict",
+        compared=compared,
+        robot=robot,
+        ran={"names": names, "differ": bool(named), "checked": len(checked), "all": experiments},
+        models=sum(check.about == About.MODELS for check in checks),
+        failed=len(also.differing),
+        checks=len(checks),
+        empty=[section.name for section in sections if not section.result.checks],
+        also=also,
+        top=top if top and top.value and not any(also) else None,
+        causes=causes,
+        consequences=sum(len(explained(section, causes)) for section in sections),
+        first=also.differing[0] if also.differing else None,
     )
+    return "\n".join(filter(None, map(str.strip, lines.split("\n"))))
 
 
-def outcome(section: Section) -> str:
-    """Whether a section's claim holds, in words."""
-    checks = section.result.checks
-    differing, broke, unstable, unconfirmed = failures([section])
-    if differing:
-        return f"It does not hold: {sum(not check.passed for check in checks)} of {len(checks)} checks fail."
-    if broke:
-        return f"It is not decided: {broke[0].quantity} does not hold ({broke[0].note})."
-    if unstable or unconfirmed:
-        but = [unconfirmed_in_words(unconfirmed)] if unconfirmed else []
-        but += [f"the robot is {unstable_in_words(unstable)}"] if unstable else []
-        return f"{sum(check.passed for check in checks)} checks pass; but {'; and '.join(but)}."
-    return f"It holds: all {len(checks)} checks pass." if checks else "It is not decided: nothing was compared."
+def outcome(section: Section, causes: Sequence[dict] = ()) -> str:
+    """Whether a section passes, in a sentence."""
+    checks, of_kinds = section.result.checks, failures([section])
+    numbers = {"checks": len(checks), "failed": sum(map(len, of_kinds)), "explained": len(explained(section, causes))}
+    return say(Finding("verdict", "outcome", {**numbers, "also": of_kinds}))
 
 
 def standing(section: Section) -> tuple[bool | None, str]:
@@ -180,9 +166,19 @@ def standing(section: Section) -> tuple[bool | None, str]:
     if differing:
         return False, f"{sum(not check.passed for check in checks)} of {len(checks)} fail"
     if broke:
-        return False, "broke off" if any(check.quantity == ENDS for check in broke) else "not whole"
+        return False, "broke off" if any(check.quantity == ENDS for check in broke) else "incomplete"
     if unconfirmed:
         return False, f"{len(unconfirmed)} not confirmed"
     if unstable:
-        return False, "its step is not stable"
+        return False, "unstable step"
     return (True, "pass") if checks else (None, "nothing compared")
+
+
+def headline(section: Section) -> str:
+    """The number of a section for the first screen; how many checks pass where it has none."""
+    if section.result.headline:
+        return say(section.result.headline)
+    checks = section.result.checks
+    shares = [check.over_tolerance for check in checks if check.over_tolerance is not None and check.passed]
+    numbers = {"passed": sum(check.passed for check in checks), "checks": len(checks)}
+    return say(Finding("verdict", "checks_passed", {**numbers, "share": max(shares, default=None)})) if checks else ""

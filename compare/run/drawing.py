@@ -1,18 +1,19 @@
 """Figures on disk, drawn in another process than the one that computes."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
 
-from ..experiments import module
+from ..experiments import EXPERIMENTS, module
 from ..judge.check import Result
 from ..process.crash import described
-from ..report import images, overview
+from ..report import images
 from ..report.folder import writing
 from ..report.text import say
+from ..report.verdict import Section
 from ..robots import Robot
 
 FIRST = "the first"  # of the figures of an experiment
@@ -27,18 +28,18 @@ def draw(
     others: Mapping[str, Result] | None = None,
     part: str | None = None,
 ) -> tuple[list, list]:
-    """The figures of an experiment on disk: names (without .png) and captions; of those that could not be drawn: names and why.
+    """The figures of an experiment on disk: names (without .png) and captions; of those that failed: names and why.
 
-    `figures(result, robot)` of the experiment's module yields calls that return (name, figure, caption): one that raises leaves
-    the later ones alone. others: for the pictures of the first screen, see report.overview. part: FIRST, one of HALVES, or all.
-    An error of the disk is raised.
+    A call of `figures(result, robot)` that raises leaves the later ones alone; an error of the disk is raised. others: the
+    results for the picture of the first screen, see `results_needed`. part: FIRST, one of HALVES, or all.
     """
     drawn, failed = [], []
     try:
         own = islice(module(experiment).figures(result, robot), 1 if part == FIRST else None)
-        figures = chain(own, overview.pictures_due(experiment, result, robot, others))
-        for call in of_half(figures, part) if part in HALVES else figures:
-            name, path = called(call), None
+        pictures = getattr(module(experiment), "overview", None) if others else None
+        overview = pictures({**others, experiment: result}, robot) if pictures else ()
+        for call in half_of(chain(own, overview), part) if part in HALVES else chain(own, overview):
+            name, path = name_of(call), None
             try:
                 with quiet(robot):
                     file, figure, caption = call()
@@ -61,8 +62,22 @@ def draw(
     return drawn, failed
 
 
-def of_half(figures: Iterable[Callable], half: str) -> Iterator[Callable]:
-    """Those of the calls that draw by the same function as the first one, or by others: names are alike in the former alone."""
+def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Section]) -> dict[str, Result]:
+    """The results, rows alone, for the picture of the first screen, if it can be drawn once this experiment is done.
+
+    names: of the experiments that run, in their order; sections: of those that are done. A picture of two experiments is drawn
+    with the later one.
+    """
+    picture = EXPERIMENTS[experiment].overview if experiment in EXPERIMENTS else ""
+    needed = [name for name in names if picture and EXPERIMENTS[name].overview == picture]
+    if needed[-1:] != [experiment]:
+        return {}
+    results = {section.name: section.result for section in sections if section.name in needed}
+    return {name: Result(name, rows=result.rows, label=result.label) for name, result in results.items()}
+
+
+def half_of(figures: Iterable[Callable], half: str) -> Iterator[Callable]:
+    """The calls that draw by the same function as the first one, or the others: only the former may have equal names."""
     first = None
     for call in figures:
         function = getattr(call, "func", call)
@@ -71,8 +86,8 @@ def of_half(figures: Iterable[Callable], half: str) -> Iterator[Callable]:
             yield call
 
 
-def called(call: Callable) -> str:
-    """What a figure is called before it is drawn: by its function, and what that is asked to draw beside the result."""
+def name_of(call: Callable) -> str:
+    """The name of a figure before it is drawn: its function and what it draws of the result."""
     more = [getattr(value, "name", value) for value in getattr(call, "args", ())]
     more = [value for value in more if isinstance(value, str)]
     name = getattr(getattr(call, "func", call), "__name__", "without a name")
@@ -80,5 +95,5 @@ def called(call: Callable) -> str:
 
 
 def quiet(robot: Robot) -> AbstractContextManager:
-    """A block in which numpy says nothing of what is no number, where a user's own equations may give such: checks do."""
+    """A block in which NumPy does not warn of NaN where a user's own equations may give it: checks report that."""
     return np.errstate(all="ignore") if getattr(robot, "own", ()) else nullcontext()

@@ -1,4 +1,4 @@
-"""How the experiments are run: one after the other, long work and drawing beside it."""
+"""Runs the experiments one after the other; long work and drawing go to other processes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -14,24 +14,21 @@ from ..judge.finding import Finding
 from ..process.clock import Clock
 from ..process.crash import described
 from ..process.workers import WorkerEnded, Workers
-from ..report import overview
-from ..report.remaining import END, START
 from ..report.terminal import Terminal
 from ..report.text import block, has, say
-from ..report.verdict import Section, failures
-from .drawing import FIRST, HALVES, draw, quiet
+from ..report.verdict import STATES_CAUSES, Section, explained, failures
+from .drawing import FIRST, HALVES, draw, quiet, results_needed
 
-Found = tuple[
-    Result | None, Result | None
-]  # what an experiment found, or the failed check that stands for it where it broke off
+START, END = "start", "figures"  # tasks of the clock: what comes before the first experiment and after the last
+Found = tuple[Result | None, Result | None]  # the result of an experiment, or a failed check where it broke off
 
 DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
-# the numbers that Mbar and h follow from, as `parameters` calls them
+# the numbers on which Mbar and h depend, by their names in `parameters`
 IN_EQUATIONS = (
-    "order", "parent", "ref", "axis", "anchor", "mass", "com", "inertia", "gravity", "armature", "flag gravity",
+    "order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature", "flag gravity",
 )  # fmt: skip
 NOTHING_FAILED = "nothing failed"
-SHOWN = 5  # checks of an experiment that fail, on the terminal
+SHOWN, SHOWN_BESIDE_CAUSE = 5, 2  # lines on the terminal about an experiment that fails; where a cause explains some
 
 
 def examine(
@@ -43,15 +40,15 @@ def examine(
     clock: Clock | None = None,
     have: Mapping[str, Found] | None = None,
 ) -> tuple[list[Section], list[dict], dict[str, str]]:
-    """The section of each experiment, its figures drawn, the causes of what fails, and what is skipped with its reason.
+    """The section of each experiment with its figures, the causes of failing checks, and the skipped experiments with reasons.
 
-    An experiment that raises is one failed check; the others go on. A diagnosis beside other experiments is made where one of
-    these fails. clock: of the workers, which gets to know what each experiment takes; have: what some of them found already.
+    An experiment that raises is one failed check; the others go on. Among other experiments the diagnosis runs only if one of
+    them fails. clock: of the workers, it measures each experiment; have: results that are known already.
     """
     clock, have = clock or Clock(), have or {}
     (folder / "figures").mkdir()
     sections, drawings, waiting, causes, reasons = [], [], [], [], {}
-    own, said = setup.engines.get("own"), set()
+    own, reported = setup.engines.get("own"), set()
     modules = {name: module(name) for name in names}
     begin = {name: experiment for name, experiment in modules.items() if name not in have}
     crashed = {name: begun(name, experiment, setup, clock) for name, experiment in begin.items()}
@@ -59,8 +56,8 @@ def examine(
     order = sorted(modules, key=TIMED.__contains__)
     for name in order:
         experiment = modules[name]
-        asked_for = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
-        if name == "diagnosis" and len(modules) > 1 and not asked_for:
+        is_needed = any(failures([section])[0] for section in sections if section.name in DIAGNOSED)
+        if name == "diagnosis" and len(modules) > 1 and not is_needed:
             reasons[name] = NOTHING_FAILED
             terminal.say(f"{name:<13} skipped: {NOTHING_FAILED}")
             clock.ends(name)
@@ -69,16 +66,16 @@ def examine(
         with clock.of(name):
             setup.progress(block(name, "summary"))
             result, crash = have.get(name) or found_by(name, experiment, setup, crashed[name])
-            asked, unsaid = attempt(name, partial(own_words, name, experiment), setup)
+            words, without_words = attempt(name, partial(own_words, name, experiment), setup)
             if own:
-                add_problems(crash or result, own.equations.problems, said)
-            sections.append(Section(name, *(asked or (name, "", "")), crash or result))
-            sections[-1].result.checks += unsaid.checks if unsaid else []
-            new = new_causes(setup, sections, causes)
+                add_problems(crash or result, own.equations.problems, reported)
+            sections.append(Section(name, *(words or (name, "", "")), crash or result))
+            sections[-1].result.checks += without_words.checks if without_words else []
+            new = [{"experiment": name, **cause} for cause in new_causes(setup, sections, causes)]
             causes = new + causes
         clock.ends(name)
         with clock.of(END):
-            others = overview.results_needed(name, order, sections)
+            others = results_needed(name, order, sections)
             drawing = partial(workers.submit, draw, name, result, setup.robot, folder / "figures", others)
             parts = [] if crash else parts_drawn(name, sections[-1], setup)
             jobs = [(sections[-1], partial(drawing, part)) for part in parts]
@@ -86,7 +83,7 @@ def examine(
                 waiting += jobs
             else:
                 drawings += [(section, job()) for section, job in jobs]
-        say_outcome(terminal, sections[-1], clock.seconds_of(name), new)
+        say_outcome(terminal, sections[-1], clock.seconds_of(name), new, causes)
     with clock.of(END):
         setup.progress("figures")
         drawings += [(section, drawing()) for section, drawing in waiting]
@@ -97,33 +94,41 @@ def examine(
 
 
 def computed(name: str, experiment: ModuleType, setup: Setup) -> Found:
-    """What an experiment finds by itself."""
+    """The result of an experiment that runs alone."""
     return found_by(name, experiment, setup, begun(name, experiment, setup, Clock()))
 
 
 def found_by(name: str, experiment: ModuleType, setup: Setup, crashed: Result | None) -> Found:
-    """What an experiment finds. crashed: its failed check, if it broke off when it was set going."""
-    return (None, crashed) if crashed else attempt(name, experiment.rows, setup)
+    """The result of an experiment. crashed: its failed check, if `begin` raised."""
+    if crashed:
+        return None, crashed
+    return attempt(name, lambda setup: with_headline(experiment, experiment.rows(setup)), setup)
+
+
+def with_headline(experiment: ModuleType, result: Result) -> Result:
+    if result.headline is None and hasattr(experiment, "headline"):
+        result.headline = experiment.headline(result)
+    return result
 
 
 def begun(name: str, experiment: ModuleType, setup: Setup, clock: Clock) -> Result | None:
-    """Set an experiment's long work going, if it has any that is not under way; a failed check if that breaks off."""
+    """Start an experiment's long work, if it is not under way; a failed check if that raises."""
     if not hasattr(experiment, "begin") or name in setup.background:
         return None
     with clock.of(name):
         return attempt(name, experiment.begin, setup)[1]
 
 
-def add_problems(result: Result, problems: Sequence, said: set) -> None:
-    """What is wrong with those of a user's own equations that an experiment asks, each a failed check before all others.
+def add_problems(result: Result, problems: Sequence, reported: set) -> None:
+    """Add a failed check for each problem of the user's own equations that an experiment calls, before its other checks.
 
-    problems: with quantity and text, see engines.own; said: those that need not be said again, to which these are added.
+    problems: with quantity and text, see engines.own; reported: their numbers, so that each is reported once.
     """
     others, result.checks = result.checks, []
     for k, problem in enumerate(problems):
-        if k not in said and problem.quantity in (asks_of_own(result.experiment) or (problem.quantity,)):
-            said.add(k)
-            result.check("", f"{problem.quantity} gives what it should", None, 0.0, "", problem.text, rule="equal")
+        if k not in reported and problem.quantity in (asks_of_own(result.experiment) or (problem.quantity,)):
+            reported.add(k)
+            result.check("", f"{problem.quantity} returns valid values", None, 0.0, "", problem.text, rule="equal")
     result.checks += others
 
 
@@ -133,7 +138,7 @@ def asks_of_own(name: str) -> tuple[str, ...] | None:
 
 
 def own_words(name: str, experiment: ModuleType, setup: Setup) -> tuple[str, str, str]:
-    """What an experiment says of itself: its title, its claim, its tolerance."""
+    """The title, the claim and the tolerance of an experiment."""
     values = getattr(experiment, "claim_values", lambda robot: {})(setup.robot)
     claim, tolerance = (
         say(Finding(name, kind, {"robot": setup.robot, "values": values}))
@@ -145,10 +150,9 @@ def own_words(name: str, experiment: ModuleType, setup: Setup) -> tuple[str, str
 
 
 def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict]) -> list[dict]:
-    """The causes that are sought because the last of these sections is the first that fails, or the first of DIAGNOSED.
+    """The causes of the failures in the last section, if it is the first that fails, or the first of DIAGNOSED that does.
 
-    Where numbers are stated, those that are read back as others are the causes, or what explains several of them at once;
-    nothing else is sought then.
+    Where numbers are stated, the causes are the numbers that differ, or what explains several of them at once.
     """
     failed = [section.name for section in sections if failures([section])[0]]
     if not failed or failed[-1] != sections[-1].name:
@@ -165,7 +169,7 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict])
 
 
 def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
-    """The causes, in which one option, convention, number or slip stands for all numbers of Mbar and h where it explains them."""
+    """The causes; one option, convention, number or error of two replaces several numbers of Mbar and h if it explains them."""
     if sum(cause["quantity"] in IN_EQUATIONS for cause in of_numbers) < 2 or setup.faults:
         return list(of_numbers)
     diagnosis = module("diagnosis")
@@ -173,11 +177,15 @@ def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
     explaining = [diagnosis.record(cause) for cause in found.diagnosis.causes if cause.rank < 3] if found else []
     if not explaining:
         return list(of_numbers)
-    return [explaining[0], *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS)]
+    replaced = [quantity for quantity in IN_EQUATIONS if quantity in {cause["quantity"] for cause in of_numbers}]
+    return [
+        explaining[0] | {"quantity": replaced[0]},
+        *(cause for cause in of_numbers if cause["quantity"] not in IN_EQUATIONS),
+    ]
 
 
 def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
-    """What explains the values of Mbar, h and accelerations, except for places that are known as causes."""
+    """The causes of differences of Mbar, h and accelerations, except for places that are known as causes."""
     diagnosis = module("diagnosis")
     found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)
     return (
@@ -188,13 +196,13 @@ def of_values(setup: Setup, known: Sequence[str]) -> list[dict]:
 
 
 def find_causes(setup: Setup) -> list[dict]:
-    """What of the model explains that checks fail: each number, as stated and as compiled; the gravest first."""
+    """The numbers of the model that differ from the stated ones; the gravest first."""
     result, _ = attempt("parameters", module("parameters").rows, setup)
     return result.curves["causes"] if result else []
 
 
 def attempt(name: str, act: Callable, setup: Setup) -> tuple:
-    """What an experiment's function returns, and None; if it raises, None and a Result with one failed check."""
+    """The return value of act(setup), and None; if it raises, None and a Result with one failed check."""
     try:
         with quiet(setup.robot):
             return act(setup), None
@@ -207,21 +215,21 @@ def attempt(name: str, act: Callable, setup: Setup) -> tuple:
 
 
 def parts_drawn(name: str, section: Section, setup: Setup) -> Sequence[str | None]:
-    """What is drawn of an experiment: all its figures; in a quick run of several experiments the first, unless a check fails."""
+    """The parts of the figures to draw: all; in a quick run of several experiments the first figure, unless a check fails."""
     if setup.is_quick and not setup.alone and not any(failures([section])):
         return (FIRST,)
     return HALVES if name in TIMED else (None,)
 
 
 def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
-    """Wait for a section's figures. One that could not be drawn is a failed check; an error of the disk is raised."""
+    """Wait for a section's figures. One that raised is a failed check; an error of the disk is raised."""
     try:
         figures, failed = drawing.result()
         section.figures = [*section.figures, *figures]
     except OSError:
         raise
-    except WorkerEnded:  # what was computed is kept
-        failed = [("number 1", "the process that draws was ended from outside")]
+    except WorkerEnded:  # the result is not lost
+        failed = [("number 1", "the drawing process was killed")]
     except Exception as error:  # the result cannot be sent to where it is drawn
         failed = [("number 1", described(error))]
     for name, line in failed:
@@ -231,29 +239,41 @@ def take_figures(terminal: Terminal, section: Section, drawing: Future) -> None:
 
 
 def largest_share_in_words(share: float) -> str:
-    """The largest share of a tolerance that is used, in at most 26 characters."""
+    """The largest share of a tolerance, in at most 26 characters."""
     percent = 100.0 * share
     if percent < 0.1:
         return "below 0.1 % of tolerance"
     return f"at most {float(f'{percent:.2g}' if percent >= 1.0 else f'{percent:.1g}'):g} % of tolerance"
 
 
-def say_outcome(terminal: Terminal, section: Section, seconds: float, causes: Sequence[dict]) -> None:
-    """One line for an experiment; of one in which checks fail the causes, where they are new, and the first checks.
+def say_outcome(
+    terminal: Terminal, section: Section, seconds: float, new: Sequence[dict], causes: Sequence[dict] = ()
+) -> None:
+    """One line for an experiment; then the causes that are new, and the first failing checks that no cause explains.
 
-    seconds: of the processor, for the experiment itself.
+    seconds: of the processor, for the experiment itself; causes: all that are known.
     """
-    checks = section.result.checks
+    checks, of_cause = section.result.checks, explained(section, causes)
     failed = [check for check in checks if not check.passed]
     used = [check.over_tolerance for check in checks if check.over_tolerance is not None]
     most = largest_share_in_words(max(used)) if any(used) and not failed else ""
+    if of_cause:
+        some = f"{len(of_cause)} " if len(of_cause) < len(failed) else ""
+        most = f"{some}explained by the cause"
     word = f"{len(failed)} FAILED" if failed else "ok" if checks else "nothing"
     many = f"{len(checks):>3} check{'s' if len(checks) != 1 else ' '}"
     terminal.say(f"{section.name:<13} {word:<10} {many}  {most:<26} {seconds:5.1f} s", "red" if failed else "")
-    lines = [f"  CAUSE {cause['text']}" for cause in causes]
-    if not (causes and section.name in ("parameters", "diagnosis")):  # there the causes are the checks
-        lines += [f"  FAIL {check}" for check in failed]
-    for line in lines[:SHOWN]:
+    lines = [f"  CAUSE {cause['text']}" for cause in new]
+    if not (causes and section.name in STATES_CAUSES):  # there the causes are the checks
+        lines += [f"  FAIL {check}" for check in failed if check not in of_cause]
+    shown = SHOWN_BESIDE_CAUSE if of_cause else SHOWN
+    for line in lines[:shown]:
         terminal.say(line, "red")
-    if len(lines) > SHOWN:
-        terminal.say(f"  and {len(lines) - SHOWN} more: in the report", "red")
+    if len(lines) > shown:
+        terminal.say(f"  and {len(lines) - shown} more: in the report", "red")
+
+
+def progress(clock: Clock, names: Sequence[str]) -> list[str]:
+    """How far a run of these experiments is: "4 of 11", "acceleration"."""
+    number = 1 + sum(name in clock.ended for name in names)
+    return [f"{number} of {len(names)}", clock.under_way] if clock.under_way in names else []

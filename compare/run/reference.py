@@ -1,7 +1,7 @@
-"""The reference: what a file is compared with.
+"""The reference with which a file is compared.
 
-The arm's stated numbers, those of a solution, another MJCF file, tmt's equations for the compiled model, or equations of a
-user's own: FILE.py:OBJECT, MODULE:OBJECT.
+The arm's stated numbers, those of a solution, another MJCF file, tmt's equations for the compiled model, or a user's
+own equations: FILE.py:OBJECT, MODULE:OBJECT.
 """
 
 import dataclasses
@@ -29,7 +29,7 @@ OWN_FILE = "mjcf/arm.xml"  # what is compared where no file is given
 
 
 class JointsDiffer(ModelError):
-    """A file whose joints are not those of the reference; why: which are missing, or too many."""
+    """A file and a reference with different joints; why: which are missing or extra."""
 
     def __init__(self, shown: str, whose: str, why: str):
         super().__init__(f"{shown} cannot be compared with {whose}: {why}")
@@ -37,44 +37,44 @@ class JointsDiffer(ModelError):
 
 
 class Reference(NamedTuple):
-    """What a file is compared with."""
+    """The reference of a file."""
 
     kind: str  # of REFERENCES, "solution" or "own"
     file: str  # as it is given, in one line
-    open_tree: tuple[str, ...] = ()  # equalities of the file that are off
+    open_tree: tuple[str, ...] = ()  # equalities of the file, which are switched off
     warnings: tuple[str, ...] = ()  # of MuJoCo's compiler, one line each
-    asked: str = ""  # the solution, or where equations of one's own come from, as it is given, in one line
+    asked: str = ""  # the solution, or the place of own equations, as given, in one line
     own: Engine | None = None  # of these equations
-    renamed: tuple[str, ...] = ()  # "wrist as hand": joints that are not matched by their names
-    why_itself: str = ""  # why it is compared with its own compiled model, where that was not asked for
+    renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
+    why_itself: str = ""  # why it is compared with its own compiled model by default
 
     @property
     def name(self) -> str:
-        """The arm, or the file; the solution, or where one's own equations come from."""
+        """The arm, the file, the solution, or the place of own equations."""
         return "arm" if self.kind == "arm" else self.asked or self.file
 
     @property
     def compared(self) -> str:
-        """What agrees or does not."""
+        """The subject of the verdict."""
         return {"model": "TMT and MuJoCo", "own": "Your equations and MuJoCo"}.get(self.kind, "The two models")
 
     @property
     def matched(self) -> str:
-        """Which joints are matched by something else than their names, in words; "": none is."""
+        """The joints matched under other names, in words; "": none."""
         return f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
 
     @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the output and of the report."""
-        said = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.asked)}"]
-        said += [self.matched] * bool(self.renamed)
+        lines = [f"reference: {self.kind}; {self.file} compared with {REFERENCES.get(self.kind, self.asked)}"]
+        lines += [self.matched] * bool(self.renamed)
         if self.open_tree:
-            said.append(f"open tree: {len(self.open_tree)} equalities off: {', '.join(self.open_tree)}")
-        return tuple(map(in_one_line, (*said, *(f"MuJoCo warns: {line}" for line in self.warnings))))
+            lines.append(f"open tree: {len(self.open_tree)} equalities switched off: {', '.join(self.open_tree)}")
+        return tuple(map(in_one_line, (*lines, *(f"MuJoCo warns: {line}" for line in self.warnings))))
 
 
 class Compared(NamedTuple):
-    """What is compared: MuJoCo's model, the robot, and what the file was read as."""
+    """MuJoCo's model, the robot, and the reading of the file."""
 
     reference: Reference
     robot: Robot
@@ -82,15 +82,15 @@ class Compared(NamedTuple):
     reading: Reading | None  # None: the robot's numbers are stated
 
     def asked_step(self, dt: float | None, integrator: str | None) -> tuple[float, str] | None:
-        """A step, s, and an integrator that are asked about, the file's where one is None; None: both are.
+        """The step, s, and the integrator of --dt and --integrator, the file's where one is None; None: both are.
 
-        ModelError, in one line: there is no such integrator, or no servo to ask about.
+        ModelError, in one line: unknown integrator, or no servo.
         """
         if dt is None and integrator is None:
             return None
         if self.reading is None or not self.robot.drive.actuators:
             why = "has no actuator" if self.reading else "is compared by its stated numbers, which have no actuator"
-            raise ModelError(f"--dt and --integrator ask about a robot's own servos, and {self.robot.name} {why}")
+            raise ModelError(f"--dt and --integrator need servos, and {self.robot.name} {why}")
         try:
             name = integrator_by_name(integrator or self.reading.integrator)
         except ValueError as error:
@@ -105,12 +105,11 @@ def compared_with(
     shown: str | None = None,
     solution: str | None = None,
 ) -> Compared:
-    """A file (None: the arm's own) and the reference that is asked for; None: the arm, if the file has exactly its hinges.
+    """A file (None: the arm's) and a reference (None: the arm, if the file has exactly its hinges, else the compiled model).
 
-    joints: of equations of one's own, separated by commas, see joint_map; shown: what the file is called, if not by its path;
-    solution: where the solution is, if not where it is asked for.
-    ModelError, in one line, for a file that cannot be compared so, JointsDiffer where its joints are others than those of the
-    reference; OwnFileError for equations that cannot be used.
+    joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path; solution: the
+    path of the solution, if not `asked`. ModelError, in one line, for a file that cannot be compared, JointsDiffer for
+    different joints, OwnFileError for equations that cannot be used.
     """
     file, shown = path or ARM.mjcf, in_one_line(shown or path or OWN_FILE)
     if asked == "arm" or (asked is None and (path is None or has_hinges(path, ARM.joints))):
@@ -130,7 +129,7 @@ def compared_with(
 
 
 def is_solution(asked: str | None) -> bool:
-    """Whether a reference that is asked for is another MJCF file."""
+    """Whether a reference is another MJCF file."""
     return (asked or "").lower().endswith((".xml", ".mjcf"))
 
 
@@ -154,10 +153,7 @@ def with_solution(reading: Reading, of_file: tuple, asked: str, solution: Readin
 def joints_matched(
     stated: Robot | Reading, reading: Reading, shown: str, whose: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The file's joints in the order of the stated ones, and those that are matched by something else than their names.
-
-    JointsDiffer, if there are others.
-    """
+    """The file's joints in the order of the stated ones, and those matched under other names; JointsDiffer if any is left."""
     try:
         return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:

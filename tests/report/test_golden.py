@@ -10,8 +10,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from compare.experiments import EXPERIMENTS, module
-from compare.report import images, overview, verdict
-from compare.report.markdown import markdown, markdown_body
+from compare.report import images, verdict
+from compare.report.document import Document
 from compare.report.parts import Parts
 from compare.robots.arm import ARM
 from compare.run import drawing, examine
@@ -35,13 +35,15 @@ def report_of_arm(small, folder) -> str:
     """report.md of all experiments on the arm, its figures not rendered: what is wrong with these, test_drawn_figures sees."""
     sections = []
     for name in EXPERIMENTS:
-        section = verdict.Section(name, *examine.own_words(name, module(name), SimpleNamespace(robot=ARM)), small(name))
+        result = examine.with_headline(module(name), small(name))
+        section = verdict.Section(name, *examine.own_words(name, module(name), SimpleNamespace(robot=ARM)), result)
         sections.append(section)
-        others = overview.results_needed(name, list(EXPERIMENTS), sections)
+        others = drawing.results_needed(name, list(EXPERIMENTS), sections)
         section.figures, lost = drawing.draw(name, section.result, ARM, folder, others)
         assert lost == []
     report = verdict.Report(sections, ARM, {"command": "a small run"}, verdict.verdict(sections, len(EXPERIMENTS)))
-    return markdown(report, markdown_body(report, Parts()), Parts())
+    document = Document(report, Parts())
+    return document.text(document.body())
 
 
 def test_the_words_of_a_small_report(small, tmp_path, monkeypatch):

@@ -9,9 +9,9 @@ import pytest
 from matplotlib.figure import Figure
 from sections import BAD, GOOD, section
 
-from compare.report import images, page
+from compare.report import images
+from compare.report.document import OVERVIEW, Document
 from compare.report.files import write
-from compare.report.overview import BEGINNING
 from compare.report.parts import Parts
 from compare.report.verdict import Report, verdict
 from compare.robots import Question
@@ -40,7 +40,8 @@ def report_of(folder, sections, causes=(), skipped=(), robot=ARM):
 def page_of(folder, sections, causes=(), skipped=()):
     """The first screen of a page of these sections, and what comes below it."""
     report, parts = report_of(folder, sections, causes, skipped), Parts()
-    html = page.page(report, page.page_body(folder, report, parts), parts)
+    document = Document(report, parts, folder)
+    html = document.text(document.body())
     at = html.index("<section")
     return html[:at], html[at:]
 
@@ -49,8 +50,8 @@ def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all
     names = ("parameters", "mass", "acceleration", "trajectory")
     sections = [section(name, GOOD) for name in names]
     with_figures(sections[1], "mass_distances")
-    with_figures(sections[2], "acceleration_distances", f"{BEGINNING}agreement")
-    with_figures(sections[3], "trajectory_a", f"{BEGINNING}scenes")
+    with_figures(sections[2], "acceleration_distances", f"{OVERVIEW}agreement")
+    with_figures(sections[3], "trajectory_a", f"{OVERVIEW}scenes")
     top, rest = page_of(folder, sections, skipped=[("speed", "<too slow>")])
     assert top.index('class="verdict good"') < top.index('class="experiments"') < top.index('class="pictures"')
     assert 'class="causes"' not in top and '<main id="main" class="good">' in top
@@ -65,8 +66,8 @@ def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all
 def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_shows_it(folder):
     sections = [
         with_figures(section("mass", GOOD), "mass_distances"),
-        with_figures(section("acceleration", GOOD), f"{BEGINNING}agreement"),
-        with_figures(section("trajectory", GOOD, BAD), f"{BEGINNING}scenes"),
+        with_figures(section("acceleration", GOOD), f"{OVERVIEW}agreement"),
+        with_figures(section("trajectory", GOOD, BAD), f"{OVERVIEW}scenes"),
         section("speed"),
     ]
     top, rest = page_of(folder, sections, causes=[CAUSE])
@@ -112,7 +113,7 @@ def test_results_have_every_check_cause_and_digit(folder):
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
     html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
     assert names not in text and CAUSE["text"] in html and CAUSE["text"] in text
-    assert html.count("<td>0.123</td>") == 3 and "**Checks that fail:**" in text
+    assert html.count("<td>0.123</td>") == 3 and "1 check explained by the cause" in text
     assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]  # WebP is in the page alone
 
 

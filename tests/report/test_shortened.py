@@ -3,7 +3,7 @@
 from sections import BAD, GOOD, section
 
 from compare.experiments import EXPERIMENTS
-from compare.report import markdown
+from compare.report.document import Document
 from compare.report.parts import Parts
 from compare.report.shortened import shortened
 from compare.report.verdict import Report
@@ -42,7 +42,8 @@ def test_of_numbers_that_are_stated_those_that_differ_are_shown_and_without_grou
 
 def text_of(*sections):
     report = Report(sections, ARM, {"command": "c"}, "Worst in <i>.", (), ())
-    return markdown.markdown(report, markdown.markdown_body(report, Parts()), Parts())
+    document = Document(report, Parts())
+    return document.text(document.body())
 
 
 def test_report_md_has_at_most_300_lines_whatever_there_is_to_say():

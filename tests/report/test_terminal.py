@@ -1,4 +1,4 @@
-"""What a user sees on a terminal, wide or narrow, clever or dumb, with any name of a file; how long a run takes still."""
+"""What a user sees on a terminal, wide or narrow, clever or dumb, with any name of a file; how far a run is."""
 
 import json
 import os
@@ -9,9 +9,9 @@ import pytest
 from runs import ROOT, compare, in_shell
 
 from compare.process.clock import Clock
-from compare.report.remaining import END, START, Remaining
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
+from compare.run.examine import progress
 
 OLD = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"
 
@@ -65,17 +65,10 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     assert ROOT.as_posix() not in run.stderr
 
 
-PLAN = {START: 10.0, "a": 20.0, "b": 60.0, END: 100.0}
-
-
-@pytest.mark.parametrize("elapsed, ended, seconds", [
-    (7.0, {}, 93.0), (25.0, {START: 10.0, "a": 20.0}, 75.0),
-    (120.0, {START: 20.0, "a": 40.0, "b": 120.0}, 40.0 * 130.0 / 70.0),  # a slow machine: almost twice of the planned 40
-    (500.0, {START: 10.0, "a": 20.0}, 40.0),  # b is late; what comes after it is left
-    (500.0, {START: 10.0, "a": 20.0, "b": 60.0}, None),  # nothing is known of the last
-])  # fmt: skip
-def test_an_estimate_is_what_is_left_of_the_plan_scaled_by_what_was_seen(elapsed, ended, seconds):
-    clock = type("Stopped", (Clock,), {"elapsed": elapsed})()
-    clock.ended, clock.under_way = ended, "a"
-    left = Remaining(clock, ["a", "b"], PLAN)
-    assert left.seconds == pytest.approx(seconds) and len(left.words()) == (3 if seconds else 2)
+def test_progress_is_the_number_and_the_name_of_the_experiment_under_way():
+    clock = Clock()
+    clock.ends("start")
+    clock.ends("mass")
+    assert progress(clock, ["mass", "gravity"]) == []
+    clock.begins("gravity")
+    assert progress(clock, ["mass", "gravity"]) == ["2 of 2", "gravity"]

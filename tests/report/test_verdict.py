@@ -7,16 +7,19 @@ from matplotlib.colors import to_hex
 from sections import BAD, GOOD, section
 from small_runs import Lines
 
+from compare.experiments import figures_overview, module
+from compare.experiments.speed import first_screen as of_speed
+from compare.experiments.speed.first_screen import Cheapest, Curve
+from compare.experiments.stability import first_screen as of_stability
+from compare.experiments.stability.first_screen import Limit
 from compare.judge.check import About, Result
 from compare.judge.units import renamed
-from compare.report import engines_apart, figures_overview, methods_compared
-from compare.report.methods_compared import Cheapest, Curve, Limit
-from compare.report.one_number import one_number
 from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE, RED
-from compare.report.verdict import Section, failures, outcome, passed, standing, verdict
+from compare.report.text import say
+from compare.report.verdict import explained, failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
-from compare.run.examine import say_outcome
+from compare.run.examine import say_outcome, with_headline
 
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
 
@@ -33,7 +36,7 @@ def test_one_failing_check_among_many_fails_the_verdict(place):
     checks[place] = BAD
     sections = [section("gravity", GOOD), section("mass", *checks)]
     assert not passed(sections) and counts(*sections) == [1, 0, 0, 0]
-    assert "1 of 201 checks" in verdict(sections, 2) and "1 of 200 checks" in outcome(sections[-1])
+    assert "1 of 201 comparisons" in verdict(sections, 2) and "1 of 200 checks" in outcome(sections[-1])
 
 
 def test_the_verdict_names_the_check_that_uses_most_of_its_rounding_tolerance():
@@ -53,13 +56,31 @@ def test_what_does_not_agree_is_named_with_its_first_cause_and_nothing_else():
         section("diagnosis", BAD),
     ]  # which says why others fail
     text = verdict(sections, 10, [{"text": f"number {k}"} for k in range(3)])
-    first = text.partition(":")[0]
-    assert " mass " in first and "gravity" not in first and "diagnosis" not in first and "2 of 4" in text
-    assert "number 0, and 2 more" in text and "number 2" not in text
+    assert "3 of 10 experiments" in text and " mass." in text and "gravity" not in text and "diagnosis" not in text
+    assert "2 of 4" in text and "number 0; 2 more" in text and "number 2" not in text
+
+
+def cause(rank=2, experiment="parameters", **more):
+    return {"rank": rank, "experiment": experiment, "text": "mass of forearm: stated 1"} | more
+
+
+@pytest.mark.parametrize("name, found, count", [
+    ("mass", cause(quantity="mass"), 1), ("mass", cause(), 1), ("mass", cause(3), 0),
+    ("mass", cause(quantity="gravity"), 0), ("kinematics", cause(quantity="mass"), 0), ("kinematics", cause(quantity="com"), 1),
+    ("kinematics", cause(), 0), ("gravity", cause(quantity="inertia"), 0), ("trajectory", cause(quantity="damping"), 1),
+    ("mass", cause(experiment="mass"), 1), ("mass", cause(experiment="gravity"), 0), ("parameters", cause(quantity="mass"), 0),
+    ("diagnosis", cause(quantity="mass"), 0),
+])  # fmt: skip
+def test_a_cause_explains_comparisons_that_depend_on_it_from_its_experiment_on_and_nothing_else(name, found, count):
+    of = section(
+        name, GOOD, BAD, *(("what", 2.0, 1.0, "at most", False, about) for about in About if about != About.MODELS)
+    )
+    assert [check.about for check in explained(of, [found])] == [About.MODELS] * count
+    assert explained(of, []) == [] and len(explained(of, [cause(3), found])) == count
 
 
 def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagree():
-    differs = "do not agree"  # the sentence that decides: none of the others may have it
+    differs = "differ:"  # the sentence that decides: none of the others may have it
     said = set()
     for k, about in enumerate((About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION)):
         of = section("mass", GOOD, ("what", 2.0, 1.0, "at most", False, about))
@@ -80,6 +101,10 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
     say_outcome(said, section("mass", *[BAD] * 7, GOOD), 1.0, [{"text": "mass of forearm: stated 1"}])
     assert said[1].split()[1:5] == ["7", "FAILED", "8", "checks"] and said[2] == "  CAUSE mass of forearm: stated 1"
     assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[3:]] == [True] * 4 + [False]
+    wrong = ("what", 2.0, 1.0, "at most", False, About.PREDICTION)
+    del said[:]
+    say_outcome(said, section("mass", *[BAD] * 7, wrong), 1.0, [], [cause()])
+    assert [line.startswith("  FAIL mass: what") for line in said] == [False, True] and " 7 explained" in said[0]
 
 
 # the answers to the questions of the assignment
@@ -87,7 +112,7 @@ def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
 
 def answer_of(*sections) -> dict:
     """The answers by their part."""
-    return {part: answer for part, _, _, answer in answers(sections, ARM)}
+    return answers(sections, ARM).set_index("part")["answer"].to_dict()
 
 
 def apart(scene, difference, quantity="Mbar"):
@@ -118,14 +143,19 @@ def test_what_to_use_gives_each_engine_its_own_time_in_the_scene_of_the_caption(
     lines = [LINE | {"target_rad": 1e-3, "mujoco_ms": 5.0}, LINE, LINE | {"scene": "zero", "mujoco_ms": 8.0}]
     rows = [{"scene": "bent", "dt_s": 0.5, "steps": 9}, {"scene": "zero", "dt_s": 0.5, "steps": 8}]
     ran = section("speed", rows=rows, what_should_i_use=renamed(lines, "rad or m"))
-    for regular, numbers in ((None, ("4.5 s", "bent", "7 ms")), ("zero", ("4 s", "zero", "8 ms"))):
+    for regular, duration, scene, time in ((None, 4.5, "bent", 7.0), ("zero", 4.0, "zero", 8.0)):
         ran.result.curves["regular"] = regular
-        found = answers([ran], ARM)[-1][-1]
-        named = ("1e-06 rad or m", "MuJoCo RK4, 9 steps (dt 0.5 s)", "rk4, 2 ms", *numbers)
-        assert all(number in found for number in named)
+        ran.result.curves["choice"] = of_speed.choice(ran.result)
+        values = ran.result.curves["choice"].values
+        assert (values["duration"], values["scene"], values["unit"]) == (duration, scene, "rad or m")
+        assert [(one["setting"], one["ms"]) for one in values["settings"]] == [
+            ("MuJoCo RK4, 9 steps", time),
+            ("rk4", 2.0),
+        ]
+        assert f"{duration:g} s ({scene})" in answers([ran], ARM)["answer"].iloc[-1]
 
 
-# the one number of each experiment
+# the headline of each experiment
 
 OFF = {"of": "forearm", "quantity": "com", "component": "x", "stated": 2.0, "compiled": 2.5, "difference": 0.5,
        "unit": "m"}  # fmt: skip
@@ -139,19 +169,25 @@ FAULT = {"visible": True, "outcome": "right", "faults": 3}
 FASTER = {"speedup": 4.21, "hinges": "gamma", "scene": "a"}
 
 
+def headline_of(name, of):
+    with_headline(module(name), of.result)
+    return headline(of)
+
+
 @pytest.mark.parametrize("name, rows, numbers, named", [
     ("parameters", [SAME, OFF], "1 2 0.5", "com x of forearm"),
     ("parameters", [OFF, HEAVY], "0 2 0.5", "com x of forearm"),  # relative to their sizes
     ("published", [PRINTED | {"mujoco": 0.8}], "0 1", ""),
-    ("mass", [APART, APART | {"quantity": "other", "worst_difference": 1.0, "difference_over_bar": 0.05}], "2e-16 10", "Mbar"),
+    ("gravity", [APART, APART | {"quantity": "other", "worst_difference": 1.0, "difference_over_bar": 0.05}], "2e-16 10", "Mbar"),
     ("trajectory", [{"scene": "a", "difference_over_band": 0.04}, {"scene": "a", "difference_over_band": 12.0}], "1 12", ""),
     ("diagnosis", [FAULT, FAULT | {"outcome": "wrong"}, FAULT | {"visible": False}], "3 6", ""),
     ("stability", [STEP, STEP | {"observed_dt_s": 0.0995}], "2 0.5", ""),
     ("reduction", [FASTER | {"speedup": 1.05}], "1.1", "gamma"),
     ("reduction", [FASTER | {"speedup": 1.04}], "1 1 50", ""),  # as much as the clock may be off: how many checks pass
 ])  # fmt: skip
-def test_the_one_number_is_computed_and_comes_out_either_way(name, rows, numbers, named):
-    said = one_number(section(name, GOOD, rows=rows))
+def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):
+    of = section(name, GOOD, rows=rows)
+    said = headline_of(name, of)
     found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?", said.replace(" m2", ""))
     assert found == numbers.split() and named in said, said
 
@@ -169,7 +205,7 @@ def timed(engine, method, seconds, error, **more):
 
 def marks(experiment, result):
     """What is marked in the first panel of the picture of an experiment: (mark, colour, x) of every point."""
-    ((_, figure, _),) = (call() for call in figures_overview.pictures(experiment, {experiment: result}, ARM))
+    ((_, figure, _),) = (call() for call in module(experiment).overview({experiment: result}, ARM))
     lines = [line for line in figure.axes[0].get_lines() if line.get_marker() not in (None, "None", "")]
     return {(line.get_marker(), to_hex(line.get_color()), float(x)) for line in lines for x in line.get_xdata()}
 
@@ -180,11 +216,13 @@ def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_
         OF_BIAS | {"difference_eps": 7.0, "tmt_from_exact_eps": None, "mujoco_from_exact_eps": None},
         OF_BIAS | {"quantity": "other", "difference_eps": 9.0},
     ]
-    (found,) = engines_apart.agreements({"mass": Result("mass", rows=rows)})
-    assert found[1:] == (7.0, 1.0, None, True) and "7 eps" in engines_apart.agreement_in_words([found], "TMT")
+    (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
+    assert found | {"name": ""} == {"name": "", "apart": 7.0, "ours": 1.0, "theirs": None, "passed": True}
+    _, _, caption = figures_overview.draw_agreement({"mass": Result("mass", rows=rows)})
+    assert "Maximum difference: 7 eps" in say(caption)
     rows.append(OF_BIAS | {"difference_eps": float("nan"), "passed": False})
-    (found,) = engines_apart.agreements({"mass": Result("mass", rows=rows)})
-    assert found.apart == float("inf") and not found.passed
+    (found,) = figures_overview.agreements({"mass": Result("mass", rows=rows)})
+    assert found["apart"] == float("inf") and not found["passed"]
     drawn = marks("mass", Result("mass", rows=[OF_BIAS]))
     assert drawn == {("D", to_hex("black"), 2.0), ("o", to_hex(BLUE), 1.0), ("s", to_hex(ORANGE), 4.0)}
 
@@ -196,13 +234,13 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
         timed("tmt", "rk4", 1e-9, 2.0), timed("heyoka", "Taylor", None, None, why_not="absent"),
     ]  # fmt: skip
     result = Result("speed", rows=rows, curves={"regular": "s", "unit": "rad"})
-    assert methods_compared.best_curves(result) == [
-        Curve("tmt", [1e-3, 1e-6, 1e-9], [1.0, 4.0, 5.0], Cheapest("dopri8", 4.0)),
+    assert of_speed.best_curves(result) == [
+        Curve("tmt", [1e-3, 1e-6, 1e-9], [1.0, 4.0, 5.0], Cheapest("tmt", "dopri8", 4.0)),
         Curve("mujoco", [1.1e-6], [10.0], None),  # which is just outside of the error asked for
     ]
     rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt_s=0.00244140625, steps=2048.0))
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    said = one_number(Section("speed", "", "", "", result))
+    said = say(of_speed.headline(result))
     assert "MuJoCo RK4, 2048 steps (dt 0.0024 s), 3 ms" in said and "tmt dopri8, 4 ms" in said
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
 
@@ -212,12 +250,12 @@ def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
     curves = {"looked at": {"centres": ("s",)}, "schemes": {("tmt", "rk4"): "rk4", ("mujoco", "RK4"): "rk4"}}
     mujoco = row | {"engine": "mujoco", "method": "RK4", "observed_dt_s": 0.0995}
     result = Result("stability", rows=[row, mujoco, row | {"scene": "saddle"}], curves=curves)
-    found = methods_compared.limits_found(result)
+    found = of_stability.limits_of(result)
     assert found[0] == Limit("rk4", "tmt", "s", 0.5, "finite", 0.1, 0.1001, True) and len(found) == 2
-    assert " 0.5 %" in methods_compared.limits_at_a_glance(found)
+    assert of_stability.summary(found) == {"limits": 2, "known": 2, "wrong": 0, "off": pytest.approx(0.005)}
     result.check("s, TMT rk4, damping 0.5", "growth in 8 steps", 2.0, 1.0, "")  # of something else
-    assert all(one.passed for one in methods_compared.limits_found(result))
+    assert all(one.passed for one in of_stability.limits_of(result))
     result.check("s, MuJoCo RK4, damping 0.5", "limit, observed / predicted - 1", 2.0, 1.0, "")
-    found = methods_compared.limits_found(result)
-    assert "1 of 2" in one_number(Section("stability", "", "", "", result))
+    found = of_stability.limits_of(result)
+    assert of_stability.headline(result).values["wrong"] == 1
     assert {("o", to_hex(BLUE), 0.1001), ("X", to_hex(RED), 0.0995)} <= marks("stability", result)

@@ -22,6 +22,7 @@ from ...robots import Robot
 from .. import Experiment
 from ..setup import Setup
 from . import fault_table
+from .first_screen import headline as headline
 from .own_equations import asked_conditions, for_command_line
 from .single_steps import Stepped, steps_of_integrators
 

@@ -15,6 +15,7 @@ from ...robots.case import Coordinates
 from .. import Experiment
 from ..setup import Setup
 from . import file, solution
+from .first_screen import headline as headline
 
 EXPERIMENT = Experiment(order=10, serves_own=False)
 NOT_HAD = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")

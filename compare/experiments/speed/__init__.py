@@ -18,6 +18,7 @@ from ...truth.reference import DOUBLES, LOST, Reference, has_no_reference
 from .. import Experiment
 from ..setup import Setup
 from . import accuracy, advice, evaluations, orders
+from .first_screen import best_curves, choice
 from .runs import FIRST_STEPS, fill_in, measured, prepared, take_times
 from .settings import followed, left_out, methods_following, regular_of, scenes_of
 
@@ -82,6 +83,8 @@ def rows(setup: Setup, timed: bool = True) -> Result:
         add_times(result, setup, rows_of)
         add_absent(result, setup)
     result.rows = renamed([{name: row.get(name) for name in COLUMNS} for row in result.rows], unit)
+    if timed:
+        result.curves["choice"] = choice(result)
     return result
 
 
@@ -140,3 +143,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     for scene in result.curves["floors"]:
         yield partial(figures_speed.draw_times, result, scene, beginning=scene_begins(scene, robot))
     yield partial(figures_speed.draw_evaluations, result)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    from .figures_overview import draw_times  # matplotlib is for the process that draws
+
+    if best_curves(results["speed"]):
+        yield partial(draw_times, results["speed"])

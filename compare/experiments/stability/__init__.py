@@ -1,6 +1,6 @@
 """Stability: where each method fails, predicted from one step of it and shown in runs, with all joints together."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import product
 
@@ -17,6 +17,8 @@ from . import beyond, choice, claims, departure, failure, falling, growth, limit
 from .choice import dampings_of
 from .claims_judged import check_claims
 from .equilibria import check_equilibria, planes
+from .first_screen import headline as headline
+from .first_screen import limits_of
 from .limits_judged import check_limits
 from .subjects import MANY, places, subjects_of
 
@@ -209,3 +211,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
     for figure, has_data in drawn.items():
         if has_data:
             yield partial(figure, result, robot)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    from .figures_overview import draw_limits  # matplotlib is for the process that draws
+
+    if any(limit.predicted or limit.observed or not limit.passed for limit in limits_of(results["stability"])):
+        yield partial(draw_limits, results["stability"], robot)

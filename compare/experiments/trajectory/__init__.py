@@ -1,6 +1,6 @@
 """Motion by the same scheme on both sides: a method of tmt for every integrator of MuJoCo."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 
 from ...engines import LABELS, Engine, methods_in
@@ -12,6 +12,7 @@ from ...robots import Robot
 from .. import Experiment
 from ..setup import Setup
 from . import many_digits, motion, true_motion
+from .first_screen import headline as headline
 from .plan import begin
 from .rules import compare_derivatives
 
@@ -98,3 +99,10 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
         yield partial(figures_runs.draw_drift, result)
     if result.curves.get("drawn"):
         yield partial(figures_motion_gif.draw_motion, result)
+
+
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[partial]:
+    from .figures_overview import draw_scenes  # matplotlib is for the process that draws
+
+    if results["trajectory"].rows:
+        yield partial(draw_scenes, results["trajectory"], robot)

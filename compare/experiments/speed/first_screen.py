@@ -1,0 +1,95 @@
+"""What speed shows on the first screen: the settings of each engine that are best in both error and time."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
+
+from ...judge import units
+from ...judge.check import Result
+from ...judge.finding import Finding
+
+TARGET = 1e-6  # rad or m: the error for which the cheapest setting is named
+NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none
+LABELS = {"mujoco": "MuJoCo", "scipy": "SciPy"}  # tmt is the name of the package
+
+
+class Cheapest(NamedTuple):
+    """The setting that takes the least time within TARGET."""
+
+    engine: str
+    method: str
+    milliseconds: float
+    steps: float | None = None
+    dt: float | None = None  # s
+    tolerance: float | None = None
+
+
+class Curve(NamedTuple):
+    """The settings of one engine that no other of the same engine beats in both error and time."""
+
+    engine: str
+    errors: list[float]  # rad or m, from coarse to fine
+    milliseconds: list[float]
+    cheapest: Cheapest | None  # the first within TARGET
+
+
+def target(result: Result) -> dict:
+    return {"target": TARGET, "unit": result.curves.get("unit", "rad"), "scene": result.curves.get("regular")}
+
+
+def best_curves(result: Result) -> list[Curve]:
+    """A curve for each engine that computed the scene in which errors are regular."""
+    scene, error = result.curves.get("regular"), partial(units.value, name="worst_error")
+    rows = [
+        row
+        for row in result.rows
+        if row["scene"] == scene and row["why_not"] is None and row["seconds"] and not row["diverged"]
+    ]
+    curves = []
+    for engine in dict.fromkeys(row["engine"] for row in rows):
+        front, least = [], NOT_SOLVED
+        own = [row for row in rows if row["engine"] == engine and error(row) is not None]
+        for row in sorted(own, key=lambda row: (row["seconds"], error(row))):
+            if error(row) < least:
+                front.append(row)
+                least = error(row)
+        if front:
+            within = [
+                Cheapest(engine, row["method"], 1e3 * row["seconds"], row.get("steps"), row.get("dt_s"), row.get("tolerance"))
+                for row in front
+                if error(row) <= TARGET
+            ]  # fmt: skip
+            errors, times = [float(error(row)) for row in front], [1e3 * row["seconds"] for row in front]
+            curves.append(Curve(engine, errors, times, within[0] if within else None))
+    return curves
+
+
+def cheapest(curves: Sequence[Curve]) -> list[Cheapest]:
+    """The cheapest setting of all engines, and the cheapest of MuJoCo (of tmt, if the first is MuJoCo's)."""
+    reached = {curve.engine: curve.cheapest for curve in curves if curve.cheapest}
+    if not reached:
+        return []
+    first = min(reached, key=lambda engine: reached[engine].milliseconds)
+    other = "mujoco" if first != "mujoco" else "tmt"
+    return [reached[engine] for engine in (first, other) if engine in reached]
+
+
+def choice(result: Result) -> Finding | None:
+    """The answer to: which integrator, which step? A line of the table what_should_i_use, of the regular scene if it is there."""
+    lines = result.tables.get("what_should_i_use", [])
+    named = [line for line in lines if units.value(line, "target") == TARGET and line["mujoco"] and line["tmt"]]
+    if not named:
+        return None
+    regular = result.curves.get("regular")
+    line = next((line for line in named if line["scene"] == regular), named[0])
+    durations = (row["dt_s"] * row["steps"] for row in result.rows if row["scene"] == line["scene"] and row["dt_s"])
+    settings = [
+        {
+            "setting": line[engine].replace("mujoco", "MuJoCo", 1),
+            "dt": line.get(f"{engine}_dt_s"),
+            "ms": line[f"{engine}_ms"],
+        }
+        for engine in ("mujoco", "tmt")
+    ]
+    duration, unit = next(durations), line.get("unit", "rad")
+    return result.finding("choice", target=TARGET, unit=unit, scene=line["scene"], duration=duration, settings=settings)

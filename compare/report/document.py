@@ -1,0 +1,247 @@
+"""A report as one document in two media: report.md, which is short, and index.html, which has all and folds it.
+
+Both are rendered from document.md.jinja; here is chosen how much of each part is shown.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pandas as pd
+from markdown_it import MarkdownIt
+
+from ..experiments import EXPERIMENTS, Experiment
+from .images import embedded, moves
+from .motion import motion_in_html
+from .parts import Parts
+from .questions import answers
+from .shortened import shortened
+from .tables import closest_checks, heading, of_causes, origins, records, shown
+from .text import block, count, environment, sentence
+from .verdict import Report, Section, explained, failures, headline, outcome, passed, standing
+
+MOST_LINES = 300  # of report.md
+SIZES = 40, 16, 12, 8, 4, 2, 0  # rows of each table in report.md: the first with which it has so few lines
+MOST_ROWS, MOST_OF_RUNS = 40, 60  # of a table in the page; its file has all
+FIRST_NOTES = 3  # of a section of the page that are not folded
+MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
+FIRST_CAUSES = 4  # on the first screen
+OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
+LINKED = ("_distances", "_limits")  # how the files of the figures to which they lead end
+MAIN_TABLES = ("what_should_i_use",)  # tables in report.md beside a section's own
+
+
+class Document:
+    """One report in one medium. folder: where its figures are, for a page; None: report.md."""
+
+    def __init__(self, report: Report, parts: Parts, folder: Path | None = None):
+        self.report, self.parts, self.folder = report, parts, folder
+        self.page = folder is not None
+        self.file = "index.html" if self.page else "report.md"
+        data = {"page": self.page, "embedded": self.embedded}
+        self.template = environment().get_template("document.md.jinja").make_module(data)
+        self.rows, self.answers = MOST_ROWS, parts.made("the questions", None, answers, report.sections, report.robot)
+
+    def embedded(self, file: str) -> tuple[str, int, int]:
+        return embedded(self.folder / "figures" / f"{file}.png")
+
+    def body(self) -> list[str]:
+        """All parts below the verdict; those that break are left out. Of report.md, as much as MOST_LINES allow."""
+        if self.page:
+            return self.made_body()
+        for self.rows in SIZES:
+            body = self.made_body()
+            if len(joined(body).splitlines()) + len(self.report.top) + 12 <= MOST_LINES:
+                break
+        return body
+
+    def made_body(self) -> list[str]:
+        report = self.report
+        texts = [self.made("the first screen", self.first_screen)]
+        if self.page:
+            texts.append(self.parts.made("the motion in index.html", "", motion_in_html, report.sections, report.robot))
+        texts.append(self.made("the introduction", self.introduction))
+        if report.causes:
+            texts.append(self.template.causes(table_of(of_causes(report.causes))))
+        if self.answers is not None and len(self.answers):
+            texts.append(self.template.questions(table_of(self.answers), bool(report.robot.questions)))
+        for section in report.sections:
+            text = self.parts.made(f"{section.name} in {self.file}", None, self.section, section)
+            texts.append(self.template.missing(section.name, section.title) if text is None else text)
+        texts.append(self.template.skipped(report.skipped) if report.skipped else "")
+        return [*texts, self.template.provenance(table_of(origins(report.origin)))]
+
+    def made(self, name: str, make: Callable[[], str]) -> str:
+        return self.parts.made(f"{name} in {self.file}", "", make)
+
+    def text(self, body: Sequence[str]) -> str:
+        """The whole document, with what could not be made of it."""
+        report, good = self.report, passed(self.report.sections) and not self.parts.broken
+        reference = () if report.reference is None else report.reference.lines
+        lines, title = report.verdict.split("\n"), title_of(report.robot)
+        head = self.template.head(title, reference, lines, self.parts.lines, report.top, good)
+        if not self.page:
+            return joined([head, *body])
+        return (
+            environment()
+            .get_template("page.html.jinja")
+            .render(
+                title=title,
+                good=good,
+                links=self.links(),
+                body=MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])),
+            )
+        )
+
+    def links(self) -> list[tuple[str, bool]]:
+        """The sections to which the page leads, and whether a check of them fails."""
+        names = [("questions", False)] if self.answers is not None and len(self.answers) else []
+        names += [(section.name, standing(section)[0] is False) for section in self.report.sections]
+        return [*names, ("provenance", False)]
+
+    def first_screen(self) -> str:
+        """A line for each experiment, the pictures; on the page also what explains that checks fail."""
+        report, failing, more = self.report, None, 0
+        lines = [self.parts.made(f"the line of {one.name}", None, self.line, one) for one in report.sections]
+        failed = [check for kind in failures(report.sections) for check in kind]
+        if report.causes:
+            failing = table_of(of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank"))
+            failing["label"] = "Cause" if len(report.causes) == 1 else "Causes"
+            more = len(report.causes) - FIRST_CAUSES
+        elif failed:
+            columns = ["experiment", "scene", "quantity", "value", "tolerance", "note"]
+            failing = table_of(records(failed[:FIRST_CAUSES])[columns]) | {"label": "Failing checks"}
+            more = len(failed) - FIRST_CAUSES
+        if failing:
+            failing["known"] = bool(report.causes)
+        pictures = self.parts.made("the pictures of the first screen", [], self.pictures)
+        return self.template.first_screen(
+            [line for line in lines if line], report.skipped, pictures, failing, max(more, 0)
+        )
+
+    def line(self, section: Section) -> dict:
+        """The line of one experiment: what it asks, whether it passes, its headline."""
+        good, words = standing(section)
+        named = {"name": section.name, "title": section.title, "outcome": words, "headline": headline(section)}
+        if explained(section, self.report.causes) and not any(failures([section])[1:]):
+            named["headline"] = block("verdict", "consequence")
+        return named | {"good": good, "kind": kind(good)}
+
+    def pictures(self) -> list[dict]:
+        """The pictures, those in which something fails first, each with the anchor of its figure.
+
+        If no picture is of what fails, a figure of the first failing experiment comes before them.
+        """
+        wrong = [section for section in self.report.sections if any(failures([section]))]
+        pictures, shown = [], []
+        for section in self.report.sections:
+            for file, caption in section.figures:
+                if file.startswith(OVERVIEW):
+                    of = [one for one in self.report.sections if picture_of(one) == picture_of(section)]
+                    shown += [one for one in of if one in wrong]
+                    about = {"file": file, "path": f"{file}.png", "caption": caption, "link": linked_figure(of)}
+                    words = {"title": block(section.name, "overview_title")}
+                    words["alternative"] = block(section.name, "overview_alternative")
+                    pictures.append(about | words | {"fails": any(one in wrong for one in of)})
+        still = [(section, [one for one in figures_of(section) if not one["moves"]]) for section in wrong]
+        own = [(section, figures) for section, figures in still if figures]
+        if own and not shown and self.page:
+            section, figures = own[0]
+            figure = next((one for one in figures if one["file"].endswith("_distances")), figures[0])
+            about = {"alternative": figure["caption"], "caption": "", "link": f"figure-{figure['file']}"}
+            pictures.insert(0, figure | about | {"title": section.title, "fails": True})
+        return sorted(pictures, key=lambda picture: not picture["fails"]) if self.page else pictures
+
+    def introduction(self) -> str:
+        robot = self.report.robot
+        joints = joints_of(robot)
+        return sentence(" ".join(self.template.introduction(robot, robot.described or robot.name, joints).split()))
+
+    def section(self, section: Section) -> str:
+        """One experiment: what was found, figures, tolerance, and the details."""
+        result, (good, _) = section.result, standing(section)
+        consequences = explained(section, self.report.causes)
+        failed = [check for check in result.checks if not check.passed and check not in consequences]
+        few = MOST_ROWS if self.page else max(1, self.rows // 2)
+        most = FIRST_NOTES if self.page else None if self.rows == MOST_ROWS else max(1, self.rows // 2)
+        notes, figures = section.notes, [one for one in figures_of(section) if not (self.page and one["moves"])]
+        first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
+        first = [one for one in figures if one in first or one["file"].endswith(LINKED)]
+        return self.template.section(
+            name=section.name,
+            title=section.title,
+            good=good,
+            kind=kind(good),
+            outcome=outcome(section, self.report.causes),
+            headline=headline(section) if result.headline else "",
+            claim=section.claim,
+            tolerance=section.tolerance,
+            failing={"count": len(failed), "rows": table_of(records(failed[:few]))},
+            explained={"count": len(consequences), "rows": table_of(records(consequences[:MOST_ROWS]))},
+            notes=notes[:most],
+            further=notes[most:] if most else [],
+            tables=[self.table(section, name, rows) for name, rows in section.tables.items()],
+            checks={"count": len(result.checks), "rows": table_of(closest_checks(section, MOST_ROWS))},
+            open_figures=first,
+            folded_figures=[one for one in figures if one not in first],
+        )
+
+    def table(self, section: Section, name: str, rows: Sequence[dict]) -> dict:
+        """A table with the rows that a reader needs; its rows are None where only its file has them."""
+        about = {"name": name, "title": heading(name), "count": len(rows), "which": "", "rows": None}
+        columns = section.result.shown if name == section.name else None
+        is_main = self.page or (self.rows and (name == section.name or name in MAIN_TABLES))
+        if columns == [] or name in section.result.filed or not is_main:
+            return about
+        most = (MOST_ROWS, MOST_OF_RUNS) if self.page else (self.rows, self.rows * MOST_OF_RUNS // MOST_ROWS)
+        few, about["which"] = shortened(rows, *most)
+        about["rows"] = table_of(shown(pd.DataFrame(few), columns if few else None))
+        return about
+
+
+def picture_of(section: Section) -> str:
+    return EXPERIMENTS.get(section.name, Experiment(0)).overview
+
+
+def title_of(robot) -> str:
+    return block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
+
+
+def kind(good: bool | None) -> str:
+    """The style of what passes, fails, or was not compared."""
+    return "none" if good is None else "good" if good else "bad"
+
+
+def table_of(table: pd.DataFrame) -> dict:
+    return {"columns": list(table.columns), "cells": table.astype(str).to_numpy().tolist()}
+
+
+def figures_of(section: Section) -> list[dict]:
+    """The figures of a section without the pictures of the first screen."""
+    return [
+        {"file": file, "path": file if moves(file) else f"{file}.png", "caption": caption, "moves": moves(file)}
+        for file, caption in section.figures
+        if not file.startswith(OVERVIEW)
+    ]
+
+
+def linked_figure(sections: Sequence[Section]) -> str:
+    """The anchor of the figure behind a picture: of distances or limits, else the first of the last section."""
+    files = [one["file"] for section in sections for one in figures_of(section) if not one["moves"]]
+    best = [file for file in files if file.endswith(LINKED)] or files
+    return f"figure-{best[0]}" if best else sections[-1].name
+
+
+def joints_of(robot) -> list[str]:
+    """The joints of a robot by their kinds with their counts: of a file as it has them, a free joint as one."""
+    counts = {feature.feature: feature.count for feature in robot.features}
+    counts = counts or {name: robot.tree.kind.count(name) for name in robot.tree.kind}
+    names = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
+    return [count(counts[key], name) for key, name in names.items() if counts.get(key)]
+
+
+def joined(paragraphs: Sequence[str]) -> str:
+    """Paragraphs as one text, with one empty line between them, but none between the items of a list."""
+    lines = "\n".join(line.rstrip() for line in "\n\n".join(paragraphs).split("\n"))
+    text = re.sub(r"\n{3,}", "\n\n", lines).strip() + "\n"
+    return re.sub(r"(?m)^(- .*)\n\n(?=- )", r"\1\n", text)
