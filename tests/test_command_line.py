@@ -136,7 +136,7 @@ def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(inside, tmp
     assert main(["stability", "--quick", "--mjcf", str(path), *asked, "--out", str(out)]) == 1
     lines = capsys.readouterr().out.splitlines()
     at = next(k for k, line in enumerate(lines) if line.startswith("TMT and MuJoCo agree in stability"))
-    assert "limit is 1." in lines[at] and "Asked: 1 ms under Euler: stable (limit 1." in lines[at + 2]
+    assert "limit is 1." in lines[at] and "Requested step, 1 ms with Euler: stable (limit 1." in lines[at + 2]
     results = results_in(out)
     assert not results["passed"] and results["causes"] == []
     failed = [check for check in results["checks"] if not check["passed"]]

@@ -11,7 +11,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from ..judge.finding import Finding
-from ..judge.words import capital, listed
+from ..judge.words import capital, listed, seconds, some_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -27,6 +27,8 @@ FILTERS = {
     "degrees": lambda angle, digits=4: f"{angle * 57.29577951308232:.{digits}g} deg",
     "count": count,
     "listed": lambda words: listed(list(words)),
+    "some": lambda words: some_of(list(words)),
+    "seconds": seconds,
     "capital": capital,
 }
 

@@ -1,10 +1,11 @@
-"""The largest stable step under a robot's own servos as MuJoCo's runs show it, found without the prediction."""
+"""Runs of MuJoCo under a robot's own servos: the largest stable step, and the whole file at its own step."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from ....engines.mujoco.acting import Acting
+from ....engines.mujoco.whole import whole_run
 from ....robots.case import SEED
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO
@@ -23,6 +24,9 @@ GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: w
 GROWN_SLOWLY, GROWN_EVENLY, GROWN_FROM = 1.003, 0.5, 1e-5
 ASKED_AGAIN = 30.0  # times the deviation, where that decides
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
+FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run of the whole file, and of its part whose speeds count
+FULL_PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
+CALM = 1e-3  # rad/s or m/s, root of the mean square
 
 
 def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | None]:
@@ -130,3 +134,19 @@ def measured_speeds(acting: Acting, at: Posture) -> list[int]:
 def base_of(acting: Acting, at: Posture) -> str:
     """The base that a run has."""
     return "locked" if {*at.base} & {*acting.locked} else at.bases[0]
+
+
+def full_model(model, at: Posture, dt: float, integrator: str) -> dict:
+    """The whole file, contacts and friction on, for two seconds: columns of step_limits.csv.
+
+    model: the file's, as it was compiled. It starts at the posture itself, which need not be where it rests.
+    """
+    speed = FULL_PUSH * np.random.default_rng(SEED).normal(size=model.nv)
+    with np.errstate(over="ignore", invalid="ignore"):
+        run = whole_run(model, at.robot.drive, at.start, at.u, dt, integrator, FULL_TIME, FULL_LAST, speed)
+    return {
+        "full_model_rms_speed": run.rms_speed if np.isfinite(run.rms_speed) else None,
+        "full_model_warnings": run.warnings,
+        "full_model_resets": run.resets,
+        "full_model_calm": bool(run.rms_speed < CALM),
+    }

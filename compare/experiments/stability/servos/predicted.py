@@ -1,11 +1,10 @@
-"""Step limits under a robot's own servos at its postures, predicted, and the same by the eigenvalues of a step."""
+"""Step limits under a robot's own servos at its postures, predicted."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ....engines.mujoco import Reading
 from ....engines.mujoco.acting import Acting
@@ -13,15 +12,14 @@ from ....engines.mujoco.flags import INTEGRATORS
 from ....engines.mujoco.holding import limits_in_force
 from ....robots import Robot
 from ....truth.driven import Posture
-from ....truth.linear import NEUTRAL
 from ....truth.step_limits import LIMIT_UP_TO, Limit, Small
 
-NEAR_LIMIT = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
 FAR_FROM_POSTURE = 0.1  # rad or m, of a rest from the posture
 MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
 STILL_THERE = 1e-6  # rad or m
 GIVEN_WAY = 0.01  # rad or m
-ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is asked
+ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is compared
+FULL_MODEL = ("full_model_rms_speed", "full_model_warnings", "full_model_resets", "full_model_calm")  # columns
 
 
 class Predicted(NamedTuple):
@@ -136,67 +134,30 @@ def limit_rows(found: Sequence[Predicted], dt: float, integrator: str) -> list[d
         for base in one.at.bases:
             for name in INTEGRATORS:
                 limit = one.limits.get((base, name), Limit("not_at_rest", None, "", None, ""))
-                rows.append(
-                    {
-                        "posture": one.name,
-                        "base": base,
-                        "integrator": name,
-                        "limit": limit.limit,
-                        "predicted_dt_s": limit.dt and float(limit.dt),
-                        "observed_dt_s": None,
-                        "file_dt_s": dt,
-                        "file_integrator": integrator,
-                        "stable_at_file_dt": one.is_stable(base, name, dt) if one.rests else None,
-                        "limiting_joint": limit.joint if limit.limit == "finite" else None,
-                        "mode_per_s": limit.rate,
-                        "mode_kind": limit.kind or None,
-                        "step_response_error": None,
-                    }
-                )
+                rows.append({
+                    "posture": one.name, "base": base, "integrator": name, "limit": limit.limit,
+                    "predicted_dt_s": limit.dt and float(limit.dt), "observed_dt_s": None, "file_dt_s": dt,
+                    "file_integrator": integrator, "stable_at_file_dt": one.is_stable(base, name, dt) if one.rests else None,
+                    "limiting_joint": limit.joint if limit.limit == "finite" else None, "mode_per_s": limit.rate,
+                    "mode_kind": limit.kind or None, "step_response_error": None, **dict.fromkeys(FULL_MODEL),
+                })  # fmt: skip
     return rows
 
 
-class Steps(NamedTuple):
-    """What the eigenvalues of a step say of one limit."""
+def radii_apart(one: Predicted, reading: Reading) -> dict[tuple[str, str], float]:
+    """The difference of the spectral radius of a step near each finite limit, TMT to MuJoCo, by base and integrator.
 
-    base: str
-    integrator: str
-    apart: (
-        float | None
-    )  # of the limit: how far the one by the closed form is from that by eigenvalues; None: no closed form
-    beside: (
-        float | None
-    )  # the largest difference of the spectral radius from that of MuJoCo's own derivative; None: RK4
-
-
-def steps_at(one: Predicted, reading: Reading) -> list[Steps]:
-    """Each finite limit of a posture beside the eigenvalues of steps, our own and MuJoCo's."""
-    rows = []
+    RK4 has no derivative in MuJoCo; soft constraints rest elsewhere with each step: these are compared by runs alone.
+    """
+    radii = {}
     for (base, integrator), limit in one.limits.items():
-        if limit.limit == "finite" and not one.gives_way(base, integrator):
+        if limit.limit == "finite" and integrator != "RK4" and not one.gives_way(base, integrator):
             at = one.there[base, integrator]
-            small, acting = at.small(base), acting_at(reading, at, base)
-            # compared by runs alone where soft constraints act: loaded, they rest elsewhere with each step
-            skipped = integrator == "RK4" or small.is_coupled
-            beside = None if skipped else radius_apart(acting, at, small, integrator, limit.dt)
-            rows.append(Steps(base, integrator, forms_apart(small, integrator, limit), beside))
-    return rows
-
-
-def forms_apart(small: Small, integrator: str, limit: Limit) -> float | None:
-    """How far a limit by the closed form is from the step at which the spectral radius passes 1, of itself."""
-    if not small.has_closed_form(integrator) or limit.shape is None:
-        return None
-
-    def excess(dt):
-        return small.growth(integrator, dt) - 1.0 - max(NEUTRAL, 2.0 * dt * small.neutral)
-
-    low, high = limit.dt * (1.0 - NEAR_LIMIT), limit.dt * (1.0 + NEAR_LIMIT)
-    if excess(low) <= 0.0 < excess(high):
-        by_radius = brentq(excess, low, high, xtol=1e-9 * limit.dt)
-    else:
-        by_radius = small.scanned(integrator) or np.inf
-    return float(abs(limit.dt / by_radius - 1.0))
+            small = at.small(base)
+            if not small.is_coupled:
+                acting = acting_at(reading, at, base)
+                radii[base, integrator] = radius_apart(acting, at, small, integrator, limit.dt)
+    return radii
 
 
 def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt: float) -> float:
