@@ -18,7 +18,7 @@ FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step
 
 
 def claim_values(robot: Robot) -> dict:
-    """What the claim and the tolerance of this robot name, beside the robot."""
+    """What the claim and the tolerance need in addition to the robot."""
     return {
         "unit": subjects.unit_of_movements(robot),
         "servos": servos.TOLERANCES if robot.drive.actuators else None,
@@ -75,9 +75,7 @@ def begin(setup: Setup) -> None:
         "not led": departure.not_led(saddle, leaving, dts),
         "torques": start_claim(claims.holding_torques),
         "finer": start_claim(claims.finer_steps, full=False, counts=of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))),
-        "printed": start_claim(
-            claims.printed_torque, counts=of(claims.PRINTED_COUNTS, claims.PRINTED_COUNTS, (64, 256))
-        ),
+        "printed": start_claim(claims.printed_torque, counts=claims.PRINTED_COUNTS[: of(4, 4, 2)]),
         "kept": start_claim(claims.kept, full=False, counts=of(claims.COUNTS_WITHIN, (), claims.COUNTS_WITHIN[::7])),
         "reset": start(failure.own_reset, free),
         "gain": start(failure.silent_gain, free),
@@ -90,8 +88,7 @@ def rows(setup: Setup) -> Result:
     if "stability" not in setup.background:
         begin(setup)
     work, chosen, methods = setup.background.pop("stability"), subjects_of(setup.robot), methods_of(setup)
-    robot = chosen.robot
-    saddle = chosen.saddle
+    robot, saddle = chosen.robot, chosen.saddle
     result.curves["looked at"] = {"centres": chosen.centres, "saddle": saddle and saddle.name}
     result.curves["rate at saddle"] = saddle and float(saddle.modes[0].real.max())
     result.curves["schemes"] = {(method.engine, method.name): method.scheme for method in methods}
@@ -120,12 +117,10 @@ def rows(setup: Setup) -> Result:
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     # matplotlib is for the process that draws
     from . import figures_stability as drawing
-    from .servos.figures_step import draw_step_response
 
     curves, centres = result.curves, result.curves["looked at"]["centres"]
     saddle = curves["looked at"]["saddle"]
     drawn = {
-        draw_step_response: any(curves.get("step response", {"lines": {}})["lines"].values()),
         drawing.draw_limits: any(
             row["predicted_dt_s"] or row["observed_dt_s"] for row in result.rows if row["scene"] in centres
         ),

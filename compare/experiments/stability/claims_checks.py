@@ -70,8 +70,8 @@ def check_finer_steps(result: Result, robot: Robot, finer: list[dict]) -> None:
         quantity = f"movement in {claims.duration:g} s at {count} steps"
         still &= result.check(where, quantity, row["moved_rad"], 0.0, "rad", about=About.PREDICTION).passed
     turned, series, leave = 0, list(dict.fromkeys((row["engine"], row[column]) for row in finer)), True
-    for of in series:
-        rows = [row for row in finer if (row["engine"], row[column]) == of and row["direction"]]
+    for engine, sign in series:
+        rows = [row for row in finer if (row["engine"], row[column]) == (engine, sign) and row["direction"]]
         turned += any(before["direction"] != row["direction"] for before, row in pairwise(rows))
         leave &= bool(rows)
     last = [row for row in finer if row["engine"] == "tmt" and row[column] == 1][-1]

@@ -19,14 +19,14 @@ PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the ang
 # rad, as the error of torque that moves the equilibrium as far; less is a few ulps
 TORQUE_ERRORS = (1e-13, 1e-14, 3e-15)
 DEPARTURE_TOLERANCE = 0.03  # s, or one step: how near the prediction an observed departure is to be
-DEPARTURE_SCHEMES = (
+DEPARTURE_SCHEMES = [
     "rk4",
     "semi_implicit_euler",
     "implicit",
     "implicit_midpoint",
     "gauss_legendre_4",
     "explicit_euler",
-)
+]
 INSTANT = 1e-6  # s
 MOST_VARIED = 5  # joints, whose torques are varied in all combinations
 
@@ -113,7 +113,7 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
         sizes += [(size, np.zeros(n), own + size * push) for size in TORQUE_ERRORS]
         if at.case.robot.is_read:
             sizes = [(size, *more) for size, *more in sizes if not_lost(at, size)]
-        starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
+        starts, torques = (np.array(values) for values in list(zip(*sizes))[1:])
         off = residual(method, engines, at, torques)
         expected = predicted(at, method.scheme, dt, [moved for _, moved, _ in sizes], off)
         if allowed and None not in expected:
@@ -196,7 +196,7 @@ def departure_values(rows: list[dict]) -> dict:
 
 
 def span(times: Iterable[float | None]) -> tuple[float, float] | None:
-    """The first and the last of some times; None: there is none. None among them stands for never."""
+    """The first and the last of some times; None: there is none. A time of None: never."""
     times = [time for time in times if time is not None]
     return (min(times), max(times)) if times else None
 
@@ -238,7 +238,7 @@ def residual(method: Method, engines: Mapping[str, Engine], at: Held, tau: np.nd
 
 
 def variants(tau: np.ndarray, reach: int = 1) -> np.ndarray:
-    """The torques within so many ulps of each component, (k, n) N m; the one in the middle is tau itself.
+    """The torques within `reach` ulps of each component, (k, n) N m; the one in the middle is tau itself.
 
     (2 reach + 1)^n of them, 27 for one ulp of three joints; of more than five joints one component differs at a time.
     """

@@ -7,7 +7,7 @@ from ....robots import Robot
 from ....truth.step_limits import LIMIT_UP_TO
 from . import response
 from .lifting import Lift
-from .predicted import Predicted
+from .predicted import Prediction
 
 DEFAULT_INTEGRATOR = "Euler"  # MuJoCo's integrator where a file states none
 SHAKES = 10.0  # fold, of the speed with a stable integrator: then the step is the cause
@@ -22,7 +22,7 @@ def known(rows: Sequence[dict], integrator: str) -> list[dict]:
     return sorted(mine, key=lambda row: row["predicted_dt_s"] or float("inf"))
 
 
-def find_answer(result: Result, rows: Sequence[dict], robot: Robot, predictions: Sequence[Predicted]) -> None:
+def find_answer(result: Result, rows: Sequence[dict], robot: Robot, predictions: Sequence[Prediction]) -> None:
     """Whether the file's step is stable, with its own integrator and with MuJoCo's default."""
     dt, integrator = rows[0]["file_dt_s"], rows[0]["file_integrator"]
     default = verdict(rows, DEFAULT_INTEGRATOR) if integrator != DEFAULT_INTEGRATOR else None
@@ -79,53 +79,50 @@ def shaking(rows: Sequence[dict], bad: Sequence[dict]) -> tuple[str, int, int]:
 
 def without_limit(rows: Sequence[dict]) -> list[dict]:
     """The postures that have no limit, by the reason."""
-    found = []
+    groups = []
     for reason in WITHOUT_LIMIT:
         mine = [row for row in rows if row["limit"] == reason and row["base"] != "locked"]
         if mine:
             postures = list(dict.fromkeys(row["posture"] for row in mine))
-            found.append({"reason": reason, "postures": postures, "floats": any(row["base"] == "free" for row in mine)})
-    return found
+            floats = any(row["base"] == "free" for row in mine)
+            groups.append({"reason": reason, "postures": postures, "floats": floats})
+    return groups
 
 
-def conditions(predictions: Sequence[Predicted]) -> dict:
+def conditions(predictions: Sequence[Prediction]) -> dict:
     """What is not part of the limits: contacts, if the file has any, gravity, joints that nothing holds."""
     robot = predictions[0].at.robot
-    aside = dict.fromkeys(robot.coordinates.speeds[k] for one in predictions if one.is_known for k in one.at.aside)
+    postures = [prediction.at for prediction in predictions if prediction.is_known]
+    aside = dict.fromkeys(robot.coordinates.speeds[k] for at in postures for k in at.aside)
     contacts = any(feature.feature == "contact" for feature in robot.features)
     return {"contacts": contacts, "floats": bool(predictions[0].at.base), "aside": list(aside)}
 
 
 def find_requested(
-    result: Result, predictions: Sequence[Predicted], dt: float, integrator: str, errors: Sequence[float | None]
+    result: Result, predictions: Sequence[Prediction], dt: float, integrator: str, errors: Sequence[float | None]
 ) -> None:
     """Whether the step of --dt and --integrator is stable; errors: of the step response, where it is."""
     robot, resting = predictions[0].at.robot, with_limit(predictions, integrator)
     values = {"dt": dt, "integrator": integrator, "has_servos": robot.drive.feeds_back, "known": bool(resting)}
     if resting:
-        stable = {one.name: bool(one.is_stable(one.at.bases[0], integrator, dt)) for one in resting}
-        least = min(resting, key=lambda one: one.limits[one.at.bases[0], integrator].dt or LIMIT_UP_TO)
-        limit, same = least.limits[least.at.bases[0], integrator], all(stable.values())
-        where = [name for name, is_stable in stable.items() if is_stable == same]
-        values |= {
-            "stable": same,
-            "postures": [] if len(where) == len(predictions) else where,
-            "limit": limit.dt,
-            "joint": limit.joint,
-            "posture": least.name if len(predictions) > 1 else None,
-            "error": max((error for error in errors if error is not None), default=None),
-        }
+        bad = [prediction for prediction in resting if not prediction.is_stable(prediction.base, integrator, dt)]
+        where = [prediction.name for prediction in bad or resting]
+        least = min(resting, key=lambda prediction: prediction.limits[prediction.base, integrator].dt or LIMIT_UP_TO)
+        limit = least.limits[least.base, integrator]
+        values |= {"stable": not bad, "postures": [] if len(where) == len(predictions) else where, "limit": limit.dt}
+        values |= {"joint": limit.joint, "posture": least.name if len(predictions) > 1 else None}
+        values["error"] = max((error for error in errors if error is not None), default=None)
     result.top.append(result.finding("requested_step", "servos", **values, conditions=conditions(predictions)))
 
 
-def with_limit(predictions: Sequence[Predicted], integrator: str) -> list[Predicted]:
+def with_limit(predictions: Sequence[Prediction], integrator: str) -> list[Prediction]:
     """The postures at rest whose step has a limit, or is known to have none, with an integrator."""
-    return [one for one in predictions if one.rests and (one.at.bases[0], integrator) in one.pairs]
+    return [prediction for prediction in predictions if (prediction.base, integrator) in prediction.pairs]
 
 
-def find_changes(result: Result, one: Predicted, integrator: str, lifts: Sequence[Lift], dt: float) -> None:
+def find_changes(result: Result, prediction: Prediction, integrator: str, lifts: Sequence[Lift], dt: float) -> None:
     """What would make the file's step stable with an integrator: only what held in a run."""
-    coordinates = one.at.robot.coordinates
+    coordinates = prediction.at.robot.coordinates
     held, units = [lift for lift in lifts if lift.tried], dict(zip(coordinates.speeds, coordinates.units))
 
     def parts(kind: str) -> list[tuple]:
@@ -134,10 +131,10 @@ def find_changes(result: Result, one: Predicted, integrator: str, lifts: Sequenc
 
     others = [(lift.names[0], lift.factor) for lift in held if lift.kind == "integrator"]
     values = {"integrators": others, "kv": parts("kv"), "armature": parts("armature")}
-    result.find("changes", "servos", dt=dt, posture=one.name, integrator=integrator, **values)
+    result.find("changes", "servos", dt=dt, posture=prediction.name, integrator=integrator, **values)
 
 
-def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Predicted]) -> None:
+def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Prediction]) -> None:
     """The other notes, in the order in which they are of use."""
     of_each = [known(rows, integrator) for integrator in dict.fromkeys(row["integrator"] for row in rows)]
     integrators, dt = [mine[0] | worst_of(mine) for mine in of_each if mine], rows[0]["file_dt_s"]
@@ -158,7 +155,6 @@ def find_notes(result: Result, rows: Sequence[dict], predictions: Sequence[Predi
         }
         result.find("full_model", "servos", count=len(full), calm=names[True], moving=names[False])
     find_postures(result, predictions)
-    find_actuators(result, predictions)
 
 
 def worst_of(rows: Sequence[dict]) -> dict:
@@ -167,33 +163,27 @@ def worst_of(rows: Sequence[dict]) -> dict:
     return {"error": max(errors, default=None), "stable": all(row["stable_at_file_dt"] for row in rows)}
 
 
-def find_postures(result: Result, predictions: Sequence[Predicted]) -> None:
-    """Where the postures rest."""
-    units = list(dict.fromkeys(predictions[0].at.robot.coordinates.units))
-    moved = [(one.name, one.at.moved) for one in predictions if one.rests and one.at.moved > RESTS_WITHIN]
-    if moved:
-        result.find("rests", "servos", postures=moved, unit="/".join(units))
-    if any(one.at.small(base).is_coupled for one in predictions if one.rests for base in one.at.bases):
-        result.find("constraints", "servos")
-    for one in predictions:
-        joints, in_force = one.at.beyond(0.0) if one.at.limits else one.at.beyond(), bool(one.at.limits)
-        if one.rests and joints:
-            result.find("beyond_range", "servos", posture=one.name, joints=list(joints), in_force=in_force)
-        base = one.at.bases[0]
-        soft = [name for of, name in one.pairs if of == base and one.gives_way(of, name)]
-        if soft:
-            result.find("gives_way", "servos", posture=one.name, integrators=soft)
-
-
-def find_actuators(result: Result, predictions: Sequence[Predicted]) -> None:
-    """Actuators that exert nothing, or are cut by their range."""
+def find_postures(result: Result, predictions: Sequence[Prediction]) -> None:
+    """Where the postures rest, and the actuators that exert nothing or are cut by their range."""
     robot = predictions[0].at.robot
-    drive, off = robot.drive, [(one.name, one.off) for one in robot.drive.actuators if one.off]
-    if off:
+    resting = [prediction for prediction in predictions if prediction.rests]
+    moved = [(prediction.name, prediction.at.moved) for prediction in resting if prediction.at.moved > RESTS_WITHIN]
+    if moved:
+        result.find("rests", "servos", postures=moved, unit="/".join(dict.fromkeys(robot.coordinates.units)))
+    if any(prediction.at.small(base).is_coupled for prediction in resting for base in prediction.at.bases):
+        result.find("constraints", "servos")
+    drive = robot.drive
+    if off := [(actuator.name, actuator.off) for actuator in drive.actuators if actuator.off]:
         result.find("actuators_off", "servos", actuators=off)
-    for one in predictions:
-        cut = [(drive.actuators[i].name, force) for i, force in one.at.cut.forces.items()] if one.rests else []
-        cut += [(robot.coordinates.speeds[k], force) for k, force in one.at.cut.sums.items()] if one.rests else []
+    for prediction in resting:
+        at, name, in_force = prediction.at, prediction.name, bool(prediction.at.limits)
+        if joints := list(at.beyond(0.0) if in_force else at.beyond()):
+            result.find("beyond_range", "servos", posture=name, joints=joints, in_force=in_force)
+        pairs = [pair for pair in prediction.pairs if pair[0] == prediction.base]
+        if soft := [integrator for base, integrator in pairs if prediction.gives_way(base, integrator)]:
+            result.find("gives_way", "servos", posture=name, integrators=soft)
+        cut = [(drive.actuators[i].name, force) for i, force in at.cut.forces.items()]
+        cut += [(robot.coordinates.speeds[k], force) for k, force in at.cut.sums.items()]
         if cut:
-            result.find("actuators_cut", "servos", posture=one.name, forces=cut)
+            result.find("actuators_cut", "servos", posture=name, forces=cut)
     result.find("rest_without_actuators", "servos")

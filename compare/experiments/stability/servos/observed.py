@@ -19,10 +19,10 @@ APART = 0.01  # of a deviation at the start: what constraints do not allow, whic
 RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
-# what changes its sign with every step grows if it does so from part to part after the first two, by so much in all, fold, and
-# at its slowest by so much of its fastest; less of it, of the deviation at the start, is not looked at
+# an alternating deviation grows if it does so from part to part after the first two: the smallest growth in all, fold, of the
+# slowest growth over the fastest, and the smallest share of the deviation at the start
 GROWN_SLOWLY, GROWN_EVENLY, GROWN_FROM = 1.003, 0.5, 1e-5
-ASKED_AGAIN = 30.0  # times the deviation, where that decides
+LARGER = 30.0  # times the deviation, of a second run
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
 FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run of the whole file, and of its part whose speeds count
 FULL_PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
@@ -33,7 +33,7 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
     """The largest dt, s, at which no small deviation grows in MuJoCo: ("finite", dt); ("none", None): none grows up to 5 s.
 
     Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
-    acting: MuJoCo at the posture, with the base that is asked for.
+    acting: MuJoCo at the posture, with a base.
     """
     count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 2
     tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]  # the first at most SOUGHT_FROM
@@ -51,7 +51,7 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
 
 
 def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
-    """Whether a small random deviation from rest grows in a run of so many steps."""
+    """Whether a small random deviation from rest grows in a run."""
     largest, turning = sizes_in_a_run(acting, at, integrator, dt, steps)
     late = 3 * RUN_PARTS // 4
     if len(largest) < RUN_PARTS or largest[late:].max() > GROWN_STILL * max(1.0, largest[: RUN_PARTS // 2].max()):
@@ -59,7 +59,7 @@ def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps
     if steps < NARROWED_STEPS or not hardly_grows(turning):
         return False
     # rounding, which may seem to grow, is less of a larger deviation
-    larger = sizes_in_a_run(acting, at, integrator, dt, steps, ASKED_AGAIN)[1]
+    larger = sizes_in_a_run(acting, at, integrator, dt, steps, LARGER)[1]
     return len(larger) < RUN_PARTS or (hardly_grows(larger) and larger[-1] > GROWN_EVENLY * turning[-1])
 
 
@@ -75,14 +75,14 @@ def sizes_in_a_run(
     acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """By the parts of a run, up to where it has grown far: the largest deviation, and what of it changes its sign every step."""
-    found = []
+    sizes = []
     with np.errstate(over="ignore", invalid="ignore"):
         for off in run_parts(acting, at, integrator, dt, steps, times):
             size = np.linalg.norm(off, axis=1).max()
             if not size <= GROWN_FAR:  # or no number
                 break
-            found.append((size, alternating(off)))
-    return np.array(found).reshape(-1, 2).T
+            sizes.append((size, alternating(off)))
+    return np.array(sizes).reshape(-1, 2).T
 
 
 def alternating(off: np.ndarray) -> float:
@@ -98,7 +98,7 @@ def alternating(off: np.ndarray) -> float:
 def run_parts(
     acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
 ) -> Iterator[np.ndarray]:
-    """Deviations in each part of a run, (steps, n), in units of that at its start, which is so many times the usual one.
+    """Deviations in each part of a run, (steps, n), in units of that at its start; times: its multiple.
 
     The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
     by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
