@@ -117,10 +117,12 @@ def rows(setup: Setup) -> Result:
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     # matplotlib is for the process that draws
     from . import figures_stability as drawing
+    from .servos.figures_step import draw_step_response
 
     curves, centres = result.curves, result.curves["looked at"]["centres"]
     saddle = curves["looked at"]["saddle"]
     drawn = {
+        draw_step_response: any(curves.get("step response", {"lines": {}})["lines"].values()),
         drawing.draw_limits: any(
             row["predicted_dt_s"] or row["observed_dt_s"] for row in result.rows if row["scene"] in centres
         ),

@@ -13,7 +13,7 @@ from compare.engines.mujoco.flags import INTEGRATORS
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import servos
-from compare.experiments.stability.servos import observed, predicted, response
+from compare.experiments.stability.servos import figures_step, observed, predicted, response
 from compare.experiments.stability.servos.findings import shaking, verdict
 from compare.experiments.stability.servos.lifting import lifts
 from compare.experiments.stability.servos.observed import grows_in_runs, hardly_grows
@@ -241,11 +241,18 @@ def test_a_quick_run_has_every_limit_and_observes_the_files_own_integrator_and_e
     assert sum(check.quantity == AT_OWN_STEP for check in result.checks) == 2
 
 
-def test_a_full_run_observes_every_integrator():
+def test_a_full_run_observes_every_integrator_and_draws_curves(result):
     for alone in (True, False):
-        work = servos.begin(read(swing(key=UP), Setup.small, alone=alone))
+        setup = read(swing(key=UP), Setup.small, alone=alone)
+        work = servos.begin(setup)
         # every integrator at the first posture with a limit; `stability` alone the file's, which is Euler, at the other
         assert [one.name for one, *_ in work["tried"]] == ["up"] * len(INTEGRATORS) + ["qpos0"] * alone
+    drawn, curves = work["curves"]
+    assert [name for _, name in drawn] == [*INTEGRATORS]
+    servos.add(result, setup, work | {"tried": [], "curves": (drawn[:1], curves)})  # one curve, and no limit is sought
+    row, (curve,) = result.tables["step_limits"][0], result.curves["step response"]["lines"].values()
+    assert curve[0][0] < 0.002 < curve[-1][0] <= row["predicted_dt_s"] < 1.5 * curve[-1][0]
+    assert figures_step.draw_step_response(result, None)
 
 
 def test_a_file_that_is_not_stable_at_its_own_step_fails_a_check_and_is_told_what_helps():

@@ -22,7 +22,7 @@ def begin(setup: Setup) -> dict | None:
     """Predict the limits and start the runs; None: the robot has no actuator, or its numbers are stated.
 
     All integrators are observed, and run in the full model, at the first posture that has a limit; at others the file's and
-    Euler. A quick run has these two alone and observes, as a run of all experiments does, at one posture.
+    Euler. A quick run has these two alone and observes, as a run of all experiments does, at one posture; it draws nothing.
     """
     robot, reading = setup.robot, setup.reading
     if reading is None or not robot.drive.actuators:
@@ -46,6 +46,10 @@ def begin(setup: Setup) -> dict | None:
         names = integrators_run(prediction, own, reading.dt, prediction is shown and not setup.is_quick)
         full += [(prediction, name) for name in names]
 
+    drawn = [
+        (shown, name) for name in INTEGRATORS if shown and not setup.is_quick and (shown.base, name) in shown.pairs
+    ]
+
     def start(function, items):
         return setup.map(partial(function, reading=reading), *(zip(*items) if items else [()]))
 
@@ -57,6 +61,7 @@ def begin(setup: Setup) -> dict | None:
         "errors": start(errors_at, [(prediction,) for prediction in resting]),
         "lifts": (unstable, start(lifts_at, unstable)),
         "full": (full, start(full_at, full)),
+        "curves": (drawn, start(curve_at, drawn)),
     }
 
 
@@ -90,6 +95,11 @@ def errors_at(prediction: Prediction, reading: Reading) -> dict[tuple[str, str],
 
 def error_at(prediction: Prediction, base: str, integrator: str, dt: float, reading: Reading) -> float | None:
     return response.response_error(acting_at(reading, prediction.at, base), prediction.at, base, integrator, dt)
+
+
+def curve_at(prediction: Prediction, integrator: str, reading: Reading) -> list[tuple[float, float]]:
+    at, base, limit = prediction.at, prediction.base, prediction.limits[prediction.base, integrator].dt
+    return response.curve(acting_at(reading, at, base), at, base, integrator, reading.dt, limit)
 
 
 def lifts_at(prediction: Prediction, integrator: str, reading: Reading) -> list[lifting.Lift]:
@@ -133,6 +143,14 @@ def add(result: Result, setup: Setup, work: dict) -> None:
     for (prediction, name), lifts in zip(*work["lifts"]):
         findings.find_changes(result, prediction, name, lifts, reading.dt)
     findings.find_notes(result, rows, predictions)
+    drawn, curves = work["curves"]
+    if drawn:
+        shown = drawn[0][0]
+        result.curves["step response"] = {
+            "posture": shown.name,
+            "rows": [row for row in rows if (row["posture"], row["base"]) == (shown.name, shown.base)],
+            "lines": {name: curve for (_, name), curve in zip(drawn, curves)},
+        }
 
 
 def named_place(posture: str, base: str, integrator: str, several: bool) -> str:

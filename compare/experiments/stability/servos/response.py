@@ -12,6 +12,7 @@ RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, m
 RESPONSE_LEAST = 1e-3  # of the largest response: joints of a unit that move less count as if they did so much
 RESPONSE_MOST = 100.0  # fold, of the largest response
 MOST_STEPS = 10_000  # of a run
+CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
 
 
 def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
@@ -46,6 +47,24 @@ def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: 
         for unit in set(units)
     ]
     return float(max(ratios))
+
+
+def curve(
+    acting: Acting, at: Posture, base: str, integrator: str, file_dt: float, limit: float | None
+) -> list[tuple[float, float]]:
+    """(dt, error) from well below the file's step up to the limit, s; without one up to the whole response.
+
+    Empty where each step up to the limit would be too short.
+    """
+    end = min(limit or LASTS, LASTS)
+    first = max(min(file_dt, end) / CURVE_FROM, LASTS / MOST_STEPS)
+    if first >= end:
+        return []
+    count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
+    errors = [
+        (float(dt), response_error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))
+    ]
+    return [(dt, off) for dt, off in errors if off is not None]
 
 
 def jump_of(at: Posture) -> np.ndarray:
