@@ -32,3 +32,16 @@ def listed(words: Sequence[str]) -> str:
 def scene_of(place: str, names: Sequence[str]) -> str | None:
     """The scene of a check: the longest name with which its place begins."""
     return max((name for name in names if f"{place},".startswith(f"{name},")), key=len, default=None)
+
+
+def some_of(words: Sequence[str], most: int = 6) -> str:
+    """The first of many words as a list."""
+    more = len(words) - most
+    return f"{', '.join(words[:most])} and {more} more" if more > 0 else listed(words)
+
+
+def seconds(time: float, near: float | None = None) -> str:
+    """A time with two digits, 2 ms or 0.15 s; with four where it is near another one."""
+    digits = 4 if near and abs(time / near - 1.0) < 0.1 and time != near else 2
+    number, unit = (1e3 * time, "ms") if time < 0.1 else (time, "s")
+    return f"{float(f'{number:.{digits}g}'):g} {unit}"

@@ -1,30 +1,34 @@
-"""How long a held posture is kept: departure from a saddle, under a small push and a small torque, in runs and predicted."""
+"""How long a held posture is kept: departure from a saddle after a small push or a small torque, in runs and predicted."""
 
 from collections.abc import Iterable, Mapping
+from itertools import product
 
 import numpy as np
+
+from tmt import literal
 
 from ...engines import Engine, Method
 from ...judge.check import About, Result
 from ...judge.run import LEFT, departure
 from ...judge.scale import EPS, gravity_scale
 from ...truth.linear import NEGLIGIBLE, Held
-from .choice import unit_of_movements, who
-from .torques import offset, own_torque, residual
+from .subjects import unit_of_movements, who
 
 LONGEST_DEPARTURE = 12.0  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
 # rad, as the error of torque that moves the equilibrium as far; less is a few ulps
 TORQUE_ERRORS = (1e-13, 1e-14, 3e-15)
 DEPARTURE_TOLERANCE = 0.03  # s, or one step: how near the prediction an observed departure is to be
-DEPARTURE_SCHEMES = (
+DEPARTURE_SCHEMES = [
     "rk4",
     "semi_implicit_euler",
     "implicit",
     "implicit_midpoint",
     "gauss_legendre_4",
     "explicit_euler",
-)
+]
+INSTANT = 1e-6  # s
+MOST_VARIED = 5  # joints, whose torques are varied in all combinations
 
 
 def predicted(
@@ -109,7 +113,7 @@ def departures(dt: float, at: Held, engines: Mapping[str, Engine], methods: tupl
         sizes += [(size, np.zeros(n), own + size * push) for size in TORQUE_ERRORS]
         if at.case.robot.is_read:
             sizes = [(size, *more) for size, *more in sizes if not_lost(at, size)]
-        starts, torques = (np.array([of[k] for of in sizes]) for k in (1, 2))
+        starts, torques = (np.array(values) for values in list(zip(*sizes))[1:])
         off = residual(method, engines, at, torques)
         expected = predicted(at, method.scheme, dt, [moved for _, moved, _ in sizes], off)
         if allowed and None not in expected:
@@ -132,33 +136,29 @@ def check_departures(result: Result, rows: list[dict]) -> None:
         return
     result.tables.setdefault("departure", []).extend(rows)
     for row in rows:
-        check_row(
-            result, f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s, {size_of(row):.0e} {unit_in(row)}", row
-        )
-    result.notes.append(departures_in_words(rows))
+        size = f"{size_of(row):.0e} {unit_in(row)}"
+        check_row(result, f"{row['scene']}, {who(row)}, dt = {row['dt_s']:.4g} s, {size}", row)
+    result.find("departures", **departure_values(rows))
 
 
-def not_led_in_words(at: Held, methods: tuple[Method, ...], dts: Iterable[float]) -> list[str]:
-    """Which methods are left out with which steps, because another mode grows faster than that of the saddle."""
-    found = [f"{method.label} at {dt:.4g} s" for method in methods for dt in dts if not is_led(at, method.scheme, dt)]
-    if not found:
-        return []
-    return [
-        f"Departures from {at.name} are not compared where a step lets another mode grow faster than that of the saddle, for "
-        f"then rounding decides: {'; '.join(found)}."
-    ]
+def not_led(at: Held, methods: tuple[Method, ...], dts: Iterable[float]) -> list[tuple[str, float]]:
+    """The methods and steps with which another mode grows faster than that of the saddle: they are left out."""
+    return [(method.label, dt) for method in methods for dt in dts if not is_led(at, method.scheme, dt)]
+
+
+def column_of(row: dict) -> str:
+    """The column of a row's perturbation."""
+    return next(name for name in row if name.startswith("perturbation_"))
 
 
 def unit_in(row: dict) -> str:
     """The unit of a row's perturbation."""
-    return (
-        next(name for name in row if name.startswith("perturbation_")).removeprefix("perturbation_").replace("_", " ")
-    )
+    return column_of(row).removeprefix("perturbation_").replace("_", " ")
 
 
 def size_of(row: dict) -> float:
     """A row's perturbation, in that unit."""
-    return next(value for name, value in row.items() if name.startswith("perturbation_"))
+    return row[column_of(row)]
 
 
 def late(row: dict) -> float | None:
@@ -178,35 +178,27 @@ def check_row(result: Result, where: str, row: dict) -> None:
     result.check(where, quantity, None if off is None else abs(off), near_row(row), "s", note, about=About.PREDICTION)
 
 
-def departures_in_words(rows: list[dict]) -> str:
-    """How many departures are as predicted, and the farthest."""
+def departure_values(rows: list[dict]) -> dict:
+    """How many departures are as predicted, and the worst."""
     both = [row for row in rows if None not in (row["observed_s"], row["predicted_s"])]
     neither = sum(row["observed_s"] is row["predicted_s"] is None for row in rows)
-    close = sum(abs(late(row)) <= near_row(row) for row in both)
-    postures = " and ".join(dict.fromkeys(row["scene"].removesuffix(", torque off") for row in rows))
-    text = f"{len(rows)} starts at {postures}: {len(both)} leave in the run and in the prediction"
-    if both:
-        worst = max(both, key=lambda row: abs(late(row)))
-        coarsest = max((row["dt_s"] for row in both), default=0.0)
-        text += (
-            f", {close} of these within one step or {DEPARTURE_TOLERANCE:g} s; the largest difference is "
-            f"{abs(late(worst)):.3f} s ({worst['scene']}, {who(worst)}, dt = {worst['dt_s']:.4g} s, "
-            f"{size_of(worst):g} {unit_in(worst)})"
-        )
-        fine = [abs(late(row)) for row in both if row["dt_s"] < coarsest]
-        text += f", and {max(fine):.3f} s at steps below {coarsest:.4g} s" if fine else ""
-    text += f"; staying in both: {neither}" if neither else ""
-    lost = len(rows) - len(both) - neither
-    return text + (f"; staying in only one of the two: {lost}." if lost else ".")
+    worst = max(both, key=lambda row: abs(late(row)), default=None)
+    return {
+        "postures": list(dict.fromkeys(row["scene"].removesuffix(", torque off") for row in rows)),
+        "count": len(rows),
+        "leave": len(both),
+        "close": sum(abs(late(row)) <= near_row(row) for row in both),
+        "worst": worst
+        and {"off": abs(late(worst)), "method": who(worst), "dt": worst["dt_s"], "scene": worst["scene"]},
+        "stay": neither,
+        "differ": len(rows) - len(both) - neither,
+    }
 
 
-def span(times: Iterable[float | None]) -> str:
-    """The first and the last of some times in words; None among them stands for never."""
+def span(times: Iterable[float | None]) -> tuple[float, float] | None:
+    """The first and the last of some times; None: there is none. A time of None: never."""
     times = [time for time in times if time is not None]
-    if not times:
-        return "no time within reach"
-    low, high = (f"{time:.2f}" for time in (min(times), max(times)))
-    return f"{low} s" if low == high else f"{low} to {high} s"
+    return (min(times), max(times)) if times else None
 
 
 def near_row(row: dict) -> float:
@@ -217,3 +209,53 @@ def near_row(row: dict) -> float:
 def near(dt: float) -> float:
     """How near a prediction an observed departure is to be, s: one step or 0.03 s."""
     return max(DEPARTURE_TOLERANCE, dt) * (1.0 + 1e-9)
+
+
+# torques that hold
+
+
+def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.ndarray:
+    """The torque under which the compiled arithmetic of an engine gives no acceleration at all at the posture, (n,) N m.
+
+    MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the one whose
+    residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
+    """
+    if method.engine == "mujoco":
+        own = engines["mujoco"].of(at.case).gravity_balance(at.q)
+        return own + literal.spring_torque(at.q, at.tree) if at.tree.has_springs else own
+    tau = variants(at.tau, 2)
+    return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
+
+
+def residual(method: Method, engines: Mapping[str, Engine], at: Held, tau: np.ndarray) -> np.ndarray:
+    """The torque by which tau, (..., n) N m, fails to hold the posture in the arithmetic of an engine, to less than an ulp.
+
+    Read from the first step of a method, which is so short that nothing moves: Mbar qd / dt.
+    """
+    start = at.moved(np.zeros_like(tau))
+    motion = engines[method.engine].of(at.case).run(start, np.zeros_like(tau), tau, INSTANT, 1, method.name)
+    return motion.v[..., 1, :] @ at.mass_matrix / INSTANT
+
+
+def variants(tau: np.ndarray, reach: int = 1) -> np.ndarray:
+    """The torques within `reach` ulps of each component, (k, n) N m; the one in the middle is tau itself.
+
+    (2 reach + 1)^n of them, 27 for one ulp of three joints; of more than five joints one component differs at a time.
+    """
+    ulps = range(-reach, reach + 1)
+    if len(tau) <= MOST_VARIED:
+        away = np.array(list(product(ulps, repeat=len(tau))))
+    else:
+        single = [k * unit for k in ulps if k for unit in np.eye(len(tau))]
+        away = np.array([*single[: len(single) // 2], np.zeros(len(tau)), *single[len(single) // 2 :]])
+    return tau + away * np.spacing(np.abs(tau))
+
+
+def offset(at: Held, off: np.ndarray) -> np.ndarray:
+    """How far the posture is from the equilibrium of the held torque plus a small torque, rad and N m (k, n).
+
+    A torque along a mode without stiffness has no equilibrium, and is too small to matter.
+    """
+    n = at.nv
+    accelerations = np.linalg.solve(at.mass_matrix, np.transpose(off))
+    return (np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2) @ accelerations).T

@@ -1,6 +1,5 @@
-"""What each held posture is, what one step of each method does there, and where that is in the method's stability region."""
+"""What each held posture is, and what one step of each method does there."""
 
-from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -12,83 +11,57 @@ from ...engines.mujoco.linear import NUDGE, transition
 from ...judge.check import Result
 from ...judge.rounding import step_rounding
 from ...judge.scale import EPS, FACTOR
-from ...judge.words import posture_begins
-from ...robots import Robot
 from ...truth.linear import Held, held
 from ...truth.postures import posture_names
-from ...truth.steps import beyond_limit, is_runge_kutta, region
+from ...truth.steps import beyond_limit, is_runge_kutta
 from ..setup import Setup
-from .choice import coarsest_case, dampings_of
-from .growth import MOST_OF_A_STEP
-from .subjects import Subjects, places, subjects_of
+from .subjects import coarsest_case, dampings_of, subjects_of
 
-FINE_AMPLIFICATION, DAMPED_AMPLIFICATION = (
-    1e-2,
-    5e-4,
-)  # s, of steps whose amplification is compared; the second with much damping
-
-
-MOST_NAMED = 6  # rates of a posture in a sentence
+FINE_STEP, FINE_DAMPED_STEP = 1e-2, 5e-4  # s, of steps whose amplification is compared; the second with much damping
+MOST_OF_A_STEP = 100.0  # fold: later stages are too far away for a difference quotient
+SLOW = 1e-3  # 1/s: slower rates are not reported
 
 
 def check_equilibria(result: Result, setup: Setup) -> None:
-    """What each held posture is, and TMT's amplification of a step beside MuJoCo's."""
-    robot, mujoco, table, too_long = subjects_of(setup.robot).robot, setup.engines["mujoco"], [], []
-    usual = (FINE_AMPLIFICATION, coarsest_case(robot).scene.dt)
+    """The kind of each held posture; TMT's amplification of a step compared with MuJoCo's."""
+    robot, mujoco, too_long = subjects_of(setup.robot).robot, setup.engines["mujoco"], {}
+    usual = (FINE_STEP, coarsest_case(robot).scene.dt)
     for name in posture_names(robot):
-        at = held(robot, name)
-        values = at.modes[0]
-        table += [
-            {"scene": name, "kind": at.kind, "mode": k, "real_per_s": float(v.real), "imaginary_per_s": float(v.imag)}
-            for k, v in enumerate(values)
-        ]
-        result.notes.append(kind_in_words(at))
-        for damping, steps in zip(dampings_of(robot), (usual, usual, (DAMPED_AMPLIFICATION,))):
+        result.find("posture", **posture_values(held(robot, name)))
+        for damping, steps in zip(dampings_of(robot), (usual, usual, (FINE_DAMPED_STEP,))):
             at = held(robot, name, damping)
             for method, dt in product(one_of_each_scheme(mujoco), steps):
                 where = f"{name}, {method.name}, dt = {dt:.4g} s, damping {damping:g}"
                 if is_runge_kutta(METHODS[method.scheme]) and at.growth(method.scheme, dt) > MOST_OF_A_STEP:
-                    too_long.append(f"{where}, is {beyond_limit(at, method.scheme, dt):.3g} times beyond the limit")
+                    too_long[where] = beyond_limit(at, method.scheme, dt)
                     continue
                 theirs = transition(mujoco.of(at.case), at.q, at.tau, dt, method.name)
                 rounded = rounding_of_step(at, method.scheme, dt) if robot.is_read else 0.0
                 check_amplification(result, where, at.sizes, at.step(method.scheme, dt), theirs, rounded)
-    result.tables["stability_modes"] = table
     if too_long:
-        result.notes.append(
-            "The amplification of a step is not compared where its later stages are too far away for a difference quotient: "
-            f"{'; '.join(too_long)}."
-        )
+        result.find("no_difference_quotient", places=too_long)
 
 
-def kind_in_words(at: Held) -> str:
-    """What a held posture is, and its modes."""
+def posture_values(at: Held) -> dict:
+    """What a held posture is, and the rates of its modes, 1/s or rad/s."""
     values = at.modes[0]
-    swings = [f"{v.imag:.3f} rad/s" for v in values if v.imag > 1e-3]
-    grows = [f"{v.real:.3f} per second" for v in values if v.real > 1e-3 and v.imag >= 0.0]
-    decays = [-v.real for v in values if v.real < -1e-3]
-    texts = [f"grows by {few(grows, ' and ')}"] * bool(grows) + [f"swings at {few(swings, ', ')}"] * bool(swings)
-    if decays and any(at.tree.damping):
-        texts.append(f"decays by {min(decays):.3g} to {max(decays):.4g} per second")
-    if at.case.robot.is_read and at.without_stiffness.any():
-        zero = at.without_stiffness.sum()
-        texts.append(f"{zero} of {len(values)} rates {'is' if zero == 1 else 'are'} zero")
-    kind = at.kind if at.kind == "marginal" else f"a {decaying(at) or at.kind}"
-    return f"{posture_begins(at.name, at.case.robot)}, held, is {kind}" + (f": {'; '.join(texts)}." if texts else ".")
+    decays = [-v.real for v in values if v.real < -SLOW]
+    return {
+        "name": at.name,
+        "equilibrium": decaying(at) or at.kind,
+        "grows": [float(v.real) for v in values if v.real > SLOW and v.imag >= 0.0],
+        "swings": [float(v.imag) for v in values if v.imag > SLOW],
+        "decays": (min(decays), max(decays)) if decays and any(at.tree.damping) else None,
+        "zero": int(at.without_stiffness.sum()) if at.case.robot.is_read else 0,
+    }
 
 
 def decaying(at: Held) -> str | None:
-    """What a centre is called of which every mode decays: a stable focus if one swings, else a stable node; None: it is not."""
+    """A centre of which every mode decays: a stable focus if one swings, else a stable node; None: it is not."""
     values, small = at.modes[0], at.small
     if at.kind != "centre" or not (values.real < -small).all():
         return None
     return "stable focus" if (np.abs(values.imag) > small).any() else "stable node"
-
-
-def few(texts: Sequence[str], between: str) -> str:
-    """The first of many texts, and how many more there are."""
-    more = len(texts) - MOST_NAMED
-    return between.join(texts[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def rounding_of_step(at: Held, scheme: str, dt: float) -> float:
@@ -111,19 +84,3 @@ def check_amplification(
     allowed = max(FACTOR * EPS * (1.0 + np.abs(q).max()) * np.abs(ours).max(), rounded) / NUDGE
     quantity = "amplification of one step, TMT to MuJoCo"
     result.check(where, quantity, np.abs(ours - theirs).max(), allowed, "", rounding=True)
-
-
-def planes(result: Result, robot: Robot, subjects: Subjects, schemes: Sequence[str]) -> None:
-    """The stability region of each method in the plane of eigenvalue times dt, and where the postures are in it."""
-    x, y = np.linspace(-7.2, 1.8, 226), np.linspace(-0.6, 6.4, 176)
-    z = x[None, :] + 1j * y[:, None]
-    grown = {name: region(name, z) for name in schemes}
-    alike = {name: next(other for other in grown if np.array_equal(grown[other], grown[name])) for name in schemes}
-    result.curves["regions"] = {  # methods that do the same at rest share one
-        tuple(name for name in schemes if alike[name] == first): (x, y, grown[first])
-        for first in dict.fromkeys(alike.values())
-    }
-    result.curves["points"] = {
-        (name, damping): held(robot, name, damping).modes[0]
-        for name, damping in places(subjects.centres[:1], subjects.saddles[:1], dampings_of(robot)[:2])
-    }

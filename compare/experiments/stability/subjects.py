@@ -1,6 +1,6 @@
-"""Which postures and motions of a robot are looked at, and what is left out because it has none."""
+"""What is examined of a robot: postures, a free motion, methods of both engines, added damping."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -8,149 +8,175 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...judge.words import posture_begins
+import tmt
+
+from ...engines import LABELS, Engine, Method, one_of_each_scheme, same_scheme
+from ...judge.finding import Finding
+from ...judge.scale import gravity_scale
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.conserved import floats
-from ...truth.linear import Held, held
-from ...truth.postures import all_of_kind, all_that_stay, of_kind, posture_names
+from ...truth.linear import NEGLIGIBLE, Held, held
+from ...truth.postures import all_of_kind, all_that_stay, posture_names
 from ...truth.rest import at_rest
-from .choice import DAMPINGS, free_motion
-from .falling import without_law
-from .growth import stiffest
 
-MOST_POSTURES = 6  # named postures that are looked at, the first
-MANY = 7  # speeds, beyond which the runs of a file's robot are at one such posture
-REST = "at rest"  # the name of the posture at which a robot that is read from a file rests without torque
+DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
+QUICK_SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit_midpoint")  # tmt's names
+MOST_POSTURES = 6  # the first of the named postures
+MANY_SPEEDS = 7  # beyond, the runs of a file's robot are at one stable posture
+REST = "at rest"  # the posture at which a file's robot rests without torque
 
 
 class Subjects(NamedTuple):
-    """What is looked at of a robot; None where it has none."""
+    """What is examined of a robot; None where it has none."""
 
-    robot: Robot  # with the postures that are looked at, and no others
-    centres: tuple[str, ...]  # the one that stands for its kind first
+    robot: Robot  # with the examined postures alone
+    centres: tuple[str, ...]  # postures at which a small deviation stays small
     saddles: tuple[str, ...]
-    centre: Held | None
+    centre: Held | None  # the first
     saddle: Held | None
-    swinging: Held | None  # the centre, if a mode swings there
-    marginal: Held | None  # one whose potential is cubic along its mode without stiffness
     free: Case | None  # a free motion from the centre
-    left_out: tuple[str, ...]  # what is left out, and why, in sentences
-
-    @property
-    def names(self) -> dict:
-        """The names of the postures, for who draws."""
-        one = {kind: at and at.name for kind, at in (("saddle", self.saddle), ("marginal", self.marginal))}
-        return one | {"centres": self.centres, "centre": self.centre and self.centre.name}
+    left_out: tuple[Finding, ...]
 
 
 @lru_cache(maxsize=64)
 def subjects_of(robot: Robot) -> Subjects:
-    """What is looked at of a robot."""
-    robot, left_out = looked_at(robot)
-    centres, saddles = (tuple(names) for names in (all_that_stay(robot), all_of_kind(robot, "saddle")))
-    still = [name for name in centres if held(robot, name).without_stiffness.all()]
-    centres = tuple(name for name in centres if name not in still)
-    if robot.is_read and robot.coordinates.nv > MANY and len(centres) > 1:
-        left_out.append(
-            f"A robot of more than {MANY} speeds is run at the first of the postures at which a small deviation stays small: "
-            f"{centres[0]}, not {', '.join(centres[1:])}."
-        )
+    """What is examined of a robot."""
+    left_out = []
+
+    def leave_out(kind: str, **values) -> None:
+        left_out.append(Finding("stability", kind, values))
+
+    robot = with_rest(robot, leave_out)
+    noun, is_read = robot.noun, robot.is_read
+    stable, saddles = tuple(all_that_stay(robot)), tuple(all_of_kind(robot, "saddle"))
+    flat = [name for name in stable if held(robot, name).without_stiffness.all()]
+    centres = tuple(name for name in stable if name not in flat)
+    if is_read and robot.coordinates.nv > MANY_SPEEDS and len(centres) > 1:
+        leave_out("first_stable_posture_only", most=MANY_SPEEDS, first=centres[0], others=centres[1:])
         centres = centres[:1]
-    centre, saddle = (held(robot, names[0]) if names else None for names in (centres, saddles))
-    swinging = centre if centre and stiffest(centre)[0] > 0.0 else None
-    name = of_kind(robot, "marginal")
-    marginal = held(robot, name) if name and not (robot.is_read and held(robot, name).stays) else None
-    lawless = without_law(marginal) if marginal else None
-    none = f"None of the {robot.noun}'s named postures is"
-    if still:
-        left_out.append(
-            f"At {still[0]} every rate is zero: no step is too large there, and there is no limit to look for."
-        )
-    if robot.is_read:
-        left_out += left_out_of_a_file(robot, centre or still)
-    elif not centre:
-        left_out.append(
-            f"{none} a centre: limits of steps at one, the map of growth, silent failures and long runs are left out."
-        )
-    elif not swinging:
-        left_out.append(f"No mode swings at {centre.name}: the nonlinear edge is left out.")
-    if not saddle:
-        left_out.append(f"{none} a saddle: departures from one are left out.")
-    if not name:
-        left_out.append(f"{none} marginal: the law of leaving one is left out.")
-    elif not marginal:
-        left_out.append(
-            f"{posture_begins(name, robot)}, held, is marginal, but nothing pushes along its movements without stiffness: the "
-            "law of leaving it is left out."
-        )
-    elif lawless:
-        left_out.append(
-            f"{posture_begins(name, robot)}, held, is marginal, but {lawless}: the law of leaving it is left out."
-        )
-    if not robot.claims and not robot.is_read:
-        left_out.append(f"Nothing is claimed of the {robot.noun}: there are no claims to repeat.")
-    marginal, free = None if lawless else marginal, free_motion(robot)
-    if robot.is_read and (set(robot.tree.kind) != {"hinge"} or robot.tree.has_springs):
+    if flat:
+        leave_out("all_rates_zero", posture=flat[0])
+    if is_read:
+        leave_out("reduced_for_files", noun=noun, has_stable=bool(stable))
+    elif not centres:
+        leave_out("no_centre", noun=noun)
+    if not saddles:
+        leave_out("no_saddle", noun=noun)
+    free = free_motion(robot)
+    if is_read and (set(robot.tree.kind) != {"hinge"} or robot.tree.has_springs):
         free = None
-        left_out.append(
-            "Silent failures are left out: they are seen by the range of the potential, which is known of hinges without "
-            "springs only."
-        )
-    return Subjects(robot, centres, saddles, centre, saddle, swinging, marginal, free, tuple(left_out))
+        leave_out("no_silent_failures")
+    centre, saddle = (held(robot, names[0]) if names else None for names in (centres, saddles))
+    return Subjects(robot, centres, saddles, centre, saddle, free, tuple(left_out))
 
 
-def left_out_of_a_file(robot: Robot, stays: object) -> list[str]:
-    """What is left out of every robot that is read from a file."""
-    words = [
-        f"The {robot.noun} is read from a file, of which a report looks at modes, limits of steps, departures and silent "
-        "failures alone, with its own damping. Left out are methods that solve an equation in each step, the map of growth, the "
-        "nonlinear edge and long runs: they would take most of the time of a report."
-    ]
-    if not stays:
-        words.append(f"No posture of the {robot.noun} keeps a small deviation small: limits of steps are left out.")
-    return words
-
-
-def looked_at(robot: Robot) -> tuple[Robot, list[str]]:
-    """The robot with the postures that are looked at, and what is to be said of that.
-
-    Of a file's robot, whose postures are seldom at rest without torque, also the one to which it sinks from the first of them.
-    """
-    names, notes = posture_names(robot), []
+def with_rest(robot: Robot, leave_out) -> Robot:
+    """The robot with the examined postures alone; of a file also the one to which it sinks from the first of them."""
+    names = posture_names(robot)
     if len(names) > MOST_POSTURES:
+        leave_out("first_postures_only", count=len(names), names=names[:MOST_POSTURES])
         names = names[:MOST_POSTURES]
-        notes.append(
-            f"Of {len(posture_names(robot))} named postures the first {len(names)} are looked at: {', '.join(names)}."
-        )
         postures, positions = ({n: of[n] for n in names if n in of} for of in (robot.postures, robot.positions))
         robot = replace(robot, postures=postures, positions=positions)
     if not robot.is_read:
-        return robot, notes
+        return robot
     if floats(robot.tree):
         if np.any(robot.tree.gravity):
-            notes.append(
-                f"The {robot.noun} has a free body, which has no rest under gravity: all that is held here is held without "
-                "gravity."
-            )
-        return robot, notes
-    found = at_rest(robot.tree, robot.posture(names[0]))
-    if found is None:
-        notes.append(f"No posture was found at which the {robot.noun} rests without torque: it sinks for ever.")
-        return robot, notes
-    known = [name for name in names if np.abs(robot.coordinates.difference(found, robot.posture(name))).max() < 1e-6]
-    if not known:
-        rest = REST if REST not in names else f"{REST} without torque"
-        robot = replace(robot, positions={**robot.positions, rest: tuple(map(float, found))})
-        notes.append(
-            f"Under no torque the {robot.noun} rests at a posture that was found downhill from {names[0]}; it is called "
-            f"{rest}."
-        )
-    return robot, notes
+            leave_out("no_gravity", noun=robot.noun)
+        return robot
+    rest = at_rest(robot.tree, robot.posture(names[0]))
+    if rest is None:
+        leave_out("no_rest", noun=robot.noun)
+        return robot
+    apart = [np.abs(robot.coordinates.difference(rest, robot.posture(name))).max() for name in names]
+    if min(apart) < 1e-6:
+        return robot
+    name = REST if REST not in names else f"{REST} without torque"
+    leave_out("rest_found", noun=robot.noun, start=names[0], name=name)
+    return replace(robot, positions={**robot.positions, name: tuple(map(float, rest))})
 
 
-def places(
-    centres: Sequence[str], saddles: Sequence[str], dampings: Sequence[float] = DAMPINGS
-) -> list[tuple[str, float]]:
+def free_motion(robot: Robot) -> Case | None:
+    """The robot released at the first centre at which it moves, a scene of its own if there is one; None: no centre.
+
+    Of a file's robot the first of its scenes in which it moves freely.
+    """
+    if robot.is_read:
+        return next((case for case in robot.cases if case.is_free and not np.any(case.scene.damping)), None)
+    centres = all_that_stay(robot)
+    if not centres:
+        return None
+    least = NEGLIGIBLE * gravity_scale(robot.tree)
+    centre = next((name for name in centres if np.abs(held(robot, name).tau).max() > least), centres[0])
+    for case in robot.cases:
+        scene = case.scene
+        changed = scene.damping or scene.locked or any(scene.speed) or not scene.gravity
+        if scene.posture == centre and case.is_free and not changed:
+            return case
+    return robot.case(f"{centre}, free", posture=centre)
+
+
+def places(centres: Sequence[str], saddles: Sequence[str], dampings: Sequence[float]) -> list[tuple[str, float]]:
     """Postures with the damping that is added, N m s/rad: centres with each, saddles with none."""
     return [*product(centres, dampings), *((name, 0.0) for name in saddles)]
+
+
+def dampings_of(robot: Robot) -> tuple[float, ...]:
+    """The damping that is added, N m s/rad; a file's robot has its own alone."""
+    return DAMPINGS[:1] if robot.is_read else DAMPINGS
+
+
+# methods
+
+
+def all_methods(engines: Mapping[str, Engine]) -> tuple[Method, ...]:
+    """Every fixed-step method of tmt and of MuJoCo."""
+    return tuple(m for name in ("tmt", "mujoco") for m in engines[name].methods.values() if not m.adaptive)
+
+
+def explicit(methods: Sequence[Method]) -> tuple[Method, ...]:
+    """Those whose stages solve no equation."""
+    return tuple(m for m in methods if m.engine != "tmt" or not tmt.METHODS[m.name].solves_stages)
+
+
+def of_schemes(engines: Mapping[str, Engine], schemes: Sequence[str]) -> tuple[Method, ...]:
+    """tmt's methods of these names, and one of MuJoCo for each of these schemes that it has."""
+    ours = tuple(engines["tmt"].methods[scheme] for scheme in schemes)
+    return ours + tuple(m for m in one_of_each_scheme(engines["mujoco"]) if m.scheme in schemes)
+
+
+def rk4_of_both(engines: Mapping[str, Engine]) -> tuple[Method, Method]:
+    """RK4 of tmt and of MuJoCo."""
+    rk4 = same_scheme(engines, engines["mujoco"].methods["RK4"], "tmt")
+    return rk4, same_scheme(engines, rk4, "mujoco")
+
+
+# names
+
+
+def coarsest_case(robot: Robot) -> Case:
+    """The case whose step is the coarsest: the free motion, else the robot's default."""
+    return free_motion(robot) or robot.case()
+
+
+def fraction(duration: float, dt: float) -> str:
+    """A step that divides a run, as a fraction: 5/64."""
+    return f"{duration:g}/{round(duration / dt)}"
+
+
+def who(row: dict) -> str:
+    """The engine and the method of a row."""
+    return f"{LABELS[row['engine']]} {row['method']}"
+
+
+def unit_of_movements(robot: Robot) -> str:
+    """rad, m, or both."""
+    return " or ".join(dict.fromkeys(robot.coordinates.units))
+
+
+def damped(robot: Robot, damping: float) -> str:
+    """The damping, N m s/rad, as a title."""
+    if damping:
+        return f"damping {damping:g}"
+    return "with its own damping" if any(robot.tree.damping) else "undamped"

@@ -1,12 +1,13 @@
-"""The figure of what a step costs under a robot's own servos: its size against the error of a step response."""
+"""The figure of the error of a step response over dt, with the robot's own servos."""
 
 from matplotlib.figure import Figure
 
 from ....judge.check import Result
+from ....judge.finding import Finding
+from ....judge.words import seconds
 from ....report.style import BLUE, GREEN, ORANGE, PINK, RED, WIDTH
 from ....robots import Robot
 from .response import LASTS
-from .sentences import in_digits, in_seconds
 
 STEP_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn over each other, the wider one below
     "Euler": (BLUE, "-", "o", 1.3),
@@ -17,8 +18,8 @@ STEP_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn ove
 }
 
 
-def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, str]:
-    """Step against error, a line for each integrator, with its stable end and the file's own point."""
+def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
+    """Error over step, a line for each integrator, with its largest stable step and the file's own point."""
     drawn = result.curves["step response"]
     rows = {row["integrator"]: row for row in drawn["rows"]}
     own = rows[drawn["rows"][0]["file_integrator"]] if drawn["rows"] else None
@@ -29,15 +30,15 @@ def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, str]:
             continue
         colour, dash, marker, width = STEP_LOOKS[name]
         limit = rows[name]["predicted_dt_s"]
-        ends = f"stable up to {in_seconds(limit)}" if limit else "no limit up to 5 s"
+        ends = f"stable up to {seconds(limit)}" if limit else "no limit up to 5 s"
         ax.loglog(*zip(*line), color=colour, linestyle=dash, linewidth=width, label=f"{name}, {ends}")
         if limit and limit <= 1.001 * line[-1][0]:
             ax.plot(*line[-1], marker=marker, color=colour, markersize=7, markeredgecolor="black", zorder=4)
-    ax.plot([], [], "s", color="white", markeredgecolor="black", label="filled mark: the last stable step")
+    ax.plot([], [], "s", color="white", markeredgecolor="black", label="filled: largest stable step")
     if own and own["step_response_error"]:
         ax.plot(
             own["file_dt_s"], own["step_response_error"], "*", color="black", markersize=13, zorder=5,
-            label=f"the file's own: {in_seconds(own['file_dt_s'])}, {own['file_integrator']}",
+            label=f"the file's step: {seconds(own['file_dt_s'])}, {own['file_integrator']}",
         )  # fmt: skip
     ax.set(xlabel="dt, s", ylabel="error of the step response, ratio")
     ax.axvline(drawn["rows"][0]["file_dt_s"], color="black", linewidth=0.6, linestyle=":")
@@ -48,21 +49,15 @@ def draw_step_response(result: Result, robot: Robot) -> tuple[str, Figure, str]:
         if row["step_response_error"] is not None and row["stable_at_file_dt"]
     }
     best = min(errors, key=errors.get, default=None)
-    dt = in_seconds(drawn["rows"][0]["file_dt_s"])
-    caption = (
-        f"What a step costs beside being stable, at {drawn['posture']}: all targets of servos are moved by a step, and "
-        f"MuJoCo's response over {LASTS:g} s is compared with the exact one of the linear equations; largest difference over "
-        "largest response. A mark is the last stable step. "
+    caption = result.finding(
+        "figure_step_response",
+        "servos",
+        posture=drawn["posture"],
+        seconds=LASTS,
+        dt=drawn["rows"][0]["file_dt_s"],
+        integrator=drawn["rows"][0]["file_integrator"],
+        error=own and own["step_response_error"],
+        best=best,
+        least=errors.get(best),
     )
-    if own and own["step_response_error"]:
-        caption += (
-            f"The file's own {dt} under {own['file_integrator']} is {in_digits(100 * own['step_response_error'])} % off"
-        )
-        caption += (
-            f"; least at that step is {best} with {in_digits(100 * errors[best])} %."
-            if best != own["integrator"]
-            else ", the least of all integrators at that step."
-        )
-    elif best:
-        caption += f"At the file's own {dt} the least error is that of {best}, {in_digits(100 * errors[best])} %."
     return "stability_step_response", fig, caption

@@ -1,4 +1,4 @@
-"""What would lift the limit of a step: another integrator, less gain of speed, more armature; each is tried in MuJoCo."""
+"""Changes that lift the step limit: another integrator, less kv, more armature; each is tried in MuJoCo."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,18 +21,15 @@ CHANGE_DIGITS = 2  # of the numbers that are proposed
 class Lift(NamedTuple):
     """One change, all of whose parts are needed.
 
-    kind: integrator; kv, the gain of speed of the actuators that are named may be at most so large; armature, of the joints that
-    are named, the joint's own, must be at least so large.
+    kind: integrator; kv, the largest speed gains of the named actuators; armature, the smallest of the named joints.
     """
 
     kind: str
     names: tuple[str, ...]  # of an integrator, of actuators, of joints
-    values: tuple[
-        float, ...
-    ]  # of kv N m s/rad or N s/m over the gear squared, of armature kg m2 or kg; of an integrator: ()
+    values: tuple[float, ...]  # kv, N m s/rad or N s/m over the gear squared; armature, kg m2 or kg; integrator: ()
     limit: Limit  # with it
     factor: float | None  # of the limit over the one before; None: it has none up to 5 s
-    tried: bool  # nothing grew in a run at the step that is asked for
+    tried: bool  # nothing grew in a run at the file's step
 
 
 def lifts(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> list[Lift]:
@@ -95,7 +92,7 @@ def heavier(acting: Acting, at: Posture, small: Small, now: Limit, integrator: s
     """The least armature on as few joints as it takes; []: none is large enough."""
     kept, coordinates = observed.measured_speeds(acting, at), at.robot.coordinates
     explicit = small.D - small.braking(integrator)
-    # what a joint needs that is alone, and what it has
+    # inertia that a joint needs if it is alone, and its own
     needed = (dt * dt * np.abs(np.diag(small.K)) + 2.0 * dt * np.abs(np.diag(explicit))) / 4.0
     has = 1.0 / np.diag(np.linalg.inv(small.M))
     able = np.flatnonzero([name in coordinates.names for name in small.names] & (needed > 0.0))

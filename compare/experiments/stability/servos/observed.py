@@ -1,10 +1,11 @@
-"""The largest stable step under a robot's own servos as MuJoCo's runs show it, found without the prediction."""
+"""Runs of MuJoCo under a robot's own servos: the largest stable step, and the whole file at its own step."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from ....engines.mujoco.acting import Acting
+from ....engines.mujoco.whole import whole_run
 from ....robots.case import SEED
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO
@@ -18,18 +19,21 @@ APART = 0.01  # of a deviation at the start: what constraints do not allow, whic
 RUN_PARTS = 8  # of a run: after each it ends if the deviation has grown far
 GROWN_FAR = 100.0  # fold, of the deviation at the start: it has grown. A motion that is bounded comes back long before
 GROWN_STILL = 3.0  # fold, of the largest deviation up to the middle of a run: what exceeds it in the last quarter grows
-# what changes its sign with every step grows if it does so from part to part after the first two, by so much in all, fold, and
-# at its slowest by so much of its fastest; less of it, of the deviation at the start, is not looked at
+# an alternating deviation grows if it does so from part to part after the first two: the smallest growth in all, fold, of the
+# slowest growth over the fastest, and the smallest share of the deviation at the start
 GROWN_SLOWLY, GROWN_EVENLY, GROWN_FROM = 1.003, 0.5, 1e-5
-ASKED_AGAIN = 30.0  # times the deviation, where that decides
+LARGER = 30.0  # times the deviation, of a second run
 NARROWED = 1e-3  # relative, between a step that holds and one that does not
+FULL_TIME, FULL_LAST = 2.0, 0.5  # s: of a run of the whole file, and of its part whose speeds count
+FULL_PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay where it is, however unstable
+CALM = 1e-3  # rad/s or m/s, root of the mean square
 
 
 def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | None]:
     """The largest dt, s, at which no small deviation grows in MuJoCo: ("finite", dt); ("none", None): none grows up to 5 s.
 
     Upwards to the first step that fails, then by bisection; ("always", None): the shortest that is tried fails.
-    acting: MuJoCo at the posture, with the base that is asked for.
+    acting: MuJoCo at the posture, with a base.
     """
     count = int(np.log(LIMIT_UP_TO / SOUGHT_FROM) / np.log(SOUGHT_BY)) + 2
     tried = LIMIT_UP_TO / SOUGHT_BY ** np.arange(count)[::-1]  # the first at most SOUGHT_FROM
@@ -47,7 +51,7 @@ def limit(acting: Acting, at: Posture, integrator: str) -> tuple[str, float | No
 
 
 def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps: int = NARROWED_STEPS) -> bool:
-    """Whether a small random deviation from rest grows in a run of so many steps."""
+    """Whether a small random deviation from rest grows in a run."""
     largest, turning = sizes_in_a_run(acting, at, integrator, dt, steps)
     late = 3 * RUN_PARTS // 4
     if len(largest) < RUN_PARTS or largest[late:].max() > GROWN_STILL * max(1.0, largest[: RUN_PARTS // 2].max()):
@@ -55,7 +59,7 @@ def grows_in_runs(acting: Acting, at: Posture, integrator: str, dt: float, steps
     if steps < NARROWED_STEPS or not hardly_grows(turning):
         return False
     # rounding, which may seem to grow, is less of a larger deviation
-    larger = sizes_in_a_run(acting, at, integrator, dt, steps, ASKED_AGAIN)[1]
+    larger = sizes_in_a_run(acting, at, integrator, dt, steps, LARGER)[1]
     return len(larger) < RUN_PARTS or (hardly_grows(larger) and larger[-1] > GROWN_EVENLY * turning[-1])
 
 
@@ -71,14 +75,14 @@ def sizes_in_a_run(
     acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """By the parts of a run, up to where it has grown far: the largest deviation, and what of it changes its sign every step."""
-    found = []
+    sizes = []
     with np.errstate(over="ignore", invalid="ignore"):
         for off in run_parts(acting, at, integrator, dt, steps, times):
             size = np.linalg.norm(off, axis=1).max()
             if not size <= GROWN_FAR:  # or no number
                 break
-            found.append((size, alternating(off)))
-    return np.array(found).reshape(-1, 2).T
+            sizes.append((size, alternating(off)))
+    return np.array(sizes).reshape(-1, 2).T
 
 
 def alternating(off: np.ndarray) -> float:
@@ -94,7 +98,7 @@ def alternating(off: np.ndarray) -> float:
 def run_parts(
     acting: Acting, at: Posture, integrator: str, dt: float, steps: int, times: float = 1.0
 ) -> Iterator[np.ndarray]:
-    """Deviations in each part of a run, (steps, n), in units of that at its start, which is so many times the usual one.
+    """Deviations in each part of a run, (steps, n), in units of that at its start; times: its multiple.
 
     The square of their length is dx' M dx, of which no swing makes more than it was. At the start each joint has its part of it,
     by chance, and so have activations of filters. A free base moves so that there is no momentum, and is not measured.
@@ -130,3 +134,19 @@ def measured_speeds(acting: Acting, at: Posture) -> list[int]:
 def base_of(acting: Acting, at: Posture) -> str:
     """The base that a run has."""
     return "locked" if {*at.base} & {*acting.locked} else at.bases[0]
+
+
+def full_model(model, at: Posture, dt: float, integrator: str) -> dict:
+    """The whole file, contacts and friction on, for two seconds: columns of step_limits.csv.
+
+    model: the file's, as it was compiled. It starts at the posture itself, which need not be where it rests.
+    """
+    speed = FULL_PUSH * np.random.default_rng(SEED).normal(size=model.nv)
+    with np.errstate(over="ignore", invalid="ignore"):
+        run = whole_run(model, at.robot.drive, at.start, at.u, dt, integrator, FULL_TIME, FULL_LAST, speed)
+    return {
+        "full_model_rms_speed": run.rms_speed if np.isfinite(run.rms_speed) else None,
+        "full_model_warnings": run.warnings,
+        "full_model_resets": run.resets,
+        "full_model_calm": bool(run.rms_speed < CALM),
+    }

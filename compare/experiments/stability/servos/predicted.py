@@ -1,11 +1,10 @@
-"""Step limits under a robot's own servos at its postures, predicted, and the same by the eigenvalues of a step."""
+"""Step limits under a robot's own servos at its postures, predicted."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ....engines.mujoco import Reading
 from ....engines.mujoco.acting import Acting
@@ -13,18 +12,17 @@ from ....engines.mujoco.flags import INTEGRATORS
 from ....engines.mujoco.holding import limits_in_force
 from ....robots import Robot
 from ....truth.driven import Posture
-from ....truth.linear import NEUTRAL
 from ....truth.step_limits import LIMIT_UP_TO, Limit, Small
 
-NEAR_LIMIT = 1e-3  # of a limit: where the eigenvalues of a step are asked whether it is one
 FAR_FROM_POSTURE = 0.1  # rad or m, of a rest from the posture
 MOST_RESTS, SAME_REST = 4, 1e-3  # of limits, each at the rest with the one before; steps that are one, relative
 STILL_THERE = 1e-6  # rad or m
 GIVEN_WAY = 0.01  # rad or m
-ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is asked
+ASIDE_OF_LIMIT = 1e-2  # of a limit: where a step of MuJoCo is compared
+FULL_MODEL = ("full_model_rms_speed", "full_model_warnings", "full_model_resets", "full_model_calm")  # columns
 
 
-class Predicted(NamedTuple):
+class Prediction(NamedTuple):
     """What is predicted at one posture."""
 
     at: Posture
@@ -36,22 +34,27 @@ class Predicted(NamedTuple):
         return self.at.name
 
     @property
+    def base(self) -> str:
+        """The base that counts."""
+        return self.at.bases[0]
+
+    @property
     def rests(self) -> bool:
         return bool(self.limits)
 
     @property
     def is_known(self) -> bool:
         """Whether every integrator has a limit, or is known to have none, with the base that counts."""
-        kinds = {limit.limit for (base, _), limit in self.limits.items() if base == self.at.bases[0]}
+        kinds = {limit.limit for (base, _), limit in self.limits.items() if base == self.base}
         return bool(kinds) and kinds <= {"finite", "none"}
 
     @property
     def is_finite(self) -> bool:
         """Whether it has a limit that counts."""
-        return any(limit.limit == "finite" for (base, _), limit in self.limits.items() if base == self.at.bases[0])
+        return any(limit.limit == "finite" for (base, _), limit in self.limits.items() if base == self.base)
 
     def gives_way(self, base: str, integrator: str) -> bool:
-        """Whether soft constraints give way so far at a limit that the posture is another one: runs are not asked for it."""
+        """Whether soft constraints give way at a limit to another posture: that limit is not observed."""
         apart = self.at.robot.coordinates.difference(self.there[base, integrator].q, self.at.q)
         return bool(np.abs(apart).max() > GIVEN_WAY)
 
@@ -74,44 +77,44 @@ def acting_at(reading: Reading, at: Posture, base: str) -> Acting:
     return Acting(reading.model, at.robot.drive, at.cut, locked, weightless=bool(at.base), limits=at.limits)
 
 
-def predicted_at(robot: Robot, name: str, reading: Reading) -> Predicted:
+def predicted_at(robot: Robot, name: str, reading: Reading) -> Prediction:
     """The limits of every integrator at a posture, with each base; none where it does not rest.
 
-    Where that tells nothing, without the joints that nothing holds.
+    If they are not known, those without the joints that nothing holds.
     """
-    found = near_by(robot, name, reading)
-    unheld = () if found.is_known or not robot.drive.servos else found.at.unheld
-    without = near_by(robot, name, reading, unheld) if unheld else found
-    return without if without.is_known else found
+    prediction = near_by(robot, name, reading)
+    unheld = () if prediction.is_known or not robot.drive.servos else prediction.at.unheld
+    without = near_by(robot, name, reading, unheld) if unheld else prediction
+    return without if without.is_known else prediction
 
 
-def near_by(robot: Robot, name: str, reading: Reading, aside: tuple[int, ...] = ()) -> Predicted:
-    """The same with some speeds locked; with the limits of joints where it rests far away beyond them, or not at all, without."""
+def near_by(robot: Robot, name: str, reading: Reading, aside: tuple[int, ...] = ()) -> Prediction:
+    """The limits with some speeds locked; joint limits are on where without them it rests far beyond them, or not at all."""
 
-    def within(limits: tuple[int, ...]) -> Predicted:
+    def within(limits: tuple[int, ...]) -> Prediction:
         acting = Acting(reading.model, robot.drive, limits=limits)
         rows = acting.rows if acting.is_coupled else None
         return predicted_of(Posture(robot, name, acting.along, rows, reading.dt, aside))
 
-    found, limits = within(()), limits_in_force(reading.model)
-    if not limits or (found.is_known and (found.at.moved < FAR_FROM_POSTURE or not found.at.beyond())):
-        return found
+    free, limits = within(()), limits_in_force(reading.model)
+    if not limits or (free.is_known and (free.at.moved < FAR_FROM_POSTURE or not free.at.beyond())):
+        return free
     limited = within(limits)
-    return limited if limited.is_known else found
+    return limited if limited.is_known else free
 
 
-def predicted_of(at: Posture) -> Predicted:
-    """The same of all joints that are not aside."""
+def predicted_of(at: Posture) -> Prediction:
+    """The limits of all joints that are not aside."""
     if at.rest[1]:
-        return Predicted(at, {}, {})
+        return Prediction(at, {}, {})
     nothing = Limit("drifts", None, "", None, "")  # free bodies that stand alone, and nothing else
-    found = {
+    pairs = {
         (base, name): limit_at(at, base, name) if at.small(base).names else (at, nothing)
         for base in at.bases
         for name in INTEGRATORS
     }
-    limits = {pair: limit for pair, (_, limit) in found.items()}
-    return Predicted(at, {pair: there for pair, (there, _) in found.items()}, limits)
+    there, limits = ({pair: value[k] for pair, value in pairs.items()} for k in (0, 1))
+    return Prediction(at, there, limits)
 
 
 def limit_at(at: Posture, base: str, integrator: str) -> tuple[Posture, Limit]:
@@ -129,89 +132,53 @@ def limit_at(at: Posture, base: str, integrator: str) -> tuple[Posture, Limit]:
     return at, limit
 
 
-def limit_rows(found: Sequence[Predicted], dt: float, integrator: str) -> list[dict]:
+def limit_rows(predictions: Sequence[Prediction], dt: float, integrator: str) -> list[dict]:
     """The rows of step_limits.csv before anything is run: one per posture, base and integrator; dt, integrator: the file's."""
     rows = []
-    for one in found:
-        for base in one.at.bases:
+    for prediction in predictions:
+        for base in prediction.at.bases:
             for name in INTEGRATORS:
-                limit = one.limits.get((base, name), Limit("not_at_rest", None, "", None, ""))
-                rows.append(
-                    {
-                        "posture": one.name,
-                        "base": base,
-                        "integrator": name,
-                        "limit": limit.limit,
-                        "predicted_dt_s": limit.dt and float(limit.dt),
-                        "observed_dt_s": None,
-                        "file_dt_s": dt,
-                        "file_integrator": integrator,
-                        "stable_at_file_dt": one.is_stable(base, name, dt) if one.rests else None,
-                        "limiting_joint": limit.joint if limit.limit == "finite" else None,
-                        "mode_per_s": limit.rate,
-                        "mode_kind": limit.kind or None,
-                        "step_response_error": None,
-                    }
-                )
+                limit = prediction.limits.get((base, name), Limit("not_at_rest", None, "", None, ""))
+                stable = prediction.is_stable(base, name, dt) if prediction.rests else None
+                rows.append({
+                    "posture": prediction.name, "base": base, "integrator": name, "limit": limit.limit,
+                    "predicted_dt_s": limit.dt and float(limit.dt), "observed_dt_s": None, "file_dt_s": dt,
+                    "file_integrator": integrator, "stable_at_file_dt": stable,
+                    "limiting_joint": limit.joint if limit.limit == "finite" else None, "mode_per_s": limit.rate,
+                    "mode_kind": limit.kind or None, "step_response_error": None, **dict.fromkeys(FULL_MODEL),
+                })  # fmt: skip
     return rows
 
 
-class Steps(NamedTuple):
-    """What the eigenvalues of a step say of one limit."""
+def radii_apart(prediction: Prediction, reading: Reading) -> dict[tuple[str, str], float]:
+    """The difference of the spectral radius of a step near each finite limit, TMT to MuJoCo, by base and integrator.
 
-    base: str
-    integrator: str
-    apart: (
-        float | None
-    )  # of the limit: how far the one by the closed form is from that by eigenvalues; None: no closed form
-    beside: (
-        float | None
-    )  # the largest difference of the spectral radius from that of MuJoCo's own derivative; None: RK4
-
-
-def steps_at(one: Predicted, reading: Reading) -> list[Steps]:
-    """Each finite limit of a posture beside the eigenvalues of steps, our own and MuJoCo's."""
-    rows = []
-    for (base, integrator), limit in one.limits.items():
-        if limit.limit == "finite" and not one.gives_way(base, integrator):
-            at = one.there[base, integrator]
-            small, acting = at.small(base), acting_at(reading, at, base)
-            # compared by runs alone where soft constraints act: loaded, they rest elsewhere with each step
-            skipped = integrator == "RK4" or small.is_coupled
-            beside = None if skipped else radius_apart(acting, at, small, integrator, limit.dt)
-            rows.append(Steps(base, integrator, forms_apart(small, integrator, limit), beside))
-    return rows
-
-
-def forms_apart(small: Small, integrator: str, limit: Limit) -> float | None:
-    """How far a limit by the closed form is from the step at which the spectral radius passes 1, of itself."""
-    if not small.has_closed_form(integrator) or limit.shape is None:
-        return None
-
-    def excess(dt):
-        return small.growth(integrator, dt) - 1.0 - max(NEUTRAL, 2.0 * dt * small.neutral)
-
-    low, high = limit.dt * (1.0 - NEAR_LIMIT), limit.dt * (1.0 + NEAR_LIMIT)
-    if excess(low) <= 0.0 < excess(high):
-        by_radius = brentq(excess, low, high, xtol=1e-9 * limit.dt)
-    else:
-        by_radius = small.scanned(integrator) or np.inf
-    return float(abs(limit.dt / by_radius - 1.0))
+    RK4 has no derivative in MuJoCo; soft constraints rest elsewhere with each step: these are compared by runs alone.
+    """
+    radii = {}
+    for (base, integrator), limit in prediction.limits.items():
+        if limit.limit == "finite" and integrator != "RK4" and not prediction.gives_way(base, integrator):
+            at = prediction.there[base, integrator]
+            small = at.small(base)
+            if not small.is_coupled:
+                acting = acting_at(reading, at, base)
+                radii[base, integrator] = radius_apart(acting, at, small, integrator, limit.dt)
+    return radii
 
 
 def radius_apart(acting: Acting, at: Posture, small: Small, integrator: str, dt: float) -> float:
-    """The spectral radius of a step beside that of MuJoCo's own derivative, just below and above a limit: the larger difference.
+    """The difference of the spectral radius of a step from MuJoCo's, just below and above a limit: the larger one.
 
     What is free to move, or held by a rotor, stays as it is: that has the radius 1. Of activations only filters can grow.
     """
     nv = acting.model.nv
     kept = [k for k in range(2 * nv) if k % nv not in (*at.lone, *at.aside)] + [2 * nv + k for k in acting.filters]
     least = 1.0 if at.base else 0.0
-    found = []
+    apart = []
     for step in (dt * (1.0 - ASIDE_OF_LIMIT), dt * (1.0 + ASIDE_OF_LIMIT)):
         A = acting.transition(at.q, at.u, step, integrator)[np.ix_(kept, kept)]
         theirs = float(np.abs(np.linalg.eigvals(A)).max())
         decays = [np.exp(-step / tau) if is_exact else abs(1.0 - step / tau) for _, tau, is_exact in small.poles]
         own = max(small.growth(integrator, step) if small.names else 0.0, *decays, 0.0)
-        found.append(abs(max(theirs, least) - max(own, least)))
-    return max(found)
+        apart.append(abs(max(theirs, least) - max(own, least)))
+    return max(apart)

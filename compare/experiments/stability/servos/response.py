@@ -1,4 +1,4 @@
-"""How far MuJoCo's response to a step of all servo targets is from the exact one, at a step size."""
+"""The error of MuJoCo's response to a step of all servo targets."""
 
 import numpy as np
 from scipy.linalg import expm
@@ -9,24 +9,22 @@ from .observed import measured_speeds
 
 LASTS = 0.2  # s, of a response; at least one step
 RESPONSE_SIZE = 1e-4  # rad or m: how far a response, and the posture at rest, may move
-RESPONSE_LEAST = (
-    1e-3  # of the largest response, rad or m: joints of a kind that answer less count as if they did so much
-)
+RESPONSE_LEAST = 1e-3  # of the largest response: joints of a unit that move less count as if they did so much
 RESPONSE_MOST = 100.0  # fold, of the largest response
+MOST_STEPS = 10_000  # of a run
 CURVE_FROM, CURVE_BY = 16.0, np.sqrt(2.0)  # of a curve: the file's step over its first, and one step over the next
-CURVE_MOST = 10_000  # steps of a run of a curve: it takes no shorter ones
 
 
 def response_error(acting: Acting, at: Posture, base: str, integrator: str, dt: float) -> float | None:
     """The largest difference from the exact response over the largest response, in 0.2 s, a ratio.
 
-    Of rad and of m each by themselves, the worse of both; None: no servo, nothing moves, or it diverged.
-    The targets of all servos jump by the
-    same length, so that nothing moves by more than 1e-4 rad or m; u of those with an activation jumps too. Exact: the matrix
-    exponential of the linear equations. Half of the difference of two runs, there and back, has neither an offset nor squares.
+    Of rad and of m separately, the larger of both; None: no servo, nothing moves, it diverged, or more than 10,000 steps.
+    The targets of all servos jump by the same length, so that nothing moves by more than 1e-4 rad or m; u of those with an
+    activation jumps too. Exact: the matrix exponential of the linear equations. Half of the difference of two runs, there and
+    back, has neither an offset nor squares.
     """
     jump = jump_of(at)
-    if not jump.any():
+    if not jump.any() or LASTS / dt > MOST_STEPS:
         return None
     steps = max(1, round(LASTS / dt))
     kept = measured_speeds(acting, at)
@@ -59,24 +57,24 @@ def curve(
     Empty where each step up to the limit would be too short.
     """
     end = min(limit or LASTS, LASTS)
-    first = max(min(file_dt, end) / CURVE_FROM, LASTS / CURVE_MOST)
+    first = max(min(file_dt, end) / CURVE_FROM, LASTS / MOST_STEPS)
     if first >= end:
         return []
     count = int(np.ceil(np.log(end / first) / np.log(CURVE_BY))) + 1
-    found = [
+    errors = [
         (float(dt), response_error(acting, at, base, integrator, dt)) for dt in np.geomspace(first, end, max(count, 2))
     ]
-    return [(dt, off) for dt, off in found if off is not None]
+    return [(dt, off) for dt, off in errors if off is not None]
 
 
 def jump_of(at: Posture) -> np.ndarray:
     """By how much u of each actuator jumps so that all targets move by the same length, 1 rad or m, (k,)."""
     lengths = at.driven.along(at.q).lengths
     jump = np.zeros(len(at.u))
-    for i, (one, u, length) in enumerate(zip(at.robot.drive.actuators, at.u, lengths)):
-        gain = one.gain[0] + one.gain[1] * length
-        if one.is_servo and gain and i not in at.cut.forces:
-            jump[i] = one.stiffness(u) / gain
+    for i, (actuator, u, length) in enumerate(zip(at.robot.drive.actuators, at.u, lengths)):
+        gain = actuator.gain[0] + actuator.gain[1] * length
+        if actuator.is_servo and gain and i not in at.cut.forces:
+            jump[i] = actuator.stiffness(u) / gain
     return jump
 
 
@@ -93,17 +91,20 @@ def exact_response(at: Posture, base: str, jump: np.ndarray, dt: float, steps: i
     by_place, by_speed, by_force = small.equations(dt)
     A[n : 2 * n] = np.hstack([by_place, by_speed, by_force @ force[:, None]])
     step, state = expm(dt * A), np.eye(2 * n + 1)[-1]
-    found = []
+    states = []
     for _ in range(steps):
         state = step @ state
-        found.append(state[:n])
-    return np.array([*found, np.linalg.lstsq(-by_place, by_force @ force, rcond=1e-9)[0]])
+        states.append(state[:n])
+    return np.array([*states, np.linalg.lstsq(-by_place, by_force @ force, rcond=1e-9)[0]])
 
 
 def pushed(at: Posture, base: str, jump: np.ndarray) -> np.ndarray:
     """The force of a jump of u on the speeds of Posture.small, (n,); a free base gives way."""
     along = at.driven.along(at.q)
-    gains = [one.gain[0] + one.gain[1] * length for one, length in zip(at.robot.drive.actuators, along.lengths)]
+    gains = [
+        actuator.gain[0] + actuator.gain[1] * length
+        for actuator, length in zip(at.robot.drive.actuators, along.lengths)
+    ]
     force = (gains * jump) @ along.moments[: len(jump)]
     names = at.small(base).names
     kept = [k for k, name in enumerate(at.whole.names) if name in names]
