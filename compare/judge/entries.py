@@ -47,10 +47,11 @@ def scales(tree: tmt.Tree, is_read: bool, q: np.ndarray, qd: ArrayLike = 0.0) ->
     return (Entries if has_own_scales(tree, is_read) else Numbers)(tree, q, qd)
 
 
-def unit(tree: tmt.Tree, of_hinge: str, of_slide: str) -> str:
-    """The unit of a quantity whose entries have one for hinges and balls and one for slides: those that are there."""
-    kinds = set(tree.kind)
-    return " or ".join([of_hinge] * (kinds != {"slide"}) + [of_slide] * ("slide" in kinds))
+def unit(tree: tmt.Tree, of_hinge: str, of_slide: str, of_both: str = "") -> str:
+    """The unit of a quantity whose entries belong to hinges and balls, to slides, or to one of each: those that are there."""
+    turns, slides = set(tree.kind) != {"slide"}, "slide" in tree.kind
+    units = [of_hinge] * turns + [of_both] * (turns and slides) + [of_slide] * slides
+    return " or ".join(filter(None, units))
 
 
 class Numbers:
