@@ -4,8 +4,8 @@ from ..edit import Edit
 
 # module, function, quantity: as written in the call of `check`, _1, _2 for what is filled in
 CHECKS = (
-    ("parameters", "rows", "quantity"),
-    ("parameters", "causes_of_other_forces", 'f"no forces of {_1}"'),
+    ("parameters", "compare_number", "quantity"),
+    ("parameters", "check_forces", 'f"no forces of {_1}"'),
     ("published", "check_answer", 'f"{_1}: {item.quantity} - printed"'),
     ("published", "check_answer", 'f"{_1}: {item.quantity} - exact"'),
     ("published", "check_answer", "digits"),
