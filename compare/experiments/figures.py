@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from ..engines import LABELS
 from ..judge.check import Result
-from ..judge.entries import scales, unit
-from ..judge.scale import EPS, FACTOR
+from ..judge.entries import unit
+from ..judge.scale import FACTOR
 from ..report.style import BLUE, LINES, ORANGE, RED, WIDTH, plain, zero_at_the_end
 from ..robots import Robot
 
@@ -87,12 +87,10 @@ def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     ax.set(xlabel=f"{x}, deg", ylabel=f"{y}, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
     fig.colorbar(image, label="condition number of Mbar")
     maxima = []
-    for (name, (value, at, mirrored)), look in zip(result.curves["worst"].items(), WORST_LOOKS):
-        a, b = np.degrees(at)
-        twice = abs(mirrored - value) <= 1e-6 * value
-        places = ([a, -a], [b, b]) if twice else ([a], [b])
-        ax.plot(*places, linestyle="none", **look, label=f"maximum, {LABELS[name]}")
-        maxima.append({"label": LABELS[name], "value": value, "at": (a, b), "twice": twice, "mirrored": mirrored})
+    for (name, (value, worst)), look in zip(result.curves["worst"].items(), WORST_LOOKS):
+        place = np.degrees(worst)
+        ax.plot(*place[:, None], linestyle="none", **look, label=f"maximum, {LABELS[name]}")
+        maxima.append({"label": LABELS[name], "value": value, "at": tuple(place)})
     fig.legend(loc="outside upper center", ncols=2)
     zero = [robot.symbol(joint) for joint in robot.joints if joint not in robot.conditioning.joints]
     return "mass_condition", fig, result.finding("condition", joints=[x, y], zero=zero, maxima=maxima)
@@ -122,33 +120,14 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
     columns = 100 // (8 + max(map(len, labels)))  # of a legend that fits the page
     entries = sorted(zip(*ax.get_legend_handles_labels()), key=lambda entry: entry[1] == "MuJoCo")
     fig.legend(*zip(*entries), loc="outside upper center", ncols=max(1, min(len(shown) + 1, 6, columns)))
-    return (
-        "gravity_postures",
-        fig,
-        result.finding(
-            "postures",
-            shown=len(postures),
-            postures=len(torques),
-            of_joints=len(shown),
-            joints=len(speeds),
-            label=LABELS[first],
-            springs=robot.tree.has_springs,
-            difference=np.max([np.abs(of[first] - of[second]) for of in torques.values()]),
-            unit=unit(robot.tree, "N m", "N"),
-            at_rest=without_torque(torques, robot),
-        ),
-    )
-
-
-def without_torque(torques: dict, robot: Robot) -> dict[str, list]:
-    """Postures that need no torque, except for rounding, by the engine's label; by "" where both engines agree."""
-    allowed = {
-        posture: FACTOR * EPS * scales(robot.tree, robot.is_read, robot.poses[posture][None]).holding
-        for posture in torques
+    caption = {
+        "shown": len(postures),
+        "postures": len(torques),
+        "of_joints": len(shown),
+        "joints": len(speeds),
+        "label": LABELS[first],
+        "springs": robot.tree.has_springs,
+        "difference": np.max([np.abs(of[first] - of[second]) for of in torques.values()]),
+        "unit": unit(robot.tree, "N m", "N"),
     }
-    at_rest = {
-        LABELS[name]: [posture for posture, of in torques.items() if (np.abs(of[name]) <= allowed[posture]).all()]
-        for name in robot.compared
-    }
-    first, second = at_rest.values()
-    return {"": first} if first == second else at_rest
+    return "gravity_postures", fig, result.finding("postures", **caption)

@@ -78,9 +78,8 @@ def rows(setup: Setup) -> Result:
         check_definiteness(result, LABELS[name], M[name], in_units=own_scales)
         if robot.conditioning:
             value, worst = worst_condition(robot, dynamics.mass_matrix)
-            mirrored = float(np.linalg.cond(dynamics.mass_matrix(at_angles(robot, worst * [-1.0, 1.0]))))
             check_conditioning(result, robot, LABELS[name], value, worst)
-            result.curves.setdefault("worst", {})[name] = (value, worst, mirrored)
+            result.curves.setdefault("worst", {})[name] = (value, worst)
     if robot.conditioning:
         degrees = setup.of(3.0, 3.0, 15.0)
         result.curves["condition"] = condition_grid(robot, comparison.engines[0].mass_matrix, degrees)

@@ -91,8 +91,6 @@ def rows(setup: Setup) -> Result:
                     "tolerance": of.rounding + (0.0 if item.is_rounding else item.half_digit),
                 }
             )
-    for item in filter(is_noise, robot.printed):
-        result.find("digits", **printed_digits(item, answers[item.item], robot))
     if robot.remarks:
         result.notes += robot.remarks(answers, dynamics)
     return result
@@ -116,18 +114,6 @@ def check_answer(result: Result, item: Printed, of: Answer, joints: tuple) -> No
         k = joints.index(joint)
         off = abs(abs(of.nearest[k]) - abs(printed[k]))
         result.check(where, f"exact: |{item.quantity}_{joint}| - |printed|", off, item.half_digit, item.unit)
-
-
-def printed_digits(item: Printed, of: Answer, robot: Robot) -> dict:
-    """Which components of an item that is zero except for rounding are met to every printed digit, and by which engine."""
-    met = []
-    for label, values in (("exact arithmetic", of.nearest), ("TMT", of.tmt), ("MuJoCo", of.mujoco)):
-        components = [(name, v, p) for name, v, p in zip(robot.joints, values, item.values) if p]
-        equal = [name for name, v, p in components if abs(v - p) <= item.half_digit]
-        opposite = [name for name, v, p in components if abs(v + p) <= item.half_digit]
-        met.append({"label": label, "equal": equal, "opposite": opposite, "all": len(equal) == len(components)})
-    exact_values = [float(value) for value in of.exact]
-    return {"item": item, "met": met, "rounding": of.rounding, "exact": exact_values}
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:

@@ -2,11 +2,6 @@
 
 from collections.abc import Sequence
 
-ROWS_COMPILED = (
-    "Rows that are called compiled show what the functions of tmt return once compiled code answers; the others are the method "
-    "as it stands."
-)
-
 
 def capital(text: str) -> str:
     """A text as the beginning of a sentence."""
