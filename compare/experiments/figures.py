@@ -1,4 +1,4 @@
-"""Figures of the experiments that are one file: differences, the condition number, holding torques.
+"""Figures of the experiments at single states: differences, condition number, holding torques.
 
 Each function returns (file name, figure, caption).
 """

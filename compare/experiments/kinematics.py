@@ -20,7 +20,7 @@ from .setup import Setup
 EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"), options=("--joints",))
 COMPARED = ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv")
 DIFFERENCED, STEP = 20, 1e-6  # states at most, and step in s, of central differences of a Jacobian along the motion
-CLEARLY = 1e3  # of two ways, one is wrong if its error is larger by this factor
+CLEARLY = 1e3  # mj_jacDot is wrong if its error is larger by this factor
 
 
 def compared(robot: Robot) -> list[str]:

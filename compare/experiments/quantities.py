@@ -16,7 +16,7 @@ class Quantity(NamedTuple):
 
     function: str  # of Dynamics and of tmt's compiled functions
     arguments: tuple[str, ...]  # of a Sample
-    units: tuple[str, ...]  # for hinges and balls, for slides, for both together; one if they are the same
+    units: tuple[str, ...]  # for hinges and balls, for slides, for one of each; a single one for all
     scale: str  # of judge.entries
     truth: str  # a field of tmt.exact.values.Truth
     part: int | None = None  # of a function that returns several arrays
@@ -76,7 +76,7 @@ class Comparison:
 
 
 def add_notes(result: Result, setup: Setup) -> None:
-    """What holds for all of these comparisons: states that are left out, compiled rows, the headline."""
+    """Add the notes of the samples, the note on compiled rows, and the headline."""
     result.notes += [*setup.named.notes, *setup.random.notes]
     if not setup.robot.own:
         result.find("rows_compiled", of="shared")

@@ -32,7 +32,7 @@ def component(k: int, count: int) -> str:
 
 
 def rows_of(owner: str, quantity: str, stated: Sequence, compiled: Sequence, unit: str, **more) -> list[dict]:
-    """The rows of the table, one for each component; stated None: it is not."""
+    """Rows of the table, one for each component. stated: None for a component that is not stated."""
     return [
         {"of": owner, "quantity": quantity, "component": component(k, len(compiled)), "stated": a, "compiled": b}
         | {"difference": None if a is None else b - a, "unit": unit}
@@ -93,7 +93,7 @@ def check_forces(result: Result, setup: Setup, causes: Sequence[dict] = ()) -> l
         allowed = FACTOR * EPS * float(largest) if source == PASSIVE else 0.0
         most = float(np.abs(force).max())
         check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed))
-        if not check.passed and not any(known["quantity"] in EXPLAINED.get(source, ()) for known in causes):
+        if not check.passed and not any(cause["quantity"] in EXPLAINED.get(source, ()) for cause in causes):
             place = f"forces of {source}"
             text = f"{place}: stated none, up to {most:.3g} N m at random states"
             unexplained.append(cause(2, place, 0.0, most, text, np.inf, place))

@@ -57,10 +57,10 @@ def compare_features(result: Result, setup: Setup) -> list[dict]:
     for name, feature in (theirs | ours).items():
         if feature.treatment == MODELLED or name in MAY_DIFFER:
             continue
-        stated, compiled = (float(known[name].count if name in known else 0) for known in (theirs, ours))
+        stated, compiled = (float(features[name].count if name in features else 0) for features in (theirs, ours))
         result.check("file", f"{name}, how many", compiled, stated, "", rule="equal")
         text = f"{name}: {stated:g} in {robot.stated_in}, {compiled:g} in this file" if stated != compiled else ""
-        a, b = (np.array(known[name].numbers if name in known else ()) for known in (theirs, ours))
+        a, b = (np.array(features[name].numbers if name in features else ()) for features in (theirs, ours))
         if not text and (len(a) or len(b)):
             difference = np.abs(a - b) if len(a) == len(b) else np.array([np.inf])
             allowed = FACTOR * EPS * np.abs(a).max(initial=0.0)
