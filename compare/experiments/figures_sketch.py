@@ -54,12 +54,14 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
     kinds, posture = robot.tree.kind, next(iter(poses))
     values = {
+        "noun": robot.noun,
+        "bodies": robot.tree.body_names,
         "counts": {kind: kinds.count(kind) for kind in KIND_COLOURS if kind in kinds},
         "joints": joints_in_space(robot, poses[posture] if robot.is_read else robot.posture()) if few else [],
         "posture": posture if robot.is_read and len(poses) > 1 else "",
         "has_free": any(free_parts(robot.tree)),
     }
-    return file_name(robot.name), fig, Finding("parameters", "sketch", {"robot": robot, **values})
+    return file_name(robot.name), fig, Finding("parameters", "sketch", values)
 
 
 def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
