@@ -93,7 +93,7 @@ def test_imports_keep_their_directions():
             said = f"{dotted(path)} imports {name}"
             is_style = path.stem.startswith("figures") and name == "compare.report.style"
             assert part(name) in allowed or is_style, said
-            shared = ("compare.experiments.figures", "compare.experiments.setup")
+            shared = tuple(f"compare.experiments.{name}" for name in ("figures", "quantities", "setup"))
             assert (
                 not name.startswith("compare.experiments.") or name.startswith(shared) or name.split(".")[:3] == own
             ), said

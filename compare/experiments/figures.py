@@ -1,4 +1,4 @@
-"""Figures of the experiments that are one file: differences, the condition number, holding torques.
+"""Figures of the experiments at single states: differences, condition number, holding torques.
 
 Each function returns (file name, figure, caption).
 """
@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 
 from ..engines import LABELS
 from ..judge.check import Result
-from ..judge.entries import has_own_scales, scales, unit
-from ..judge.scale import EPS, FACTOR, gravity_scale
-from ..judge.words import capital
+from ..judge.entries import unit
+from ..judge.scale import FACTOR
 from ..report.style import BLUE, LINES, ORANGE, RED, WIDTH, plain, zero_at_the_end
 from ..robots import Robot
 
@@ -25,10 +24,10 @@ HATCHES = (None, "///", "...", "xxx", "\\\\\\", "+++")  # of joints, for who pri
 
 
 def draw_distances(result: Result, sample: str, quantities: list[str] | None = None) -> tuple[str, Figure, str]:
-    """How far apart the engines are over all states, and how far each is from the exact value."""
+    """Cumulative distributions of the differences between the engines, and of each from the exact value."""
     curves = result.curves[sample]
     label = result.label
-    exact = [name for name, c in curves.items() if f"{label} to exact" in c]  # none where an exact state takes too long
+    exact = [name for name, c in curves.items() if f"{label} to exact" in c]  # none where exact values take too long
     quantities = quantities or exact or list(curves)[:6]
     columns = 2 if len(quantities) == 4 else min(3, len(quantities))
     lines = -(-len(quantities) // columns)
@@ -43,16 +42,15 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
         for name, colour, dash in styles if exact else styles[:1]:
             values = np.maximum(curves[quantity][name], ZERO_AT)
             share = np.arange(1, len(values) + 1) / len(values)
-            of_many = np.unique(np.linspace(0, len(values) - 1, MOST_DRAWN).round().astype(int))
-            shown = of_many if len(values) > MOST_DRAWN else slice(None)
+            shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), MOST_DRAWN)).round().astype(int))
             ax.step(values[shown], share[shown], where="post", color=colour, linestyle=dash, label=name)
         ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
         ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
     for ax in axes.flat[len(quantities) :]:
         ax.set_visible(False)
-    of_all = [line.get_xdata() for ax in axes.flat for line in ax.lines]
-    largest = max((values[-1] for values in of_all if np.isfinite(values[-1])), default=FACTOR)
-    zeros = min(values[0] for values in of_all) <= ZERO_AT
+    drawn = [line.get_xdata() for ax in axes.flat for line in ax.lines]
+    largest = max((values[-1] for values in drawn if np.isfinite(values[-1])), default=FACTOR)
+    zeros = min(values[0] for values in drawn) <= ZERO_AT
     if zeros:
         zero_at_the_end(axes[0, 0].xaxis, ZERO_AT, largest, most=4 + 2 * (columns < 3))
     for ax in axes[:, 0]:
@@ -60,24 +58,24 @@ def draw_distances(result: Result, sample: str, quantities: list[str] | None = N
     fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     worst, of_worst = max((largest_of(curves[q][f"{label} to MuJoCo"]), q) for q in quantities)
-    known = None
+    distances = None
     if exact:
         ours, theirs = (
             max(largest_of(curves[q][f"{engine} to exact"]) for q in quantities) for engine in (label, "MuJoCo")
         )
-        known = {"states": len(curves[quantities[0]][f"{label} to exact"]), "ours": ours, "theirs": theirs}
-    values = {"sample": sample, "label": label, "worst": worst, "of_worst": of_worst, "exact": known}
+        distances = {"states": len(curves[quantities[0]][f"{label} to exact"]), "ours": ours, "theirs": theirs}
+    values = {"sample": sample, "label": label, "worst": worst, "of_worst": of_worst, "exact": distances}
     caption = result.finding("distances", of="shared", **values, zero_at=ZERO_AT if zeros else None)
     return f"{result.experiment}_distances", fig, caption
 
 
 def largest_of(curve: np.ndarray) -> float:
-    """The last of sorted differences; inf where one is no number, as one's own equations may give."""
+    """The last of sorted differences; inf where one is NaN, as a user's own equations may give."""
     return float(curve[-1]) if np.isfinite(curve[-1]) else np.inf
 
 
 def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
-    """The condition number of Mbar over the two joints on which it is said to depend."""
+    """Condition number of Mbar over the two joints of the robot's `conditioning`."""
     *angles, values = result.curves["condition"]
     first, second = np.degrees(angles)
     x, y = (robot.symbol(joint) for joint in robot.conditioning.joints)
@@ -89,21 +87,19 @@ def draw_condition(result: Result, robot: Robot) -> tuple[str, Figure, str]:
     ax.set(xlabel=f"{x}, deg", ylabel=f"{y}, deg", xticks=range(-180, 181, 90), yticks=range(-180, 181, 90))
     fig.colorbar(image, label="condition number of Mbar")
     maxima = []
-    for (name, (value, at, mirrored)), look in zip(result.curves["worst"].items(), WORST_LOOKS):
-        a, b = np.degrees(at)
-        twice = abs(mirrored - value) <= 1e-6 * value
-        places = ([a, -a], [b, b]) if twice else ([a], [b])
-        ax.plot(*places, linestyle="none", **look, label=f"maximum, {LABELS[name]}")
-        maxima.append({"label": LABELS[name], "value": value, "at": (a, b), "twice": twice, "mirrored": mirrored})
+    for (name, (value, worst)), look in zip(result.curves["worst"].items(), WORST_LOOKS):
+        place = np.degrees(worst)
+        ax.plot(*place[:, None], linestyle="none", **look, label=f"maximum, {LABELS[name]}")
+        maxima.append({"label": LABELS[name], "value": value, "at": tuple(place)})
     fig.legend(loc="outside upper center", ncols=2)
     zero = [robot.symbol(joint) for joint in robot.joints if joint not in robot.conditioning.joints]
     return "mass_condition", fig, result.finding("condition", joints=[x, y], zero=zero, maxima=maxima)
 
 
 def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str]:
-    """Holding torques at the named postures: of more than six joints the six that need most, of the first eight postures."""
-    kept, speeds = result.curves["postures"], robot.coordinates.speeds
-    postures = dict(list(kept.items())[:SHOWN_POSTURES])
+    """Holding torques of at most six joints, those with the largest, at the first eight named postures."""
+    torques, speeds = result.curves["postures"], robot.coordinates.speeds
+    postures = dict(list(torques.items())[:SHOWN_POSTURES])
     first, second = robot.compared
     most = np.max([np.abs(of[first]) for of in postures.values()], axis=0)
     shown = sorted(np.argsort(-most, kind="stable")[: len(LINES)])
@@ -121,45 +117,17 @@ def draw_holding_torques(result: Result, robot: Robot) -> tuple[str, Figure, str
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.set_xticks(places, [plain(name) for name in postures])
     ax.set(ylabel=f"holding torque, {unit(robot.tree, 'N m', 'N')}")
-    columns = 100 // (8 + max(map(len, labels)))  # that a page has room for
-    handles, texts = ax.get_legend_handles_labels()
-    order = sorted(range(len(texts)), key=lambda i: texts[i] == "MuJoCo")  # it is the last
-    handles, texts = ([of[i] for i in order] for of in (handles, texts))
-    fig.legend(handles, texts, loc="outside upper center", ncols=max(1, min(len(shown) + 1, 6, columns)))
-    apart = max(np.abs(of[first] - of[second]).max() for of in kept.values())
-    which = "each named posture" if len(postures) == len(kept) else f"the first {len(postures)} of {len(kept)} postures"
-    of = "" if len(shown) == len(speeds) else f", at the {len(shown)} of {len(speeds)} joints that need most"
-    springs = " with its springs" if robot.tree.has_springs else ""
-    most = f"at most {apart:.1e}" if np.isfinite(apart) else "somewhere no number of"
-    caption = (
-        f"Torque that holds {which}{springs}{of}: {LABELS[first]} (bars) and MuJoCo (black marks), {most} "
-        f"{unit(robot.tree, 'N m', 'N')} apart. " + needless(kept, robot)
-    )
-    return "gravity_postures", fig, caption
-
-
-def needless(postures: dict, robot: Robot) -> str:
-    """Which postures need no torque, except for rounding, in both engines or in one, in words."""
-    zero = {
-        posture: FACTOR * EPS * scales(robot.tree, robot.is_read, robot.poses[posture][None]).holding
-        if has_own_scales(robot.tree, robot.is_read)
-        else FACTOR * EPS * gravity_scale(robot.tree)
-        for posture in postures
+    columns = 100 // (8 + max(map(len, labels)))  # of a legend that fits the page
+    entries = sorted(zip(*ax.get_legend_handles_labels()), key=lambda entry: entry[1] == "MuJoCo")
+    fig.legend(*zip(*entries), loc="outside upper center", ncols=max(1, min(len(shown) + 1, 6, columns)))
+    caption = {
+        "shown": len(postures),
+        "postures": len(torques),
+        "of_joints": len(shown),
+        "joints": len(speeds),
+        "label": LABELS[first],
+        "springs": robot.tree.has_springs,
+        "difference": np.max([np.abs(of[first] - of[second]) for of in torques.values()]),
+        "unit": unit(robot.tree, "N m", "N"),
     }
-    rest = {
-        name: [posture for posture, of in postures.items() if (np.abs(of[name]) <= zero[posture]).all()]
-        for name in robot.compared
-    }
-    first, second = rest
-    if rest[first] == rest[second]:
-        return needless_in_words("Both need", rest[first])
-    return " ".join(needless_in_words(f"{capital(LABELS[name])} needs", at) for name, at in rest.items())
-
-
-def needless_in_words(needs: str, postures: list) -> str:
-    """Where no torque is needed, in a sentence that begins with who needs."""
-    return (
-        f"{needs} none, except for rounding, at: {', '.join(postures)}."
-        if postures
-        else f"{needs} some at every posture."
-    )
+    return "gravity_postures", fig, result.finding("postures", **caption)

@@ -1,7 +1,5 @@
 """The sketch of a robot: a stick figure in two postures with the axes of its joints, from the method's own frames."""
 
-from collections.abc import Sequence
-
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,64 +7,65 @@ from matplotlib.figure import Figure
 from tmt import literal
 from tmt.equations import method
 
-from ..judge.words import listed
+from ..judge.finding import Finding
 from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines, plain
 from ..robots import Robot
-from ..robots.stick import AZIMUTH, ELEVATION, RIGHTWARD, UPWARD, free_parts, stick_figure
+from ..robots.stick import AZIMUTH, ELEVATION, RIGHTWARD, UPWARD, as_seen, free_parts, stick_figure
 
-SKETCHED_BY_NAME = 6  # joints at most, and bodies, that are named in a sketch
+MOST_NAMED = 6  # joints, and bodies, that are named in a sketch
 KIND_COLOURS = {"hinge": BLUE, "slide": RED, "ball": GREEN}
-CENTRED = {"ha": "center", "va": "center"}
 
 
-def draw_sketch(robot: Robot) -> tuple[str, Figure, str]:
-    """The robot with the axes of its joints in two postures, from the method's own frames."""
-    poses = sketched(robot)
-    parts = {name: (chains(robot, q), literal.com_positions(q, robot.tree)) for name, q in poses.items()}
-    size = max(np.ptp(np.concatenate([*lines, coms]), axis=0).max() for lines, coms in parts.values()) or 1.0  # m
-    few = max(len(robot.joints), len(robot.tree.mass)) <= SKETCHED_BY_NAME
+def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
+    """The robot and the axes of its joints in two postures."""
+    poses = {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
+    coms = {name: literal.com_positions(q, robot.tree) for name, q in poses.items()}
+    sticks = {}
+    for name, q in poses.items():
+        (points,), links = stick_figure(robot, q[None])
+        sticks[name] = [points] if robot.landmarks else [points[list(link)] for link in links]
+    size = max(np.ptp(np.concatenate([*sticks[name], coms[name]]), axis=0).max() for name in poses) or 1.0  # m
+    few = max(len(robot.joints), len(robot.tree.mass)) <= MOST_NAMED
     arrows = {name: axes(robot, q, (0.57 if few else 0.1) * size) for name, q in poses.items()}
-    tips = [arrow.sum(axis=1) for arrow in arrows.values()]
-    drawn = np.concatenate([*tips, *(part for lines, coms in parts.values() for part in (*lines, coms))])
+    drawn = np.concatenate([part for name in poses for part in (*sticks[name], coms[name], arrows[name].sum(axis=1))])
     half, middle = 0.55 * np.ptp(drawn, axis=0).max(), (drawn.max(axis=0) + drawn.min(axis=0)) / 2
     fig = Figure(figsize=(WIDTH, 3.9))
     fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.93, wspace=0.05)
-    for k, (name, (lines, coms)) in enumerate(parts.items()):
-        ax = fig.add_subplot(1, len(poses), k + 1, projection="3d", facecolor="none")
-        for line in lines:
+    for k, (name, q) in enumerate(poses.items(), start=1):
+        ax = fig.add_subplot(1, len(poses), k, projection="3d", facecolor="none")
+        for line in sticks[name]:
             ax.plot(*line.T, color=(GREY, 0.6), linewidth=6 if few else 3, solid_capstyle="round")
         draw_joints(ax, robot, arrows[name], few)
-        for number, com in enumerate(coms, start=1):
-            ax.scatter(*com, color="black", s=25 if few else 8, depthshade=False)
-            if few:
-                ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
+        ax.scatter(*coms[name].T, color="black", s=25 if few else 8, depthshade=False)
+        for number, com in enumerate(coms[name] if few else (), start=1):
+            ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
         if robot.landmarks:
-            names, (chain,) = robot.landmarks(poses[name]), lines
-            for text, point, (right, up) in zip(names, chain, label_directions(chain, arrows[name])):
+            (chain,) = sticks[name]
+            for text, point, (right, up) in zip(robot.landmarks(q), chain, label_directions(chain, arrows[name])):
                 side = {"ha": "left" if right > 0.0 else "right", "va": "bottom" if up > 0.5 else "center"}
                 ax.text(*(point + 0.1 * size * (right * RIGHTWARD + up * UPWARD)), text, color=GREY, fontsize=8, **side)
         angles = few and set(robot.tree.kind) == {"hinge"}
-        at = f": ({', '.join(f'{a:g}' for a in np.degrees(poses[name]))})°" if angles else ""
-        ax.set(title=f"{plain(name)}{at}")
-        ax.set(**{f"{which}label": f"{axis}, m" for which, axis in zip("xyz", robot.axes)})
-        ax.set(**{f"{which}lim": (centre - half, centre + half) for which, centre in zip("xyz", middle)})
+        ax.set(title=plain(name) + (f": ({', '.join(f'{a:g}' for a in np.degrees(q))})°" if angles else ""))
+        for axis, label, centre in zip("xyz", robot.axes, middle):
+            ax.set(**{f"{axis}label": f"{label}, m", f"{axis}lim": (centre - half, centre + half)})
         for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
             axis.set_major_locator(matplotlib.ticker.MaxNLocator(4, steps=[1, 2, 5, 10]))
         ax.view_init(elev=ELEVATION, azim=AZIMUTH)
         ax.set_box_aspect((1, 1, 1), zoom=1.1)
-    return file_name(robot.name), fig, sketch_in_words(robot, few)
-
-
-def sketched(robot: Robot) -> dict[str, np.ndarray]:
-    """The postures that are drawn, by name."""
-    return {name: robot.poses[name] for name in robot.sketched or tuple(robot.poses)[:2]}
+    kinds, posture = robot.tree.kind, next(iter(poses))
+    values = {
+        "noun": robot.noun,
+        "bodies": robot.tree.body_names,
+        "counts": {kind: kinds.count(kind) for kind in KIND_COLOURS if kind in kinds},
+        "joints": joints_in_space(robot, poses[posture] if robot.is_read else robot.posture()) if few else [],
+        "posture": posture if robot.is_read and len(poses) > 1 else "",
+        "has_free": any(free_parts(robot.tree)),
+    }
+    return file_name(robot.name), fig, Finding("parameters", "sketch", values)
 
 
 def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
-    """The axes of hinges as arrows, the directions of slides as dashed lines through them, balls as a dot in a circle.
-
-    few: each joint has its colour and its name; else the colour is that of its kind.
-    """
+    """Arrows along hinges, dashed lines along slides, a dot in a circle for balls; of few joints each has its name."""
     tree, lines = robot.tree, joint_lines(robot)
     fontsize = 13 if all(len(robot.symbol(joint)) <= 2 for joint in robot.joints) else 9
     for joint, free, (kind, _, by) in zip(robot.joints, free_parts(tree), tree.coordinates.joints):
@@ -75,57 +74,14 @@ def draw_joints(ax, robot: Robot, arrows: np.ndarray, few: bool) -> None:
         if kind == "ball":
             ax.plot(*origin[:, None], marker="o", markersize=11, color=colour, fillstyle="none")
             ax.plot(*origin[:, None], marker="o", markersize=3, color=colour)
+            label = origin + 0.2 * np.linalg.norm(axis) * (RIGHTWARD + (-2.0 if free else 1.0) * UPWARD)
         else:
             ax.quiver(*origin, *axis, color=colour, linewidth=2 if few else 1.2, arrow_length_ratio=0.2)
+            label = origin + 1.3 * axis
         if kind == "slide":
             ax.plot(*np.stack([origin - axis, origin]).T, color=colour, linewidth=1.2, linestyle="--")
-        if few and kind == "ball":
-            ax.text(
-                *(origin + 0.2 * np.linalg.norm(axis) * (RIGHTWARD - 2.0 * UPWARD if free else RIGHTWARD + UPWARD)),
-                plain(joint),
-                color=colour,
-                fontsize=fontsize,
-            )
-        elif few:
-            ax.text(*(origin + 1.3 * axis), plain(robot.symbol(joint)), color=colour, fontsize=fontsize, **CENTRED)
-
-
-def sketch_in_words(robot: Robot, few: bool) -> str:
-    """The caption of the sketch: what each of a few joints does, or how many there are of each kind."""
-    bodies = [f"the {body} ({number})" for number, body in enumerate(robot.tree.body_names, start=1)]
-    kinds, (posture, *others) = robot.tree.kind, sketched(robot)
-    at = f", at {posture}" if robot.is_read and others else ""
-    if few and set(kinds) == {"hinge"}:
-        return (
-            f"The {robot.noun} and its hinges, drawn from the method's own kinematics{at}: {', then '.join(hinges(robot))}. "
-            f"Dots: centres of mass of {listed(bodies)}."
-        )
-    signs = {
-        "hinge": "an arrow along its axis",
-        "slide": "a dashed line along its direction",
-        "ball": "a dot in a circle",
-    }
-    counted = [
-        f"{kinds.count(kind)} {kind}{'s' if kinds.count(kind) > 1 else ''} ({sign})"
-        for kind, sign in signs.items()
-        if kind in kinds
-    ]
-    free = "; a free body is three slides and a ball" if any(free_parts(robot.tree)) else ""
-    which = f"{at}: {', then '.join(hinges(robot))}" if few else ""
-    of = listed(bodies) if few else f"{len(bodies)} bodies"
-    return (
-        f"The {robot.noun}, drawn from the method's own kinematics: {listed(counted)}{free}{which}. Sticks: from joint to joint, "
-        f"and to the last centres of mass. Dots: centres of mass of {of}."
-    )
-
-
-def chains(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
-    """The lines of a robot at joint positions q, (nq,): points in m, (k, 3) each.
-
-    Through its landmarks; else from each joint to the next, and from the last ones to the centres of mass that they move.
-    """
-    (points,), links = stick_figure(robot, q[None])
-    return [points] if robot.landmarks else [points[list(link)] for link in links]
+        if few:
+            ax.text(*label, plain(robot.symbol(joint)), color=colour, fontsize=fontsize, ha="center", va="center")
 
 
 def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:
@@ -142,10 +98,7 @@ def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:
 
 
 def label_directions(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
-    """Where on paper the labels of a chain's points, (k, 3) m, stand free: to the right and up, (k, 2), of length 1.
-
-    Away from the links and from the arrows, (n, 2, 3), that meet in the point; to the left if these are balanced.
-    """
+    """Directions on paper, (k, 2), away from the links and arrows, (n, 2, 3), that meet in a chain's points, (k, 3) m."""
     away = np.tile(-0.01 * RIGHTWARD, (len(chain), 1))
     links = np.diff(chain, axis=0)
     links /= np.maximum(np.linalg.norm(links, axis=1), 1e-12)[:, None]
@@ -153,26 +106,17 @@ def label_directions(chain: np.ndarray, arrows: np.ndarray) -> np.ndarray:
     away[1:] += links
     for origin, axis in arrows:
         away -= np.isclose(chain, origin).all(axis=1)[:, None] * axis / np.linalg.norm(axis)
-    on_paper = away @ np.stack([RIGHTWARD, UPWARD], axis=1)
+    on_paper = as_seen(away)
     return on_paper / np.linalg.norm(on_paper, axis=1)[:, None]
 
 
-def hinges(robot: Robot) -> list[str]:
-    """What each hinge turns about, or slide moves along, and where it is, in words, in their order.
-
-    At the reference; of a file's robot where it is drawn, in the first posture.
-    """
-    rest = next(iter(sketched(robot).values())) if robot.is_read else robot.posture()
-    landmarks = robot.landmarks(rest) if robot.landmarks else {"origin": np.zeros(3)}
-    words = []
-    way = {"hinge": " about ", "slide": " along ", "ball": ""}
-    for joint, kind, frame in zip(robot.joints, robot.tree.kind, method.joint_frames(robot.tree, rest.tolist())):
+def joints_in_space(robot: Robot, q: np.ndarray) -> list[dict]:
+    """Name, kind, axis and place of each joint at positions q, (nq,): "y", "shoulder", or numbers."""
+    landmarks = robot.landmarks(q) if robot.landmarks else {"origin": np.zeros(3)}
+    joints = []
+    for joint, kind, frame in zip(robot.joints, robot.tree.kind, method.joint_frames(robot.tree, q.tolist())):
         axis, origin = ([float(v) + 0.0 for v in vector] for vector in (frame.axes[0], frame.origin))
-        about = "" if kind == "ball" else "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else triple(axis)
-        near = (f"at the {name}" for name, point in landmarks.items() if np.allclose(point, origin))
-        words.append(f"{robot.symbol(joint)}{way[kind]}{about} {next(near, f'at {triple(origin)} m')}")
-    return words
-
-
-def triple(values: Sequence[float]) -> str:
-    return f"({', '.join(f'{v:.3g}' for v in values)})"
+        along = "xyz"[axis.index(1.0)] if sorted(axis) == [0.0, 0.0, 1.0] else axis
+        place = next((name for name, point in landmarks.items() if np.allclose(point, origin)), origin)
+        joints.append({"name": robot.symbol(joint), "kind": kind, "axis": along, "place": place})
+    return joints

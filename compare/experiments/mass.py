@@ -9,22 +9,21 @@ from scipy.optimize import minimize
 from tmt import literal
 
 from ..engines import LABELS
-from ..engines.tmt import Compiled
-from ..judge.check import Result, agreement_headline, over
-from ..judge.entries import has_own_scales, scales
+from ..judge.check import Result, over
+from ..judge.entries import has_own_scales
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from . import Experiment
+from .quantities import Comparison, add_notes
 from .setup import Setup
 
 EXPERIMENT = Experiment(
     order=40, asks_of_own=("mass_matrix",), options=("--joints",), diagnosed=True, overview="agreement"
 )
-SAME_PLACE = np.radians(0.01)  # what a search finds of the place of a flat maximum
+SAME_PLACE = np.radians(0.01)  # accuracy of a search for a flat maximum
 
 
 def claim_values(robot: Robot) -> dict:
-    """What the claim and the tolerance of this robot name, beside the robot."""
     return {
         "own_scales": has_own_scales(robot.tree, robot.is_read),
         "condition": robot.conditioning and largest_condition(robot),
@@ -32,75 +31,66 @@ def claim_values(robot: Robot) -> dict:
 
 
 def at_angles(robot: Robot, angles: np.ndarray) -> np.ndarray:
-    """Joint angles, rad, (..., n), with these of the two joints of the robot's conditioning, (..., 2); the others at 0."""
+    """Joint angles, rad, (..., n): those of the two joints of `conditioning` as given, (..., 2), the others 0."""
     q = np.zeros((*np.shape(angles)[:-1], len(robot.joints)))
     q[..., [robot.joints.index(name) for name in robot.conditioning.joints]] = angles
     return q
 
 
 def largest_condition(robot: Robot) -> float:
-    """The condition number of the stated Mbar where it is said to be largest."""
+    """Condition number of the stated Mbar at the stated worst posture."""
     return float(
         np.linalg.cond(literal.mass_matrix(at_angles(robot, np.radians(robot.conditioning.worst)), robot.tree))
     )
 
 
 def condition_grid(robot: Robot, mass_matrix: Callable, degrees: float) -> tuple:
-    """Angles of the two joints, rad, (k,) each, and condition numbers on their grid, (k, k), the second joint's by rows."""
+    """Angles of the two joints, rad, (k,) each, and condition numbers on their grid, (k, k): a row for each second angle."""
     angles = np.radians(np.arange(-180.0, 180.0 + degrees, degrees))
     second, first = np.meshgrid(angles, angles, indexing="ij")
     return angles, angles, np.linalg.cond(mass_matrix(at_angles(robot, np.stack([first, second], axis=-1))))
 
 
 def worst_condition(robot: Robot, mass_matrix: Callable) -> tuple:
-    """The largest condition number and its two angles, rad: the best point of a grid, then a local search."""
+    """Largest condition number and its two angles, rad: the best point of a grid, then a local search."""
     first, second, values = condition_grid(robot, mass_matrix, degrees=20.0)
     row, column = np.unravel_index(values.argmax(), values.shape)
-    found = minimize(
+    maximum = minimize(
         lambda x: -np.linalg.cond(mass_matrix(at_angles(robot, x))),
         [first[column], second[row]],
         method="Nelder-Mead",
         options={"xatol": 1e-6, "fatol": 1e-12},
     )
-    return -found.fun, found.x
+    return -maximum.fun, maximum.x
 
 
 def rows(setup: Setup) -> Result:
     """Agreement at each named posture and at random states; symmetry, definiteness, conditioning."""
-    robot, compared, (ours, theirs) = setup.robot, setup.compared(), setup.robot.compared
-    result = Result("mass", label=LABELS[ours])
-    own = has_own_scales(robot.tree, robot.is_read)
-    turns, slides = set(robot.tree.kind) != {"slide"}, "slide" in robot.tree.kind
-    units = " or ".join(["kg m2"] * turns + ["kg m"] * (turns and slides) + ["kg"] * slides)
+    robot = setup.robot
+    result, own_scales = Result("mass", label=LABELS[robot.compared[0]]), has_own_scales(robot.tree, robot.is_read)
     for sample in (*setup.named.each(), setup.random):
-        M = {name: dynamics.mass_matrix(sample.q) for name, dynamics in compared.items()}
-        scale = scales(robot.tree, robot.is_read, sample.q)
-        result.agree(sample, "Mbar", units, M[ours], M[theirs], scale.mass_matrix, truth="mass_matrix")
-    if not robot.own:
-        compiled = Compiled(robot.tree).mass_matrix(sample.q)
-        result.agree(sample, "Mbar, compiled", units, compiled, M[theirs], scale.mass_matrix)
-    check_symmetry(result, M[ours], scale.mass_matrix if own else None)  # MuJoCo's is one triangle written twice
-    for name, dynamics in compared.items():
-        check_definiteness(result, LABELS[name], M[name], in_units=own)
+        comparison = Comparison(setup, sample)
+        comparison.agree(result, "Mbar")
+    M = dict(zip(robot.compared, comparison.values("Mbar")))  # at random states
+    scale = comparison.scale.mass_matrix if own_scales else None
+    check_symmetry(result, M[robot.compared[0]], scale)  # MuJoCo's is one triangle written twice
+    for name, dynamics in setup.compared().items():
+        check_definiteness(result, LABELS[name], M[name], in_units=own_scales)
         if robot.conditioning:
             value, worst = worst_condition(robot, dynamics.mass_matrix)
-            mirrored = float(np.linalg.cond(dynamics.mass_matrix(at_angles(robot, worst * [-1.0, 1.0]))))
             check_conditioning(result, robot, LABELS[name], value, worst)
-            result.curves.setdefault("worst", {})[name] = (value, worst, mirrored)
-    result.notes += [note for sample in (setup.named, setup.random) for note in sample.notes]
+            result.curves.setdefault("worst", {})[name] = (value, worst)
     if robot.conditioning:
         degrees = setup.of(3.0, 3.0, 15.0)
-        result.curves["condition"] = condition_grid(robot, compared[ours].mass_matrix, degrees)
+        result.curves["condition"] = condition_grid(robot, comparison.engines[0].mass_matrix, degrees)
     elif not robot.is_read:
         result.find("conditioning_not_stated", noun=robot.noun)
-    if not robot.own:
-        result.find("rows_compiled", of="shared")
-    result.headline = agreement_headline(result)
+    add_notes(result, setup)
     return result
 
 
 def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray | None = None) -> None:
-    """What MuJoCo is compared with has both triangles, the same except for rounding. scale: of each entry; None: the largest."""
+    """Mbar is symmetric except for rounding. scale: of each entry; None: the largest entry."""
     of = "its largest entry" if scale is None else "the scale of the entry"
     skew = over(np.abs(M - M.transpose(0, 2, 1)), np.abs(M).max(axis=(1, 2), keepdims=True) if scale is None else scale)
     what = f"{result.label}: Mbar - Mbar' over {of}"
@@ -108,9 +98,9 @@ def check_symmetry(result: Result, M: np.ndarray, scale: np.ndarray | None = Non
 
 
 def check_definiteness(result: Result, label: str, M: np.ndarray, in_units: bool = False) -> None:
-    """Mbar is positive definite beyond doubt: its least eigenvalue over its largest, the least of all states.
+    """The smallest eigenvalue of Mbar over its largest, the minimum over all states, is more than rounding.
 
-    in_units: of Mbar in units of its diagonal, where its entries are kg and kg m2.
+    in_units: Mbar is in units of its diagonal, where its entries are kg and kg m2.
     """
     named = "Mbar in units of its diagonal" if in_units else "Mbar"
     finite = np.isfinite(M).all(axis=(1, 2))
@@ -120,14 +110,14 @@ def check_definiteness(result: Result, label: str, M: np.ndarray, in_units: bool
 
 
 def scaled_by_diagonal(M: np.ndarray) -> np.ndarray:
-    """M_ij / sqrt(M_ii M_jj), whose diagonal is 1; as it is where a diagonal entry is not positive: that is not definite."""
+    """M_ij / sqrt(M_ii M_jj), whose diagonal is 1; M itself where a diagonal entry is not positive: that is not definite."""
     diagonal = np.einsum("sii->si", M)
     root = np.sqrt(np.where((diagonal > 0.0).all(axis=1, keepdims=True), diagonal, 1.0))
     return M / (root[:, :, None] * root[:, None, :])
 
 
 def check_conditioning(result: Result, robot: Robot, label: str, value: float, worst: np.ndarray) -> None:
-    """The largest condition number and its two angles, rad, are those of the stated robot; the first of either sign."""
+    """The largest condition number and its two angles, rad, are the stated ones; the first angle has either sign."""
     (first, second), (x, y) = robot.conditioning
     largest = largest_condition(robot)
     at = f"{first} = {np.degrees(worst[0]):.3f}, {second} = {np.degrees(worst[1]):.3f} deg"

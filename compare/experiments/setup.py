@@ -1,4 +1,4 @@
-"""What an experiment is given: the robot, the engines, and how much is to be done."""
+"""The setup of an experiment: the robot, the engines, and the size of the run."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -9,12 +9,13 @@ from ..engines import Dynamics, Engine, compared
 from ..engines.heyoka import Heyoka
 from ..engines.scipy import Scipy
 from ..engines.tmt import Tmt
+from ..judge.finding import Finding
 from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import Case
 
 T = TypeVar("T")
-SECONDS_OF_OWN = 5.0  # of a user's own equations, called once at each random state
+SECONDS_OF_OWN = 5.0  # of a user's own equations at all random states together
 
 
 def engines(mujoco: Engine, own: Engine | None = None) -> dict[str, Engine]:
@@ -29,60 +30,54 @@ def nothing(*_: object) -> None:
 
 @dataclass(frozen=True)
 class Setup:
-    """What an experiment needs: the robot, the engines, and how much is to be done."""
+    """The robot, the engines, and the size of the run."""
 
     robot: Robot
     engines: Mapping[str, Engine]
     states: int = 10_000  # random states
-    exact_states: int = 200  # of these, how many are compared with the exact values too
-    map: Callable = map  # where the scenes of an experiment may run side by side
-    reading: object | None = None  # what the file was read as, see engines.mujoco.reading; None: the numbers are stated
-    quiet: Callable = nothing  # waits until nothing runs beside: for timings
-    progress: Callable = nothing  # says how far long work has come
-    background: dict = field(default_factory=dict)  # work under way, by its name
+    exact_states: int = 200  # the first of these are compared with the exact values too
+    map: Callable = map  # for the scenes of an experiment: parallel where possible
+    reading: object | None = None  # of a robot's file, see engines.mujoco.reading
+    quiet: Callable = nothing  # waits until nothing else runs: for timings
+    progress: Callable = nothing  # reports the progress of long work
+    background: dict = field(default_factory=dict)  # work under way, by name
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
-    faults: bool = False  # diagnosis: of made faults, in place of the robot's own differences
-    alone: bool = False  # whether an experiment is asked for by itself, and may take longer than in `all`
-    # where the calls of a long list go, see fleet.calls.Calls; None: wherever `map` has them made
-    door: object | None = None
-    asked: tuple[float, str] | None = None  # stability: a step, s, and an integrator of MuJoCo that are asked about
-    size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
+    faults: bool = False  # diagnosis: of seeded errors instead of the robot's own differences
+    alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
+    door: object | None = None  # executor for long lists of calls, see fleet.calls.Calls; None: `map`
+    asked: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked
+    size: str = "full"  # "quick": some parts, in seconds; "small": all parts with few states and steps, for tests
 
     @property
     def is_quick(self) -> bool:
-        """Whether some paths are left out."""
         return self.size == "quick"
 
     def of(self, full: T, quick: T, small: T) -> T:
-        """What a run of this size takes."""
+        """The value for this size of the run."""
         return {"full": full, "quick": quick, "small": small}[self.size]
 
     @classmethod
     def quick(cls, robot: Robot, engines: Mapping[str, Engine], **more) -> "Setup":
-        """Fewer of everything, for a first answer in seconds."""
         return cls(robot, engines, states=1000, exact_states=20, finer=(1,), size="quick", **more)
 
     @classmethod
     def small(cls, robot: Robot, engines: Mapping[str, Engine], **more) -> "Setup":
-        """Every path of a full run with few states and steps: for tests."""
         return cls(robot, engines, states=50, exact_states=2, finer=(1, 2), size="small", **more)
 
     def compared(self, case: Case | None = None) -> dict[str, Dynamics]:
-        """The dynamics of a case (of the robot as it is) in the two engines that are compared, mujoco last."""
+        """The dynamics of a case (default: the robot unchanged) in the two engines that are compared, mujoco last."""
         return compared(self.engines, case or self.robot.case())
 
     @cached_property
     def named(self) -> samples.Sample:
-        """The named postures."""
         return samples.named(self.robot)
 
     @cached_property
     def random(self) -> samples.Sample:
-        """Random states."""
         own = self.engines.get("own")
         count = own.equations.affordable(self.states, SECONDS_OF_OWN) if own else self.states
         sample = samples.random(self.robot, count, self.exact_states)
         if count < self.states:
-            takes = f"your equations take {own.equations.seconds:.2g} s a state"
-            sample.notes = (f"{count:,} random states in place of {self.states:,}: {takes}.", *sample.notes)
+            values = {"count": count, "states": self.states, "seconds": own.equations.seconds}
+            sample.notes = (Finding("shared", "fewer_states", values), *sample.notes)
         return sample

@@ -1,8 +1,8 @@
-"""Scales of tolerances of every quantity: of any robot each entry's own; of stated hinges one number for each state.
+"""Scales of tolerances of every quantity: in general one for each entry, for stated hinges one number for each state.
 
-Entries have units of their own (kg beside kg m2, N beside N m), and sizes: one number for all would hide errors of small ones.
-The scale of an entry is the sum of the absolute values of the terms that are added up in it, as each may be where it is largest:
-with L the largest distance from the origin that a centre of mass can have at that state,
+Entries differ in unit (kg and kg m2, N and N m) and size: one number for all would hide errors of small ones. The scale of an
+entry is the sum of the absolute values of the terms that are added in it, each at its maximum. With L the largest possible
+distance of a centre of mass from the origin at that state:
 
     a column of T_b     t = L of a hinge or ball, 1 of a slide, 0 if the joint does not move the body
     of B_b              u = 1 of a hinge or ball, 0 of a slide
@@ -10,9 +10,9 @@ with L the largest distance from the origin that a centre of mass can have at th
     Mbar_ij             sum of m t_i t_j + |I| u_i u_j, and the armature
     h_i                 sum of t_i m (2 S w + g) + u_i (m V^2 + |I| S^2)
 
-and all that is of a body times k, the number of hinges and balls that turn it, at least 1: each turn hands on the rounding of
-those before it and adds its own. Where a system is solved, errors of eps in Mbar and in the forces go through |Mbar^-1|, entry
-by entry: no condition number, which would depend on the units. Mbar times the solution is off by no more than those errors.
+Every term of a body is multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the
+rounding of those before it and adds its own. Where a system is solved, errors of eps in Mbar and in the forces are multiplied by
+|Mbar^-1|, entry by entry: a condition number would depend on the units. Mbar times the solution has no more than those errors.
 """
 
 from collections.abc import Iterable
@@ -38,23 +38,24 @@ from .scale import (
 
 
 def has_own_scales(tree: tmt.Tree, is_read: bool) -> bool:
-    """Whether each entry has its own scale: not with stated hinges that have nothing else. is_read: the numbers are a file's."""
+    """Whether each entry has its own scale: all robots but stated hinges without springs and armature. is_read: from a file."""
     return is_read or set(tree.kind) != {"hinge"} or tree.has_springs or any(tree.armature)
 
 
 def scales(tree: tmt.Tree, is_read: bool, q: np.ndarray, qd: ArrayLike = 0.0) -> "Entries | Numbers":
-    """The scales of a robot at states q (states, nq), qd (states, nv). is_read: its numbers are those of a file."""
+    """The scales of a robot at states q (states, nq), qd (states, nv). is_read: its numbers are from a file."""
     return (Entries if has_own_scales(tree, is_read) else Numbers)(tree, q, qd)
 
 
-def unit(tree: tmt.Tree, of_hinge: str, of_slide: str) -> str:
-    """The unit of a quantity whose entries have one for hinges and balls and one for slides: those that are there."""
-    kinds = set(tree.kind)
-    return " or ".join([of_hinge] * (kinds != {"slide"}) + [of_slide] * ("slide" in kinds))
+def unit(tree: tmt.Tree, of_hinge: str, of_slide: str, of_both: str = "") -> str:
+    """The units of a quantity's entries for hinges and balls, for slides, and for one of each, as far as the tree has them."""
+    turns, slides = set(tree.kind) != {"slide"}, "slide" in tree.kind
+    units = [of_hinge] * turns + [of_both] * (turns and slides) + [of_slide] * slides
+    return " or ".join(filter(None, units))
 
 
 class Numbers:
-    """Scales of hinges at states q, qd (states, n): a number, or (states,). Norms take the place of entries."""
+    """Scales of hinges at states q, qd (states, n): a number, or (states,), from norms."""
 
     B = 1.0
 
@@ -89,11 +90,11 @@ class Numbers:
         return self.bias + np.abs(tau).max(axis=1) + self.drag
 
     def acceleration(self, force: ArrayLike, qdd: ArrayLike) -> np.ndarray:
-        """Of qdd, whatever it is: its bound |Mbar^-1| force stands for it."""
+        """Of qdd, with its bound |Mbar^-1| force in place of its size."""
         return acceleration_scale(self.tree, self.q, force)
 
     def closing(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
-        """Of a torque found by one engine for another's qdd, N m, (states,)."""
+        """Of the torque that one engine computes for another's qdd, N m, (states,)."""
         return self.condition * force
 
     def power(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
@@ -121,30 +122,13 @@ class Entries:
         self.inertia = self.count * np.linalg.norm(tree.inertia, 2, axis=(1, 2))
         self.spin, self.slip = np.abs(self.qd) @ self.turns.T, np.abs(self.qd) @ self.slides.T  # S and V, (states, m)
         self.speed = self.length[:, None] * self.spin + self.slip
-
-    @cached_property
-    def positions(self) -> np.ndarray:
-        return (self.count * self.length[:, None])[:, :, None]
+        self.positions, self.B = (self.count * self.length[:, None])[:, :, None], self.count[None, :, None, None]
+        self.angular_velocities, self.w_conv = ((self.count * self.spin**k)[:, :, None] for k in (1, 2))
+        self.v_conv = (self.count * 2.0 * self.spin * self.speed)[:, :, None]
 
     @cached_property
     def T(self) -> np.ndarray:
         return (self.count[:, None] * (self.slides + self.length[:, None, None] * self.turns))[:, :, None, :]
-
-    @cached_property
-    def B(self) -> np.ndarray:
-        return self.count[None, :, None, None]
-
-    @cached_property
-    def angular_velocities(self) -> np.ndarray:
-        return (self.count * self.spin)[:, :, None]
-
-    @cached_property
-    def v_conv(self) -> np.ndarray:
-        return (self.count * 2.0 * self.spin * self.speed)[:, :, None]
-
-    @cached_property
-    def w_conv(self) -> np.ndarray:
-        return (self.count * self.spin**2)[:, :, None]
 
     @cached_property
     def mass_matrix(self) -> np.ndarray:
@@ -206,14 +190,14 @@ class Entries:
         return np.einsum("sij,sj->si", sizes, np.abs(qdd)) + force
 
     def acceleration(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
-        """Of qdd where errors of eps in Mbar and in the forces go through |Mbar^-1|, (states, nv)."""
+        """Of qdd: errors of eps in Mbar and in the forces times |Mbar^-1|, (states, nv)."""
         return np.einsum("sij,sj->si", self.inverse, self.residual(force, np.broadcast_to(qdd, force.shape)))
 
     def closing(self, force: np.ndarray, qdd: ArrayLike) -> np.ndarray:
-        """Of a force found by one engine for another's qdd, N m or N, (states, nv).
+        """Of the force that one engine computes for another's qdd, N m or N, (states, nv).
 
-        A qdd of a solver that is backward stable solves a system that is off by eps in Mbar and in the forces, whatever the
-        condition of Mbar: once for each engine.
+        The qdd of a backward stable solver solves a system with errors of eps in Mbar and in the forces, whatever the condition
+        of Mbar: once for each engine.
         """
         return 2.0 * self.residual(force, np.broadcast_to(qdd, force.shape))
 

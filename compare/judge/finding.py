@@ -1,4 +1,4 @@
-"""What is found, as numbers: the words stand in templates."""
+"""Findings: numbers and names for a macro of a template."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Finding:
-    """A sentence to be written: the macro `kind` of the template `of`.md.jinja, called with `values`."""
+    """The macro `kind` of the template `of`.md.jinja, to be called with `values`."""
 
     of: str  # an experiment, or another template
     kind: str

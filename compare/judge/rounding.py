@@ -1,4 +1,4 @@
-"""How far rounding alone may drive two runs of the same method apart."""
+"""Bounds of the difference that rounding alone makes between two runs of the same method."""
 
 import numpy as np
 
@@ -8,19 +8,18 @@ from tmt.methods.stepping import Method, stepped
 
 from .scale import EPS, FACTOR, bias_scale, gain_scale, spring_scale
 
-SAMPLED = 16  # states of a block at which the bound of a step is taken
-NARROW = 1e-3  # rad, m: while the band of the positions is below, a run is judged
-# of the turn that a ball makes in a step: its new quaternion is a product, of unit length, of the old one and that of the
-# movement. Cosine and sine are off by 1.5 eps, each of the four sums of four products by 2 eps, which makes 4 eps of all four,
-# and the division by the length by 0.5 eps: 6 eps of the quaternion, 12 of the turn, 24 on both sides. The difference of two
-# quaternions is once more such a product, 8 eps of the turn
+SAMPLED = 16  # states of a block at which the bound of a step is computed
+NARROW = 1e-3  # rad, m: a run is judged while the band of its positions is narrower
+# Rounding of a ball's turn in a step. The new quaternion is a product of the old one and that of the movement, scaled to length
+# 1. Errors: cosine and sine 1.5 eps; four sums of four products 2 eps each, 4 eps together; division by the length 0.5 eps. That
+# is 6 eps of the quaternion, 12 of the turn, 24 for two runs. The difference of two quaternions is another product: 8 eps
 OF_A_BALL = 32 * EPS
 
 
 def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float) -> tuple:
-    """a, |a| and the bound of the rounding of a, rad/s2; (states,) each: a solves A a = force, A the method's matrix.
+    """a, |a| and the bound of the rounding error of a, rad/s2; (states,) each: A a = force, with the method's matrix A.
 
-    |A^-1| (64 eps |A| |a| + 64 eps S): A by its singular values, S the sum of the absolute terms of the force.
+    The bound is |A^-1| (64 eps |A| |a| + 64 eps S), with singular values of A and S the sum of the absolute terms of the force.
     """
     shape = q.shape[:1]
     if len(tree.axis) > FEW_SPEEDS and has_residual(stepping):
@@ -43,11 +42,11 @@ def slope_rounding(stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, 
 def step_rounding(
     stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float
 ) -> np.ndarray:
-    """Bound delta, to first order in dt, of the difference that rounding adds in one step, (steps, 2 nv), of movements first.
+    """Bound delta, to first order in dt, of the difference that rounding adds in one step, (steps, 2 nv), movements first.
 
-    Speeds: dt x the rounding of the slope, the largest over the stages of the step, plus that of the sum qd + dt a.
-    Positions: that of the sum q + dt qd, plus dt times that of the speeds. The sums have at most 8 roundings on both sides; in
-    place of that of q a ball has the rounding of a product of quaternions, see OF_A_BALL.
+    Speeds: dt x the rounding of the slope (maximum over the stages) plus that of the sum qd + dt a. Positions: the rounding of
+    the sum q + dt qd plus dt x that of the speeds. The sums have at most 8 roundings in the two runs together; for a ball,
+    OF_A_BALL replaces the rounding of q.
     """
     stages = []
 
@@ -64,7 +63,7 @@ def step_rounding(
 
 
 def of_positions(tree: Tree, q: np.ndarray) -> np.ndarray:
-    """What 8 eps are a part of in the sum of a position and its change, for each movement, (states, nv)."""
+    """The sizes of which the sum of a position and its change has 8 eps of rounding, (states, nv)."""
     if not tree.coordinates.balls:
         return np.abs(q)
     sizes = np.full((len(q), tree.coordinates.nv), OF_A_BALL / (8 * EPS))
@@ -84,10 +83,9 @@ def band(
     every: int = 1,
     most: int | None = None,
 ) -> np.ndarray:
-    """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), at every so many steps.
+    """band(t_n) = sum over k of |J_n ... J_(k+1)| delta_k along a run of states (steps + 1, nq, nv), (steps / every + 1, 2 nv).
 
-    Shape (steps / every + 1, 2 nv). Infinite from where the run has diverged, or the band is far too wide to judge by, and after
-    at most so many steps.
+    every: steps between two values. Infinite from where the run has diverged or the band is far too wide, and after `most` steps.
     """
     blocks = (len(q) - 1) // every
     finite = np.isfinite([*q.T, *qd.T]).all(axis=0)
@@ -100,7 +98,7 @@ def band(
         return widths
     q, qd = q[: ran * every], qd[: ran * every]
     jacobians = amplification(stepping, tree, q, qd, tau, dt).reshape(ran, every, size, size)
-    # the bound varies slowly: at fine steps it is taken at some of the states, and holds for those that follow
+    # the bound varies slowly: at fine steps it is computed at some states, and used for those that follow
     stride = max(1, every // SAMPLED)
     delta = step_rounding(stepping, tree, q[::stride], qd[::stride], tau, dt)
     delta = np.repeat(delta, stride, axis=0).reshape(ran, every, size)
@@ -112,7 +110,7 @@ def band(
         to_end[:, k] = to_end[:, k + 1] @ jacobians[:, k + 1]
     across = to_end[:, 0] @ jacobians[:, 0]
 
-    carried = np.empty((size, ran * every, size))  # carried[:, k]: what has become of step k's rounding
+    carried = np.empty((size, ran * every, size))  # carried[:, k]: the rounding of step k, propagated
     for j in range(ran):
         done, here = j * every, (j + 1) * every
         carried[:, :done] = np.tensordot(across[j], carried[:, :done], axes=1)
@@ -126,10 +124,9 @@ def band(
 def growth(
     stepping: Method, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, every: int
 ) -> np.ndarray:
-    """log10 of how much a small difference of the state at the start has grown, at every so many steps.
+    """log10 of the growth of a small difference of the initial state, at every `every` steps.
 
-    The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled on the way so that it may grow without limit. NaN from where
-    the run has diverged.
+    The 2-norm of J_n ... J_1 (rad and rad/s together), rescaled to avoid overflow. NaN from where the run has diverged.
     """
     product, scale = np.eye(2 * qd.shape[1]), 0.0
     finite = np.isfinite([*q.T, *qd.T]).all(axis=0)

@@ -1,8 +1,7 @@
 """Scales of tolerances: from the stated numbers and TMT's own terms, for each state.
 
-A difference is judged against 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that
-are added up in it, times the condition number of Mbar where a linear system is solved; it is taken for each state and is
-never the quantity itself (which may be zero).
+A tolerance is 64 x eps x scale. The scale of a quantity is the sum of the absolute values of the terms that are added in it,
+times the condition number of Mbar where a linear system is solved; it is never the quantity itself, which may be zero.
 """
 
 import numpy as np
@@ -18,9 +17,9 @@ FACTOR = 64
 
 
 def reaches(tree: tmt.Tree, q: ArrayLike | None = None) -> np.ndarray:
-    """Largest distance of each centre of mass from the origin, m: lengths added along the tree, shape (m,).
+    """Largest possible distance of each centre of mass from the origin, m, (m,): lengths added along the tree.
 
-    q: positions (..., nq); with them the shape is (..., m), and what slides have moved is added. Without, these are at rest.
+    q: positions (..., nq): the displacements of slides are added, and the shape is (..., m).
     """
     q = np.array(tree.zero) if q is None else np.asarray(q, float)
     to_joint = []
@@ -34,7 +33,7 @@ def reaches(tree: tmt.Tree, q: ArrayLike | None = None) -> np.ndarray:
 
 
 def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndarray:
-    """Sum of m g reach, N m or J; at positions q (..., nq) of slides with their reach there, (...)."""
+    """Sum of m g reach, N m or J; with q (..., nq) the reach at these positions of the slides, (...)."""
     sums = np.linalg.norm(tree.gravity) * (reaches(tree, q) @ np.array(tree.mass))
     return float(sums) if q is None else sums
 
@@ -65,10 +64,10 @@ def condition(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
 
 
 def acceleration_scale(tree: tmt.Tree, q: np.ndarray, force: ArrayLike, size: ArrayLike | None = None) -> np.ndarray:
-    """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): what errors of eps in Mbar and in the force do to qdd.
+    """|Mbar^-1| (|Mbar| |qdd| + force), rad/s2, (states,): the effect of errors of eps in Mbar and in the force on qdd.
 
-    force: scale of the forces, N m, (states,). size: |qdd| where it is known; without it, its bound |Mbar^-1| force,
-    so that the scale is (cond(Mbar) + 1) |Mbar^-1| force. Norms of Mbar are its eigenvalues.
+    force: scale of the forces, N m, (states,). size: |qdd|; None: its bound |Mbar^-1| force, for which the scale is
+    (cond(Mbar) + 1) |Mbar^-1| force. Norms of Mbar are its eigenvalues.
     """
     eigenvalues = np.linalg.eigvalsh(literal.mass_matrix(q, tree))
     size = force / eigenvalues[:, 0] if size is None else size
@@ -83,7 +82,7 @@ def gain_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
 
 
 def spring_scale(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
-    """k (|q| + |rest|) of the springs, N m or N, (..., nv): of a ball, whose turn is at most half a one, k times pi."""
+    """k (|q| + |rest|) of the springs, N m or N, (..., nv); for a ball, which turns by pi at most, k pi."""
     scale = np.zeros((*q.shape[:-1], tree.coordinates.nv))
     for k, (kind, at, by) in zip(tree.stiffness, tree.coordinates.joints):
         scale[..., by] = k * (np.pi if kind == "ball" else np.abs(q[..., at]) + np.abs(tree.rest[at.start]))

@@ -1,18 +1,18 @@
-"""Timing: what is compared is timed in turns, so that whatever slows the machine down slows all of them; and the machine."""
+"""Timing in turns, so that whatever slows the machine down slows all functions alike; and the processor's name."""
 
 import platform
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-TIMED_ENOUGH = 0.01  # s: what has taken so long in all is timed no more than twice
-WARM = 0.004  # s: what takes so long needs no call to warm up, which weighs little beside it
-ONCE = 0.02  # s: and what takes so long is timed once
+TIMED_ENOUGH = 0.01  # s: a function whose calls took this long together is called at most twice
+WARM = 0.004  # s: a longer call needs no call before it to warm up
+ONCE = 0.02  # s: a longer call is timed once
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
 
 def in_turns(runs: list[Callable], rounds: int) -> list[list[float]]:
-    """Seconds of each call of each function, at most so many rounds, after one to warm up what is short."""
+    """Seconds of each call of each function, at most `rounds` calls, after one to warm up short functions."""
     times = [[] for _ in runs]
     for k in range(rounds + 1):
         for run, taken in zip(runs, times):
@@ -36,13 +36,13 @@ def cpu() -> str:
 
 
 def vectors() -> str:
-    """The processor's name and the widest vectors that it has, as far as the system tells."""
+    """The processor's name and its widest vectors, where the system reports them."""
     flags = (first_line("flags") or first_line("Features")).split()
-    return f"{cpu()}, {next((name for flag, name in WIDTHS if flag in flags), 'width of its vectors unknown')}"
+    return f"{cpu()}, {next((name for flag, name in WIDTHS if flag in flags), 'vector width unknown')}"
 
 
 def first_line(name: str) -> str:
-    """The first value of that name that Linux tells of the processor; "" elsewhere."""
+    """The first value of this name in /proc/cpuinfo; "" on other systems."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Tables and sentences of a robot whose joints do not all move in rad."""
+"""Tables of a robot whose joints do not all move in rad."""
 
 from collections.abc import Sequence
 
@@ -6,17 +6,17 @@ RAD = "_rad"
 
 
 def renamed(rows: Sequence[dict], unit: str) -> list[dict]:
-    """Rows whose columns named in rad hold another unit, or several: those columns without it, and a column `unit`."""
+    """Rows with the suffix _rad of columns replaced by a column `unit`, unless the unit is rad."""
     if unit == "rad":
         return list(rows)
     return [{name.removesuffix(RAD): value for name, value in row.items()} | {"unit": unit} for row in rows]
 
 
 def value(row: dict, name: str) -> object:
-    """What a row holds in a column, named in rad or not."""
+    """The value of a column, with or without the suffix _rad."""
     return row[name + RAD] if name + RAD in row else row[name]
 
 
 def said(text: str, unit: str) -> str:
-    """A sentence that says rad, with another unit."""
+    """A text with the unit rad replaced."""
     return text if unit == "rad" else text.replace(" rad", f" {unit}").replace(RAD, "")

@@ -2,25 +2,20 @@
 
 from collections.abc import Sequence
 
-ROWS_COMPILED = (
-    "Rows that are called compiled show what the functions of tmt return once compiled code answers; the others are the method "
-    "as it stands."
-)
-
 
 def capital(text: str) -> str:
-    """A text as the beginning of a sentence."""
+    """A text with a capital at its beginning."""
     return text[:1].upper() + text[1:]
 
 
 def scene_begins(name: str, robot) -> str:
-    """A scene's name as the beginning of a sentence; one of a user stays as it is."""
+    """A scene's name at the beginning of a sentence; the name of a user's scene stays as it is."""
     is_own = any(scene.name == name and "own" in scene.tags for scene in robot.scenes)
     return f"Scene {name}" if is_own else capital(name)
 
 
 def posture_begins(name: str, robot) -> str:
-    """A posture's name as the beginning of a sentence; one of a file stays as it is."""
+    """A posture's name at the beginning of a sentence; the name of a file's keyframe stays as it is."""
     return f"Posture {name}" if name in robot.positions else capital(name)
 
 

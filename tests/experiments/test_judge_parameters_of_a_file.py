@@ -7,10 +7,12 @@ from models import PATHS
 from compare.engines.mujoco import engine, read
 from compare.engines.mujoco.stated import Stated
 from compare.experiments import parameters
-from compare.experiments.parameters.file import compare_number, tolerance_of, treatments_in_words
+from compare.experiments.parameters.file import add_inventory, tolerance_of
+from compare.experiments.parameters.numbers import compare_number
 from compare.experiments.setup import Setup, engines
 from compare.judge.check import Result
 from compare.judge.scale import EPS
+from compare.report.text import say
 from compare.robots.file import robot_of
 from compare.run.reference import compared_with
 
@@ -55,9 +57,17 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
     asked = {name: row["asked_by"] for name, row in rows.items()}
     assert asked["arm", "mass"] == asked["rod", "mass"] == asked["arm", "inertia"] == "settotalmass"
     assert asked["rod", "com"] and asked["rod", "com"] != "settotalmass" and asked["lift", "damping"] == ""
-    said = next(note for note in result.notes if "settotalmass" in note)
-    assert "arm, 1 to 2 kg" in said and "0.25 kg m2" in said  # the most that a mass and an inertia are changed by
+    changed = next(note for note in result.notes if note.kind == "changed" and note.values["why"] == "settotalmass")
+    largest = {change["quantity"]: change["largest"] for change in changed.values["changes"]}
+    assert [largest["mass"][name] for name in ("place", "stated", "compiled")] == ["arm", 1.0, 2.0]
+    assert largest["inertia"]["by"] == pytest.approx(0.25) and "arm, 1 to 2 kg" in say(changed)
     assert (rows["lift", "damping"]["unit"], rows["turn", "damping"]["unit"]) == ("N s/m", "N m s/rad")
+
+
+def compared(result, number):
+    """The causes of a number that differs."""
+    stated, compiled = (np.ravel(values).astype(float) for values in (number.stated, number.compiled))
+    return compare_number(result, number.place, number.quantity, stated, compiled, "", tolerance_of(number))
 
 
 @pytest.mark.parametrize("quantity, stated, scale", [
@@ -67,15 +77,15 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
 def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale, share, passes):
     number, result = Stated("arm", quantity, stated, stated + share * 64 * EPS * scale, ""), Result("parameters")
     assert tolerance_of(number) == pytest.approx(64 * EPS * scale)
-    causes = compare_number(result, number, "")
+    causes = compared(result, number)
     assert (result.checks[0].passed, not causes) == (passes, passes)
 
 
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
-    (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5, ""), "kg")
+    (cause,) = compared(Result("parameters"), Stated("arm", "mass", 2.0, 2.5, ""))
     assert (cause["rank"], cause["place"], cause["stated"], cause["found"]) == (2, "mass of arm", 2.0, 2.5)
     vector, result = Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]), ""), Result("parameters")
-    assert [cause["place"] for cause in compare_number(result, vector, "m")] == ["com y of arm", "com z of arm"]
+    assert [cause["place"] for cause in compared(result, vector)] == ["com y of arm", "com z of arm"]
     assert failing(result) == ["com"]
 
 
@@ -119,9 +129,9 @@ def test_what_no_equation_has_is_compared_by_its_numbers(tmp_path):
 
 
 def test_what_is_modelled_is_not_called_switched_off():
-    features = read(PATHS["gripper"]).features
+    features, result = read(PATHS["gripper"]).features, Result("parameters")
+    add_inventory(result, features)
+    named = {note.kind: [feature.feature for feature in note.values["features"]] for note in result.notes}
     off = [f.feature for f in features if f.treatment not in ("modelled", "open_tree")]
-    modelled = [f.feature for f in features if f.treatment == "modelled"]
-    first, second, *_ = treatments_in_words(features)
-    assert off and all(f"{name} (" in second for name in off) and all(f"{name} (" in first for name in modelled)
-    assert len(treatments_in_words([f for f in features if f.treatment == "modelled"])) == 1
+    assert off and named["switched_off"] == off
+    assert named["modelled"] == [f.feature for f in features if f.treatment == "modelled"]

@@ -1,4 +1,4 @@
-"""The numbers of a file beside those of a solution, both as MuJoCo compiled them."""
+"""The numbers of a file and those of a solution, both as MuJoCo compiled them."""
 
 from collections.abc import Sequence
 
@@ -10,41 +10,30 @@ from ...engines.mujoco.inventory import MODELLED
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ..setup import Setup
+from .numbers import cause
 
-MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # of which no equation of motion without them says anything
-CLAIM_OF_SOLUTION = (
-    "The model as MuJoCo compiled it has the numbers of {}, joint by joint and body by body: parent, axis, anchor, zero, "
-    "damping, armature and spring of each joint; mass, centre of mass and inertia tensor of each body; gravity. Of what the "
-    "equations do not have, it has as many, and their numbers, in order of size, are those of the solution; geoms that touch, "
-    "limits and actuators may be others."
-)
-TOLERANCE_OF_SOLUTION = (
-    "64 eps x the largest entry of the quantity in the solution, of any joint or body. Counts, and forces of what is switched "
-    "off: exactly."
-)
+MAY_DIFFER = "contact", "limit", "clamp", "actuator"  # the equations of motion without them do not depend on these
 
 
 def compared_numbers(setup: Setup) -> tuple[dict, dict]:
-    """The numbers of the solution, and those of the file in the same order: arrays per joint, speed, position or body, or one."""
+    """The numbers of the solution, and those of the file in the same order."""
     tree, reading = setup.robot.tree, setup.reading
     joints = [reading.tree.hinge_names.index(name) for name in tree.hinge_names]
     bodies = [reading.bodies.index(body) for body in setup.engines["mujoco"].bodies]
-    return ordered_numbers(tree, range(len(joints)), range(len(bodies))), ordered_numbers(reading.tree, joints, bodies)
+    return numbers_of(tree, range(len(joints)), range(len(bodies))), numbers_of(reading.tree, joints, bodies)
 
 
-def ordered_numbers(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
-    """The numbers of a Tree, by quantity. joints, bodies: in which order."""
+def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict:
+    """The numbers of a Tree by quantity: arrays per joint, speed, position or body, or one. joints, bodies: in this order."""
     anchors = []
     for parent, offset in zip(tree.parent, tree.offset):
         anchors.append(np.array(offset) + (anchors[parent] if parent >= 0 else 0.0))
-    speeds = [v for j in joints for v in range(*tree.coordinates.joints[j][2].indices(tree.coordinates.nv))]
-    positions = [i for j in joints for i in range(*tree.coordinates.joints[j][1].indices(tree.coordinates.nq))]
+    places = tree.coordinates.joints
+    positions, speeds = (
+        [i for j in joints for i in range(places[j][of].start, places[j][of].stop)] for of in (1, 2)
+    )  # fmt: skip
     numbers = {-1: -1} | {j: i for i, j in enumerate(joints)}
-    sprung = [
-        bool(tree.stiffness[j])
-        for j, (_, at, _) in enumerate(tree.coordinates.joints)
-        for _ in range(at.start, at.stop)
-    ]
+    is_sprung = [bool(k) for k, (_, at, _) in zip(tree.stiffness, places) for _ in range(at.start, at.stop)]
     return {
         "parent": np.array([numbers[tree.parent[j]] for j in joints]),
         "axis": np.array(tree.axis)[speeds],
@@ -53,7 +42,7 @@ def ordered_numbers(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]
         "damping": np.array(tree.damping)[speeds],
         "armature": np.array(tree.armature)[speeds],
         "stiffness": np.array(tree.stiffness)[joints],
-        "rest": (np.array(tree.rest) * sprung)[positions],
+        "rest": (np.array(tree.rest) * is_sprung)[positions],
         "mass": np.array(tree.mass)[bodies],
         "com": np.array(tree.com)[bodies],
         "inertia": np.array(tree.inertia)[bodies],
@@ -62,28 +51,23 @@ def ordered_numbers(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]
 
 
 def compare_features(result: Result, setup: Setup) -> list[dict]:
-    """A check for each thing that the equations do not have, how many there are of it; of those that differ the causes."""
+    """Checks of what the equations do not have: the count of each feature, and its numbers; the causes where they differ."""
     robot, causes = setup.robot, []
-    features = {feature.feature: feature for feature in (*robot.features_stated, *robot.features)}
-    stated, found = ({feature.feature: feature for feature in each} for each in (robot.features_stated, robot.features))
-    for name in (name for name, feature in features.items() if feature.treatment != MODELLED):
-        a, b = (float(known[name].count if name in known else 0) for known in (stated, found))
-        if name in MAY_DIFFER:
+    ours, theirs = ({f.feature: f for f in features} for features in (robot.features, robot.features_stated))
+    for name, feature in (theirs | ours).items():
+        if feature.treatment == MODELLED or name in MAY_DIFFER:
             continue
-        result.check("file", f"{name}, how many", b, a, "", rule="equal")
-        text = f"{name}: {a:g} in {robot.stated_in}, {b:g} in this file" if a != b else ""
-        ours, theirs = (np.array(known[name].numbers if name in known else ()) for known in (found, stated))
-        if not text and (len(ours) or len(theirs)):
-            off = np.abs(ours - theirs).max() if len(ours) == len(theirs) else np.inf
-            check = result.check(
-                "file", f"{name}, its numbers", off, FACTOR * EPS * np.abs(theirs).max(initial=0.0), ""
-            )
-            if not check.passed:
-                k = int(np.argmax(np.abs(ours - theirs))) if len(ours) == len(theirs) else 0
-                values = f": {ours[k]:.9g} in place of {theirs[k]:.9g}" if len(ours) == len(theirs) else ""
-                text = f"{name}: other numbers than in {robot.stated_in}{values}"
+        stated, compiled = (float(features[name].count if name in features else 0) for features in (theirs, ours))
+        result.check("file", f"{name}, how many", compiled, stated, "", rule="equal")
+        text = f"{name}: {stated:g} in {robot.stated_in}, {compiled:g} in this file" if stated != compiled else ""
+        a, b = (np.array(features[name].numbers if name in features else ()) for features in (theirs, ours))
+        if not text and (len(a) or len(b)):
+            difference = np.abs(a - b) if len(a) == len(b) else np.array([np.inf])
+            allowed = FACTOR * EPS * np.abs(a).max(initial=0.0)
+            if not result.check("file", f"{name}, its numbers", difference.max(), allowed, "").passed:
+                k = int(np.argmax(difference))
+                values = f": stated {a[k]:.9g}, compiled {b[k]:.9g}" if len(a) == len(b) else ""
+                text = f"{name}: not the numbers of {robot.stated_in}{values}"
         if text:
-            causes.append(
-                {"rank": 2, "place": name, "stated": a, "found": b, "text": text, "size": 1.0, "quantity": name}
-            )
+            causes.append(cause(2, name, stated, compiled, text, 1.0, name))
     return causes

@@ -4,8 +4,8 @@ from ..edit import Edit
 
 # module, function, quantity: as written in the call of `check`, _1, _2 for what is filled in
 CHECKS = (
-    ("parameters", "rows", "quantity"),
-    ("parameters", "causes_of_other_forces", 'f"no forces of {_1}"'),
+    ("parameters", "compare_number", "quantity"),
+    ("parameters", "check_forces", 'f"no forces of {_1}"'),
     ("published", "check_answer", 'f"{_1}: {item.quantity} - printed"'),
     ("published", "check_answer", 'f"{_1}: {item.quantity} - exact"'),
     ("published", "check_answer", "digits"),
@@ -48,18 +48,13 @@ CHECKS = (
 )
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (
-    ("mass", "rows", '"Mbar"'),
-    ("gravity", "rows", '"holding torque"'),
     ("gravity", "rows", '"holding torque, springs too"'),
     ("gravity", "rows", 'f"{_1}: torque - dV/dq"'),
     ("gravity", "rows", '"yours: gravity - bias at rest"'),
     ("gravity", "rows", '"MuJoCo: torque - dV/dq"'),
     ("gravity", "rows", 'f"qdd of MuJoCo under {_1} torque"'),
-    ("acceleration", "rows", '"bias"'),
-    ("acceleration", "rows", '"qdd"'),
     ("acceleration", "rows", 'f"tau from MuJoCo\'s qdd by {_1}"'),
     ("acceleration", "rows", 'f"tau from {_1} qdd by mj_inverse"'),
-    ("acceleration", "rows", '"energy"'),
     ("acceleration", "rows", 'f"dE/dt - {work} at {_1} qdd"'),
     ("acceleration", "rows", "quantity"),
 )
@@ -75,9 +70,9 @@ EDITS = (
         for module, where, quantity in AGREEMENTS
     ),
     *(
-        Edit("kinematics", "rows", "result.agree(_1, _2, _3, ours, theirs, *_4)",
-             f"result.agree(_1, _2, _3, ours, ours if quantity == {quantity!r} else theirs, *_4)",
+        Edit("quantities", "Comparison.agree", "result.agree(_1, _2, _3, ours, theirs, *_4)",
+             f"result.agree(_1, _2, _3, ours, ours if name == {quantity!r} else theirs, *_4)",
              f"{quantity} is compared with itself")
-        for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv")
+        for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv", "Mbar", "holding torque", "bias", "qdd", "energy")
     ),
 )  # fmt: skip

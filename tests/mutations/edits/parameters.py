@@ -10,24 +10,25 @@ READ = (
 FOUND = "np.asarray(compiled[quantity], dtype=float)"
 EDITS = (
     *(
-        Edit("parameters", "rows", FOUND, f"expected if quantity == {name!r} else {FOUND}", f"{name} is read as stated")
+        Edit("parameters", "rows", FOUND, f"numbers if quantity == {name!r} else {FOUND}", f"{name} is read as stated")
         for name in READ
     ),
     Edit("parameters", "rows", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
     Edit("parameters", "rows", "sorted(causes, key=_1)", "causes", "causes in the order in which they are found"),
-    Edit("parameters", "causes_in", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
-    Edit("parameters", "cause", "[f'{number:.7g} {unit}'.rstrip() for number in (stated, found)]",
-         "[f'{number:.7g} {unit}'.rstrip() for number in (found, stated)]", "stated and compiled are exchanged"),
+    Edit("parameters.numbers", "compare_number", "quantity in OPTIONS", "False", "an option is no cause of rank 1"),
+    Edit("parameters.numbers", "compare_number", "[words.get(number, _1) for number in (a, b)]",
+         "[words.get(number, _1) for number in (b, a)]", "stated and compiled are exchanged"),
     Edit("parameters.file", "tolerance_of", "max(FACTOR * EPS, number.precision)", "1e-3",
          "a number of a file may be off by a thousandth"),
     Edit("parameters.file", "rows_of_file", "number.why", "''", "nothing asks for a change", nth=1),
     Edit("parameters.file", "tolerance_of", "np.trace(number.stated)", "100 * np.trace(number.stated)", "a tensor by more"),
-    Edit("parameters.file", "rows_of_file", "known and not number.why", "known and number.why",
+    Edit("parameters.file", "rows_of_file", "is_stated and not number.why", "is_stated and number.why",
          "what an option asks for is compared, and nothing else"),
-    Edit("parameters.file", "compare_number", "not difference <= allowed", "difference > allowed", "NaN is no cause"),
-    Edit("parameters.file", "check_forces", "np.abs(force).max()", "0.0 * np.abs(force).max()", "no force is seen"),
-    Edit("parameters.file", "most_in_words", "max(known, key=_1)", "min(known, key=_1)", "the least change is called the most"),
-    Edit("parameters.file", "treatments_in_words", "f.treatment not in of", "f.treatment in of",
+    Edit("parameters.numbers", "compare_number", "not difference[k] <= tolerance", "difference[k] > tolerance",
+         "NaN is no cause"),
+    Edit("parameters.numbers", "check_forces", "np.abs(force).max()", "0.0 * np.abs(force).max()", "no force is seen"),
+    Edit("parameters.file", "changes", "max(stated, key=_1)", "min(stated, key=_1)", "the least change is called the most"),
+    Edit("parameters.file", "add_inventory", "f.treatment not in _1", "f.treatment in _1",
          "what is modelled is called switched off"),
     Edit("reference", "compared_with", "path is None or has_hinges(path, ARM.joints)", "True", "any file is that of the arm"),
     Edit("reference", "Reference.lines", "self.open_tree", "False", "an open tree is not said", nth=1),

@@ -50,7 +50,7 @@ EDITS = (
     Edit("verdict", "standing", "if differing:\n _1", "pass", "the line of an experiment whose checks fail says pass"),
     Edit("report.document", "Document.pictures", "any(one in wrong for one in of)", "False",
          "the picture that shows what fails is not marked"),
-    Edit("judge.check", "agreement_headline", "max(known, *_1)", "min(known, *_1)", "its line has the best difference"),
+    Edit("judge.check", "agreement_headline", "max(finite, *_1)", "min(finite, *_1)", "its line has the best difference"),
     Edit("published", "headline", "all(_1)", "any(_1)", "a printed number that one engine meets is met by both"),
     Edit("judge.check", "largest_known", "max(known)", "min(known)", "the picture has the least distance"),
     Edit("stability.first_screen", "summary", "max(_1, default=0.0)", "min(_1, default=0.0)",

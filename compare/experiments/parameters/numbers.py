@@ -1,0 +1,100 @@
+"""A number, vector or tensor of the model, stated and compiled: its rows, its check, a cause for each component that differs.
+
+And the check that no other forces act.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tmt import literal
+
+from ...engines.mujoco.parameters import STATED_FLAGS
+from ...judge.check import Result
+from ...judge.scale import EPS, FACTOR
+from ..setup import Setup
+
+# without a counterpart in the equations
+ABSENT = ("contact pairs", "damping beyond linear", "stiffness beyond linear", "actuator damping", "actuator armature")
+OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "contact pairs")  # causes of rank 1
+EXPLAINED = {  # forces, by the quantities that cause them
+    "springs, fluid and tendons": ("stiffness", "density", "viscosity", "gravcomp", *ABSENT[1:4]),
+    "constraints and contacts": ("limited", "frictionloss", "contact pairs"),
+}
+PASSIVE = "fluid and tendons"  # MuJoCo adds their forces to those of springs and damping
+
+
+def component(k: int, count: int) -> str:
+    """The k-th of 1, 3 or 9 components by name."""
+    if count == 1:
+        return ""
+    return "xyz"[k] if count == 3 else "xyz"[k // 3] + "xyz"[k % 3]
+
+
+def rows_of(owner: str, quantity: str, stated: Sequence, compiled: Sequence, unit: str, **more) -> list[dict]:
+    """Rows of the table, one for each component. stated: None for a component that is not stated."""
+    return [
+        {"of": owner, "quantity": quantity, "component": component(k, len(compiled)), "stated": a, "compiled": b}
+        | {"difference": None if a is None else b - a, "unit": unit}
+        | more
+        for k, (a, b) in enumerate(zip(stated, compiled))
+    ]
+
+
+def compare_number(
+    result: Result,
+    owner: str,
+    quantity: str,
+    stated: np.ndarray,
+    compiled: np.ndarray,
+    unit: str,
+    tolerance: float,
+    is_whole: bool = False,
+    words: Mapping[float, str] = {},
+) -> list[dict]:
+    """Adds the check of a quantity of a body or joint; returns a cause for each component that differs.
+
+    is_whole: a count, an index or a flag. words: for such numbers. Rank 1: an option, or a convention of a joint (its
+    order, its sign, its zero); 2: one number.
+    """
+    difference = np.abs(stated - compiled)
+    value, bound, rule = (compiled[0], stated[0], "equal") if is_whole else (difference.max(), tolerance, "at most")
+    result.check(owner, quantity, value, bound, unit, rounding=not is_whole, rule=rule)
+    is_flipped = quantity == "axis" and bool(np.abs(stated + compiled).max() <= tolerance)
+    causes = []
+    for k, (a, b) in enumerate(zip(stated, compiled)):
+        if not difference[k] <= tolerance:
+            of = "" if owner == "world" else f"of {owner}"
+            place = " ".join(filter(None, (quantity, component(k, len(stated)), of)))
+            values = [words.get(number, f"{number:.7g} {unit}".rstrip()) for number in (a, b)]
+            if values[0] == values[1]:
+                values = [f"{float(number)!r} {unit}".rstrip() for number in (a, b)]
+            text = f"{place}: stated {values[0]}, compiled {values[1]}" + " (the opposite sign)" * is_flipped
+            rank = 1 if is_flipped or quantity in OPTIONS else 2
+            causes.append(cause(rank, place, a, b, text, difference[k] / tolerance if tolerance else np.inf, quantity))
+    return causes
+
+
+def cause(rank: int, place: str, stated: float, compiled: float, text: str, size: float, quantity: str) -> dict:
+    """A cause; size: its difference over its tolerance."""
+    compiled = float(compiled) if np.isfinite(compiled) else None
+    about = {"rank": rank, "place": place, "stated": float(stated), "found": compiled, "text": text}
+    return about | {"size": float(size), "quantity": quantity}
+
+
+def check_forces(result: Result, setup: Setup, causes: Sequence[dict] = ()) -> list[dict]:
+    """Checks that no forces act that the equations do not have; returns the causes of those that `causes` do not explain.
+
+    Of a sum with springs and damping only the rounding is allowed.
+    """
+    tree, sample, unexplained = setup.robot.tree, setup.random, []
+    largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
+    for source, force in setup.compared()["mujoco"].other_forces(sample.q, sample.qd).items():
+        allowed = FACTOR * EPS * float(largest) if source == PASSIVE else 0.0
+        most = float(np.abs(force).max())
+        check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=bool(allowed))
+        if not check.passed and not any(cause["quantity"] in EXPLAINED.get(source, ()) for cause in causes):
+            place = f"forces of {source}"
+            text = f"{place}: stated none, up to {most:.3g} N m at random states"
+            unexplained.append(cause(2, place, 0.0, most, text, np.inf, place))
+    return unexplained
