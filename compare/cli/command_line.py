@@ -137,13 +137,6 @@ OPTIONS_OF_ALL = {
         "type": not_empty, "metavar": "NAME",
         "help": "stability: the same with this integrator of MuJoCo (default: the file's)",
     }),
-    "--workers": (False, {
-        "type": process_count, "metavar": "N", "help": "the made faults of diagnosis in N processes",
-    }),
-    "--dask": (False, {
-        "type": not_empty, "metavar": "ADDRESS",
-        "help": "the same on the Dask cluster of this scheduler",
-    }),
 }  # fmt: skip
 
 
@@ -245,9 +238,5 @@ def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace)
         whole.error("--joints is for equations of your own (--reference FILE.py:OBJECT or MODULE:OBJECT)")
     if (options.dt, options.integrator) != (None, None) and name != "stability":
         whole.error(f"--dt and --integrator are for stability; {name} answers for no other step")
-    given = "--dask" if options.dask else "--workers" if options.workers else None
-    if options.dask and options.workers:
-        whole.error("--workers is for processes on this machine; a cluster has its own (--dask)")
-    of_itself = name == "diagnosis" and not (options.mjcf or options.reference)
-    if given and not of_itself:
-        whole.error(f"{given} is for diagnosis without --mjcf and --reference, and for fleet")
+    if name == "diagnosis" and not (options.mjcf or options.reference):
+        whole.error("diagnosis needs a robot's file or equations of your own (--mjcf, --reference)")

@@ -41,10 +41,7 @@ class Setup:
     progress: Callable = nothing  # says how far long work has come
     background: dict = field(default_factory=dict)  # work under way, by its name
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
-    faults: bool = False  # diagnosis: of made faults, in place of the robot's own differences
     alone: bool = False  # whether an experiment is asked for by itself, and may take longer than in `all`
-    # where the calls of a long list go, see fleet.calls.Calls; None: wherever `map` has them made
-    door: object | None = None
     asked: tuple[float, str] | None = None  # stability: a step, s, and an integrator of MuJoCo that are asked about
     size: str = "full"  # or "quick": some paths, for a first answer in seconds; "small": all paths, as little as may be
 

@@ -97,13 +97,9 @@ def of_trajectory(result: Result) -> str:
 
 
 def of_diagnosis(result: Result) -> str:
-    """The first explanation; of made faults how many are found."""
-    if "place" in result.rows[0]:
-        more = f" and {len(result.rows) - 1} more" if len(result.rows) > 1 else ""
-        return f"explained by: {result.rows[0]['place']}{more}"
-    seen = [row for row in result.rows if row["visible"]]
-    found = sum(row["faults"] for row in seen if row["outcome"] in ("right", "tied"))
-    return f"{found} of {sum(row['faults'] for row in seen)} made faults that can be seen are explained"
+    """The first explanation."""
+    more = f" and {len(result.rows) - 1} more" if len(result.rows) > 1 else ""
+    return f"explained by: {result.rows[0]['place']}{more}"
 
 
 def of_speed(result: Result) -> str:

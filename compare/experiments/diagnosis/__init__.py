@@ -21,11 +21,9 @@ from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from .. import Experiment
 from ..setup import Setup
-from . import fault_table
 from .own_equations import asked_conditions, for_command_line
-from .single_steps import Stepped, steps_of_integrators
 
-EXPERIMENT = Experiment(order=80, options=("--joints", "--workers", "--dask"))
+EXPERIMENT = Experiment(order=80, options=("--joints",))
 SECONDS = 8.0  # of a search
 CAUSE_COLUMNS = ["rank", "kind", "place", "stated", "explains", "unit", "left_over", "tied"]
 NO_NUMBERS = "not all values are numbers"
@@ -43,12 +41,11 @@ class Found(NamedTuple):
     of_forces: list[Cause]  # what else acts in the accelerations
     force_ratio: float  # of a force left over to its tolerance, the largest
     unasked: str = ""  # why the conditions were not asked
-    steps: tuple[Stepped, ...] = ()  # of MuJoCo's integrators, where all else agrees
 
     @property
     def causes(self) -> list[Cause]:
         """Of one rank each, those of Mbar and h first."""
-        return [*self.diagnosis.causes, *self.of_forces, *(cause for one in self.steps for cause in one.causes)]
+        return [*self.diagnosis.causes, *self.of_forces]
 
     @property
     def sentence_of_forces(self) -> str:
@@ -116,9 +113,7 @@ def search(setup: Setup) -> Found:
     force_ratio = largest_ratio(over(np.abs(acting), size))
     of_forces = causes_of_forces(tree, q, qd, tau, h, acting, size) if 1.0 < force_ratio < np.inf else []
     ratio = largest_ratio(off)
-    agrees = name == "mujoco" and max(ratio, force_ratio) <= 1.0
-    steps = tuple(steps_of_integrators(setup, q, qd, tau)) if agrees else ()
-    return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked, steps)
+    return Found(name, len(q), asked, diagnosis, ratio, of_forces, force_ratio, unasked)
 
 
 def largest_ratio(ratios: np.ndarray) -> float:
@@ -150,9 +145,7 @@ def left_over(tree: tmt.Tree, q, qd, tau, M, h, qdd) -> tuple[np.ndarray, np.nda
 
 
 def rows(setup: Setup) -> Result:
-    """One row for each explanation; one check of what is asked, whose note is the cause. Of made faults see fault_table."""
-    if setup.faults:
-        return fault_table.rows_of_faults(setup)
+    """One row for each explanation; one check of what is asked, whose note is the cause."""
     result, found = Result("diagnosis", shown=CAUSE_COLUMNS), diagnosed(setup)
     of, whose = f"{found.states} random states", WHOSE_VALUES[found.engine]
     for condition in found.conditions:
@@ -167,9 +160,6 @@ def rows(setup: Setup) -> Result:
     note = "" if found.force_ratio <= 1.0 else acting
     what = f"{whose} accelerations follow from M and h: force left over, over its tolerance"
     result.check(of, what, found.force_ratio, 1.0, "", note)
-    for one in found.steps:
-        what = f"one step of {one.integrator} is that of {one.scheme}: largest difference over its tolerance"
-        result.check(of, what, one.ratio, 1.0, "", one.sentence)
     result.rows = [{name: getattr(cause, name) for name in CAUSE_COLUMNS} for cause in found.causes]
     result.notes += sentences(found)
     result.curves["nearest"] = diagnosis.nearest
@@ -190,7 +180,6 @@ def sentences(found: Found) -> list[str]:
         said.append(f"{NO_NUMBERS[0].upper()}{NO_NUMBERS[1:]}: what is said here is of the others.")
     elif found.force_ratio > 1.0:
         said.append(found.sentence_of_forces)
-    said += [one.sentence for one in found.steps if one.ratio > 1.0]
     said = [for_command_line(text, found.engine == "own") for text in dict.fromkeys(said)]
     return said + [found.unasked] * bool(found.unasked) or [
         "There is nothing to explain: Mbar, h and accelerations agree."
@@ -213,5 +202,3 @@ def figures(result: Result, robot: Robot) -> Iterator[partial]:
 
     if result.curves.get("nearest"):
         yield partial(figures_found.draw_nearest, result)
-    if result.curves.get("outcomes"):
-        yield partial(figures_found.draw_outcomes, result)

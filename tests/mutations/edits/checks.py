@@ -49,7 +49,6 @@ CHECKS = (
     ("failure", "check_silent", "quantity"),
     ("long_runs", "check_minutes", "quantity"),
     ("equilibria", "check_amplification", "quantity"),
-    ("fault_table", "rows_by_pieces", "ENDS"),
 )
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (
