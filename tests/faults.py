@@ -227,7 +227,7 @@ def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
     q, qd = np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES_ASKED, nv))
     scale = Entries(tree, q, qd)
     allowed = FACTOR * EPS * packed(scale.mass_matrix + np.zeros((len(q), 1, 1)), scale.bias, nv, len(q))
-    return diagnose(tree, tree.hinge_names, q, qd, packed(*fault.make(tree, q, qd), nv, len(q)), allowed, SECONDS)
+    return diagnose(tree, q, qd, packed(*fault.make(tree, q, qd), nv, len(q)), allowed, SECONDS)
 
 
 def outcome(fault: Fault) -> tuple[str, list[str]]:

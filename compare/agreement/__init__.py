@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from .given import Given, State
 from .message import message
-from .why import cause_of
+from .why import Why, cause_of
 
 __all__ = ["Difference", "State", "assert_agrees", "differences"]
 
@@ -80,7 +80,7 @@ def assert_agrees(
     __tracebackhide__ = True  # pytest shows the line of the test
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
     if given.fails or given.problems:
-        raise AssertionError(message(given, *(cause_of(given) if given.fails else ("", False))))
+        raise AssertionError(message(given, cause_of(given) if given.fails else Why()))
 
 
 def differences(
@@ -103,7 +103,7 @@ def differences(
     The same arguments and errors as `assert_agrees`.
     """
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
-    cause = cause_of(given)[0] if given.fails else ""
+    cause = cause_of(given).text if given.fails else ""
     found = []
     for name, one in given.compared.items():
         entries = given.entries(name)

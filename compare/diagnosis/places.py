@@ -43,6 +43,11 @@ class Place(NamedTuple):
     column: np.ndarray | None = None  # (states,), of several entries (states, entries)
 
     @property
+    def is_zero(self) -> bool:
+        """Whether it is the zero of a joint."""
+        return self.kind == OF_ZERO
+
+    @property
     def is_quadratic(self) -> bool:
         """Whether Mbar and h are a polynomial of second degree in it."""
         return not any(path.field in ("axis", "reference") for path, _ in self.moves)
@@ -148,36 +153,27 @@ def coefficients(equations: Equations) -> list[Place]:
     nv, states, names = equations.nv, len(equations.q), equations.names
     values = dict(zip(equations.entries, equations.values()[0].T))
     at = {entry: k for k, entry in enumerate(equations.entries)}
-    found = [
-        Place(
-            2,
-            "coefficient",
-            entry_name(("M", i, j), names),
-            1.0,
-            "times",
-            1.0,
-            entry=at["M", i, j],
-            column=values["M", i, j],
-        )
-        for i, j in zip(*map(np.ndarray.tolist, equations.triangle))
-    ]
+    found = []
+
+    def add(name, entry, column, stated=1.0):
+        found.append(Place(2, "coefficient", name, stated, "times", 1.0, entry=entry, column=column))
+
+    for i, j in zip(*map(np.ndarray.tolist, equations.triangle)):
+        add(entry_name(("M", i, j), names), at["M", i, j], values["M", i, j])
     whole, parts = equations.values()[0], len(equations.triangle[0])
     for name, part in {"M": slice(parts), "h": slice(parts, None), "M and h": slice(None)}.items():
-        found.append(Place(2, "coefficient", f"all of {name}", 1.0, "times", 1.0, entry=part, column=whole[:, part]))
+        add(f"all of {name}", part, whole[:, part])
     of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, bias_at_rest(equations))
     for i in range(nv):
-        row = values["h", i]
-        of = entry_name(("h", i), names)
-        found.append(Place(2, "coefficient", of, 1.0, "times", 1.0, entry=at["h", i], column=row))
-        found.append(Place(2, "coefficient", f"{of} at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i]))
+        row, entry = entry_name(("h", i), names), at["h", i]
+        add(row, entry, values["h", i])
+        add(f"{row} at rest", entry, weight[:, i])
         for j in range(nv) if nv <= MOST_SPEEDS else ():
             if j != i:
-                name = f"{entry_name(('h', j), names)} at rest in {of}"
-                found.append(Place(2, "coefficient", name, 0.0, "times", 1.0, entry=at["h", i], column=weight[:, j]))
+                add(f"{entry_name(('h', j), names)} at rest in {row}", entry, weight[:, j], stated=0.0)
         for (j, k), column in of_rates.items():
-            name = f"{of}, coefficient of {rates_name(j, k, names)}"
-            column = column[:, i] * equations.qd[:, j] * equations.qd[:, k]
-            found.append(Place(2, "coefficient", name, 1.0, "times", 1.0, entry=at["h", i], column=column))
+            name = f"{row}, coefficient of {rates_name(j, k, names)}"
+            add(name, entry, column[:, i] * equations.qd[:, j] * equations.qd[:, k])
     found += terms_of_rows(equations) if nv <= MOST_SPEEDS else []
     return [place for place in found if np.abs(place.column).max() > 0.0 and len(place.column) == states]
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from .cause import CLOSE, FACTORS, value_of
 from .fit import Fitted, Search
 from .model import BODY_TERMS, Equations, Path
 from .places import Place
-from .words import CLOSE, FACTORS, value_of
 
 ROUNDED_INERTIA = 1e-9  # of an inertia, that the digits of a fit may take from it
 

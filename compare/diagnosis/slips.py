@@ -99,7 +99,7 @@ def slips(equations: Equations) -> Iterator[Variant]:
     }
     for name, changed in slipped.items():
         for of, which in groups.items():
-            yield slip(name.format(of), "right", "so", lambda c=changed, w=which: parts.values(**only(parts, c, w)))
+            yield slip(name.format(of), "no", "yes", lambda c=changed, w=which: parts.values(**only(parts, c, w)))
     for of, which in groups.items():
         yield from in_mass_alone(parts, PARALLEL_AXIS.format(of), {"inertia": without_parallel}, which)
     for b, body in enumerate(tree.body_names):
@@ -111,8 +111,8 @@ def slips(equations: Equations) -> Iterator[Variant]:
             axes = "xyz"[x] + " and " + "xyz"[y]
             yield slip(
                 f"axes {axes} of the inertia of {body} exchanged",
-                "right",
-                "so",
+                "no",
+                "yes",
                 lambda i=swapped: parts.values(inertia=i),
             )
     yield from plain_numbers(equations)
@@ -131,7 +131,7 @@ def in_mass_alone(parts: Parts, name: str, changed: dict, which: list[int]) -> I
         of = f" in {entry_name(equations.entries[together[0]], equations.names)} alone"
         mixed = right.copy()
         mixed[..., together] = values[..., together]
-        yield slip(name + (IN_MASS_ALONE if len(together) > 1 else of), "right", "so", lambda v=mixed: v)
+        yield slip(name + (IN_MASS_ALONE if len(together) > 1 else of), "no", "yes", lambda v=mixed: v)
 
 
 def lagrange(equations: Equations) -> Iterator[Variant]:
@@ -212,13 +212,13 @@ def plain_numbers(equations: Equations) -> Iterator[Variant]:
     tree, made = equations.tree, []  # name, stated, explains, what is added to numbers
     for b, (body, com) in enumerate(zip(tree.body_names, tree.com)):
         added = {Path("com", (b, k)): -com[k] for k in range(3) if com[k]}
-        made.append((f"CoM of {body}", "where it is", "at the joint", added))
+        made.append((f"CoM of {body}", "as stated", "at the joint", added))
     for (a, one), (b, other) in combinations(enumerate(tree.body_names), 2):
         more = tree.mass[b] - tree.mass[a]
         made.append(
             (
                 f"masses of {one} and {other}",
-                "right",
+                "as stated",
                 "exchanged",
                 {Path("mass", (a,)): more, Path("mass", (b,)): -more},
             )

@@ -127,9 +127,10 @@ class Absolute(Recast):
         super().__init__(inner, change)
 
 
-def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Variant]:
-    """Order, senses and units of the joints. names: of the joints, as the given equations take them in this order."""
+def conventions(equations: Equations) -> Iterator[Variant]:
+    """Order, senses and units of the joints."""
     tree, q, qd = equations.tree, equations.q, equations.qd
+    names = tree.hinge_names
     coordinates = Coordinates(names, tree.kind)
     kinds, straight = dict(zip(names, tree.kind)), [name for name, kind in zip(names, tree.kind) if kind != "ball"]
 
@@ -172,13 +173,14 @@ def other_orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tup
             yield tuple(names[i] for i in order)
 
 
-def both(equations: Equations, names: tuple[str, ...], given: np.ndarray, weight: np.ndarray) -> Iterator[Variant]:
+def both(equations: Equations, given: np.ndarray, weight: np.ndarray) -> Iterator[Variant]:
     """An order and senses together, of up to six hinges and slides: those that explain the first state.
 
     given, weight: (states, entries), the weight 0 where nothing is given. There are tens of thousands of six joints: they are
     evaluated as states.
     """
-    tree, n = equations.tree, len(names)
+    tree, names = equations.tree, equations.tree.hinge_names
+    n = len(names)
     if n > MOST_PERMUTED or "ball" in tree.kind:
         return
     places = {name: i for i, name in enumerate(names)}

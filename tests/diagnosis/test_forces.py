@@ -40,7 +40,7 @@ def test_what_acts_besides_is_named(force, rank, place, explains):
 
 
 def test_neither_a_damper_nor_friction_below_zero_is_named():
-    assert causes(-0.1 * QD * [0, 1, 0]) == causes(-0.3 * np.sign(QD) * [1, 0, 0]) == []
+    assert causes(-0.1 * QD * [0, 1, 0]) == causes(-0.3 * np.sign(QD) * [1, 0, 0]) == ()
 
 
 @pytest.mark.parametrize("share, found", [(0.99, True), (1.01, False)])

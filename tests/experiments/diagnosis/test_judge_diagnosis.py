@@ -34,7 +34,7 @@ def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     assert row.items() >= named.items() and (cause["place"], cause["found"]) == (row["place"], row["explains"])
     assert "mass of forearm" in check.note and "1.51 kg" in check.note
     ((*_, caption),) = [draw() for draw in diagnosis.figures(result, None)]
-    assert "mass of forearm" in caption
+    assert caption.values["names"][0] == "mass of forearm"
 
 
 def test_damping_is_seen_in_accelerations_alone():
