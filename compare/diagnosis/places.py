@@ -1,7 +1,7 @@
 """The places where equations can be wrong by one number: of the model, of a term, of a coefficient.
 
-A change x of a place adds x times its coefficient to entries of the tree (or to factors of terms), or x times the right
-coefficient to an entry of Mbar or h. A convention of a joint, its zero, is a number too, of rank 1; the others are of rank 2.
+A change x of a place adds x times a coefficient to entries of the tree (or to factors of terms), or x times a column of values
+to an entry of Mbar or h. The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ OF_TERM = {
     "convective": "convective term T' m v_conv of {}", "Euler": "Euler term B' I w_conv of {}",
     "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
 }  # fmt: skip
-TOGETHER = {  # terms that are often left out together, and what they are called
+TOGETHER = {  # terms that are often left out together
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
     "velocity terms of {} in h": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
@@ -26,7 +26,7 @@ TOGETHER = {  # terms that are often left out together, and what they are called
 OF_BIAS = ("gravity", "convective", "Euler", "gyroscopic")  # of the terms, those of h
 EVERY_BODY = "every body"
 OF_ZERO = "zero position"  # the kind of a place
-MOST_SPEEDS = 12  # of which every product has its coefficients: there are nv^2 (nv + 1) / 2
+MOST_SPEEDS = 12  # with more, coefficients of products of speeds are not tried: there are nv^2 (nv + 1) / 2
 
 
 class Place(NamedTuple):
@@ -54,12 +54,11 @@ class Place(NamedTuple):
 
 
 def all_places(equations: Equations) -> list[Place]:
-    """All of them."""
     return [*numbers(equations), *terms(equations), *coefficients(equations), *forces_in_bias(equations)]
 
 
 def forces_in_bias(equations: Equations) -> list[Place]:
-    """Damping and springs of joints, which do not belong in h."""
+    """Damping and springs of joints that were added to h."""
     tree, nv, found = equations.tree, equations.nv, []
     first = len(equations.entries) - nv
 
@@ -80,7 +79,7 @@ def forces_in_bias(equations: Equations) -> list[Place]:
 
 
 def numbers(equations: Equations) -> list[Place]:
-    """Every number of the tree; where only the anchor of a joint moves, all that the joint carries stays where it is."""
+    """Every number of the tree. "anchor": the joint moves, all that it carries stays in place."""
     tree, stated = equations.tree, equations.stated
     length = max(1e-3, float(np.abs(stated["offset"]).max()), float(np.abs(stated["com"]).max()))
     found = []
@@ -123,7 +122,7 @@ def numbers(equations: Equations) -> list[Place]:
 
 
 def terms(equations: Equations) -> list[Place]:
-    """The factor of every term of each body, and of all bodies together where there are several; 1 is right."""
+    """The factor of every term of each body and of all bodies together; 1 is right."""
     bodies = equations.tree.body_names
     groups = {body: [b] for b, body in enumerate(bodies)}
     if len(bodies) > 1:
@@ -138,7 +137,7 @@ def terms(equations: Equations) -> list[Place]:
 
 
 def entry_name(entry: tuple, names: Sequence[str]) -> str:
-    """An entry of Mbar or h, "M[hip][knee]": of Mbar the one above the diagonal stands for both."""
+    """An entry of Mbar or h, "M[hip][knee]"; the entry of Mbar above the diagonal names both."""
     kind, *indices = entry
     return kind + "".join(f"[{names[i]}]" for i in sorted(indices))
 
