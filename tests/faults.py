@@ -112,7 +112,6 @@ def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", 
 
 
 def by_composite(tree: tmt.Tree, q, qd, edited: tmt.Tree | None = None):
-    """Mbar and h by tmt's composite form, of an edited tree where there is one."""
     M, h = mass_matrix_and_bias(edited or tree, list(q.T), list(qd.T))
     M = [np.stack([np.broadcast_to(x, len(q)) for x in row], axis=-1) for row in M]
     return np.stack(M, axis=1), np.stack([np.broadcast_to(x, len(q)) for x in h], axis=-1)
@@ -156,7 +155,6 @@ def changed(tree: tmt.Tree, number: tuple, rng: np.random.Generator) -> tuple[tm
 
 
 def faults_of(robot: str, tree: tmt.Tree, rng: np.random.Generator) -> list[Fault]:
-    """Faults of every kind of one tree, with numbers of random size."""
     found, names, n, bodies = [], tree.hinge_names, len(tree.axis), range(len(tree.mass))
 
     def add(kind, place, make, *values, **more):
@@ -220,7 +218,6 @@ def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
 
 
 def outcome(fault: Fault) -> tuple[str, list[str]]:
-    """What becomes of a fault, and the places that are named."""
     found = diagnosis_of(fault, seed=3)
     places = [cause.place for cause in found.causes]
     named = [cause for cause in found.causes if cause.place == fault.place]
