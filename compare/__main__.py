@@ -91,8 +91,6 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
 
     from .engines.mujoco import ModelError
     from .engines.own.own_file import OwnFileError
-    from .fleet.calls import door_opened
-    from .fleet.tasks import FleetError
     from .process.workers import WorkerEnded, load_modules, start_workers
     from .report.folder import FolderError, made_by, new_report
     from .report.terminal import Terminal
@@ -110,7 +108,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             raise Refused(f"{options.experiment} does not apply to {robot.name}: {say(reason)}")
         asked = known.asked_step(options.dt, options.integrator)
         before = made_by(options.out)
-        with door_opened(options.dask, options.workers) as door, new_report(options.out) as folder:
+        with new_report(options.out) as folder:
             for line in compared.lines:
                 terminal.say(line)
             if options.experiment == "stability" and reading and not reading.drive.feeds_back:
@@ -127,8 +125,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
                 reasons = {name: say(reason) for name in names if (reason := skipped(name, robot))}
                 origin = provenance.provenance(command, robot.mjcf, compared.file, SEED)  # of the model as it was read
                 of_run = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show, "reading": reading}
-                of_run["faults"] = options.experiment == "diagnosis" and not options.mjcf and not options.reference
-                of_run |= {"alone": options.experiment != "all", "asked": asked, "door": door}
+                of_run |= {"alone": options.experiment != "all", "asked": asked}
                 make = Setup.quick if options.quick else Setup
                 setup = make(robot, engines(mujoco, compared.own), **of_run)
                 for name, reason in reasons.items():
@@ -144,7 +141,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             origin |= provenance.durations(workers.clock)
             report = verdict.Report(sections, robot, origin, words, causes, list(reasons.items()), compared)
             files.write(folder, report, parts)
-    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded, FleetError) as error:
+    except (ModelError, OwnFileError, SceneError, FolderError, WorkerEnded) as error:
         raise Refused(error) from None
     terminal.say()
     good = verdict.passed(sections) and not parts.broken

@@ -154,9 +154,9 @@ WRONG = {  # arguments, each with what is in its line
     "--quick fleet x": "fleet must come first",
     "mass --reference my.py": "my.py:OBJECT", "mass --out": "--out: expected one argument",
     # values, and options that do not go together
-    "mass --mjcf=": "--mjcf: the name is empty", "diagnosis --workers 0": "'0'", "stability --dt nan": "'nan'",
+    "mass --mjcf=": "--mjcf: the name is empty", "stability --dt nan": "'nan'",
     "stability --dt 5.1": "'5.1'", "mass --scenes my.toml": "mass", "mass --dask tcp://x:1": "--dask",
-    "diagnosis --reference model --workers 2": "--reference", "diagnosis --workers 2 --dask tcp://x:1": "--dask",
+    "diagnosis": "--mjcf", "diagnosis --mjcf arm.xml --workers 2": "--workers",
     "all --integrator Euler": "--integrator", "mass --joints hip,knee --reference model": "--joints",
     # what is found only when it is looked for
     "speed --scenes my.toml": "my.toml", "mass --mjcf missing.xml": "missing.xml", f"mass --mjcf {ROOT}": "directory",

@@ -126,7 +126,7 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
 
     for name in names:
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
-    setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, faults=False, is_quick=False, alone=True)
+    setup = SimpleNamespace(engines={}, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
     assert log == [
         ("rows", "mass"), ("figures", "mass", None), ("rows", "stability"), ("figures", "stability", None), ("rows", "speed"),

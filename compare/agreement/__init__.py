@@ -1,8 +1,8 @@
-"""Equations of one's own compared with MuJoCo, entry by entry: for tests of one's own.
+"""Equations of one's own compared with MuJoCo, entry by entry, for tests of one's own.
 
-The tolerance of an entry is (64 eps + rtol) x its scale. The scale is the sum of the absolute values of the terms that are
-added up in it, see judge/entries.py, and not the entry itself: that may be the small rest of large terms, and what a rounded
-constant leaves in it is as large as in the terms.
+The tolerance of an entry is (64 eps + rtol) x its scale. The scale is the sum of the absolute values of its terms, see
+judge/entries.py, not the entry itself: that may be a small difference of large terms, and a rounded constant changes it by
+as much as the terms.
 """
 
 from __future__ import annotations  # so that help() shows the short names of types
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from .given import Given, State
 from .message import message
-from .why import cause_of
+from .why import Why, cause_of
 
 __all__ = ["Difference", "State", "assert_agrees", "differences"]
 
@@ -31,12 +31,12 @@ class Difference(NamedTuple):
 
     quantity: "mass_matrix", "bias", "gravity" or "acceleration".
     entry: such as "M[hip][knee]" or "h[hip]".
-    state: number, q, qd and tau, each as one's own equations take it.
+    state: number, q, qd and tau, in the joints of one's own equations.
     yours, mujoco: both values: kg m2 (M), N m (h, gravity), rad/s2 (acceleration), of slides kg, N and m/s2.
     difference: yours - mujoco.
     tolerance: (64 eps + rtol) times the scale of the entry.
-    ratio: of the difference to its tolerance; they agree if it is at most 1; inf where yours is not a finite number.
-    cause: the probable cause of all that differs, in a sentence; "" where the entry agrees.
+    ratio: of the difference to its tolerance, at most 1 if they agree; inf where yours is not a finite number.
+    cause: the probable cause of all differences, in a sentence; "" where the entry agrees.
     """
 
     quantity: str
@@ -65,22 +65,23 @@ def assert_agrees(
     states: int = 100,
     seed: int = 0,
 ) -> None:
-    """Compare equations of your own with MuJoCo: AssertionError, with the worst place and the probable cause, unless they agree.
+    """Compare equations of your own with MuJoCo; raise AssertionError with the worst entry and the probable cause if they differ.
 
     mjcf: a path, MJCF text or an MjModel; contacts, limits, actuators and equalities are switched off.
-    mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): each a function of one state or a batch, or the array of
-    its values at the given q (N, nq), qd, tau (N, nv), or a pair of a SymPy matrix and the list of its symbols.
-    Mbar qdd + h = tau - D qd - k (q - rest), with D and k of the joints in acceleration alone; rad, N m, and m, N of slides.
-    q, qd, tau: the states, in joints of one's own; None: `states` random ones by `seed`, within the joints' ranges. A UserWarning
-    says where `states` is not what is compared: q is given, or your functions or so many states would take long.
-    joints: the joints as one's own equations take them, such as ["knee", "-hip", "ankle+90deg"]; None: as the model has them.
-    rtol: of each entry's scale, beside the tolerance of rounding: for equations whose constants are rounded.
-    ValueError, in one line, for what cannot be compared: a model, a shape, a function that raises at the first state.
+    mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state or a batch, or the array of its
+    values at the given q (N, nq), qd, tau (N, nv), or a pair of a SymPy matrix and the list of its symbols.
+    Mbar qdd + h = tau - D qd - k (q - rest); damping D and springs k of the joints are in acceleration alone. Units: rad and N m,
+    for slides m and N.
+    q, qd, tau: the states, in your joints; None: `states` random states from `seed`, within the joints' ranges. A UserWarning
+    is issued if the number of states is not `states`: because q is given, or because the functions take too long.
+    joints: the joints as your equations take them, such as ["knee", "-hip", "ankle+90deg"]; None: those of the model.
+    rtol: added to the tolerance, relative to the scale of each entry, for equations with rounded constants.
+    Raises ValueError for a model or shape that cannot be compared, or a function that raises at the first state.
     """
     __tracebackhide__ = True  # pytest shows the line of the test
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
     if given.fails or given.problems:
-        raise AssertionError(message(given, *(cause_of(given) if given.fails else ("", False))))
+        raise AssertionError(message(given, cause_of(given) if given.fails else Why()))
 
 
 def differences(
@@ -98,12 +99,12 @@ def differences(
     states: int = 100,
     seed: int = 0,
 ) -> list[Difference]:
-    """Every entry of every quantity at every state beside MuJoCo's, the largest ratio first; they agree if all are at most 1.
+    """Every entry of every quantity at every state, the largest ratio first; they agree if all ratios are at most 1.
 
     The same arguments and errors as `assert_agrees`.
     """
     given = Given(mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed)
-    cause = cause_of(given)[0] if given.fails else ""
+    cause = cause_of(given).text if given.fails else ""
     found = []
     for name, one in given.compared.items():
         entries = given.entries(name)

@@ -1,4 +1,4 @@
-"""What is to be compared, checked: the model, the states, and each quantity in one's own equations and in MuJoCo."""
+"""The arguments of assert_agrees, validated: the model, the states, each quantity in one's own equations and in MuJoCo."""
 
 import warnings
 from collections.abc import Mapping
@@ -22,13 +22,8 @@ from ..robots.given import is_number
 from ..robots.joint_map import JointMap, joint_map
 from ..robots.states import random
 
-SYMBOLS_OF = {
-    "mass_matrix": "M",
-    "bias": "h",
-    "gravity": "g",
-    "acceleration": "qdd",
-}  # and what their entries are called
-STATES_UNLESS_ASKED = 100  # random ones, unless another number is asked for
+SYMBOLS_OF = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # quantities and their entries
+DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s of one's own functions at random states
 
 
@@ -51,19 +46,19 @@ class Compared(NamedTuple):
 
     @property
     def ratio(self) -> np.ndarray:
-        """Of the difference to the tolerance; 0 where both are 0, inf where one's own is no finite number."""
+        """Of the difference to the tolerance; 0 where both are 0, inf where one's own is not a finite number."""
         off = np.abs(self.own - self.right)
         return over(np.where(np.isfinite(off), off, np.inf), self.tolerance)
 
 
 class Given:
-    """What `assert_agrees` and `differences` are given, with what it is compared with."""
+    """The arguments of `assert_agrees` and `differences`, and MuJoCo's values."""
 
     def __init__(self, mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed):
         brought = dict(zip(SYMBOLS_OF, (mass_matrix, bias, gravity, acceleration)))
         brought = {name: value for name, value in brought.items() if value is not None}
         if not brought:
-            raise ValueError(f"there is nothing to compare; {', '.join(SYMBOLS_OF)} or some of them are expected")
+            raise ValueError(f"nothing to compare: expected {', '.join(SYMBOLS_OF)} or some of them")
         if not is_number(rtol) or rtol < 0.0:
             raise ValueError(f"rtol is {shown(rtol)}; a number of at least 0 is expected")
         self.rtol, self.brought = float(rtol), brought
@@ -83,15 +78,12 @@ class Given:
             self.take_random(states, seed)
         else:
             self.take_states(q, qd, tau)
-            if states != STATES_UNLESS_ASKED:
+            if states != DEFAULT_STATES:
                 warnings.warn(
                     f"states={shown(states)} is not used: the {len(self.q)} states of q are compared", stacklevel=3
                 )
 
-    # the model
-
     def read(self, mjcf) -> None:
-        """Read the model."""
         from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
 
         if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
@@ -101,10 +93,8 @@ class Given:
         self.mujoco = engine(reading).of(self.robot.case())
         self.tree, self.coordinates = reading.tree, Coordinates(reading.tree.hinge_names, reading.tree.kind)
 
-    # the states
-
     def take_random(self, states: int, seed: int) -> None:
-        """Random states, fewer where one's own functions take long."""
+        """Random states, fewer if one's own functions take long."""
         for name, value, least in (("states", states, 1), ("seed", seed, 0)):
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
                 raise ValueError(f"{name} is {shown(value)}; a whole number of at least {least} is expected")
@@ -115,12 +105,12 @@ class Given:
         self.own.try_at(self.q, self.qd, self.tau)
         count = self.own.affordable(len(self.q), OWN_SECONDS)
         if count < len(self.q):
-            said = f"{count} states in place of {states}: your functions take {self.own.seconds:.2g} s a state"
-            warnings.warn(said, stacklevel=4)
+            text = f"{count} states instead of {states}: your functions take {self.own.seconds:.2g} s per state"
+            warnings.warn(text, stacklevel=4)
             self.q, self.qd, self.tau = self.q[:count], self.qd[:count], self.tau[:count]
 
     def take_states(self, q, qd, tau) -> None:
-        """The states that are given, in joints of one's own."""
+        """The given states, in joints of one's own."""
         nq, nv = self.coordinates.nq, self.coordinates.nv
         own = {"q": rows_given("q", q, nq, None)}
         count = len(own["q"])
@@ -134,7 +124,7 @@ class Given:
         for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
             off = np.abs(np.linalg.norm(self.q[:, joint.q], axis=1) - 1.0).max() if joint.kind == "ball" else 0.0
             if off > CLOSE_TO_ONE:
-                raise ValueError(f"q of {name} is no quaternion of length 1 at every state; w, x, y, z is expected")
+                raise ValueError(f"q of {name} is not a quaternion of length 1 at every state; w, x, y, z is expected")
 
     @cached_property
     def states(self) -> list[State]:
@@ -142,8 +132,6 @@ class Given:
         of = self.joints
         own = of.own_positions(self.q), of.own_speeds(self.qd), of.own_forces(self.tau)
         return [State(i, *map(tuple, state)) for i, state in enumerate(zip(*(part.tolist() for part in own)))]
-
-    # the quantities
 
     @cached_property
     def values(self) -> dict[str, np.ndarray]:
@@ -159,7 +147,7 @@ class Given:
         return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
 
     def table(self, name: str, brought: object) -> np.ndarray:
-        """An array of values, as it is given, (states, ...); rows of a table may be the rows of Mbar one after the other."""
+        """An array of values, (states, ...), in one's own joints; a row may have the rows of Mbar one after the other."""
         count, nv = len(self.q), self.coordinates.nv
         array = real_numbers(brought)
         shape = (count, nv, nv) if name == "mass_matrix" else (count, nv)
@@ -196,7 +184,7 @@ class Given:
         return found
 
     def entries(self, name: str) -> dict[tuple, str]:
-        """What the entries of a quantity are called, by their place."""
+        """The names of the entries of a quantity, by their place."""
         names = [self.coordinates.speeds[i] for i in self.joints.v]
         symbol = SYMBOLS_OF[name]
         if name == "mass_matrix":
@@ -205,17 +193,16 @@ class Given:
 
     @property
     def fails(self) -> bool:
-        """Whether an entry is beyond its tolerance."""
         return any((one.ratio > 1.0).any() for one in self.compared.values())
 
     @property
     def problems(self) -> list[str]:
-        """What else is wrong with one's own functions, a line each."""
+        """Other errors of one's own functions, a line each."""
         return [problem.text for problem in self.own.problems] if self.own is not None else []
 
 
 def rows_given(name: str, values: object, size: int, count: int | None) -> np.ndarray:
-    """States as rows, (states, size); a number stands for all. ValueError for anything else. count: of states, None: any."""
+    """States as rows, (states, size); a number is used for all. ValueError for anything else. count: of states, None: any."""
     array = real_numbers(values)
     expected = f"({'states' if count is None else count}, {size})"
     if array is None:

@@ -1,4 +1,4 @@
-"""The probable cause of a difference, in a sentence: what the diagnosis finds in Mbar and h, and what can only be in qdd."""
+"""The probable cause of a difference: what the diagnosis finds in Mbar and h, and what can only be in the accelerations."""
 
 from typing import NamedTuple
 
@@ -6,94 +6,81 @@ import numpy as np
 
 from tmt import literal
 
-from ..diagnosis import STATES_ASKED
-from ..diagnosis.consistency import conditions, symmetric
-from ..diagnosis.finding import LEAST_STATES
-from ..diagnosis.forces import causes_of_forces
-from ..diagnosis.stated import diagnose_stated
-from ..diagnosis.words import joints_stated
+from ..diagnosis import STATES_ASKED, Diagnosis, Values, diagnose_stated
+from ..diagnosis.cause import LEAST_STATES, Cause, joints_stated
+from ..diagnosis.consistency import Condition, conditions, symmetric
+from ..diagnosis.forces import causes_of_forces, force_left_over
 from ..engines.own import QUICK
 from ..judge.check import over
 from ..judge.entries import Entries
+from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
+from ..report.text import say
 from .given import Given
 
 SECONDS_OF_CAUSE = 10.0  # of a search
 SHARPER = 4.0  # times the tolerance: of Mbar and h that are found from accelerations
-SHOWN_CAUSES = 4
 
 
-class Values(NamedTuple):
-    """Mbar and h of one's own with their tolerances, at states in the model's joints: what a diagnosis is given."""
+class Why(NamedTuple):
+    """What explains a difference."""
 
-    q: np.ndarray
-    qd: np.ndarray
-    mass_matrix: np.ndarray | None
-    bias: np.ndarray | None
-    tolerances: tuple[np.ndarray, np.ndarray]  # of Mbar and h
+    kind: str = ""  # "condition", "forces", "solved", "accelerations_alone" or "diagnosis"; "": nothing was searched
+    condition: Condition | None = None  # the first that Mbar and h do not meet
+    diagnosis: Diagnosis | None = None
+    forces: tuple[Cause, ...] = ()
+    instead: list[str] | None = None  # joints that were stated, if others explain
+    may_be_rounded: bool = False  # whether rounded constants may be the cause
+
+    @property
+    def text(self) -> str:
+        """The cause in words; "": none."""
+        return say(Finding("agreement", "why", {"why": self})) if self.kind else ""
 
 
-def cause_of(given: Given) -> tuple[str, bool]:
-    """The sentence, "" where there are no values of which it could be sought; and whether rounded constants may have done it."""
-    if len(some_states(given)) < min(LEAST_STATES, len(given.q)):
-        return "", False  # too few of them are numbers
+def cause_of(given: Given) -> Why:
+    """The probable cause of what differs."""
+    which = some_states(given)
+    if len(which) < min(LEAST_STATES, len(given.q)):
+        return Why()  # too few of them are numbers
     failing = [name for name, one in given.compared.items() if (one.ratio > 1.0).any()]
     if failing == ["acceleration"]:
-        which = some_states(given)
         if acting := of_forces(given, which):
-            return acting, True
+            return Why("forces", forces=acting, may_be_rounded=True)
         if {"mass_matrix", "bias"} <= given.compared.keys():
-            return "mass_matrix and bias agree: it is in how they are solved, or in damping, springs or friction.", True
+            return Why("solved", may_be_rounded=True)
         values = of_accelerations(given, which)
     else:
-        values = of_equations(given, [name for name in failing if name != "acceleration"])
+        values = of_equations(given, which, [name for name in failing if name != "acceleration"])
     if values is None:
-        return "It cannot be found in values of accelerations alone: give mass_matrix and bias too.", True
-    return diagnosed_sentence(given, values)
+        return Why("accelerations_alone", may_be_rounded=True)
+    return diagnosed(given, values)
 
 
-def diagnosed_sentence(given: Given, values: Values) -> tuple[str, bool]:
-    """What a diagnosis says of values, and whether rounded constants may have done it."""
+def diagnosed(given: Given, values: Values) -> Why:
+    """What a diagnosis finds in values of Mbar and h."""
     own, M = given.own, values.mass_matrix
     if M is not None and np.isfinite(M).all():
         mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), given.coordinates.speeds)
         if not mirrored.is_met:
-            return mirrored.text, False
+            return Why("condition", mirrored)
 
     def bias(qd: np.ndarray) -> np.ndarray:
         return own.bias(values.q, qd)
 
-    can_be_asked = own is not None and own.has("bias") and own.seconds <= QUICK and "bias" in given.compared
-    found = diagnose_stated(
-        given.tree,
-        given.joints,
-        values.q,
-        values.qd,
-        (M, values.bias),
-        values.tolerances,
-        SECONDS_OF_CAUSE,
-        bias if can_be_asked else None,
-    )
+    is_quick = own is not None and own.seconds <= QUICK
+    of_speeds = bias if is_quick and own.has("bias") and "bias" in given.compared else None
+    found = diagnose_stated(given.tree, given.joints, values, SECONDS_OF_CAUSE, of_speeds)
     if not found.differs:
-        return "", True
-    sentence = found.sentence
-    if given.are_stated and any(cause.joints and not cause.joints.is_same for cause in found.causes):
-        sentence += f" That is to take the place of joints={joints_stated(given.joints)}."
-    if not found.causes and (broken := first_broken(given, values)):
-        return f"{broken} {sentence}", found.is_small
+        return Why(may_be_rounded=True)
+    restated = given.are_stated and any(cause.joints and not cause.joints.is_same for cause in found.causes)
+    condition, are_finite = None, all(np.isfinite(part).all() for part in (M, values.bias) if part is not None)
+    if not found.causes and is_quick and are_finite and own.has("mass_matrix") and own.has("bias"):
+        every = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, given.qd[: len(values.q)])
+        condition = next((one for one in every if not one.is_met), None)
     is_of_numbers = not found.causes or any("number" in cause.kind for cause in found.causes)
-    return sentence, found.is_small and is_of_numbers
-
-
-def first_broken(given: Given, values: Values) -> str:
-    """What is wrong with Mbar and h of one's own whatever the model is; "" if that is nothing, or takes long to find out."""
-    own = given.own
-    if own is None or not (own.has("mass_matrix") and own.has("bias")) or own.seconds > QUICK:
-        return ""
-    if not all(np.isfinite(part).all() for part in (values.mass_matrix, values.bias) if part is not None):
-        return ""
-    known = conditions(own.mass_matrix, own.bias, given.coordinates, values.q, given.qd[: len(values.q)])
-    return next((condition.text for condition in known if not condition.is_met), "")
+    instead = joints_stated(given.joints) if restated else None
+    return Why("diagnosis", condition, found, instead=instead, may_be_rounded=found.is_small and is_of_numbers)
 
 
 def some_states(given: Given) -> np.ndarray:
@@ -105,9 +92,8 @@ def some_states(given: Given) -> np.ndarray:
     return np.unique([finite[np.argmax(worst[finite])], *finite[: STATES_ASKED - 1]])
 
 
-def of_equations(given: Given, failing: list[str]) -> Values:
+def of_equations(given: Given, which: np.ndarray, failing: list[str]) -> Values:
     """Mbar and h at some of the states, gravity in the place of h where that alone is given or off."""
-    which = some_states(given)
     q, qd = given.q[which], given.qd[which]
     own = {name: values[which] for name, values in given.values.items()}
     M, h = own.get("mass_matrix"), own.get("bias")
@@ -123,19 +109,16 @@ def above_zero(allowed: np.ndarray) -> np.ndarray:
     return np.maximum(allowed, np.finfo(float).tiny / EPS)
 
 
-def of_forces(given: Given, which: np.ndarray) -> str:
-    """What explains accelerations that do not follow from the right Mbar and h: damping, springs and the like; "": nothing."""
+def of_forces(given: Given, which: np.ndarray) -> tuple[Cause, ...]:
+    """What explains accelerations that do not follow from the right Mbar and h: damping, springs and the like."""
     tree, q, qd, tau = given.tree, given.q[which], given.qd[which], given.tau[which]
-    qdd = given.values["acceleration"][which]
-    M, h = literal.mass_matrix(q, tree), literal.bias(q, qd, tree)
-    pull = literal.spring_torque(q, tree) if tree.has_springs else 0.0
-    acting = tau - np.array(tree.damping) * qd - pull - h - np.einsum("sij,sj->si", M, qdd)
+    qdd, h = given.values["acceleration"][which], literal.bias(q, qd, tree)
+    acting = force_left_over(tree, q, qd, tau, literal.mass_matrix(q, tree), h, qdd)
     scale = Entries(tree, q, qd)
     allowed = SHARPER * (FACTOR * EPS + given.rtol) * scale.residual(scale.force(tau), qdd)
     if not np.isfinite(acting).all() or not (over(np.abs(acting), allowed) > 1.0).any():
-        return ""
-    causes = causes_of_forces(tree, q, qd, tau, h, acting, above_zero(allowed))
-    return "; or ".join(cause.text for cause in causes[:SHOWN_CAUSES]) + "." * bool(causes)
+        return ()
+    return causes_of_forces(tree, q, qd, tau, h, acting, above_zero(allowed))
 
 
 def of_accelerations(given: Given, which: np.ndarray) -> Values | None:

@@ -84,8 +84,6 @@ OPTIONS_OF_ALL = {
     "--scenes": Option(metavar="FILE", in_all=True),
     "--dt": Option(step_in_seconds, "S"),
     "--integrator": Option(metavar="NAME"),
-    "--workers": Option(process_count, "N"),
-    "--dask": Option(metavar="ADDRESS"),
 }
 
 
@@ -192,7 +190,5 @@ def refuse_what_does_not_go_together(whole: Parser, options: argparse.Namespace)
             whole.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
     if options.joints and ":" not in (options.reference or ""):
         whole.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
-    if options.dask and options.workers:
-        whole.error("--workers is for processes on this machine; --dask uses those of a cluster")
-    if (options.dask or options.workers) and (options.mjcf or options.reference):
-        whole.error("--workers and --dask are for diagnosis without --mjcf and --reference")
+    if name == "diagnosis" and not (options.mjcf or options.reference):
+        whole.error("diagnosis needs a robot's file or equations of your own (--mjcf, --reference)")

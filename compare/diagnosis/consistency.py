@@ -1,9 +1,9 @@
-"""Whether Mbar and h can belong together, whatever the model is: found without any reference.
+"""Whether Mbar and h can belong together, whatever the model is; no reference is needed.
 
-Mbar must be symmetric and positive definite; h at rest the gradient of an energy; h less h at rest quadratic in the rates, and
-its power qd' (h - h(q, 0)) half of qd' Mdot qd along the motion. Derivatives are central differences of fourth order, whose error
-is taken from a step twice as long. Noise in the values (single precision, constants of a table that are interpolated) is
-measured first, by differences of sixth order over steps too short for anything else, and belongs to every tolerance.
+Mbar must be symmetric and positive definite; h at rest must be the gradient of an energy; h - h(q, 0) must be quadratic in the
+speeds, and its power must be qd' Mdot qd / 2. Derivatives are central differences of fourth order; their error is estimated
+with a step twice as long. Noise in the values (single precision, interpolated tables) is measured first, by differences of sixth
+order over short steps, and added to every tolerance.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,8 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..judge.finding import Finding
 from ..judge.scale import EPS, FACTOR
+from ..report.text import say
 from ..robots.coordinates import Coordinates
+from .cause import TEMPLATE
 
 STEP = 2e-3  # rad or m, or s along a motion of about one rad/s
 SAFETY = 8.0  # times the error or the noise that is estimated
@@ -24,13 +27,16 @@ ORDER = 6
 class Condition(NamedTuple):
     """One condition at the state that comes closest to breaking it."""
 
-    name: str  # what holds when it is met
+    name: str
     value: float
     tolerance: float
     unit: str
-    state: int
-    text: str  # what is wrong where it is not met
+    finding: Finding  # what is wrong where it is not met
     rule: str = "at most"  # or "at least"
+
+    @property
+    def text(self) -> str:
+        return say(self.finding)
 
     @property
     def is_met(self) -> bool:
@@ -42,8 +48,7 @@ def conditions(
 ) -> list[Condition]:
     """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv), at states q (states, nq), qd (states, nv).
 
-    A later one is asked only where those before it that it needs are met: of a bias with a part that is linear in the rates, the
-    power is that of the rest.
+    The power is evaluated only for a symmetric M, and without the part of h that is linear in the speeds.
     """
     M, still = np.asarray(mass_matrix(q)), np.zeros_like(qd)
     floors = FACTOR * EPS * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
@@ -78,9 +83,8 @@ def symmetric(M: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condi
     skew = np.abs(M - np.swapaxes(M, 1, 2))
     s = int(np.argmax(ratios(skew.max(axis=(1, 2)), allowed)))
     i, j = np.unravel_index(np.argmax(skew[s]), skew[s].shape)
-    a, b = names[i], names[j]
-    text = f"Your M is not symmetric: M[{a}][{b}] is {M[s, i, j]:.6g}, M[{b}][{a}] is {M[s, j, i]:.6g}."
-    return Condition("M is symmetric", float(skew[s].max()), float(allowed[s]), "kg m2", s, text)
+    wrong = Finding(TEMPLATE, "symmetric", {"names": (names[i], names[j]), "values": (M[s, i, j], M[s, j, i])})
+    return Condition("M is symmetric", float(skew[s].max()), float(allowed[s]), "kg m2", wrong)
 
 
 def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
@@ -91,8 +95,8 @@ def definite(M: np.ndarray, allowed: np.ndarray) -> Condition:
     least = np.linalg.eigvalsh(M / (root[:, :, None] * root[:, None, :]))[:, 0]
     s = int(np.argmin(least))
     floor = allowed[s] / diagonal[s].max() if diagonal[s].max() > 0.0 else 0.0
-    text = f"Your M is not positive definite: its least eigenvalue, in units of its diagonal, is {least[s]:.3g}."
-    return Condition("M is positive definite", float(least[s]), float(floor), "", s, text, "at least")
+    wrong = Finding(TEMPLATE, "definite", {"least": least[s]})
+    return Condition("M is positive definite", float(least[s]), float(floor), "", wrong, "at least")
 
 
 def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, floor: float) -> Condition | None:
@@ -114,11 +118,8 @@ def gradient_at_rest(weight: Callable, coordinates: Coordinates, q: np.ndarray, 
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
     s, a, b = map(int, np.unravel_index(np.argmax(ratios(curl, allowed)), curl.shape))
     one, other = coordinates.speeds[straight[a]], coordinates.speeds[straight[b]]
-    text = (
-        f"Your h at rest is not the gradient of an energy: dh[{one}]/d {other} is {slopes[s, a, b]:.6g} and dh[{other}]/d "
-        f"{one} is {slopes[s, b, a]:.6g}."
-    )
-    return Condition("h at rest is a gradient", float(curl[s, a, b]), float(allowed[s, a, b]), "N m/rad", s, text)
+    wrong = Finding(TEMPLATE, "gradient", {"names": (one, other), "values": (slopes[s, a, b], slopes[s, b, a])})
+    return Condition("h at rest is a gradient", float(curl[s, a, b]), float(allowed[s, a, b]), "N m/rad", wrong)
 
 
 def even(ahead: np.ndarray, behind: np.ndarray, allowed: np.ndarray, names: Sequence[str]) -> Condition:
@@ -126,22 +127,19 @@ def even(ahead: np.ndarray, behind: np.ndarray, allowed: np.ndarray, names: Sequ
     odd = np.abs(ahead - behind) / 2.0
     s = int(np.argmax(ratios(odd.max(axis=1), allowed)))
     i = int(np.argmax(odd[s]))
-    text = f"Your bias is linear in qd: is damping in it? Of h[{names[i]}] {odd[s, i]:.3g} N m changes its sign with the rates."
-    return Condition("h is even in the rates", float(odd[s, i]), float(allowed[s]), "N m", s, text)
+    wrong = Finding(TEMPLATE, "even", {"name": names[i], "value": odd[s, i]})
+    return Condition("h is even in the rates", float(odd[s, i]), float(allowed[s]), "N m", wrong)
 
 
 def quadratic(of_rates: np.ndarray, doubled: np.ndarray, floor: np.ndarray, names: Sequence[str]) -> Condition:
-    """Twice the rates, four times what they add to h."""
+    """At twice the speed the velocity terms are four times as large."""
     off = np.abs(doubled - 4.0 * of_rates)
     allowed = 4.0 * floor
     s = int(np.argmax(ratios(off.max(axis=1), allowed)))
     i = int(np.argmax(off[s]))
     factor = doubled[s, i] / of_rates[s, i] if of_rates[s, i] else np.inf
-    text = (
-        f"Your h is not quadratic in the rates: at twice the rates their part of h[{names[i]}] is {factor:.4g} times as large, "
-        "not 4."
-    )
-    return Condition("h is quadratic in the rates", float(off[s, i]), float(allowed[s]), "N m", s, text)
+    wrong = Finding(TEMPLATE, "quadratic", {"name": names[i], "factor": factor})
+    return Condition("h is quadratic in the rates", float(off[s, i]), float(allowed[s]), "N m", wrong)
 
 
 def power_balance(
@@ -170,18 +168,9 @@ def power_balance(
     allowed = SAFETY * error + total**2 * floor_M / STEP + 2.0 * total * floor_h / squared
     s = int(np.argmax(ratios(off, allowed)))
     watts = largest[s, 0] ** 3
-    text = (
-        f"Your h does not belong to your M: qd'(h - h at rest) is {given[s] * watts:.6g} W, and half of qd' Mdot qd is "
-        f"{slope[s] * watts:.6g} W."
-    )
-    return Condition(
-        "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2",
-        float(off[s] * watts),
-        float(allowed[s] * watts),
-        "W",
-        s,
-        text,
-    )
+    wrong = Finding(TEMPLATE, "power", {"yours": given[s] * watts, "right": slope[s] * watts})
+    name = "h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2"
+    return Condition(name, float(off[s] * watts), float(allowed[s] * watts), "W", wrong)
 
 
 def derivative(function: Callable) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

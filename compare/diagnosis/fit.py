@@ -1,4 +1,4 @@
-"""Which change of one place, or of two, explains equations: least squares over the states, many places at once."""
+"""Fits: which change of one place, or of two, explains given values; least squares over the states, many places at once."""
 
 import time
 from collections.abc import Sequence
@@ -12,8 +12,8 @@ from .model import TINY, Equations, Path
 from .places import OF_ZERO, Place
 
 ROUNDS = 25  # of a search from one start
-LEADING, PARTNERS = 4, 8  # single places, and others tried beside each
-FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds so many go on
+LEADING, PARTNERS = 4, 8  # single places, and others that are tried with each
+FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds only the best go on
 CONVERGED = 1e-14  # a step of a place, of its size
 SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
@@ -24,7 +24,7 @@ TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # further
 
 
 class Fitted(NamedTuple):
-    """A change of places that comes closest to the equations."""
+    """The best change of one or two places."""
 
     places: tuple[Place, ...]
     changes: tuple[float, ...]
@@ -33,14 +33,14 @@ class Fitted(NamedTuple):
 
 
 class OutOfTime(Exception):
-    """A search has taken the time that it was given."""
+    """A search has used its time."""
 
 
 class Search:
     """Changes of places of the right equations that come closest to given values.
 
     given: (states, entries) as `Equations.values`; NaN where nothing is given. tolerance: of each entry, (states, entries).
-    end: of time.monotonic(), when the search is over: OutOfTime.
+    end: the time.monotonic() at which OutOfTime is raised.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Search:
         self.pair_fits: list[Fitted] = []
 
     def weighted(self, values: np.ndarray) -> np.ndarray:
-        """What is left of given values, in tolerances, (..., states, entries); 0 where nothing is given."""
+        """Given values minus others, in tolerances, (..., states, entries); 0 where nothing is given."""
         return np.where(self.known, np.where(self.known, self.given, 0.0) - values, 0.0) * self.weight
 
     @property
@@ -71,7 +71,7 @@ class Search:
         return bool(np.abs(self.off).max() > 1.0)
 
     def values(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Of each row of changes, (rows, states, entries): x (rows, k), of the places which (rows, k)."""
+        """Values for each row of changes, (rows, states, entries): x (rows, k), of the places which (rows, k)."""
         if len(which) > ROWS:
             return np.concatenate(
                 [self.values(which[k : k + ROWS], x[k : k + ROWS]) for k in range(0, len(which), ROWS)]
@@ -92,12 +92,12 @@ class Search:
         return values
 
     def derivatives(self, which: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """By each of the k changes, in tolerances, (rows, k, states, entries)."""
+        """Derivatives by each of the k changes, in tolerances, (rows, k, states, entries)."""
         steps = np.eye(x.shape[1]) * (1j * TINY)
         return np.stack([self.values(which, x + step).imag / TINY for step in steps], axis=1) * self.weight
 
     def fitted(self, which: np.ndarray, x: np.ndarray, rounds: int = ROUNDS) -> tuple[np.ndarray, np.ndarray]:
-        """The changes nearest to the starts x (rows, k) that come closest, and what is then left, (rows, states, entries)."""
+        """The best changes from the starts x (rows, k), and what they leave, (rows, states, entries)."""
         size = np.array([[self.places[place].size for place in row] for row in which])
         left = self.weighted(self.values(which, x))
         best, damping, moving = (left**2).sum(axis=(1, 2)), np.full(len(x), 1e-3), np.arange(len(x))
@@ -106,7 +106,7 @@ class Search:
             J = J * size[moving][:, :, None]
             normal = np.einsum("rim,rjm->rij", J, J)
             diagonal = np.einsum("rii->ri", normal)
-            diagonal = np.where(diagonal > SEEN, diagonal, 1.0)  # a place that nothing is seen of stays
+            diagonal = np.where(diagonal > SEEN, diagonal, 1.0)  # a place without influence stays
             scaled = normal / np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
             scaled += np.eye(x.shape[1]) * damping[moving][:, None, None]
             down = np.einsum("rim,rm->ri", J, left[moving].reshape(len(moving), -1)) / np.sqrt(diagonal)
@@ -125,7 +125,7 @@ class Search:
         return x, left
 
     def outcome(self, which: np.ndarray, x: np.ndarray, left: np.ndarray) -> list[Fitted]:
-        """Of each set of places the best row, the smallest remainder first."""
+        """The best row of each set of places, the smallest remainder first."""
         found = {}
         for places, changes, rest in zip(which, x, left):
             ratio = float(np.nan_to_num(np.abs(rest).max(), nan=np.inf))
@@ -138,15 +138,15 @@ class Search:
 
     @cached_property
     def nearest(self) -> list[tuple[float, float]]:
-        """Of each place what the best change leaves, in tolerances, and that change, as far as the values are quadratic in it."""
+        """What the best change of each place leaves, in tolerances, and that change, for values quadratic in it."""
         found = nearest_changes(*self.expansion, self.off)
         return [(left, best * place.size) for (left, best), place in zip(found, self.places)]
 
     def singles(self) -> list[Fitted]:
         """Each place alone, the smallest remainder first.
 
-        Where the values are quadratic in its change, the best one is the root of a cubic; of these the few that come closest,
-        and of directions and zeros all, are fitted from several starts.
+        Where the values are quadratic in its change, the best one is the root of a cubic. The few best of these are fitted; all
+        directions and zeros are fitted from several starts.
         """
         which, starts, promising = [], [], []
         for k, (place, (left, best)) in enumerate(zip(self.places, self.nearest)):
@@ -170,7 +170,7 @@ class Search:
     def expansion(self) -> tuple[np.ndarray, np.ndarray]:
         """First and second coefficients of the values in each place's change over its size, in tolerances.
 
-        (places, states, entries) each; exact where the values are quadratic in it, in all but directions and zeros.
+        (places, states, entries) each; exact where the values are quadratic: for all except directions and zeros.
         """
         which = np.arange(len(self.places))[:, None]
         size = np.array([[place.size] for place in self.places])
@@ -185,9 +185,9 @@ class Search:
         return [place.moves[0][0] for place, moves in zip(self.places, moved) if moves and place.moves]
 
     def partners(self, leading: Fitted) -> tuple[np.ndarray, np.ndarray]:
-        """Places that explain most of what a fitted one leaves, beside it, and starts: (PARTNERS, 2) each.
+        """Places that explain most of what a fitted one leaves, together with it, and starts: (PARTNERS, 2) each.
 
-        They are found by derivatives where that place is fitted: it may have moved too far for those where it is stated.
+        They follow from derivatives at the fitted place, which may be far from the stated one.
         """
         first = next(k for k, place in enumerate(self.places) if place is leading.places[0])
         which = np.array([[first, k] for k in range(len(self.places)) if k != first])
@@ -204,7 +204,7 @@ class Search:
         return which[best], (x + steps)[best]
 
     def pairs(self) -> list[Fitted]:
-        """Two places together, of all pairs those that come closest where each change acts alone, fitted."""
+        """Two places together: the most promising of all pairs, where each change is taken to act alone, are fitted."""
         first, second = (part.reshape(len(self.places), -1) for part in self.expansion)
         columns = np.concatenate([first, second])
         lengths = np.linalg.norm(columns, axis=1)
@@ -234,7 +234,7 @@ class Search:
 
 
 def nearest_changes(first: np.ndarray, second: np.ndarray, off: np.ndarray) -> list[tuple[float, float]]:
-    """Of each place what the best change x leaves of off, |off - x first - x^2 second|, and x: a root of a cubic.
+    """What the best change x of each place leaves, |off - x first - x^2 second|, and x, a root of a cubic.
 
     first, second: (places, states, entries), off: (states, entries), in tolerances.
     """

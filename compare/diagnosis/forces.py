@@ -1,7 +1,7 @@
-"""What else acts in accelerations than Mbar and h say: a torque of the other sign, damping, springs, friction.
+"""What else acts in accelerations than Mbar and h: a torque of the opposite sign, damping, springs, friction.
 
-Of given accelerations the force  r = tau - D qd - k (q - rest) - h - Mbar qdd  is left over, with Mbar and h of the same source:
-what this source has besides, and it is zero where it has nothing.
+For given accelerations the force  r = tau - D qd - k (q - rest) - h - Mbar qdd  is left over, with Mbar and h of the same source:
+zero if nothing else acts.
 """
 
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ import numpy as np
 import tmt
 from tmt import literal
 
-from .words import EXPLAINS, Cause, nice, together
+from .cause import Cause, Change, cause_of, number_changed, tied
 
 TURNING = ("N m s/rad", "N m/rad", "N m")
 UNITS_OF_FORCES = {"hinge": TURNING, "slide": ("N s/m", "N/m", "N"), "ball": TURNING}  # of damping, stiffness, force
@@ -29,6 +29,12 @@ class Column(NamedTuple):
     is_never_negative: bool = True  # no damper, spring or friction is
 
 
+def force_left_over(tree: tmt.Tree, q, qd, tau, M, h, qdd) -> np.ndarray:
+    """r, (states, nv)."""
+    pull = literal.spring_torque(q, tree) if tree.has_springs else 0.0
+    return tau - np.array(tree.damping) * qd - pull - h - np.einsum("sij,sj->si", M, qdd)
+
+
 def causes_of_forces(
     tree: tmt.Tree,
     q: np.ndarray,
@@ -37,49 +43,40 @@ def causes_of_forces(
     h: np.ndarray,
     left_over: np.ndarray,
     tolerance: np.ndarray,
-) -> list[Cause]:
-    """What explains the forces left over, r (states, nv): all causes of the first rank in which something does; [] if nothing.
+) -> tuple[Cause, ...]:
+    """What explains the forces left over, r (states, nv): all causes of the first rank that has one.
 
     q: (states, nq), qd, tau, h: (states, nv). tolerance: of r, (states, nv) or what broadcasts to it.
     """
-    size = float(np.linalg.norm(left_over))
-
-    def left_by(force: np.ndarray) -> float | None:
-        """The share of r that a force leaves, if it explains r."""
-        rest = left_over - force
-        return float(np.linalg.norm(rest)) / size if (np.abs(rest) <= tolerance).all() else None
-
+    size, tolerance = float(np.linalg.norm(left_over)), np.broadcast_to(tolerance, left_over.shape)
+    if not (0.0 < size < np.inf and (tolerance > 0.0).all() and np.isfinite(tolerance).all()):
+        return ()
     causes = []
-    tolerance = np.broadcast_to(tolerance, left_over.shape)
-    if (
-        size == 0.0
-        or not np.isfinite(left_over).all()
-        or not (tolerance > 0.0).all()
-        or not np.isfinite(tolerance).all()
-    ):
-        return causes
-    for place, stated, explains, force in forms(tree, q, qd, tau, h):
-        if (left := left_by(force)) is not None:
-            causes.append(Cause(1, "option", place, stated, explains, "", left, 0, f"{place}: {explains}"))
-    columns = list(numbers_of_forces(tree, q, qd))
+
+    def explains(changes: list[Change], force: np.ndarray) -> None:
+        rest = left_over - force
+        if (np.abs(rest) <= tolerance).all():
+            rank = 1 if changes[0].kind == "option" else 1 + len(changes)
+            causes.append(cause_of(rank, changes, float(np.linalg.norm(rest)) / size))
+
+    for change, force in options_of_forces(tree, q, qd, tau, h):
+        explains([change], force)
+    columns, weight = list(numbers_of_forces(tree, q, qd)), (1.0 / tolerance).ravel()
     for count in (1, 2):
-        if causes:
-            break
-        for chosen in combinations(columns, count):
+        for chosen in combinations(columns, count) if not causes else ():
             matrix = np.stack([column.force.ravel() for column in chosen], axis=1)
             if np.linalg.matrix_rank(matrix) < count:
                 continue
-            weight = (1.0 / tolerance).ravel()
             x = np.linalg.lstsq(matrix * weight[:, None], left_over.ravel() * weight, rcond=None)[0]
             if any(one.stated + change < 0.0 and one.is_never_negative for one, change in zip(chosen, x)):
                 continue
-            if (left := left_by((matrix @ x).reshape(left_over.shape))) is not None:
-                causes.append(of_columns(chosen, x, left, 1 + count))
-    return [cause._replace(tied=len(causes) - 1) for cause in causes]
+            changes = [number_changed(one.name, one.stated, one.stated + dx, one.unit) for one, dx in zip(chosen, x)]
+            explains(changes, (matrix @ x).reshape(left_over.shape))
+    return tied(causes)
 
 
-def forms(tree: tmt.Tree, q, qd, tau, h) -> Iterator[tuple[str, str, str, np.ndarray]]:
-    """Options: place, stated, what explains, and the force that is left over with it."""
+def options_of_forces(tree: tmt.Tree, q, qd, tau, h) -> Iterator[tuple[Change, np.ndarray]]:
+    """Each option and the force that is left over with it."""
     drag = np.array(tree.damping) * qd
     pull = literal.spring_torque(q, tree) if tree.has_springs else np.zeros_like(qd)
     for place, stated, term in (
@@ -88,44 +85,24 @@ def forms(tree: tmt.Tree, q, qd, tau, h) -> Iterator[tuple[str, str, str, np.nda
         ("damping in the acceleration", "- D qd", drag),
         ("springs in the acceleration", "- k (q - rest)", pull),
     ):
-        if term.any():
-            yield place, stated, "left out", -term
-            yield place, stated, "of the other sign", -2.0 * term
-            yield place, stated, "twice", term
+        for explains, factor in (("left out", -1.0), ("of the other sign", -2.0), ("twice", 1.0)):
+            if term.any():
+                yield Change("option", place, stated, explains), factor * term
 
 
 def numbers_of_forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Column]:
     """Damping, stiffness, friction and a constant force of each joint, and damping of all together."""
     joints = tree.coordinates.joints
     for i, (name, (kind, at, by)) in enumerate(zip(tree.hinge_names, joints)):
-        units = UNITS_OF_FORCES[kind]
+        of_damping, of_stiffness, of_force = UNITS_OF_FORCES[kind]
         for v in range(by.start, by.stop):
-            called = name if kind != "ball" else f"{name} {'xyz'[v - by.start]}"
-            own = np.eye(qd.shape[1])[v]
-            yield Column(f"damping of {called}", units[0], tree.damping[v], qd[:, v : v + 1] * own)
-            yield Column(f"friction of {called}", units[2], 0.0, np.sign(qd[:, v : v + 1]) * own)
-            yield Column(f"constant force at {called}", units[2], 0.0, np.ones((len(qd), 1)) * own, False)
+            axis = name if kind != "ball" else f"{name} {'xyz'[v - by.start]}"
+            own, speed = np.eye(qd.shape[1])[v], qd[:, v : v + 1]
+            yield Column(f"damping of {axis}", of_damping, tree.damping[v], speed * own)
+            yield Column(f"friction of {axis}", of_force, 0.0, np.sign(speed) * own)
+            yield Column(f"constant force at {axis}", of_force, 0.0, np.ones((len(qd), 1)) * own, False)
             if kind != "ball":
                 rest = tree.rest[at.start] if tree.stiffness[i] else tree.reference[i]
-                stretched = q[:, at.start : at.stop] - rest
-                yield Column(f"stiffness of {called}", units[1], tree.stiffness[i], stretched * own)
+                yield Column(f"stiffness of {axis}", of_stiffness, tree.stiffness[i], (q[:, at] - rest) * own)
     if len(joints) > 1 and not any(tree.damping):
         yield Column("damping of every joint", "N m s/rad", 0.0, np.array(qd))
-
-
-def of_columns(chosen: tuple[Column, ...], x: np.ndarray, left: float, rank: int) -> Cause:
-    """One number or two that explain the forces."""
-    values = [column.stated + change for column, change in zip(chosen, x)]
-    texts = [
-        f"{column.name}: {nice(value)} {column.unit} in place of {nice(column.stated)}{EXPLAINS}"
-        for column, value in zip(chosen, values)
-    ]
-    text = texts[0] if len(texts) == 1 else together(texts)
-    if len(chosen) == 1:
-        (column,), (value,) = chosen, values
-        return Cause(rank, "number", column.name, column.stated, float(value), column.unit, left, 0, text)
-    joined = (
-        " and ".join(parts) for parts in ([c.name for c in chosen], [nice(c.stated) for c in chosen], map(nice, values))
-    )
-    units = " and ".join(dict.fromkeys(column.unit for column in chosen))
-    return Cause(rank, "number and number", *joined, units, left, 0, text)

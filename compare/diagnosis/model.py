@@ -1,11 +1,10 @@
 """The equations of motion as functions of a tree's numbers, for many changes of the numbers at once.
 
-Mbar and h by TMT's literal sum over the bodies, as tmt writes it: there is no other derivation here. The numbers may be
-arrays (changes, 1) beside positions (states,), real or complex; derivatives by a number are the imaginary parts that an
-imaginary change of 1e-100 leaves, exact to rounding. Each term of each body has a factor, 1 where nothing is wrong with it.
+Mbar and h are TMT's sum over the bodies, by the functions of tmt. The numbers may be arrays (changes, 1) that broadcast with
+positions (states,), real or complex; the derivative by a number is the imaginary part after an imaginary change of 1e-100, exact
+to rounding. Each term of each body has a factor, 1 in the right equations.
 """
 
-from copy import copy
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -40,7 +39,7 @@ class Path(NamedTuple):
 class Equations:
     """Mbar and h of a tree at states q (states, nq), qd (states, nv).
 
-    As one array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`. With `joints` the states,
+    One array of numbers for each state: the lower triangle of Mbar by rows, then h; see `entries`. With `joints` the states,
     Mbar and h are in joints of one's own, see joint_map.py.
     """
 
@@ -54,26 +53,19 @@ class Equations:
         self.stated["factor"] = np.ones((len(tree.mass), len(BODY_TERMS)))
         self.triangle = np.tril_indices(self.nv)
 
-    def first(self, states: int) -> "Equations":
-        """The same at the first states alone."""
-        part = copy(self)
-        part.q, part.qd = self.q[:states], self.qd[:states]
-        return part
-
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the speeds."""
         return Coordinates(self.tree.hinge_names, self.tree.kind).speeds
 
     @property
     def entries(self) -> list[tuple]:
-        """What each number of a state is: ("M", i, j) or ("h", i)."""
+        """The entries of a state: ("M", i, j) or ("h", i)."""
         return [*(("M", int(i), int(j)) for i, j in zip(*self.triangle)), *(("h", i) for i in range(self.nv))]
 
     def values(self, changes: dict | None = None) -> np.ndarray:
         """Mbar and h, (changes, states, entries), with entries of the tree changed; (1, states, entries) without changes.
 
-        changes: {Path: what is added, (changes,)}. Axes are brought to length 1 afterwards.
+        changes: {Path: what is added, (changes,)}. Changed axes are normalized.
         """
         return self.packed(*self.summed(self.parts(changes or {})))
 
@@ -123,7 +115,7 @@ class Equations:
 
 
 def packing(joints: JointMap, equations: Equations) -> tuple[list[int], np.ndarray]:
-    """Which number of a state of a model's joints stands where in joints of one's own, and its sign."""
+    """The index and sign, in the model's joints, of each entry in joints of one's own."""
     v, sense, (i, j) = joints.v, joints.sense, equations.triangle
     high, low = np.maximum(v[i], v[j]), np.minimum(v[i], v[j])
     index = np.concatenate([high * (high + 1) // 2 + low, len(i) + v])

@@ -1,7 +1,7 @@
 """The places where equations can be wrong by one number: of the model, of a term, of a coefficient.
 
-A change x of a place adds x times its coefficient to entries of the tree (or to factors of terms), or x times the right
-coefficient to an entry of Mbar or h. A convention of a joint, its zero, is a number too, of rank 1; the others are of rank 2.
+A change x of a place adds x times a coefficient to entries of the tree (or to factors of terms), or x times a column of values
+to an entry of Mbar or h. The zero of a joint is a convention and has rank 1; the other numbers have rank 2.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ OF_TERM = {
     "convective": "convective term T' m v_conv of {}", "Euler": "Euler term B' I w_conv of {}",
     "gyroscopic": "gyroscopic term B' (omega x I omega) of {}",
 }  # fmt: skip
-TOGETHER = {  # terms that are often left out together, and what they are called
+TOGETHER = {  # terms that are often left out together
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
     "velocity terms of {} in h": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
@@ -26,7 +26,7 @@ TOGETHER = {  # terms that are often left out together, and what they are called
 OF_BIAS = ("gravity", "convective", "Euler", "gyroscopic")  # of the terms, those of h
 EVERY_BODY = "every body"
 OF_ZERO = "zero position"  # the kind of a place
-MOST_SPEEDS = 12  # of which every product has its coefficients: there are nv^2 (nv + 1) / 2
+MOST_SPEEDS = 12  # with more, coefficients of products of speeds are not tried: there are nv^2 (nv + 1) / 2
 
 
 class Place(NamedTuple):
@@ -43,18 +43,22 @@ class Place(NamedTuple):
     column: np.ndarray | None = None  # (states,), of several entries (states, entries)
 
     @property
+    def is_zero(self) -> bool:
+        """Whether it is the zero of a joint."""
+        return self.kind == OF_ZERO
+
+    @property
     def is_quadratic(self) -> bool:
         """Whether Mbar and h are a polynomial of second degree in it."""
         return not any(path.field in ("axis", "reference") for path, _ in self.moves)
 
 
 def all_places(equations: Equations) -> list[Place]:
-    """All of them."""
     return [*numbers(equations), *terms(equations), *coefficients(equations), *forces_in_bias(equations)]
 
 
 def forces_in_bias(equations: Equations) -> list[Place]:
-    """Damping and springs of joints, which do not belong in h."""
+    """Damping and springs of joints that were added to h."""
     tree, nv, found = equations.tree, equations.nv, []
     first = len(equations.entries) - nv
 
@@ -75,7 +79,7 @@ def forces_in_bias(equations: Equations) -> list[Place]:
 
 
 def numbers(equations: Equations) -> list[Place]:
-    """Every number of the tree; where only the anchor of a joint moves, all that the joint carries stays where it is."""
+    """Every number of the tree. "anchor": the joint moves, all that it carries stays in place."""
     tree, stated = equations.tree, equations.stated
     length = max(1e-3, float(np.abs(stated["offset"]).max()), float(np.abs(stated["com"]).max()))
     found = []
@@ -118,7 +122,7 @@ def numbers(equations: Equations) -> list[Place]:
 
 
 def terms(equations: Equations) -> list[Place]:
-    """The factor of every term of each body, and of all bodies together where there are several; 1 is right."""
+    """The factor of every term of each body and of all bodies together; 1 is right."""
     bodies = equations.tree.body_names
     groups = {body: [b] for b, body in enumerate(bodies)}
     if len(bodies) > 1:
@@ -133,7 +137,7 @@ def terms(equations: Equations) -> list[Place]:
 
 
 def entry_name(entry: tuple, names: Sequence[str]) -> str:
-    """An entry of Mbar or h, "M[hip][knee]": of Mbar the one above the diagonal stands for both."""
+    """An entry of Mbar or h, "M[hip][knee]"; the entry of Mbar above the diagonal names both."""
     kind, *indices = entry
     return kind + "".join(f"[{names[i]}]" for i in sorted(indices))
 
@@ -148,36 +152,27 @@ def coefficients(equations: Equations) -> list[Place]:
     nv, states, names = equations.nv, len(equations.q), equations.names
     values = dict(zip(equations.entries, equations.values()[0].T))
     at = {entry: k for k, entry in enumerate(equations.entries)}
-    found = [
-        Place(
-            2,
-            "coefficient",
-            entry_name(("M", i, j), names),
-            1.0,
-            "times",
-            1.0,
-            entry=at["M", i, j],
-            column=values["M", i, j],
-        )
-        for i, j in zip(*map(np.ndarray.tolist, equations.triangle))
-    ]
+    found = []
+
+    def add(name, entry, column, stated=1.0):
+        found.append(Place(2, "coefficient", name, stated, "times", 1.0, entry=entry, column=column))
+
+    for i, j in zip(*map(np.ndarray.tolist, equations.triangle)):
+        add(entry_name(("M", i, j), names), at["M", i, j], values["M", i, j])
     whole, parts = equations.values()[0], len(equations.triangle[0])
     for name, part in {"M": slice(parts), "h": slice(parts, None), "M and h": slice(None)}.items():
-        found.append(Place(2, "coefficient", f"all of {name}", 1.0, "times", 1.0, entry=part, column=whole[:, part]))
+        add(f"all of {name}", part, whole[:, part])
     of_rates, weight = products_of_rates(equations) if nv <= MOST_SPEEDS else ({}, bias_at_rest(equations))
     for i in range(nv):
-        row = values["h", i]
-        of = entry_name(("h", i), names)
-        found.append(Place(2, "coefficient", of, 1.0, "times", 1.0, entry=at["h", i], column=row))
-        found.append(Place(2, "coefficient", f"{of} at rest", 1.0, "times", 1.0, entry=at["h", i], column=weight[:, i]))
+        row, entry = entry_name(("h", i), names), at["h", i]
+        add(row, entry, values["h", i])
+        add(f"{row} at rest", entry, weight[:, i])
         for j in range(nv) if nv <= MOST_SPEEDS else ():
             if j != i:
-                name = f"{entry_name(('h', j), names)} at rest in {of}"
-                found.append(Place(2, "coefficient", name, 0.0, "times", 1.0, entry=at["h", i], column=weight[:, j]))
+                add(f"{entry_name(('h', j), names)} at rest in {row}", entry, weight[:, j], stated=0.0)
         for (j, k), column in of_rates.items():
-            name = f"{of}, coefficient of {rates_name(j, k, names)}"
-            column = column[:, i] * equations.qd[:, j] * equations.qd[:, k]
-            found.append(Place(2, "coefficient", name, 1.0, "times", 1.0, entry=at["h", i], column=column))
+            name = f"{row}, coefficient of {rates_name(j, k, names)}"
+            add(name, entry, column[:, i] * equations.qd[:, j] * equations.qd[:, k])
     found += terms_of_rows(equations) if nv <= MOST_SPEEDS else []
     return [place for place in found if np.abs(place.column).max() > 0.0 and len(place.column) == states]
 

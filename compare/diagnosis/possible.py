@@ -1,11 +1,11 @@
-"""Whether a rigid body and a joint can have the numbers that a fit found, and whether a pair of them says anything."""
+"""Whether a rigid body and a joint can have fitted numbers, and whether a pair of them is informative."""
 
 import numpy as np
 
+from .cause import CLOSE, FACTORS, value_of
 from .fit import Fitted, Search
-from .model import BODY_TERMS, Equations, Path
+from .model import BODY_TERMS, Path
 from .places import Place
-from .words import CLOSE, FACTORS, value_of
 
 ROUNDED_INERTIA = 1e-9  # of an inertia, that the digits of a fit may take from it
 
@@ -13,8 +13,8 @@ ROUNDED_INERTIA = 1e-9  # of an inertia, that the digits of a fit may take from 
 def is_possible(fitted: Fitted, search: Search, of_body: bool = True) -> bool:
     """Whether no mass, armature, moment of inertia, damping or stiffness is below zero.
 
-    of_body: and no moment of inertia is larger than the two others together, as that of no rigid body is. A term of Mbar may have
-    the other sign, by a slip; another factor below zero is that of a negative mass or inertia.
+    of_body: and no moment of inertia is larger than the two others together. A term of Mbar may have the other sign, by a slip;
+    other factors below zero mean a negative mass or inertia.
     """
     changed, seen = {}, set(search.seen)
     for place, change in zip(fitted.places, fitted.changes):
@@ -27,12 +27,12 @@ def is_possible(fitted: Fitted, search: Search, of_body: bool = True) -> bool:
     for path, more in changed.items():
         if path.field in ("mass", "armature") and numbers[path.field][path.index] + more < 0.0:
             return False
+    inertias = np.array(numbers["inertia"])
+    for path, more in changed.items():
+        if path.field == "inertia":
+            inertias[path.index] += more
     return all(
-        is_inertia(
-            with_changes(search.equations, changed, b),
-            [k for k in range(3) if Path("inertia", (b, k, k)) in seen],
-            of_body,
-        )
+        is_inertia(inertias[b], [k for k in range(3) if Path("inertia", (b, k, k)) in seen], of_body)
         for b in {path.index[0] for path in changed if path.field == "inertia"}
     )
 
@@ -41,15 +41,6 @@ def is_of_mass(place: Place) -> bool:
     """Whether it is the factor of a term of Mbar."""
     of_mass = [BODY_TERMS.index(term) for term in ("translation", "rotation")]
     return any(path.field == "factor" and path.index[1] in of_mass for path, _ in place.moves)
-
-
-def with_changes(equations: Equations, changed: dict[Path, float], body: int) -> np.ndarray:
-    """The inertia of a body with changes, (3, 3)."""
-    inertia = np.array(equations.stated["inertia"][body])
-    for path, more in changed.items():
-        if path.field == "inertia" and path.index[0] == body:
-            inertia[path.index[1:]] += more
-    return inertia
 
 
 def is_inertia(inertia: np.ndarray, seen: list[int], of_body: bool) -> bool:
@@ -62,7 +53,7 @@ def is_inertia(inertia: np.ndarray, seen: list[int], of_body: bool) -> bool:
 
 
 def is_telling(fitted: Fitted) -> bool:
-    """Whether two places together say anything: a factor that is no plain number beside another fits nearly everything."""
+    """Whether a pair is informative: an arbitrary factor together with another number fits nearly everything."""
     return all(
         place.unit != "times" or any(abs(value_of(place, change) - factor) <= CLOSE for factor in FACTORS)
         for place, change in zip(fitted.places, fitted.changes)

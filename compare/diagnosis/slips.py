@@ -1,17 +1,14 @@
-"""Slips in a derivation that students make: what Mbar and h are with each of them.
-
-They are made on the Jacobians and convective terms of each body, of one body or of all.
-"""
+"""Common slips in a derivation: Mbar and h with each of them, made in the Jacobians and convective terms of one body or all."""
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from itertools import combinations
 
 import numpy as np
 
 from tmt.equations import method
 
-from .model import Equations, Path
+from .model import TINY, Equations, Path
 from .places import EVERY_BODY, bias_at_rest, entry_name
 from .variants import Variant
 
@@ -58,171 +55,126 @@ class Parts:
         i, j = self.equations.triangle
         return np.concatenate([M[:, i, j], h], axis=1)[None]
 
-    def of_one_rate(self) -> tuple[np.ndarray, np.ndarray]:
-        """v_conv and w_conv of each rate alone, summed: without the products of different rates."""
+    def of_single_speeds(self) -> list[np.ndarray]:
+        """v_conv and w_conv of each speed alone, summed: without the products of different speeds."""
         tree, q, qd = self.tree, self.equations.q, self.equations.qd
-        sums = np.zeros_like(self.v_conv), np.zeros_like(self.w_conv)
-        for j in range(qd.shape[1]):
-            alone = Parts(Equations(tree, q, np.where(np.arange(qd.shape[1]) == j, qd, 0.0)))
-            for total, part in zip(sums, (alone.v_conv, alone.w_conv)):
-                total += part
-        return sums
+        alone = [Parts(Equations(tree, q, qd * unit)) for unit in np.eye(qd.shape[1])]
+        return [sum(getattr(part, name) for part in alone) for name in ("v_conv", "w_conv")]
+
+    def values_with(self, changed: dict, bodies: list[int]) -> np.ndarray:
+        """The values with arrays changed for some bodies."""
+        mixed = {name: np.array(getattr(self, name)) for name in changed}
+        for name, value in changed.items():
+            mixed[name][:, bodies] = value[:, bodies]
+        return self.values(**mixed)
 
 
 def slips(equations: Equations) -> Iterator[Variant]:
     """Each slip, of each body alone and of all together."""
     parts, tree = Parts(equations), equations.tree
-    bodies = range(len(tree.mass))
-    groups = {name: [b] for b, name in enumerate(tree.body_names)} | (
-        {EVERY_BODY: list(bodies)} if len(bodies) > 1 else {}
-    )
-    v_alone, w_alone = parts.of_one_rate()
-    turned = np.einsum("sbcd,sbdi->sbci", parts.R, parts.B)
-    to_world = {"omega": "sbcd,sbd->sbc", "w_conv": "sbcd,sbd->sbc"}
-    world = {name: np.einsum(how, parts.R, getattr(parts, name)) for name, how in to_world.items()} | {"B": turned}
-    twice = {name: np.einsum(how, parts.R, world[name]) for name, how in to_world.items()}
-    twice["B"] = np.einsum("sbcd,sbdi->sbci", parts.R, turned)
-    about_joint = parts.inertia + np.array([shifted(m, np.array(c)) for m, c in zip(tree.mass, tree.com)])
-    without_parallel = 2.0 * parts.inertia - about_joint
-    wrong_way = np.einsum("sbdc,sbde,sbef->sbcf", parts.R, parts.inertia, parts.R)
-    slipped = {
-        "R for R' in the angular velocity of {}": twice,
+    groups = {name: [b] for b, name in enumerate(tree.body_names)}
+    if len(groups) > 1:
+        groups[EVERY_BODY] = list(range(len(groups)))
+    v_alone, w_alone = parts.of_single_speeds()
+    R, turning = parts.R, {name: getattr(parts, name) for name in ("omega", "w_conv", "B")}
+    world = {name: turned(R, value) for name, value in turning.items()}
+    com, mass = np.array(tree.com), np.array(tree.mass)[:, None, None]
+    of_com = mass * ((com**2).sum(axis=1)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None, :])
+    without_parallel = {"inertia": parts.inertia - of_com}
+    changes = {
+        "R for R' in the angular velocity of {}": {name: turned(R, value) for name, value in world.items()},
         "inertia of {} not turned to the inertial frame": world,
-        "R' I R for R I R' of {}": world | {"inertia": wrong_way},
-        "inertia of {} about its joint and mass counted again": {"inertia": about_joint},
-        PARALLEL_AXIS: {"inertia": without_parallel},
+        "R' I R for R I R' of {}": world | {"inertia": np.swapaxes(R, 2, 3) @ parts.inertia @ R},
+        "inertia of {} about its joint and mass counted again": {"inertia": parts.inertia + of_com},
+        PARALLEL_AXIS: without_parallel,
         "products of different rates in v_conv of {} left out": {"v_conv": v_alone},
         "products of different rates in v_conv of {} once for twice": {"v_conv": (v_alone + parts.v_conv) / 2.0},
         "products of different rates in w_conv of {} left out": {"w_conv": w_alone},
         "products of different rates in v_conv and w_conv of {} left out": {"v_conv": v_alone, "w_conv": w_alone},
         "squares of rates in v_conv of {} left out": {"v_conv": parts.v_conv - v_alone},
     }
-    for name, changed in slipped.items():
-        for of, which in groups.items():
-            yield slip(name.format(of), "right", "so", lambda c=changed, w=which: parts.values(**only(parts, c, w)))
-    for of, which in groups.items():
-        yield from in_mass_alone(parts, PARALLEL_AXIS.format(of), {"inertia": without_parallel}, which)
+    for name, changed in changes.items():
+        for body, which in groups.items():
+            yield slip(name.format(body), partial(parts.values_with, changed, which))
+    for body, which in groups.items():
+        yield from in_mass_alone(equations, PARALLEL_AXIS.format(body), parts.values_with(without_parallel, which))
     for b, body in enumerate(tree.body_names):
-        for x, y in ((0, 1), (0, 2), (1, 2)):
-            order = [0, 1, 2]
-            order[x], order[y] = y, x
-            swapped = parts.inertia.copy()
-            swapped[:, b] = swapped[:, b][:, order][:, :, order]
-            axes = "xyz"[x] + " and " + "xyz"[y]
-            yield slip(
-                f"axes {axes} of the inertia of {body} exchanged",
-                "right",
-                "so",
-                lambda i=swapped: parts.values(inertia=i),
-            )
+        for x, y in combinations(range(3), 2):
+            order = [y if k == x else x if k == y else k for k in range(3)]
+            swapped = {"inertia": parts.inertia[..., order, :][..., order]}
+            name = f"axes {'xyz'[x]} and {'xyz'[y]} of the inertia of {body} exchanged"
+            yield slip(name, partial(parts.values_with, swapped, [b]))
     yield from plain_numbers(equations)
-    yield from lagrange(equations)
+    if "ball" not in tree.kind:
+        yield from lagrange(equations)
 
 
-def in_mass_alone(parts: Parts, name: str, changed: dict, which: list[int]) -> Iterator[Variant]:
-    """A slip in Mbar alone, and in each of its entries alone."""
-    equations, right = parts.equations, parts.equations.values()
-    values = parts.values(**only(parts, changed, which))
-    entries = [k for k, entry in enumerate(equations.entries) if entry[0] == "M"]
+def turned(R: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Vectors (states, bodies, 3), or columns of them, in other axes."""
+    return R @ value if value.ndim == 4 else np.einsum("sbcd,sbd->sbc", R, value)
+
+
+def in_mass_alone(equations: Equations, name: str, values: np.ndarray) -> Iterator[Variant]:
+    """A slip in Mbar alone, and in each of its entries alone. values: with the slip everywhere."""
+    right, entries = equations.values(), range(len(equations.triangle[0]))
     differing = [k for k in entries if np.abs(values[0, :, k] - right[0, :, k]).max() > 0.0]
-    if not differing:
-        return
-    for together in [differing, *([k] for k in differing)] if len(differing) > 1 else [differing]:
-        of = f" in {entry_name(equations.entries[together[0]], equations.names)} alone"
+    for together in [differing, *([k] for k in differing)] if len(differing) > 1 else [differing] * len(differing):
+        of_entry = f" in {entry_name(equations.entries[together[0]], equations.names)} alone"
         mixed = right.copy()
         mixed[..., together] = values[..., together]
-        yield slip(name + (IN_MASS_ALONE if len(together) > 1 else of), "right", "so", lambda v=mixed: v)
+        yield slip(name + (IN_MASS_ALONE if len(together) > 1 else of_entry), lambda v=mixed: v)
 
 
 def lagrange(equations: Equations) -> Iterator[Variant]:
-    """Slips in h = Mdot qd - d(kinetic energy)/dq + dV/dq, where all joints are hinges and slides."""
-    tree, nv = equations.tree, equations.nv
-    if "ball" in tree.kind:
-        return
-    i, j = equations.triangle
+    """Slips in h = Mdot qd - d(kinetic energy)/dq + dV/dq, of hinges and slides."""
+    qd, nv, (i, j) = equations.qd, equations.nv, equations.triangle
 
     @cache
-    def parts() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        slopes = -np.stack(
-            [equations.values({Path("reference", (k,)): np.array([1e-100j])})[0].imag / 1e-100 for k in range(nv)],
-            axis=1,
-        )
-        M = np.zeros((len(equations.q), nv, nv, nv))
+    def terms() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        tiny = {k: {Path("reference", (k,)): np.array([1j * TINY])} for k in range(nv)}
+        slopes = -np.stack([equations.values(tiny[k])[0].imag / TINY for k in range(nv)], axis=1)
+        M = np.zeros((len(qd), nv, nv, nv))
         M[:, :, i, j] = M[:, :, j, i] = slopes[:, :, : len(i)]
-        qd = equations.qd
-        return (
-            np.einsum("skij,sk,sj->si", M, qd, qd),
-            np.einsum("skij,si,sj->sk", M, qd, qd) / 2.0,
-            bias_at_rest(equations),
-        )
+        Mdot_qd, gradient = np.einsum("skij,sk,sj->si", M, qd, qd), np.einsum("skij,si,sj->sk", M, qd, qd) / 2.0
+        return Mdot_qd, gradient, bias_at_rest(equations)
 
     def values(of_Mdot: float, of_gradient: float) -> np.ndarray:
-        Mdot_qd, gradient, weight = parts()
-        right = equations.values()[0]
-        return np.concatenate([right[:, : len(i)], of_Mdot * Mdot_qd - of_gradient * gradient + weight], axis=1)[None]
+        Mdot_qd, gradient, weight = terms()
+        M = equations.values()[0][:, : len(i)]
+        return np.concatenate([M, of_Mdot * Mdot_qd - of_gradient * gradient + weight], axis=1)[None]
 
-    named = {
-        "gradient of the kinetic energy in h": (
-            ("left out", 1.0, 0.0),
-            ("of the other sign", 1.0, -1.0),
-            ("twice", 1.0, 2.0),
-        ),
-        "Mdot qd in h": (
-            ("left out", 0.0, 1.0),
-            ("halved", 0.5, 1.0),
-            ("halved, and no gradient of the kinetic energy", 0.5, 0.0),
-        ),
-    }
-    for name, forms in named.items():
-        for explains, *factors in forms:
-            yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, lambda f=factors: values(*f))
+    for name, explains, *factors in (
+        ("gradient of the kinetic energy in h", "left out", 1.0, 0.0),
+        ("gradient of the kinetic energy in h", "of the other sign", 1.0, -1.0),
+        ("gradient of the kinetic energy in h", "twice", 1.0, 2.0),
+        ("Mdot qd in h", "left out", 0.0, 1.0),
+        ("Mdot qd in h", "halved", 0.5, 1.0),
+        ("Mdot qd in h", "halved, and no gradient of the kinetic energy", 0.5, 0.0),
+    ):
+        yield slip(name, partial(values, *factors), "Mdot qd - d(qd' Mbar qd / 2)/dq", explains)
 
 
-def slip(name: str, stated: str, explains: str, values: Callable[[], np.ndarray]) -> Variant:
-    """A variant whose values are known as they are."""
-    return Variant(2, "slip", name, stated, explains, lambda: Known(values()), is_simple=False)
+def slip(name: str, values: Callable[[], np.ndarray], stated: str = "no", explains: str = "yes") -> Variant:
+    return Variant(2, "slip", name, stated, explains, lambda: Fixed(values()), is_simple=False)
 
 
-class Known:
+class Fixed:
     """Values in place of equations."""
 
-    def __init__(self, known: np.ndarray):
-        self.known = known
-
-    def values(self, changes: dict | None = None) -> np.ndarray:
-        return self.known
-
-
-def only(parts: Parts, changed: dict, which: list[int]) -> dict:
-    """Arrays changed for some bodies alone."""
-    mixed = {}
-    for name, value in changed.items():
-        mixed[name] = np.array(getattr(parts, name))
-        mixed[name][:, which] = value[:, which]
-    return mixed
-
-
-def shifted(mass: float, com: np.ndarray) -> np.ndarray:
-    """What a mass adds to the inertia about a point at this distance."""
-    return mass * (com @ com * np.eye(3) - np.outer(com, com))
+    def __init__(self, values: np.ndarray):
+        self.values = lambda changes=None: values
 
 
 def plain_numbers(equations: Equations) -> Iterator[Variant]:
-    """A centre of mass at its joint, an axis along another one of the frame's: evaluated together, as changes of numbers."""
+    """A CoM at its joint, exchanged masses, an axis along another one of the frame: evaluated together, as changes of numbers."""
     tree, made = equations.tree, []  # name, stated, explains, what is added to numbers
     for b, (body, com) in enumerate(zip(tree.body_names, tree.com)):
         added = {Path("com", (b, k)): -com[k] for k in range(3) if com[k]}
-        made.append((f"CoM of {body}", "where it is", "at the joint", added))
+        made.append((f"CoM of {body}", "as stated", "at the joint", added))
     for (a, one), (b, other) in combinations(enumerate(tree.body_names), 2):
         more = tree.mass[b] - tree.mass[a]
-        made.append(
-            (
-                f"masses of {one} and {other}",
-                "right",
-                "exchanged",
-                {Path("mass", (a,)): more, Path("mass", (b,)): -more},
-            )
-        )
+        added = {Path("mass", (a,)): more, Path("mass", (b,)): -more}
+        made.append((f"masses of {one} and {other}", "as stated", "exchanged", added))
     for joint, (kind, _, by) in zip(tree.hinge_names, tree.coordinates.joints):
         stated = np.array(tree.axis[by.start])
         shown = "(" + ", ".join(f"{a:.4g}" for a in stated) + ")"
@@ -234,6 +186,7 @@ def plain_numbers(equations: Equations) -> Iterator[Variant]:
     for row, (*_, added) in enumerate(made):
         for path, change in added.items():
             changes[path][row] = change
-    values = np.broadcast_to(all_values := equations.values(changes), (len(made), *all_values.shape[1:]))
+    values = equations.values(changes)
+    values = np.broadcast_to(values, (len(made), *values.shape[1:]))
     for row, (name, stated, explains, _) in enumerate(made):
-        yield slip(name, stated, explains, lambda r=row: values[r : r + 1])
+        yield slip(name, lambda r=row: values[r : r + 1], stated, explains)

@@ -1,8 +1,8 @@
 """A difference as few terms: sines, cosines and powers of the joints' positions that are added to the right expression.
 
 Entries of Mbar and gravity, and the coefficients of products of speeds in h, are polynomials in the sines and cosines of hinges
-and in the positions of slides, of second degree in each. What a student writes wrong is mostly one term: with another factor, or
-another term in its place. Both are sought in two forms, products such as sin(hip) cos(knee) and sums such as sin(hip + knee).
+and in the positions of slides, of second degree in each. A common mistake is one term with another factor, or replaced by another
+term. Terms are tried in two forms: products such as sin(hip) cos(knee) and sums such as sin(hip + knee).
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-JOINTS_OF_TERMS = 3  # of whose positions all terms are tried
+JOINTS_OF_TERMS = 3  # the most whose terms are tried
 MOST_COLUMNS = 1500  # in pairs that are tried
 STATES_PER_TERM = 2  # at which the right expressions are known
 LEFT_BY_FIT = 1e-9  # of the largest coefficient: rounding of a fit
 AS_NEAR = 1.0 - 1e-6  # of the largest part of a target along one term
-COMBINATIONS = (  # so many terms of the right expression and of others, and whether these take the place of those
+COMBINATIONS = (  # numbers of terms of the right expression and of other terms, and whether these replace those
     *((1, 0, False), (1, 1, True), (0, 1, False), (1, 1, False), (2, 0, False), (2, 2, True)),
     *((0, 2, False), (2, 1, False), (2, 2, False), (3, 0, False)),
 )
@@ -30,7 +30,7 @@ class Terms(NamedTuple):
 
 
 def tried_terms(names: Sequence[str], kinds: Sequence[str], x: np.ndarray) -> Terms:
-    """All that are tried: those of both forms, the simplest first, and what a slip makes of an angle."""
+    """Terms of both forms, the simplest first, and wrong functions of an angle."""
     found = dict(sums_of_angles(names, kinds, x))
     found |= dict(products_of_angles(names, kinds, x, with_squares=True)) | dict(wrong_angles(names, kinds, x))
     return Terms(list(found), np.array(list(found.values())))
@@ -63,7 +63,7 @@ def products_of_angles(names, kinds, x: np.ndarray, with_squares: bool = False) 
 
 
 def sums_of_angles(names, kinds, x: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Sines and cosines of sums_of_angles of the angles, of each up to twice; times powers of the slides."""
+    """Sines and cosines of sums of the angles, each up to twice, times powers of the slides."""
     of_slides = [(name, p) for name, kind, p in zip(names, kinds, x.T) if kind == "slide"]
     along = np.array([p for _, p in of_slides]).reshape(len(of_slides), len(x)).T
     powers = list(products_of_angles([name for name, _ in of_slides], ["slide"] * len(of_slides), along))
@@ -84,7 +84,6 @@ def sums_of_angles(names, kinds, x: np.ndarray) -> Iterator[tuple[str, np.ndarra
 
 
 def sum_in_words(parts: list[tuple[int, str]]) -> str:
-    """A sum in words, "hip - 2 knee"."""
     text = ""
     for k, name in parts:
         sign = ("" if k > 0 else "-") if not text else (" + " if k > 0 else " - ")
@@ -106,7 +105,7 @@ def wrong_angles(names, kinds, x: np.ndarray) -> Iterator[tuple[str, np.ndarray]
 
 
 def right_terms(names, kinds, x: np.ndarray, right: np.ndarray) -> list[dict[str, float]]:
-    """Expressions, (expressions, states), as sums_of_angles of terms, each in the form that has fewer; {} where they are none."""
+    """Expressions, (expressions, states), as sums of terms, each in the form that has fewer; {} where there is none."""
     found: list[dict[str, float]] = []
     forms = []
     for form in (sums_of_angles, products_of_angles):
@@ -125,10 +124,7 @@ def right_terms(names, kinds, x: np.ndarray, right: np.ndarray) -> list[dict[str
 
 
 def few_terms(known: Terms, right: dict[str, float], off: np.ndarray, tolerance: np.ndarray) -> dict[str, float] | None:
-    """The terms that make up a difference, off (states,), with their coefficients: of the right expression's terms and others.
-
-    None: more than two of each would be needed.
-    """
+    """The terms that make up a difference, off (states,), with their coefficients; None: a few do not suffice."""
     columns, target = known.columns / tolerance, off / tolerance
     inner = columns @ columns.T
     places = {name: k for k, name in enumerate(known.names)}
@@ -153,7 +149,7 @@ def completed(
 ) -> list[list[int]]:
     """The chosen terms with those others, one or two, that come closest to a target with them; of one all that come as close.
 
-    inner: the inner products_of_angles of the columns.
+    inner: the inner products of the columns.
     """
     if not others or (others > 1 and len(columns) > MOST_COLUMNS):
         return [chosen] * (not others)

@@ -1,7 +1,7 @@
-"""Explanations without a number to be found: an option, a convention of a joint, a slip in the derivation.
+"""Explanations without a number to fit: options and conventions of joints; slips.py has those of the derivation.
 
-Each gives what Mbar and h would be: values as those of `Equations`. Options and conventions are of rank 1, and equations
-themselves, so that a number can be sought beside them; slips are of rank 2.
+Each gives Mbar and h as they would be, as `Equations.values` does. Options and conventions have rank 1; a number can be fitted
+together with them. Slips have rank 2.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -21,11 +21,11 @@ from .model import BODY_TERMS, Equations
 
 MAPS_AT_ONCE = 2000  # maps of the joints in one evaluation
 PARALLEL = 1e-9  # of a cosine from 1
-MOST_PERMUTED = 6  # of which every order and every set of senses is tried; of more two exchanged, and one turned
+MOST_PERMUTED = 6  # joints: with more, only exchanges of two and the sense of one are tried
 
 
 class Variant(NamedTuple):
-    """An explanation that is so or not."""
+    """An explanation that applies or does not."""
 
     rank: int
     kind: str  # "option", "order", "sign", "unit" or "slip"
@@ -34,11 +34,11 @@ class Variant(NamedTuple):
     explains: str
     equations: Callable[[], Equations]
     joints: JointMap | None = None  # of a convention of the joints
-    is_simple: bool = True  # it is tried together with one number too
+    is_simple: bool = True  # whether it is tried together with one number
 
 
 class Recast:
-    """Equations whose values are handed on changed: values -> values."""
+    """Equations with a function of their values."""
 
     def __init__(self, equations: Equations, change: Callable[[np.ndarray], np.ndarray]):
         self.equations, self.change = equations, change
@@ -49,55 +49,44 @@ class Recast:
 
 def program_options(equations: Equations) -> Iterator[Variant]:
     """What an option or a convention of the whole file or program changes."""
-    tree, nv = equations.tree, equations.nv
-    terms = {
-        "gravity": (BODY_TERMS.index("gravity"),),
-        "rates": tuple(map(BODY_TERMS.index, ("convective", "Euler", "gyroscopic"))),
-    }
+    tree, nv, q, qd = equations.tree, equations.nv, equations.q, equations.qd
 
-    def with_factor(of: str, factor: float) -> Callable:
+    def option(name: str, stated: str, explains: str, made: Callable, is_simple: bool = True) -> Variant:
+        return Variant(1, "option", name, stated, explains, made, is_simple=is_simple)
+
+    def with_field(field: str, value: float, terms: Sequence[str] = ()) -> Callable:
         def made() -> Equations:
-            changed = Equations(tree, equations.q, equations.qd)
-            changed.stated["factor"][:, terms[of]] = factor
+            changed = Equations(tree, q, qd)
+            columns = [BODY_TERMS.index(term) for term in terms]
+            changed.stated[field][(slice(None), columns) if terms else slice(None)] = value
             return changed
 
         return made
 
     def with_bias(change: Callable) -> Callable:
-        return lambda: Recast(
-            equations, lambda values: np.concatenate([values[..., :-nv], change(values[..., -nv:])], -1)
-        )
+        return lambda: Recast(equations, lambda v: np.concatenate([v[..., :-nv], change(v[..., -nv:])], axis=-1))
 
-    def without_rotors() -> Equations:
-        changed = Equations(tree, equations.q, equations.qd)
-        changed.stated["armature"][:] = 0.0
-        return changed
-
-    yield Variant(1, "option", "gravity", "on", "off", with_factor("gravity", 0.0))
-    yield Variant(1, "option", "sign of gravity", "+", "-", with_factor("gravity", -1.0))
-    yield Variant(1, "option", "velocity terms in h", "there", "left out", with_factor("rates", 0.0))
-    yield Variant(1, "option", "bias", "there", "left out", with_bias(np.zeros_like))
-    negative = with_bias(lambda h: -h)
-    yield Variant(1, "option", "sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", negative)
-    if equations.q.shape == equations.qd.shape:
-        exchanged = with_bias(lambda h: 0.0 * h + Equations(tree, equations.qd, equations.q).values()[0][:, -nv:])
-        yield Variant(
-            1, "option", "arguments of bias", "bias(q, qd)", "exchanged, bias(qd, q)", exchanged, is_simple=False
-        )
+    of_speeds = "convective", "Euler", "gyroscopic"
+    yield option("gravity", "on", "off", with_field("factor", 0.0, ["gravity"]))
+    yield option("sign of gravity", "+", "-", with_field("factor", -1.0, ["gravity"]))
+    yield option("velocity terms in h", "there", "left out", with_field("factor", 0.0, of_speeds))
+    yield option("bias", "there", "left out", with_bias(np.zeros_like))
+    yield option("sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", with_bias(lambda h: -h))
+    if q.shape == qd.shape:
+        exchanged = with_bias(lambda h: 0.0 * h + Equations(tree, qd, q).values()[0][:, -nv:])
+        yield option("arguments of bias", "bias(q, qd)", "exchanged, bias(qd, q)", exchanged, is_simple=False)
     if any(tree.damping):
-        drag = np.array(tree.damping) * equations.qd
-        yield Variant(1, "option", "damping D qd", "not in h", "in h", with_bias(lambda h: h + drag))
-        opposite = with_bias(lambda h: h - drag)
-        yield Variant(1, "option", "damping D qd", "not in h", "in h, of the other sign", opposite)
+        drag = np.array(tree.damping) * qd
+        yield option("damping D qd", "not in h", "in h", with_bias(lambda h: h + drag))
+        yield option("damping D qd", "not in h", "in h, of the other sign", with_bias(lambda h: h - drag))
     if tree.has_springs:
-        pull = literal.spring_torque(equations.q, tree)
-        yield Variant(1, "option", "springs k (q - rest)", "not in h", "in h", with_bias(lambda h: h + pull))
+        pull = literal.spring_torque(q, tree)
+        yield option("springs k (q - rest)", "not in h", "in h", with_bias(lambda h: h + pull))
     if any(tree.armature):
-        yield Variant(1, "option", "armature", "on the diagonal of Mbar", "left out", without_rotors)
+        yield option("armature", "on the diagonal of Mbar", "left out", with_field("armature", 0.0))
     if (turns := absolute_angles(tree)) is not None:
-        yield Variant(1, "option", "angles", "between a body and the one before", "between a body and the world", partial(
-            Absolute, tree, equations.q, equations.qd, turns
-        ))  # fmt: skip
+        absolute = partial(Absolute, tree, q, qd, turns)
+        yield option("angles", "between a body and the one before", "between a body and the world", absolute)
 
 
 def absolute_angles(tree: tmt.Tree) -> np.ndarray | None:
@@ -127,9 +116,10 @@ class Absolute(Recast):
         super().__init__(inner, change)
 
 
-def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Variant]:
-    """Order, senses and units of the joints. names: of the joints, as the given equations take them in this order."""
+def conventions(equations: Equations) -> Iterator[Variant]:
+    """Order, senses and units of the joints."""
     tree, q, qd = equations.tree, equations.q, equations.qd
+    names = tree.hinge_names
     coordinates = Coordinates(names, tree.kind)
     kinds, straight = dict(zip(names, tree.kind)), [name for name, kind in zip(names, tree.kind) if kind != "ball"]
 
@@ -157,7 +147,7 @@ def conventions(equations: Equations, names: tuple[str, ...]) -> Iterator[Varian
 
 
 def other_orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Other orders of joints, in which balls stand where balls stood."""
+    """Other orders of joints, with balls in the places of balls."""
     if len(names) <= MOST_PERMUTED:
         tried = permutations(range(len(names)))
     else:
@@ -172,13 +162,14 @@ def other_orders(names: tuple[str, ...], kinds: tuple[str, ...]) -> Iterator[tup
             yield tuple(names[i] for i in order)
 
 
-def both(equations: Equations, names: tuple[str, ...], given: np.ndarray, weight: np.ndarray) -> Iterator[Variant]:
+def both(equations: Equations, given: np.ndarray, weight: np.ndarray) -> Iterator[Variant]:
     """An order and senses together, of up to six hinges and slides: those that explain the first state.
 
-    given, weight: (states, entries), the weight 0 where nothing is given. There are tens of thousands of six joints: they are
-    evaluated as states.
+    given, weight: (states, entries), the weight 0 where nothing is given. Six joints have tens of thousands of combinations,
+    which are evaluated as states.
     """
-    tree, n = equations.tree, len(names)
+    tree, names = equations.tree, equations.tree.hinge_names
+    n = len(names)
     if n > MOST_PERMUTED or "ball" in tree.kind:
         return
     places = {name: i for i, name in enumerate(names)}
@@ -210,7 +201,7 @@ def both(equations: Equations, names: tuple[str, ...], given: np.ndarray, weight
 
 
 def values_of(equations: Equations, maps: Sequence[JointMap], states: int) -> Iterator[np.ndarray]:
-    """What the first states give with each map of the joints, (states, entries): evaluated together."""
+    """The values at the first states with each map of the joints, (states, entries), evaluated together."""
     q, qd = equations.q[:states], equations.qd[:states]
     for first in range(0, len(maps), MAPS_AT_ONCE):
         some = maps[first : first + MAPS_AT_ONCE]

@@ -42,9 +42,7 @@ class Setup:
     progress: Callable = nothing  # reports the progress of long work
     background: dict = field(default_factory=dict)  # work under way, by name
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
-    faults: bool = False  # diagnosis: of seeded errors instead of the robot's own differences
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
-    door: object | None = None  # executor for long lists of calls, see fleet.calls.Calls; None: `map`
     asked: tuple[float, str] | None = None  # stability: step, s, and integrator of MuJoCo to be checked
     size: str = "full"  # "quick": some parts, in seconds; "small": all parts with few states and steps, for tests
 

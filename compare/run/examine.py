@@ -163,14 +163,14 @@ def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[dict])
         asks = not known
     if (known or of_numbers) and setup.robot.is_stated:
         return in_one(setup, of_numbers)
-    if not asks or setup.faults:
+    if not asks:
         return of_numbers
     return of_values(setup, [cause["place"] for cause in known]) + of_numbers
 
 
 def in_one(setup: Setup, of_numbers: Sequence[dict]) -> list[dict]:
     """The causes; one option, convention, number or error of two replaces several numbers of Mbar and h if it explains them."""
-    if sum(cause["quantity"] in IN_EQUATIONS for cause in of_numbers) < 2 or setup.faults:
+    if sum(cause["quantity"] in IN_EQUATIONS for cause in of_numbers) < 2:
         return list(of_numbers)
     diagnosis = module("diagnosis")
     found, _ = attempt("diagnosis", diagnosis.diagnosed, setup)

@@ -1,14 +1,11 @@
 """The pool: every task gets an outcome, whatever the others do."""
 
-import math
 import os
-import platform
 from contextlib import closing
 from itertools import pairwise
 
 import toy_tasks as toy
 
-from compare.fleet.calls import door_opened
 from compare.fleet.pool import Pool
 from compare.fleet.tasks import Task, outcomes
 
@@ -34,18 +31,6 @@ def test_nothing_runs_beside_what_is_timed(tmp_path):
     for begin, end in timed:
         assert not any(other < end and begin < other_end for other, other_end in others)
 
-
-def test_calls_have_their_outcomes_in_order_and_none_is_lost_with_another():
-    ended = []
-    with door_opened(None, 1) as door:
-        found = door.outcomes(math.sqrt, [4.0, -1.0, 9.0], progress=ended.append)
-    assert [found[0].returned, found[2].returned] == [2.0, 3.0] and ended == [1, 2, 3]
-    assert found[1].broke.startswith("ValueError") and found[0].machine == platform.node()
-    with door_opened(None, None) as door:
-        assert door is None
-
-
-def test_a_process_that_is_killed_between_two_tasks_costs_no_try(tmp_path):
     with closing(Pool(1, 60.0)) as pool:
         (found,) = outcomes(pool, [Task("", os.getpid)])
         os.kill(found.returned, 9)

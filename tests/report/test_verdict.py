@@ -165,7 +165,6 @@ APART = {"quantity": "Mbar", "unit": "kg m2", "worst_difference": 2e-16, "differ
 STEP = {"scene": "s", "engine": "tmt", "method": "rk4", "damping": 0.0, "limit": "finite", "predicted_dt_s": 0.1,
         "observed_dt_s": 0.1001}  # fmt: skip
 PRINTED = {"published": 1.0, "tmt": 1.1, "mujoco": 0.9, "tolerance": 0.11}
-FAULT = {"visible": True, "outcome": "right", "faults": 3}
 
 
 def headline_of(name, of):
@@ -181,7 +180,6 @@ def headline_of(name, of):
     ("published", [PRINTED | {"mujoco": 0.8}], "0 1", ""),
     ("gravity", [APART, APART | {"quantity": "other", "worst_difference": 1.0, "difference_over_bar": 0.05}], "2e-16 10", "Mbar"),
     ("trajectory", [{"scene": "a", "difference_over_band": 0.04}, {"scene": "a", "difference_over_band": 12.0}], "1 12", ""),
-    ("diagnosis", [FAULT, FAULT | {"outcome": "wrong"}, FAULT | {"visible": False}], "3 6", ""),
     ("stability", [STEP, STEP | {"observed_dt_s": 0.0995}], "2 0.5", ""),
 ])  # fmt: skip
 def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):

@@ -22,7 +22,7 @@ def test_the_arm_has_nothing_to_explain():
     found = setup.background["diagnosis"]  # a ratio of 1 is allowed
     for k, field in enumerate(("ratio", "force_ratio")):
         for ratio, passes in ((1.0, True), (1.001, False)):
-            setup.background["diagnosis"] = found._replace(steps=(), **{field: ratio})
+            setup.background["diagnosis"] = found._replace(**{field: ratio})
             assert diagnosis.rows(setup).checks[k].passed is passes
 
 
@@ -34,23 +34,13 @@ def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     assert row.items() >= named.items() and (cause["place"], cause["found"]) == (row["place"], row["explains"])
     assert "mass of forearm" in check.note and "1.51 kg" in check.note
     ((*_, caption),) = [draw() for draw in diagnosis.figures(result, None)]
-    assert "mass of forearm" in caption
+    assert caption.values["names"][0] == "mass of forearm"
 
 
 def test_damping_is_seen_in_accelerations_alone():
     result = diagnosis.rows(setup_of(DAMPED))
     (check,) = failed(result)
     assert [row["place"] for row in result.rows] == ["damping of beta"] and "accelerations" in check.quantity
-
-
-def test_a_wrong_integrator_is_named_where_all_else_agrees():
-    setup = setup_of()
-    methods = setup.engines["mujoco"].methods
-    setup.engines["mujoco"].methods = {"Euler": methods["Euler"]._replace(scheme="implicit")}
-    result = diagnosis.rows(setup)
-    (check,), (row,) = failed(result), result.rows
-    assert "Euler" in check.quantity
-    assert (row["place"], row["stated"], row["explains"]) == ("scheme", "implicit", "semi_implicit_euler")
 
 
 @pytest.mark.parametrize("names, text, made, found", [

@@ -44,7 +44,6 @@ CHECKS = (
     ("claims_checks", "check_kept", "what"),
     ("failure", "check_silent", "quantity"),
     ("equilibria", "check_amplification", "quantity"),
-    ("fault_table", "rows_by_pieces", "ENDS"),
 )
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (

@@ -1,0 +1,250 @@
+"""Made faults that the diagnosis must name: `python -m tests.faults [COUNT]` prints outcomes; exit 1 if one is wrong.
+
+Each fault is one number, term, slip in the derivation or convention of a joint. Wrong values come from tmt's composite form or
+from a second derivation in the world's axes, which shares nothing with the search. Outcomes: "named" (alone or among others that
+explain as much); "tied" (only other causes, no less simple, and again at further states); "none"; "invisible"; "wrong".
+"""
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import tmt
+from compare.diagnosis import STATES_ASKED, Diagnosis, diagnose, packed
+from compare.diagnosis.places import OF_TERM
+from compare.engines.mujoco import reading
+from compare.judge.entries import Entries
+from compare.judge.scale import EPS, FACTOR
+from tmt.equations.composite import mass_matrix_and_bias
+
+ARM6 = Path(__file__).parent / "models" / "arm6.xml"
+SECONDS = 20.0  # of one search: what else the machine does must not change the outcome
+SLIPS = {
+    "R for R'": "R for R' in the angular velocity of {}",
+    "not turned": "inertia of {} not turned to the inertial frame",
+    "turned the wrong way": "R' I R for R I R' of {}",
+    "about the joint": "inertia of {} about its joint and mass counted again",
+}
+
+
+class Fault(NamedTuple):
+    robot: str
+    tree: tmt.Tree
+    kind: str
+    place: str  # of the cause that names it
+    values: tuple[float, ...]  # which the cause must give
+    make: Callable  # (tree, q, qd) -> Mbar, h
+
+
+class Walk:
+    """Every body's place and motion at qdd = 0, at states q, qd (states, nv) of hinges and slides, in the world's axes."""
+
+    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: np.ndarray):
+        self.tree, (self.states, self.nv) = tree, q.shape
+        zero = np.zeros((self.states, 3))
+        self.world = (zero, np.broadcast_to(np.eye(3), (self.states, 3, 3)), zero, zero, zero)
+        self.joints, self.axes = [], []  # origin, turn, angular velocity, acceleration, angular acceleration of each
+        for i, parent in enumerate(tree.parent):
+            x, R, w, a, alpha = self.joints[parent] if parent >= 0 else self.world
+            axis, angle, rate = R @ np.array(tree.axis[i]), q[:, i] - tree.reference[i], qd[:, i, None]
+            slides = tree.kind[i] == "slide"
+            arm = R @ np.array(tree.offset[i]) + (axis * angle[:, None] if slides else 0.0)
+            x, a = x + arm, a + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+            if slides:
+                self.joints.append((x, R, w, a + 2.0 * np.cross(w, axis * rate), alpha))
+            else:
+                turn = R @ rotation(np.array(tree.axis[i]), angle)
+                self.joints.append((x, turn, w + axis * rate, a, alpha + np.cross(w, axis * rate)))
+            self.axes.append(axis)
+
+    def body(self, b: int):
+        joint = self.tree.body_hinge[b]
+        x, R, w, a, alpha = self.joints[joint] if joint >= 0 else self.world
+        arm = R @ np.array(self.tree.com[b])
+        x, a = x + arm, a + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+        T, B = np.zeros((2, self.states, 3, self.nv))
+        while joint >= 0:
+            axis = self.axes[joint]
+            if self.tree.kind[joint] == "slide":
+                T[:, :, joint] = axis
+            else:
+                T[:, :, joint], B[:, :, joint] = np.cross(axis, x - self.joints[joint][0]), axis
+            joint = self.tree.parent[joint]
+        return R, w, a, alpha, T, B
+
+
+def rotation(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    K = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.eye(3) + np.sin(angle)[:, None, None] * K + (1.0 - np.cos(angle)[:, None, None]) * (K @ K)
+
+
+def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", bodies: tuple = ()):
+    """Mbar (states, nv, nv) and h (states, nv), with factors {(body, term): number} and one slip in some bodies."""
+    walk, M, h = Walk(tree, q, qd), 0.0, 0.0
+    for b, mass in enumerate(tree.mass):
+        R, w, a, alpha, T, B = walk.body(b)
+        factor = {term: (factors or {}).get((b, term), 1.0) for term in OF_TERM}
+        inertia, c = np.array(tree.inertia[b]), np.array(tree.com[b])
+        slips, Rt = slip if b in bodies else "", np.swapaxes(R, 1, 2)
+        I = R @ inertia @ Rt
+        if slips == "not turned":
+            I = np.broadcast_to(inertia, I.shape)
+        elif slips == "turned the wrong way":
+            I = Rt @ inertia @ R
+        elif slips == "about the joint":
+            I = R @ (inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))) @ Rt
+        elif slips == "R for R'":
+            w, alpha, B = (R @ R @ w[..., None])[..., 0], (R @ R @ alpha[..., None])[..., 0], R @ R @ B
+        M = M + factor["translation"] * mass * np.swapaxes(T, 1, 2) @ T
+        M = M + factor["rotation"] * np.swapaxes(B, 1, 2) @ I @ B
+        force = mass * (factor["convective"] * a - factor["gravity"] * np.array(tree.gravity))
+        moment = factor["Euler"] * np.einsum("sij,sj->si", I, alpha)
+        moment = moment + factor["gyroscopic"] * np.cross(w, np.einsum("sij,sj->si", I, w))
+        h = h + np.einsum("sci,sc->si", T, force) + np.einsum("sci,sc->si", B, moment)
+    return M + np.diag(tree.armature), h
+
+
+def by_composite(tree: tmt.Tree, q, qd, edited: tmt.Tree | None = None):
+    M, h = mass_matrix_and_bias(edited or tree, list(q.T), list(qd.T))
+    M = [np.stack([np.broadcast_to(x, len(q)) for x in row], axis=-1) for row in M]
+    return np.stack(M, axis=1), np.stack([np.broadcast_to(x, len(q)) for x in h], axis=-1)
+
+
+def in_own_joints(tree: tmt.Tree, q, qd, order=None, sense=1.0, zero=0.0, units=1.0):
+    """In other joints: own = (sense x model's + zero) x units, in this order; q and qd are taken as these."""
+    order, sense = list(range(q.shape[1])) if order is None else order, sense * np.ones(q.shape[1])
+    back = np.argsort(order)
+    M, h = by_composite(tree, ((q / units - zero) * sense)[:, back], (qd / units * sense)[:, back])
+    return M[:, order][:, :, order] * sense[:, None] * sense, h[:, order] * sense
+
+
+def tree_numbers(tree: tmt.Tree) -> Iterator[tuple[str, str, tuple, float]]:
+    """Place, field of the Tree, index and natural size of each number."""
+    length = max(np.abs(tree.offset).max(), np.abs(tree.com).max(), 1e-3)
+    for b, body in enumerate(tree.body_names):
+        yield f"mass of {body}", "mass", (b,), tree.mass[b]
+        yield from ((f"CoM {axis} of {body}", "com", (b, k), length) for k, axis in enumerate("xyz"))
+        for name in ("xx", "yy", "zz", "xy", "xz", "yz"):
+            yield f"inertia {name} of {body}", "inertia", (b, *map("xyz".index, name)), np.abs(tree.inertia[b]).max()
+    for i, joint in enumerate(tree.hinge_names):
+        for k, axis in enumerate("xyz"):
+            yield f"offset {axis} of {joint}", "offset", (i, k), length
+            yield f"axis {axis} of {joint}", "axis", (i, k), 1.0
+        yield f"armature of {joint}", "armature", (i,), max(tree.armature[i], 0.1)
+    yield from ((f"gravity {axis}", "gravity", (k,), 9.81) for k, axis in enumerate("xyz"))
+
+
+def changed(tree: tmt.Tree, number: tuple, rng: np.random.Generator) -> tuple[tmt.Tree, float] | None:
+    """The tree with one number changed by 1e-6 to 1 of its size, and the new number; None if no rigid body has it."""
+    _, field, index, scale = number
+    values = np.array(getattr(tree, field), float)
+    values[index] += rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6.0, 0.0) * scale
+    if field == "inertia":
+        values[index[0], index[2], index[1]] = values[index]
+    try:
+        return replace(tree, **{field: values.tolist()}), float(values[index])
+    except ValueError:
+        return None
+
+
+def faults_of(robot: str, tree: tmt.Tree, rng: np.random.Generator) -> list[Fault]:
+    found, names, n, bodies = [], tree.hinge_names, len(tree.axis), range(len(tree.mass))
+
+    def add(kind, place, make, *values, **more):
+        found.append(Fault(robot, tree, kind, place, values, partial(make, **more)))
+
+    for number in tree_numbers(tree):
+        if one := changed(tree, number, rng):
+            add("number", number[0], by_composite, one[1], edited=one[0])
+    for which in [*((b,) for b in bodies), tuple(bodies)]:
+        of = tree.body_names[which[0]] if len(which) == 1 else "every body"
+        for term, name in OF_TERM.items():
+            factor = float(rng.choice([0.0, 0.5, -1.0, 2.0]))
+            add("term", name.format(of), derived, factor, factors={(b, term): factor for b in which})
+        for slip, name in SLIPS.items():
+            add("slip", name.format(of), derived, slip=slip, bodies=which)
+    order = rng.permutation(n).tolist()
+    if order != sorted(order) and len(set(tree.kind)) == 1:
+        add("convention", "order of the joints", in_own_joints, order=order)
+    for i, (name, unit) in enumerate(zip(names, np.eye(n))):
+        add("convention", f"sense of {name}", in_own_joints, sense=1.0 - 2.0 * unit)
+        add("convention", f"zero of {name}", in_own_joints, zero=rng.uniform(-1.5, 1.5) * unit)
+        if tree.kind[i] == "hinge":
+            add("convention", f"unit of {name}", in_own_joints, units=1.0 + (180.0 / np.pi - 1.0) * unit)
+    return found
+
+
+def random_tree(rng: np.random.Generator) -> tmt.Tree:
+    """A tree of two to five hinges and slides with tilted axes, often branched, a body on each joint."""
+    n = int(rng.integers(2, 6))
+    turns = np.linalg.qr(rng.normal(size=(n, 3, 3)))[0]
+    second = turns * 10.0 ** rng.uniform(-3.0, -1.0, (n, 1, 3)) @ np.swapaxes(turns, 1, 2)
+    inertia = np.einsum("nii->n", second)[:, None, None] * np.eye(3) - (second + np.swapaxes(second, 1, 2)) / 2.0
+    return tmt.Tree(
+        hinge_names=tuple(f"j{i}" for i in range(n)),
+        kind=("hinge", *(str(kind) for kind in rng.choice(["hinge", "slide"], n - 1, p=[0.75, 0.25]))),
+        parent=(-1, *(i - 1 if rng.random() < 0.8 else int(rng.integers(-1, i)) for i in range(1, n))),
+        offset=rng.uniform(-0.5, 0.5, (n, 3)).tolist(), axis=rng.normal(size=(n, 3)).tolist(),
+        damping=(0.0,) * n,
+        body_names=tuple(f"b{i}" for i in range(n)), body_hinge=tuple(range(n)),
+        mass=(10.0 ** rng.uniform(-1.0, 1.0, n)).tolist(), com=rng.uniform(-0.3, 0.3, (n, 3)).tolist(),
+        inertia=inertia.tolist(), gravity=rng.uniform(-10.0, 10.0, 3).tolist(),
+        armature=(rng.uniform(0.0, 0.5, n) * (rng.random(n) < 0.3)).tolist(),
+    )  # fmt: skip
+
+
+def all_faults() -> list[Fault]:
+    rng = np.random.default_rng(13)
+    found = faults_of("arm", tmt.ARM, rng) + faults_of("arm6", reading.read(ARM6).tree, rng)
+    for k in range(len(found)):
+        of_tree = faults_of(f"random tree {k}", random_tree(rng), rng)
+        found.append(of_tree[int(rng.integers(len(of_tree)))])
+    return found
+
+
+def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
+    tree, nv = fault.tree, len(fault.tree.axis)
+    q, qd = np.random.default_rng(seed).uniform(-3.0, 3.0, (2, STATES_ASKED, nv))
+    scale = Entries(tree, q, qd)
+    allowed = FACTOR * EPS * packed(scale.mass_matrix + np.zeros((len(q), 1, 1)), scale.bias, nv, len(q))
+    return diagnose(tree, q, qd, packed(*fault.make(tree, q, qd), nv, len(q)), allowed, SECONDS)
+
+
+def outcome(fault: Fault) -> tuple[str, list[str]]:
+    found = diagnosis_of(fault, seed=3)
+    places = [cause.place for cause in found.causes]
+    named = [cause for cause in found.causes if cause.place == fault.place]
+    if named and (not fault.values or np.isclose(named[0].explains, fault.values[0], rtol=1e-6, atol=1e-9)):
+        return "named", places
+    if not found.causes:
+        return ("none" if found.differs else "invisible"), places
+    if not named and min(cause.rank for cause in found.causes) <= (1 if fault.kind == "convention" else 2):
+        again = {cause.place for cause in diagnosis_of(fault, seed=4).causes}
+        return ("tied" if again >= set(places) else "wrong"), places
+    return "wrong", places
+
+
+def main() -> int:
+    faults = all_faults()
+    count = int(sys.argv[1]) if sys.argv[1:] else len(faults)
+    faults = [faults[k] for k in np.random.default_rng(2).permutation(len(faults))[:count]]
+    with ProcessPoolExecutor() as pool:
+        outcomes = list(pool.map(outcome, faults, chunksize=4))
+    kinds = Counter((fault.kind, which) for fault, (which, _) in zip(faults, outcomes))
+    for (kind, which), number in sorted(kinds.items()):
+        print(f"{kind:<12} {which:<10} {number:5d}")
+    for fault, (which, places) in zip(faults, outcomes):
+        if which == "wrong":
+            print(f"WRONG {fault.robot}, {fault.place}: {'; '.join(places)}")
+    return int(any(which == "wrong" for which, _ in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
