@@ -1,8 +1,7 @@
 """heyoka's Taylor method on the same equations of motion; only where heyoka is installed (the extra `taylor`)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from importlib.util import find_spec
 from typing import ClassVar
 
 import numpy as np
@@ -14,10 +13,11 @@ from tmt.equations.method import acceleration
 from tmt.equations.vectors import arctan, cos, sin, sqrt
 
 from ..robots.case import Case
-from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
+from . import GRID, EngineRecord, Method, Motion, Prepared, Setting, not_installed, rows_of_states
 from .scipy import as_far_as_it_goes, each, of_length_1
 from .tmt import TmtDynamics
 
+ENGINE = EngineRecord(order=40, label="heyoka", colour="#CC79A7", marker="D", package="heyoka", extra="taylor")
 # of a compiled function: sums in another order, a sine of fewer digits, and as many states in a loop's turn as are fastest
 FASTEST = {"fast_math": True, "batch_size": 16}
 FULL = 1e-15  # tolerance: all digits of a double
@@ -33,9 +33,7 @@ class Heyoka:
     methods: ClassVar[Mapping[str, Method]] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
     def unavailable(self) -> str | None:
-        if find_spec("heyoka") is None:
-            return "heyoka is not installed; the extra `taylor` brings it, on Linux"
-        return None
+        return not_installed(self.name)
 
     def too_long(self, tree: Tree) -> str | None:
         """Why the compilation for a Tree would take minutes, or None."""
@@ -47,6 +45,10 @@ class Heyoka:
 
     def of(self, case: Case) -> "HeyokaDynamics":
         return HeyokaDynamics(case)
+
+
+def engine(schemes: Iterable[str]) -> Heyoka:
+    return Heyoka()
 
 
 class HeyokaDynamics(TmtDynamics):

@@ -1,6 +1,6 @@
 """SciPy's solve_ivp with tmt's compiled equations."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -8,9 +8,10 @@ import numpy as np
 from tmt.compiled import evaluator
 
 from ..robots.case import Case, Coordinates
-from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
+from . import GRID, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
 from .tmt import TmtDynamics
 
+ENGINE = EngineRecord(order=30, label="SciPy", colour="#009E73", marker="^")
 DEFAULT = 1e-9  # tolerance
 LEAST_RELATIVE = 2.3e-14  # that solve_ivp takes
 
@@ -28,6 +29,10 @@ class Scipy:
 
     def of(self, case: Case) -> "ScipyDynamics":
         return ScipyDynamics(case)
+
+
+def engine(schemes: Iterable[str]) -> Scipy:
+    return Scipy()
 
 
 class ScipyDynamics(TmtDynamics):

@@ -12,8 +12,9 @@ from tmt.methods import method_named
 from tmt.simulation import reasons
 
 from ..robots.case import Case
-from . import GRID, Method, Motion, Prepared, Setting
+from . import GRID, EngineRecord, Method, Motion, Prepared, Setting
 
+ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", compared=True)
 # schemes of MuJoCo that differ from others for some robots alone, which have balls, lone bodies or springs
 FOR_SOME = ("rk4_mean_speed", "implicitfast", "discrete")
 
@@ -46,6 +47,10 @@ class Tmt:
 
     def of(self, case: Case) -> "TmtDynamics":
         return TmtDynamics(case)
+
+
+def engine(schemes: Iterable[str]) -> Tmt:
+    return Tmt(schemes)
 
 
 class TmtDynamics:

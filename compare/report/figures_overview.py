@@ -9,17 +9,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from ..engines import COLOURS, MARKS
 from ..judge.check import Result
 from ..judge.scale import FACTOR
 from . import engines_apart, methods_compared, overview
-from .style import BLUE, GREEN, GREY, ORANGE, PINK, RED, plain
+from .style import BLUE, GREY, ORANGE, RED, plain
 
 SIZE = (4.2, 2.75)  # inches: about 400 px wide on the first screen
 LEAST_EPS, MOST_EPS = 1e-3, 1e6  # eps: where what is zero, and what is farther, is drawn
 LEAST_SHARE, MOST_SHARE = 1e-4, 1e3  # of a band
 MOST_IN_A_PICTURE = 9  # scenes or methods in one picture
-COLOUR_OF_ENGINE = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
-MARK_OF_ENGINE = {"mujoco": "s", "tmt": "o", "scipy": "^", "heyoka": "D"}
 NAMES_OF_SCHEMES = {
     "rk4": "RK4",
     "semi_implicit_euler": "semi-implicit\nEuler",
@@ -171,9 +170,9 @@ def picture_of_times(results: Mapping[str, Result], robot: object) -> tuple[str,
     unit = result.curves.get("unit", "rad")
     fig, ax = empty()
     for curve in methods_compared.best_curves(result):
-        colour = COLOUR_OF_ENGINE.get(curve.engine, GREY)
+        colour = COLOURS[curve.engine]
         errors = np.maximum(curve.errors, 1e-16)
-        ax.plot(errors, curve.milliseconds, marker=MARK_OF_ENGINE.get(curve.engine, "v"), markersize=3.5, linewidth=1.2,
+        ax.plot(errors, curve.milliseconds, marker=MARKS[curve.engine], markersize=3.5, linewidth=1.2,
                 color=colour, label=methods_compared.engine_in_print(curve.engine))  # fmt: skip
         if curve.cheapest:
             method, time, _ = curve.cheapest
@@ -208,7 +207,7 @@ def picture_of_limits(results: Mapping[str, Result], robot: object) -> tuple[str
             ax.vlines(one.predicted, place - 0.38, place + 0.38, color=GREY, linewidth=1.0)
             shift = 0.17 if one.engine == "mujoco" else -0.17
             mark = ("s" if one.engine == "mujoco" else "o") if one.passed else "X"
-            colour = COLOUR_OF_ENGINE.get(one.engine, GREY) if one.passed else RED
+            colour = COLOURS[one.engine] if one.passed else RED
             ax.plot(one.observed, place + shift, mark, color=(colour, 0.85), markersize=4.5)
         kinds = {one.kind for one in of}
         if "finite" not in kinds:

@@ -9,7 +9,7 @@ from tmt import literal
 from tmt.methods.stepping import stepped
 
 from ...robots.case import Case
-from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states
+from .. import GRID, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
 from .equations import OwnEquations
 from .functions import ARGUMENTS, QUICK, OwnError, is_function
 from .returned import Problem, state_in_words
@@ -26,6 +26,7 @@ __all__ = [
     "state_in_words",
 ]
 
+ENGINE = EngineRecord(order=50, label="yours", possessive="your", from_file=True)
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme
 
 
