@@ -95,7 +95,9 @@ def test_quantities_are_those_of_50_digits(engine, name, engines, rng):
         if len(fields) == 1:  # a batch of any shape is each state
             assert np.array_equal(function(*(x[2] for x in arguments)), found[2])
             assert np.array_equal(function(*(x[None] for x in arguments)), found[None])
-    if hasattr(dynamics, "other_forces"):
+    if hasattr(dynamics, "inverse"):
+        back = dynamics.inverse(q, v, dynamics.acceleration(q, v, tau))
+        assert (np.abs(back - tau).max(axis=1) <= FACTOR * EPS * scale.condition(tree, q) * with_torque).all()
         assert not any(np.abs(force).max() for force in dynamics.other_forces(q, v).values())
 
 

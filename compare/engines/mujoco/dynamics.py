@@ -101,6 +101,16 @@ class MujocoDynamics:
         """a, rad/s2, (..., nv): qacc."""
         return self._each(lambda d: d.qacc[self.dofs], q, v, self.applied(tau))
 
+    def inverse(self, q, v, a) -> np.ndarray:
+        """The torque for which a is the acceleration, N m, (..., nv): mj_inverse."""
+
+        def torque(d):
+            d.qacc[self.dofs] = d.qfrc_applied[self.dofs]
+            mujoco.mj_inverse(self.model, d)
+            return d.qfrc_inverse[self.dofs]
+
+        return self._each(torque, q, v, a)  # a travels in the place of tau
+
     def other_forces(self, q, v) -> dict:
         """Forces that the case's equations do not have, by source, N m, (..., nv) each."""
         D, has_springs = self.model.dof_damping, self.bare
