@@ -20,7 +20,7 @@ DIRECTIONS = {
     "engines": "tmt robots judge process",
     "truth": "tmt robots",
     "diagnosis": "tmt robots judge",
-    "report": "judge process experiments",
+    "report": "judge process engines experiments",
     "experiments": "tmt robots engines truth judge diagnosis",
     "run": "tmt robots engines judge process report experiments",
     "cli": "experiments process report",

@@ -1,11 +1,23 @@
-"""Who computes: one file an engine, and what is asked of each of them.
+"""The engines: who computes. Each is one file or folder here; this module finds them by looking into its folder.
 
-An engine makes the dynamics of a case; gravity, damping, locked joints and torques are applied there and nowhere else. The
-dynamics know positions q (..., nq), speeds v (..., nv) and torques tau (..., nv), in rad, rad/s and N m, of any leading batch
-shape, in the order of the case's joints; and Mbar a + bias = tau - D v.
+An engine is a module with a record, `ENGINE = EngineRecord(order=..., label=..., ...)`, whose fields are literals: they are read
+without importing the module. The module has
+
+    engine(schemes) -> Engine    the engine, for a robot on which MuJoCo's integrators are these schemes
+
+unless its record says from_file: run.reference makes an engine of a file of the user's.
+
+An engine gives the dynamics of a case; it applies gravity, damping, locked joints and torques itself. Dynamics take positions
+q (..., nq), speeds v (..., nv) and torques tau (..., nv) in rad, rad/s and N m, of any leading batch shape, with joints in the
+order of the case; and Mbar a + bias = tau - D v.
 """
 
-from collections.abc import Callable, Mapping
+import ast
+import importlib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -13,10 +25,60 @@ from numpy.typing import ArrayLike
 
 from ..robots.case import Case, Coordinates
 
-LABELS = {"tmt": "TMT", "own": "yours", "mujoco": "MuJoCo", "scipy": "SciPy", "heyoka": "heyoka"}  # in text
-WHOSE = {"tmt": "TMT's", "own": "your", "mujoco": "MuJoCo's"}  # before what they have
-COMPARED = ("tmt", "mujoco")  # the two engines that every experiment compares, except for equations of a user's own
-GRID = 64  # equal times, and the start, at which a prepared run is read
+FOLDER = Path(__file__).parent
+GRID = 64  # number of equal intervals at whose ends a prepared run is read
+
+
+@dataclass(frozen=True)
+class EngineRecord:
+    """What the program has to know of an engine before it imports it."""
+
+    order: int  # of the engines in tables and charts
+    label: str  # its name in text
+    possessive: str = ""  # before what it has; by default the label with 's
+    colour: str = "#666666"  # in charts
+    marker: str = "v"  # in charts, by matplotlib's names
+    compared: bool = False  # one of the two engines that every experiment compares (except with a user's own equations)
+    from_file: bool = False  # it is made of a user's file: of a model, or of the user's own equations
+    package: str = ""  # that must be installed
+    extra: str = ""  # of this project, which installs the package
+
+
+def records_in(folder: Path) -> dict[str, EngineRecord]:
+    """The records of the engines in a folder by the engines' names, in their order."""
+    records = {}
+    for file in (*folder.glob("*.py"), *folder.glob("*/__init__.py")):
+        text = file.read_text(encoding="utf-8")
+        for node in ast.parse(text).body if "\nENGINE = EngineRecord(" in text else ():
+            if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", None) == "ENGINE":
+                fields = {field.arg: ast.literal_eval(field.value) for field in node.value.keywords}
+                records[file.parent.name if file.stem == "__init__" else file.stem] = EngineRecord(**fields)
+    return dict(sorted(records.items(), key=lambda item: item[1].order))
+
+
+RECORDS = records_in(FOLDER)
+LABELS = {name: record.label for name, record in RECORDS.items()}
+WHOSE = {name: record.possessive or f"{record.label}'s" for name, record in RECORDS.items()}
+COLOURS = {name: record.colour for name, record in RECORDS.items()}
+MARKS = {name: record.marker for name, record in RECORDS.items()}
+COMPARED = tuple(name for name, record in RECORDS.items() if record.compared)
+
+
+def made(schemes: Collection[str], from_file: Mapping[str, "Engine"]) -> dict[str, "Engine"]:
+    """All engines by their names, in their order; some may be unavailable. from_file: those made of a user's files."""
+    modules = {name: importlib.import_module(f".{name}", __name__) for name in RECORDS if not RECORDS[name].from_file}
+    return {name: modules[name].engine(schemes) if name in modules else from_file[name]
+            for name in RECORDS if name in modules or name in from_file}  # fmt: skip
+
+
+def not_installed(name: str) -> str | None:
+    """Why an engine is unavailable, if the package that it needs is not installed; else None."""
+    package, extra = RECORDS[name].package, RECORDS[name].extra
+    if not package or find_spec(package):
+        return None
+    return (
+        f"{package} is not installed; `pip install .[{extra}]` installs it" if extra else f"{package} is not installed"
+    )
 
 
 class Method(NamedTuple):
@@ -24,8 +86,8 @@ class Method(NamedTuple):
 
     engine: str
     name: str
-    order: int | None  # of its error in the step; None: it chooses its own steps
-    scheme: str  # what it does: methods of the same scheme do the same except for rounding
+    order: int | None  # of its error; None: it chooses its own steps
+    scheme: str  # methods of the same scheme differ only by rounding
     adaptive: bool = False  # it chooses its own steps and takes a tolerance
 
     @property
@@ -34,17 +96,17 @@ class Method(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """How a method follows a motion: so many steps, or a tolerance, in a duration in s."""
+    """How a method follows a motion: in a number of steps, or within a tolerance."""
 
-    duration: float
+    duration: float  # s
     steps: int | None = None
     tolerance: float | None = None
 
     @property
     def every(self) -> int:
-        """How many of its steps lie between two of the times at which the run is read; ValueError if that is no whole number."""
+        """The number of steps from one time at which the run is read to the next; ValueError if it is not a whole number."""
         if not self.steps or self.steps % GRID:
-            raise ValueError(f"steps is {self.steps}; a multiple of {GRID} is expected")
+            raise ValueError(f"steps = {self.steps} is not a multiple of {GRID}")
         return self.steps // GRID
 
 

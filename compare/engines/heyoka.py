@@ -1,8 +1,7 @@
 """heyoka's Taylor method on the same equations of motion; only where heyoka is installed (the extra `taylor`)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from importlib.util import find_spec
 from typing import ClassVar
 
 import numpy as np
@@ -14,16 +13,16 @@ from tmt.equations.method import acceleration
 from tmt.equations.vectors import arctan, cos, sin, sqrt
 
 from ..robots.case import Case
-from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
-from .scipy import as_far_as_it_goes, each, of_length_1
-from .tmt import TmtDynamics
+from . import EngineRecord, Method, Motion, Prepared, not_installed, rows_of_states
+from .scipy import ScipyDynamics, as_far_as_it_goes, of_length_1
 
-# of a compiled function: sums in another order, a sine of fewer digits, and as many states in a loop's turn as are fastest
+ENGINE = EngineRecord(order=40, label="heyoka", colour="#CC79A7", marker="D", package="heyoka", extra="taylor")
+# options of a compiled function: sums in any order, a less exact sine, and the fastest number of states in a loop's turn
 FASTEST = {"fast_math": True, "batch_size": 16}
 FULL = 1e-15  # tolerance: all digits of a double
 # of the accelerations: heyoka's compilation takes longer than in proportion, 15 s for 290 of them, 266 s for 2479
 MOST_OPERATIONS = 600
-MOST_JOINTS = 12  # up to which the operations are counted
+MOST_JOINTS = 12  # for more the operations are not counted
 
 
 class Heyoka:
@@ -33,9 +32,7 @@ class Heyoka:
     methods: ClassVar[Mapping[str, Method]] = {"Taylor": Method("heyoka", "Taylor", None, "Taylor", adaptive=True)}
 
     def unavailable(self) -> str | None:
-        if find_spec("heyoka") is None:
-            return "heyoka is not installed; the extra `taylor` brings it, on Linux"
-        return None
+        return not_installed(self.name)
 
     def too_long(self, tree: Tree) -> str | None:
         """Why the compilation for a Tree would take minutes, or None."""
@@ -49,7 +46,11 @@ class Heyoka:
         return HeyokaDynamics(case)
 
 
-class HeyokaDynamics(TmtDynamics):
+def engine(schemes: Iterable[str]) -> Heyoka:
+    return Heyoka()
+
+
+class HeyokaDynamics(ScipyDynamics):
     """The equations of a case as heyoka's expressions."""
 
     def mass_matrix(self, q) -> np.ndarray:
@@ -69,17 +70,7 @@ class HeyokaDynamics(TmtDynamics):
         batch, states = rows_of_states(q, none if v is None else v, none if tau is None else tau)
         return dynamics(self.tree)(np.concatenate(states, axis=1).T.copy()).T.reshape(*batch, -1)
 
-    def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), tolerance)
-
-    def solved(self, q, v, tau, t, tolerance) -> Motion:
-        run, read = self.prepared(q, v, tau, t, tolerance)
-        return read(run())
-
-    def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
-        return self.prepared(q, v, tau, np.linspace(0.0, setting.duration, GRID + 1), setting.tolerance)
-
-    def prepared(self, q, v, tau, t, tolerance) -> Prepared:
+    def prepared(self, q, v, tau, t, method, tolerance) -> Prepared:
         stepper = integrator(
             self.tree, tuple(np.asarray(tau, float).tolist()), FULL if tolerance is None else tolerance
         )
@@ -127,7 +118,7 @@ def dynamics(tree: Tree):
 def compiled_accelerations(tree: Tree, fastest: bool = False):
     """heyoka's compiled function of many states, f(states, outputs=qdd): states (nq + 2 nv, N), of q, qd, tau; qdd (nv, N).
 
-    As heyoka compiles it of itself, or by FASTEST.
+    Compiled with heyoka's defaults, or with FASTEST.
     """
     import heyoka
 

@@ -33,13 +33,13 @@ class PinocchioCalls:
     @staticmethod
     def unavailable() -> str | None:
         """Why it cannot take part here, or None."""
-        return None if find_spec("pinocchio") else "Pinocchio is not installed; the extra `peers` brings it"
+        return None if find_spec("pinocchio") else "Pinocchio is not installed; `pip install .[peers]` installs it"
 
     @staticmethod
     def unfit(tree: Tree) -> str | None:
-        """Why a Tree is not built, or None."""
+        """Why a Tree is not converted, or None."""
         if "ball" in tree.kind or tree.has_gains:
-            return "for Pinocchio only trees of hinges and slides are built here, without a controller"
+            return "its model is built only for trees of hinges and slides without a controller"
         return None
 
     def mass_matrix(self, q) -> np.ndarray:

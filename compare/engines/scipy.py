@@ -1,6 +1,6 @@
 """SciPy's solve_ivp with tmt's compiled equations."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -8,9 +8,10 @@ import numpy as np
 from tmt.compiled import evaluator
 
 from ..robots.case import Case, Coordinates
-from . import GRID, Method, Motion, Prepared, Setting, rows_of_states
+from . import GRID, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
 from .tmt import TmtDynamics
 
+ENGINE = EngineRecord(order=30, label="SciPy", colour="#009E73", marker="^")
 DEFAULT = 1e-9  # tolerance
 LEAST_RELATIVE = 2.3e-14  # that solve_ivp takes
 
@@ -28,6 +29,10 @@ class Scipy:
 
     def of(self, case: Case) -> "ScipyDynamics":
         return ScipyDynamics(case)
+
+
+def engine(schemes: Iterable[str]) -> Scipy:
+    return Scipy()
 
 
 class ScipyDynamics(TmtDynamics):
@@ -57,14 +62,14 @@ class ScipyDynamics(TmtDynamics):
             q, v = y[:nq], y[nq:]
             # between its steps a solver lets quaternions drift
             a = acceleration(q if flat else of_length_1(self.coordinates, q[None])[0], v, tau)
-            if a is None:  # whatever is wrong there
+            if a is None:  # the equations have no acceleration there
                 a = np.full(len(v), np.nan)
             return np.concatenate((v if flat else tree.coordinates.component_rates(q, v), a))
 
         return rate
 
     def evaluated(self, quantity, size, q, v=None, tau=None) -> np.ndarray:
-        """A compiled quantity of so many numbers at each state, (..., size)."""
+        """A compiled quantity at each state, (..., size)."""
         none = np.zeros(self.coordinates.nv)
         batch, states = rows_of_states(q, none if v is None else v, none if tau is None else tau)
         result = np.empty((len(states[0]), size))
@@ -72,11 +77,16 @@ class ScipyDynamics(TmtDynamics):
         return result.reshape(*batch, size)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        return each(self.solved, q, v, tau, np.linspace(0.0, dt * steps, steps + 1), method, tolerance)
-
-    def solved(self, q, v, tau, t, method, tolerance) -> Motion:
-        run, read = self.prepared(q, v, tau, t, method, tolerance)
-        return read(run())
+        """One run after the other."""
+        batch, states = rows_of_states(q, v, tau)
+        t, motions = np.linspace(0.0, dt * steps, steps + 1), []
+        for state in zip(*states):
+            run, read = self.prepared(*state, t, method, tolerance)
+            motions.append(read(run()))
+        q, v = (np.array([getattr(m, name) for m in motions]).reshape(*batch, len(t), -1) for name in ("q", "v"))
+        ended = np.array([m.ended for m in motions], dtype=object).reshape(batch)[()]
+        counts = [m.evaluations for m in motions]
+        return Motion(t, q, v, None if None in counts else sum(counts), ended)
 
     def prepare(self, q, v, tau, setting: Setting, method) -> Prepared:
         return self.prepared(q, v, tau, np.linspace(0.0, setting.duration, GRID + 1), method, setting.tolerance)
@@ -129,7 +139,7 @@ def of_length_1(coordinates: Coordinates, q: np.ndarray) -> np.ndarray:
 
 
 def as_far_as_it_goes(t: np.ndarray, found: np.ndarray, start: np.ndarray, why: str) -> tuple[np.ndarray, str | None]:
-    """q and v side by side at the times t, NaN from where a run has no finite state any more, and why and when that is, or None.
+    """q and v side by side at the times t, NaN from where a run is no longer finite; and when and why that is, or None.
 
     found: (times reached, nq + nv), the states of a run that may have ended early; start: (nq + nv,), its first.
     """
@@ -139,14 +149,3 @@ def as_far_as_it_goes(t: np.ndarray, found: np.ndarray, start: np.ndarray, why: 
     path[np.cumsum(~finite) > 0] = np.nan
     ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"
     return path, ended
-
-
-def each(solved: Callable[..., Motion], q: np.ndarray, v: np.ndarray, tau: np.ndarray, *more) -> Motion:
-    """The motions of a batch, one run after the other: solved(q, v, tau, *more) is the motion of one."""
-    batch, states = rows_of_states(q, v, tau)
-    motions = [solved(*state, *more) for state in zip(*states)]
-    times = motions[0].t
-    q, v = (np.array([getattr(m, name) for m in motions]).reshape(*batch, len(times), -1) for name in ("q", "v"))
-    ended = np.array([m.ended for m in motions], dtype=object).reshape(batch)[()]
-    counts = [m.evaluations for m in motions]
-    return Motion(times, q, v, None if None in counts else sum(counts), ended)

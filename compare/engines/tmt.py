@@ -12,17 +12,27 @@ from tmt.methods import method_named
 from tmt.simulation import reasons
 
 from ..robots.case import Case
-from . import GRID, Method, Motion, Prepared, Setting
+from . import GRID, EngineRecord, Method, Motion, Prepared, Setting
 
-# schemes of MuJoCo that differ from others for some robots alone, which have balls, lone bodies or springs
+ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", compared=True)
+# schemes of MuJoCo that differ from others only for robots with balls, springs or a free body on its own
 FOR_SOME = ("rk4_mean_speed", "implicitfast", "discrete")
+QUANTITIES = (
+    "com_positions",
+    "angular_velocities",
+    "jacobians",
+    "convective_terms",
+    "mass_matrix",
+    "bias",
+    "gravity_balance",
+    "acceleration",
+    "potential_energy",
+    "energy",
+)
 
 
 class Tmt:
-    """The engine of the stated equations.
-
-    schemes: of those that differ from others for some robots alone, the ones that this robot needs.
-    """
+    """The engine of the stated equations. schemes: those of MuJoCo's integrators for this robot."""
 
     name = "tmt"
 
@@ -38,7 +48,7 @@ class Tmt:
         }
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
-        """Its methods in a case: where actuators act every scheme of MuJoCo's is another."""
+        """The methods in a case: where actuators act MuJoCo's integrators are different schemes."""
         return Tmt({*FOR_SOME[1:], *self.methods}).methods if case.controller else self.methods
 
     def unavailable(self) -> str | None:
@@ -48,41 +58,20 @@ class Tmt:
         return TmtDynamics(case)
 
 
+def engine(schemes: Iterable[str]) -> Tmt:
+    return Tmt(schemes)
+
+
 class TmtDynamics:
-    """A case's Tree, each quantity by the method as it stands."""
+    """A case's Tree; each quantity by the literal method."""
 
     def __init__(self, case: Case):
         self.tree, self.coordinates = case.tree, case.coordinates
 
-    def com_positions(self, q) -> np.ndarray:
-        return literal.com_positions(q, self.tree)
-
-    def angular_velocities(self, q, v) -> np.ndarray:
-        return literal.angular_velocities(q, v, self.tree)
-
-    def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
-        return literal.jacobians(q, self.tree)
-
-    def convective_terms(self, q, v) -> tuple[np.ndarray, np.ndarray]:
-        return literal.convective_terms(q, v, self.tree)
-
-    def mass_matrix(self, q) -> np.ndarray:
-        return literal.mass_matrix(q, self.tree)
-
-    def bias(self, q, v) -> np.ndarray:
-        return literal.bias(q, v, self.tree)
-
-    def gravity_balance(self, q) -> np.ndarray:
-        return literal.gravity_balance(q, self.tree)
-
-    def acceleration(self, q, v, tau) -> np.ndarray:
-        return literal.acceleration(q, v, tau, self.tree)
-
-    def potential_energy(self, q) -> np.ndarray:
-        return literal.potential_energy(q, self.tree)
-
-    def energy(self, q, v) -> np.ndarray:
-        return literal.energy(q, v, self.tree)
+    def __getattr__(self, quantity: str) -> Callable:
+        if quantity not in QUANTITIES:
+            raise AttributeError(quantity)
+        return partial(getattr(literal, quantity), model=self.tree)
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
         motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
@@ -110,7 +99,7 @@ class TmtDynamics:
 
 
 class Compiled:
-    """A Tree's quantities by tmt's functions once machine code answers."""
+    """A Tree's quantities by tmt's compiled code."""
 
     def __init__(self, tree: tmt.Tree):
         tmt.prepare(tree)

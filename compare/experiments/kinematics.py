@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from ..engines import LABELS
-from ..engines.mujoco.accelerations import convective_accelerations
+from ..engines.mujoco.dynamics import convective_accelerations
 from ..judge.check import Result
 from ..judge.entries import has_own_scales
 from ..judge.finding import Finding

@@ -5,10 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
-from ..engines import Dynamics, Engine, compared
-from ..engines.heyoka import Heyoka
-from ..engines.scipy import Scipy
-from ..engines.tmt import Tmt
+from ..engines import Dynamics, Engine, compared, made
 from ..judge.finding import Finding
 from ..robots import Robot
 from ..robots import states as samples
@@ -19,9 +16,9 @@ SECONDS_OF_OWN = 5.0  # of a user's own equations at all random states together
 
 
 def engines(mujoco: Engine, own: Engine | None = None) -> dict[str, Engine]:
-    """All engines by their names; some may be unavailable. own: the engine of a user's own equations, if there are any."""
+    """All engines by name; some may be unavailable. own: the engine of a user's own equations, if there are any."""
     schemes = [method.scheme for method in mujoco.methods.values()]
-    return {engine.name: engine for engine in (mujoco, Tmt(schemes), Scipy(), Heyoka(), *([own] if own else []))}
+    return made(schemes, {"mujoco": mujoco} | ({"own": own} if own else {}))
 
 
 def nothing(*_: object) -> None:

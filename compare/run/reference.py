@@ -12,7 +12,7 @@ import numpy as np
 
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, engine, has_hinges, load, read
-from ..engines.mujoco.flags import integrator_by_name
+from ..engines.mujoco.names import integrator_by_name
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import OwnFileError, aside, own_object
 from ..process.streams import in_one_line

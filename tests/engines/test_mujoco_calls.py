@@ -6,10 +6,9 @@ from files import PLAIN, case_of, mjcf
 from models import PATHS
 from trees import random_states
 
-from compare.engines.mujoco import batch, calls, engine, read
+from compare.engines.mujoco import calls, engine, read
 from compare.engines.mujoco.additions import MINIMAL, contacts, with_additions
-from compare.engines.mujoco.batch import BatchedCalls
-from compare.engines.mujoco.calls import MinimalCalls
+from compare.engines.mujoco.calls import TINY_STEP, BatchedCalls, MinimalCalls
 from compare.engines.mujoco.linear import differenced, transition
 from compare.robots.arm import ARM
 
@@ -32,7 +31,7 @@ def test_a_loop_does_all_of_it_at_the_state_that_is_there_as_often_as_it_is_told
     assert np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
     minimal.data.time = 0.0
     loops["MuJoCo, mj_step"](7)
-    assert minimal.data.time == pytest.approx(7 * calls.TINY_STEP, rel=1e-12)
+    assert minimal.data.time == pytest.approx(7 * TINY_STEP, rel=1e-12)
     minimal.place(q, v, nothing)
     minimal.model.opt.timestep = 0.01
     loops["MuJoCo, mj_step"](1)
@@ -50,10 +49,10 @@ def test_a_batch_has_the_accelerations_of_mj_forward(mujoco, rng):
     assert np.array_equal(calls.forward(), expected) and np.abs(expected).max() > 1.0
     calls.batch.bind("qvel")[:] = 0.0
     calls.forward_loop()(1)
-    assert np.array_equal(calls.found, dynamics.acceleration(q, 0.0 * v, tau))
+    assert np.array_equal(calls.qacc, dynamics.acceleration(q, 0.0 * v, tau))
     for _ in range(3):
         calls.step()
-    assert np.allclose(calls.batch.bind("time"), 3 * batch.TINY_STEP, rtol=1e-12)
+    assert np.allclose(calls.batch.bind("time"), 3 * TINY_STEP, rtol=1e-12)
 
 
 # of models with quaternions

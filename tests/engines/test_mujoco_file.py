@@ -10,9 +10,8 @@ from crane import XML as CRANE
 from edited import XML
 
 from compare.engines.mujoco import ModelError, load, parse, read
-from compare.engines.mujoco.light import moves_the_same, without_geoms, without_visuals
-from compare.engines.mujoco.lock import editable
 from compare.engines.mujoco.parameters import parameters
+from compare.engines.mujoco.source import editable, moves_the_same, without_geoms, without_visuals
 from compare.robots.arm import ARM
 
 JOINTS = 'name="gamma" type="hinge"'

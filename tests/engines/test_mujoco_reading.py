@@ -13,7 +13,7 @@ from trees import random_state
 
 from compare.engines.mujoco import ModelError, engine, read
 from compare.engines.mujoco.inventory import REASONS
-from compare.engines.mujoco.stated import stated_numbers
+from compare.engines.mujoco.parameters import stated_numbers
 
 FEW = ("ant.xml", "humanoid.xml", "reacher.xml", "swimmer.xml")
 PUBLISHED = [pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()]

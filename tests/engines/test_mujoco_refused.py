@@ -3,7 +3,7 @@
 import pytest
 from files import PLAIN, TENDON, TWO, mjcf
 
-from compare.engines.mujoco import ModelError, known, read, unknown
+from compare.engines.mujoco import ModelError, read, refused
 
 ALONG = '<actuator><general name="a" tendon="t" armature="1"/></actuator>'
 BALL = '<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'
@@ -52,7 +52,7 @@ def test_a_file_that_cannot_be_read_is_named_in_one_line(name, content, tmp_path
 ])  # fmt: skip
 def test_what_a_newer_mujoco_brings_is_refused_by_name_where_it_is_used(text, names, name, monkeypatch):
     read(text)
-    monkeypatch.setattr(unknown, names, getattr(known, names) - {name})
+    monkeypatch.setattr(refused, names, getattr(refused, names) - {name})
     with pytest.raises(ModelError, match=name.lower()):
         read(text)
     read(mjcf())

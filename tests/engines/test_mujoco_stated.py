@@ -6,7 +6,7 @@ from files import PLAIN, mjcf
 from models import PATHS
 
 from compare.engines.mujoco import read
-from compare.engines.mujoco.stated import stated_numbers
+from compare.engines.mujoco.parameters import stated_numbers
 
 SMALL = 1e-14  # relative; of a tensor up to MuJoCo 3.10: its principal moments are found to about 1e-6
 DIGITS = {"inertia": 1e-6}

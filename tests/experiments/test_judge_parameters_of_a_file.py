@@ -5,7 +5,7 @@ import pytest
 from models import PATHS
 
 from compare.engines.mujoco import engine, read
-from compare.engines.mujoco.stated import Stated
+from compare.engines.mujoco.parameters import Stated
 from compare.experiments import parameters
 from compare.experiments.parameters.file import add_inventory, tolerance_of
 from compare.experiments.parameters.numbers import compare_number

@@ -5,7 +5,7 @@ import pytest
 from edited import CART, STONE, setup_between
 from models import random_tree
 
-from compare.engines.mujoco.accelerations import convective_accelerations
+from compare.engines.mujoco.dynamics import convective_accelerations
 from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass
 from compare.experiments import figures as draw
 from compare.judge.check import Result

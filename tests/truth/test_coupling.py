@@ -7,7 +7,7 @@ from servo_models import posture_of
 
 from compare.engines.mujoco import read
 from compare.engines.mujoco.acting import Acting
-from compare.engines.mujoco.flags import INTEGRATORS
+from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.stability.servos.observed import grows_in_runs
 from compare.experiments.stability.servos.predicted import acting_at, predicted_at
 from compare.robots.file import robot_of

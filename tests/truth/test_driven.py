@@ -7,7 +7,7 @@ import pytest
 from driven_models import with_servos
 from servo_models import acting_of, posture_of
 
-from compare.engines.mujoco.flags import INTEGRATORS
+from compare.engines.mujoco.names import INTEGRATORS
 
 STEPPED = [name for name in INTEGRATORS if name != "RK4"]  # whose step MuJoCo differentiates
 LINEAR = {"discrete": 1e-3}  # what the linear map of a step may differ by; of the others 1e-8: central differences

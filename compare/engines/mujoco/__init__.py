@@ -1,8 +1,9 @@
 """MuJoCo: the only folder that imports it."""
 
+from .. import EngineRecord
 from .engine import Mujoco
-from .file import has_hinges, load, parse
-from .lock import ModelError
-from .reading import Reading, engine, read
+from .reading import Reading, engine, has_hinges, load, parse, read
+from .source import ModelError
 
+ENGINE = EngineRecord(order=10, label="MuJoCo", colour="#E69F00", marker="s", compared=True, from_file=True)
 __all__ = ["ModelError", "Mujoco", "Reading", "engine", "has_hinges", "load", "parse", "read"]

@@ -1,4 +1,4 @@
-"""A file's model in MuJoCo with its actuators: what they are along, what a step does, and runs from near a posture at rest."""
+"""A file's model in MuJoCo with its actuators at rest: their moments, constraints, linearized steps, and runs nearby."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -7,24 +7,24 @@ import numpy as np
 from mujoco.rollout import rollout
 
 from ...robots.actuators import UNCUT, Cut, Drive, Rows
-from .actuators import OF_A_JOINT, control_of
-from .flags import INTEGRATORS, bit
-from .holding import constraint_rows
+from .actuators import control_of
+from .engine import MOST_ITERATIONS, SOLVED, UNLIMITED
 from .inventory import NOT_HAD_FIELDS, open_equalities
-from .joints import kind_of
 from .linear import NUDGE
-from .rotors import output_of
-from .servos import MOST_ITERATIONS, SOLVED
+from .names import INTEGRATORS, OF_A_JOINT, bit, kind_of, on, output_of
 
-# beside the joints' springs and dampers, what drives a robot here and is therefore left as it is
+# besides the joints' springs and dampers these drive a robot here and stay
 DRIVES = ("body_gravcomp", "actuator_damping", "tendon_stiffness", "tendon_damping")
-LOCKING = 1e9  # of the largest inertia: a rotor so heavy does not turn
+LOCKING = 1e9  # of the largest inertia: a rotor as heavy as this does not turn
+DISCRETE = getattr(
+    mujoco.mjtIntegrator, "mjINT_DISCRETE", None
+)  # it is implicit in the constraints' springs and dampers
 
 
 class Acting:
-    """A compiled model whose actuators act by their laws alone, with equalities: no force range, contact, friction or medium.
+    """A compiled model whose actuators act by their laws alone, with equalities: no force range, contact, friction or fluid.
 
-    cut: what ranges cut at the posture: it stays what it is there. locked: speeds that do not move. weightless: without gravity.
+    cut: forces that ranges cut at the posture; they stay constant. locked: speeds that do not move. weightless: without gravity.
     limits: joints of the model whose limits are on. integrator by MuJoCo's name, dt in s.
     """
 
@@ -41,31 +41,23 @@ class Acting:
         m = self.model
         stages = ("EQUALITY",) * bool(open_equalities(m)) + ("LIMIT",) * bool(len(limits))
         for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
-            m.opt.disableflags |= bit((flag,))
+            m.opt.disableflags |= bit(flag)
         self.is_coupled = bool(stages)
         if stages:
             for flag in ("CONSTRAINT", *stages):
-                m.opt.disableflags &= ~bit((flag,))
+                m.opt.disableflags &= ~bit(flag)
             m.jnt_limited[np.setdiff1d(np.arange(m.njnt), limits)], m.tendon_limited[:] = 0, 0
             m.opt.tolerance, m.opt.iterations = SOLVED, max(m.opt.iterations, MOST_ITERATIONS)
         m.opt.enableflags, m.opt.density, m.opt.viscosity = 0, 0.0, 0.0
         for name in set(NOT_HAD_FIELDS) - set(DRIVES):
             if hasattr(m, name):
                 getattr(m, name)[:] = 0
-        for name in (
-            "actuator_forcelimited",
-            "actuator_ctrllimited",
-            "actuator_actlimited",
-            "jnt_actfrclimited",
-            "tendon_actfrclimited",
-        ):
+        for name in UNLIMITED:
             getattr(m, name)[:] = 0
         for i, one in enumerate(drive.actuators):
             if not one.acts or i in cut.forces:
-                m.actuator_gaintype[i], m.actuator_biastype[i] = (
-                    mujoco.mjtGain.mjGAIN_FIXED,
-                    mujoco.mjtBias.mjBIAS_AFFINE,
-                )
+                m.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
+                m.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
                 m.actuator_gainprm[i], m.actuator_biasprm[i] = 0.0, 0.0
                 m.actuator_biasprm[i, 0] = cut.forces.get(i, 0.0)
                 if m.actuator_plugin[i] >= 0:  # it has its own law, whatever stands here
@@ -111,7 +103,7 @@ class Acting:
         return lengths, np.concatenate([moments[outputs], jacobian[numbers]])
 
     def rows(self, q: np.ndarray, dt: float, integrator: str) -> Rows:
-        """Of the constraints that are on, at rest."""
+        """The constraints that are on, at rest."""
         return constraint_rows(self.model, self.data, q, dt, INTEGRATORS[integrator])
 
     def at(self, q: np.ndarray, u: np.ndarray, dt: float, integrator: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -135,7 +127,7 @@ class Acting:
 
     @property
     def filters(self) -> list[int]:
-        """Where the activations of filters stand that act: they decay by themselves."""
+        """Indices of the activations of filters that act: they decay by themselves."""
         return [
             int(self.model.actuator_actadr[i])
             for i, one in enumerate(self.drive.actuators)
@@ -154,12 +146,12 @@ class Acting:
         activation: float = 0.0,
         jump: np.ndarray | float = 0.0,
     ) -> Iterator[np.ndarray]:
-        """A run in parts of so many steps each: how far it is from q after each step, then the activations of filters from u.
+        """Deviations from q after each step of a run, then of filters' activations from u; one array for each part of the run.
 
-        (steps, nv + filters): rad or m, a ball's turn in its own axes. It starts at rest at q, moved by a small movement (nv,),
-        with a speed (nv,) and activations of filters that are off by so much; jump: of u, (k,), once for all. What has left all
-        bounds stays where MuJoCo stopped it. Where constraints hold joints the rest depends on the step: then it is how far the
-        run is from one that starts at rest at q, under u.
+        steps: their number in each part. Each array is (steps, nv + filters), in rad or m, a ball's turn in its own axes. The run
+        starts at rest at q, moved by a small movement (nv,), with a speed (nv,) and an offset of all activations of filters;
+        jump: of u, (k,), constant. A run that diverges stays where MuJoCo stopped it. Where constraints hold joints, the position
+        of rest depends on the step: then the deviation is that from a run that starts at rest at q under u.
         """
         model, data = self.at(q, np.add(u, jump), dt, integrator)
         mujoco.mj_integratePos(model, data.qpos, np.broadcast_to(movement, model.nv).astype(float), 1.0)
@@ -201,9 +193,9 @@ class Acting:
     def changed(
         self, damping: Mapping[int, float] | None = None, armature: Mapping[int, float] | None = None
     ) -> "Acting":
-        """The same with other gains of speed, kv, of actuators by number, and more armature of speeds, kg m2 or kg.
+        """A copy with other speed gains kv of actuators, by number, and more armature of speeds, kg m2 or kg.
 
-        An actuator that holds a speed has the same gain of its control.
+        The kv of an actuator that holds a speed is also the gain of its control.
         """
         other = object.__new__(Acting)
         other.__dict__.update(self.__dict__ | {"model": mujoco.MjModel.__copy__(self.model)})
@@ -232,3 +224,38 @@ def add_armature(model: mujoco.MjModel, speeds: Sequence[int], more: float | np.
     """
     model.dof_armature[speeds] += more
     model.dof_M0[speeds] += more
+
+
+def constraint_rows(model: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, dt: float, integrator: int) -> Rows:
+    """The constraints of a model at q (nq,) at a step size, s, as they are solved for an integrator of mjtIntegrator."""
+    stated = model.opt.timestep, model.opt.integrator
+    model.opt.timestep, model.opt.integrator = dt, integrator
+    data.qpos[:], data.qvel[:] = q, 0.0
+    mujoco.mj_forward(model, data)
+    model.opt.timestep, model.opt.integrator = stated
+    k, damping, impedance, slope = data.efc_KBIP.reshape(data.nefc, 4).T
+    violation, stiffness, R = data.efc_pos - data.efc_margin, k * impedance, data.efc_R.copy()
+    less = 1.0 + (dt * damping + dt * dt * stiffness) * (integrator == DISCRETE)
+    at_limit = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
+    return Rows(
+        jacobian(model, data),
+        forces=-stiffness * violation / (less * R),
+        damping=(damping + dt * stiffness * (integrator == DISCRETE)) / less,
+        # the impedance grows with the violation: aref does, and R falls
+        stiffness=(stiffness + k * violation * slope * (1.0 + 1.0 / (1.0 - impedance))) / less,
+        softness=R,
+        limits=tuple(map(int, data.efc_id[at_limit])),
+    )
+
+
+def jacobian(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    if not mujoco.mj_isSparse(model):
+        return data.efc_J.reshape(data.nefc, model.nv).copy()
+    found = np.zeros((data.nefc, model.nv))
+    mujoco.mju_sparse2dense(found, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+    return found
+
+
+def limits_in_force(model: mujoco.MjModel) -> tuple[int, ...]:
+    """The joints whose limits a file has in force, by number."""
+    return tuple(np.flatnonzero(model.jnt_limited).tolist()) if on(model, "CONSTRAINT") and on(model, "LIMIT") else ()

@@ -1,4 +1,4 @@
-"""What drives a file's robot, read from its compiled model: actuators, tendons, gravity compensation."""
+"""The actuators, tendons and gravity compensation of a compiled model."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -7,12 +7,9 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Actuator, Drive, Tendon
-from .flags import on
-from .joints import joint_name, kind_of, own_name
-from .lock import editable_again
-from .rotors import output_of
+from .names import OF_A_JOINT, joint_name, kind_of, number_of_actuators, on, output_of, own_name
+from .source import editable_again
 
-OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 WITH_LENGTH = (*OF_A_JOINT, mujoco.mjtTrn.mjTRN_SLIDERCRANK, mujoco.mjtTrn.mjTRN_TENDON, mujoco.mjtTrn.mjTRN_SITE)
 GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
@@ -21,11 +18,11 @@ GROUPS = 31  # that can be switched off
 
 
 def drive_of(model: mujoco.MjModel, source, bodies: Sequence[int], keys: Sequence[str]) -> Drive:
-    """All that drives a compiled model.
+    """Actuators, tendons and gravity compensation of a compiled model.
 
     source: what it was read from, a Path, text or None; bodies: of the Tree, by number; keys: names of the keyframes.
     """
-    count = getattr(model, "nactuator", model.nu)
+    count = number_of_actuators(model)
     passive = on(model, "SPRING") or on(model, "DAMPER")  # without both MuJoCo compensates no weight
     by_actuators = np.flatnonzero(model.jnt_actgravcomp[model.dof_jntid]).tolist()
     return Drive(
@@ -80,21 +77,19 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
 
 
 def control_of(m: mujoco.MjModel, i: int) -> tuple[int, int]:
-    """Where the control of an actuator stands, and how many numbers it is."""
+    """The index of the control of an actuator, and its number of inputs."""
     if hasattr(m, "actuator_ctrlnum"):
         return int(m.actuator_ctrladr[i]), int(m.actuator_ctrlnum[i])
     return i, 1
 
 
 def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inputs: int) -> str:
-    """Why the law of an actuator is not known here; "" if it is."""
+    """Why the law of an actuator cannot be evaluated here; "" if it can."""
     if m.actuator_plugin[i] >= 0:
         return "a plugin"
     for word, known in ((dynamics, DYNAMICS), (gain, GAINS), (bias, BIASES)):
         if word not in known:
-            return {"DCMOTOR": "a DC motor", "USER": "a law of the user's own"}.get(
-                word, f"a law of the kind {word.lower()}"
-            )
+            return {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}.get(word, f"a law of type {word.lower()}")
     if inputs != 1:
         return f"{inputs} controls"
     if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
@@ -103,9 +98,9 @@ def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inpu
         return "polynomial damping"
     transmission = mujoco.mjtTrn(m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
-        return f"a transmission of the kind {transmission.name.removeprefix('mjTRN_').lower()}"
+        return f"a transmission of type {transmission.name.removeprefix('mjTRN_').lower()}"
     if transmission not in OF_A_JOINT and np.any(getattr(m, "actuator_damping", np.zeros(i + 1))[i]):
-        return "damping of its own at no joint"
+        return "damping of its own, not at a joint"
     return ""
 
 
@@ -168,12 +163,12 @@ def tendon(m: mujoco.MjModel, i: int) -> Tendon:
 
 
 def own_damping(m: mujoco.MjModel, count: int) -> tuple[float, ...]:
-    """Damping by actuators themselves, times the gear squared, (nv,), where they act at a joint: MuJoCo has it as the joint's."""
-    found = np.zeros(m.nv)
+    """Damping of actuators at joints times the gear squared, (nv,); MuJoCo adds it to the joint's."""
+    total = np.zeros(m.nv)
     for i, damping in enumerate(getattr(m, "actuator_damping", np.zeros(count))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT and on(m, "DAMPER"):
-            found[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[output_of(m, i), 0] ** 2
-    return tuple(found.tolist())
+            total[m.dof_jntid == m.actuator_trnid[i, 0]] += damping * m.actuator_gear[output_of(m, i), 0] ** 2
+    return tuple(total.tolist())
 
 
 def unknown_springs(m: mujoco.MjModel) -> dict[str, str]:
@@ -207,7 +202,7 @@ def stated_controls(m: mujoco.MjModel, source) -> dict[int, tuple]:
         control = len(keys[k].ctrl) > 0 if keys else m.key_ctrl[k].any()
         activation = len(keys[k].act) > 0 if keys else m.key_act[k].any()
         if m.nu and (control or activation):
-            found[k] = tuple(stated_u(m, k, i, control, activation) for i in range(getattr(m, "nactuator", m.nu)))
+            found[k] = tuple(stated_u(m, k, i, control, activation) for i in range(number_of_actuators(m)))
     return found
 
 
@@ -220,7 +215,7 @@ def stated_u(m: mujoco.MjModel, k: int, i: int, control: bool, activation: bool)
 
 
 def kind(enum, value) -> str:
-    """The name of a member without what all of its enumeration have in front."""
+    """The name of a member without its prefix."""
     return enum(int(value)).name.partition("_")[2]
 
 

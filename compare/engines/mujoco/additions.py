@@ -1,4 +1,4 @@
-"""What may be added to a model in MuJoCo, each as an edit of the file's MjSpec."""
+"""Additions to a model, each an edit of the file's MjSpec, whose cost in MuJoCo an experiment measures."""
 
 from collections.abc import Callable
 
@@ -7,14 +7,12 @@ import numpy as np
 
 from .dynamics import MujocoDynamics
 from .engine import Mujoco
-from .flags import FLAGS, bit
 from .inventory import take_away
-from .joints import joint_name, kind_of
-from .light import without_geoms
-from .lock import clear, editable_again, with_names
+from .names import bit, joint_name, kind_of
+from .source import clear, editable_again, with_names, without_geoms
 
-LEFT_OUT = int(FLAGS["contact"]) | int(FLAGS["constraint"])  # stages of a step that the minimal model leaves out
-OF_THE_FORCES = bit(("GRAVITY",)) | bit(("DAMPER",)) | bit(("SPRING",))  # of the file, see take_away
+LEFT_OUT = bit("CONTACT", "CONSTRAINT")  # stages of a step that the minimal model leaves out
+OF_THE_FORCES = bit("GRAVITY", "DAMPER", "SPRING")  # of the file, see take_away
 # what the file's default class would give to an added element otherwise, where the installed MuJoCo has it
 ITS_OWN = {
     "geom": {
@@ -39,7 +37,7 @@ ON_FLOOR, OFF_FLOOR = f"{CAPSULES} + floor in reach", f"{CAPSULES} + floor out o
 
 
 def with_additions(engine: Mujoco, radius: float, near: float, far: float | None) -> dict[str, Mujoco]:
-    """Engines that have one thing more than the minimal model, the loaded one without contact and constraint stages.
+    """Engines with one addition each to the minimal model, the loaded one without contact and constraint stages.
 
     radius: of the capsules, m; near, far: heights of a floor in reach and of one out of reach, m; None: no
     floor is out of reach. No joint of these engines can be locked.
@@ -62,7 +60,7 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float | None
         spec.worldbody.add_geom(**ITS_OWN["geom"] | plane)
 
     def stage(spec, name):
-        spec.option.disableflags &= ~int(FLAGS[name])
+        spec.option.disableflags &= ~bit(name)
 
     def energy(spec):
         spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
@@ -92,8 +90,8 @@ def with_additions(engine: Mujoco, radius: float, near: float, far: float | None
         AGAIN: lambda spec: None,
         many: capsules,
         "a floor": floor,
-        "contact stage": lambda spec: stage(spec, "contact"),
-        "constraint stage": lambda spec: stage(spec, "constraint"),
+        "contact stage": lambda spec: stage(spec, "CONTACT"),
+        "constraint stage": lambda spec: stage(spec, "CONSTRAINT"),
         "energy flag": energy,
         f"{2 * len(single)} sensors": sensors,
         "a motor": motor,
@@ -118,7 +116,7 @@ def edited(engine: Mujoco, edit: Callable) -> Mujoco:
 
 
 def bare(spec: mujoco.MjSpec) -> None:
-    """Take out of a spec what a Tree has not: of its own things none may touch, act, or limit a joint."""
+    """Take out of a spec what a Tree does not have: nothing of the file may touch, act, or limit a joint."""
     with_names(spec)
     clear(spec, set(), bare=True)
     for geom in spec.geoms:
@@ -132,7 +130,7 @@ def bare(spec: mujoco.MjSpec) -> None:
 def contacts(
     dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray, tau: np.ndarray, dt: float, steps: int, integrator: str
 ) -> tuple[float, bool]:
-    """How many contacts there are in a step of a run, on average, and whether any of them pushes a joint."""
+    """The mean number of contacts in a step of a run, and whether any of them pushes a joint."""
     model, data = dynamics.own_copy(dt, integrator, q, v, tau)
     total, pushed = 0, False
     for _ in range(steps):

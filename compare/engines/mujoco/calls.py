@@ -1,4 +1,4 @@
-"""MuJoCo's own functions called from a compiled loop, for timing: no Python between two calls.
+"""MuJoCo's own functions for timing: called from a compiled loop, with no Python between two calls, or by mujoco.batch.
 
 The C library that the Python package brings is called by its functions' addresses from a few lines of LLVM's text.
 """
@@ -6,6 +6,7 @@ The C library that the Python package brings is called by its functions' address
 import ctypes
 from collections.abc import Callable
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import mujoco
@@ -15,13 +16,13 @@ from tmt.compiled import Library
 
 from .. import rows_of_states
 from .dynamics import MujocoDynamics
-from .flags import FLAGS
+from .names import bit
 
 TINY_STEP = 1e-9  # s: a loop of steps stays where it starts
 
 
 def library() -> ctypes.CDLL | None:
-    """MuJoCo's shared library, if it lies where the package usually has it."""
+    """MuJoCo's shared library, if it is where the package usually has it."""
     for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
         for path in sorted(Path(mujoco.__file__).parent.glob(pattern)):
             return opened(str(path))
@@ -30,27 +31,26 @@ def library() -> ctypes.CDLL | None:
 
 @cache
 def opened(path: str) -> ctypes.CDLL:
-    """A library, one for all that ask for it."""
     return ctypes.CDLL(path)
 
 
 class MinimalCalls:
     """Dynamics by only those of MuJoCo's functions that a tree of joints with damping needs, called by their addresses.
 
-    Contact and constraint stages are off; tendons and actuators have no part in it, and springs only in the acceleration.
+    Contact and constraint stages are off; tendons and actuators take no part, and springs only in the acceleration.
     """
 
     def __init__(self, dynamics: MujocoDynamics):
         self.coordinates, self.qpos, self.dofs = dynamics.coordinates, dynamics.qpos, dynamics.dofs
         self.model, self.data = dynamics.own_copy(TINY_STEP, "RK4")
-        self.model.opt.disableflags |= int(FLAGS["contact"]) | int(FLAGS["constraint"])
+        self.model.opt.disableflags |= bit("CONTACT", "CONSTRAINT")
         self.force, self.solution = np.zeros((2, self.model.nv))
         self.functions = functions(library())
 
     @staticmethod
     def unavailable() -> str | None:
         """Why it cannot take part here, or None."""
-        return None if library() else "MuJoCo's library was not found beside its package"
+        return None if library() else "MuJoCo's library was not found in its package"
 
     def mass_matrix(self, q) -> np.ndarray:
         """M, kg m2, (..., nv, nv): mj_makeM (or mj_crb), laid out by mj_fullM."""
@@ -83,7 +83,7 @@ class MinimalCalls:
         return self.each(solved, q, v, tau)
 
     def loops(self, q, v, tau) -> dict[str, tuple[str, Callable]]:
-        """For each way: (quantity, run(count)), where run does the same at one state count times.
+        """For each way: (quantity, run(count)), where run repeats it count times at one state.
 
         q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work is only what
         forward dynamics needs. Its solution is -M^-1 h, as no torque is added up.
@@ -112,11 +112,9 @@ class MinimalCalls:
 
     @property
     def addresses(self) -> tuple[int, int]:
-        """Of the model and of its data."""
         return self.model._address, self.data._address
 
     def place(self, q, v, tau) -> None:
-        """Set the state."""
         d = self.data
         d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
 
@@ -150,7 +148,7 @@ def functions(lib: ctypes.CDLL) -> dict[str, Callable]:
 
 @cache
 def repeated(lib: ctypes.CDLL, names: tuple[str, ...]) -> Callable:
-    """run(model, data, bias, acceleration, count): functions of the library one after the other, so many times."""
+    """run(model, data, bias, acceleration, count): functions of the library one after the other, count times."""
     more = {"mj_rne": ", i32 0, ptr %bias", "mj_solveM": ", ptr %acceleration, ptr %bias, i32 1"}
     calls = []
     for k, name in enumerate(names):
@@ -174,3 +172,38 @@ done:
 }}
 """
     return Library(text).function("run", None, *[ctypes.c_void_p] * 4, ctypes.c_int64)
+
+
+class BatchedCalls:
+    """N states of a case in one batch, their contact and constraint stages off; q (N, nq), v and tau (N, nv)."""
+
+    def __init__(self, dynamics: MujocoDynamics, q, v, tau, threads: int = 1):
+        from mujoco.batch import Batch
+
+        model = dynamics.own_copy(TINY_STEP, "RK4")[0]
+        model.opt.disableflags |= bit("CONTACT", "CONSTRAINT")
+        self.batch, self.dofs = Batch(model, len(q), threads), dynamics.dofs
+        state = self.batch.bind("qpos"), self.batch.bind("qvel"), self.batch.bind("qfrc_applied")
+        for part, values, places in zip(state, (q, v, tau), (dynamics.qpos, dynamics.dofs, dynamics.dofs)):
+            part[:, places] = values
+        self.qacc = self.batch.bind("qacc")
+
+    @staticmethod
+    def unavailable() -> str | None:
+        """Why it cannot take part here, or None."""
+        if find_spec("mujoco.batch") is None:
+            return f"MuJoCo {mujoco.__version__} has no mujoco.batch; it needs 4.0"
+        return None
+
+    def forward(self) -> np.ndarray:
+        """rad/s2, (N, nv): mj_forward of each state."""
+        self.batch.forward()
+        return self.qacc[:, self.dofs]
+
+    def step(self) -> None:
+        """mj_step of each state, with a step so short that the state stays."""
+        self.batch.step()
+
+    def forward_loop(self) -> Callable[[int], object]:
+        """run(count): mj_forward of all states count times, each time a call from Python."""
+        return lambda count: [self.batch.forward() for _ in range(count)]

@@ -1,10 +1,10 @@
-"""The dynamics of a case in MuJoCo, spoken to in the project's symbols.
+"""The dynamics of a case in MuJoCo, in the project's symbols.
 
     q, v, a <-> qpos, qvel, qacc      h <-> qfrc_bias      tau <-> qfrc_applied
     M a + h = tau - D v
 
 MuJoCo's derived fields belong to the state of the last mj_forward, not to that of the last step: every
-quantity here is evaluated with mj_forward at the state that is asked for.
+quantity here is evaluated with mj_forward at the given state.
 """
 
 from collections.abc import Callable
@@ -14,8 +14,7 @@ import numpy as np
 from mujoco.rollout import rollout
 
 from .. import GRID, Motion, Prepared, Setting, rows_of_states
-from .flags import EVALUATIONS, FLAGS, INTEGRATORS
-from .joints import joint_places, resting
+from .names import EVALUATIONS, INTEGRATORS, bit, joint_places, moving
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
@@ -37,18 +36,14 @@ class MujocoDynamics:
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
         self.model, self.data = model, mujoco.MjData(model)
         self.coordinates, self.bodies, self.bare = coordinates, list(bodies), bare
-        known = joint_places(model)
-        joints = [known[name] for name in coordinates.names]
+        by_name = joint_places(model)
+        joints = [by_name[name] for name in coordinates.names]
         self.joints = np.array([place.joint for place in joints])
         self.qpos = np.array([i for place in joints for i in place.qpos])
         self.dofs = np.array([i for place in joints for i in place.dofs])
         self.forward(zero)
-        self.left_out = np.setdiff1d(resting(model), self.bodies) if bare else []
+        self.left_out = np.setdiff1d(np.flatnonzero(~moving(model)), self.bodies) if bare else []
         self.zero_axes = self.turns(self.data.xmat)
-
-    def enabled(self, flag: str) -> bool:
-        """Whether a stage of FLAGS is on."""
-        return not self.model.opt.disableflags & int(FLAGS[flag])
 
     # quantities at states
 
@@ -117,11 +112,11 @@ class MujocoDynamics:
         return self._each(torque, q, v, a)  # a travels in the place of tau
 
     def other_forces(self, q, v) -> dict:
-        """What else acts than what the case's equations have, by its source, N m, (..., nv) each."""
-        D, known = self.model.dof_damping, self.bare
-        passive = "fluid and tendons" if known else "springs, fluid and tendons"
+        """Forces that the case's equations do not have, by source, N m, (..., nv) each."""
+        D, has_springs = self.model.dof_damping, self.bare
+        passive = "fluid and tendons" if has_springs else "springs, fluid and tendons"
         return {
-            passive: self._each(lambda d: (d.qfrc_passive + D * d.qvel - known * d.qfrc_spring)[self.dofs], q, v),
+            passive: self._each(lambda d: (d.qfrc_passive + D * d.qvel - has_springs * d.qfrc_spring)[self.dofs], q, v),
             "actuators": self._each(lambda d: d.qfrc_actuator[self.dofs], q, v),
             "constraints and contacts": self._each(lambda d: d.qfrc_constraint[self.dofs], q, v),
         }
@@ -137,10 +132,7 @@ class MujocoDynamics:
     # motion
 
     def run(self, q, v, tau, dt, steps, method, tolerance=None) -> Motion:
-        """Motion under constant torque by an integrator of MuJoCo: q (..., steps + 1, nq), v (..., steps + 1, nv).
-
-        From the moment in which a run has diverged (it stopped, or a value is not finite) it is NaN.
-        """
+        """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where a run diverges."""
         refuse_tolerance(tolerance, method)
         batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
         starts, follow = self.runner(q, v, tau, dt, steps, method)
@@ -162,14 +154,14 @@ class MujocoDynamics:
         return run, read
 
     def path(self, starts, states, dt) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """q and v of runs (runs, steps + 1, ...), NaN from the moment in which one has diverged, and why it has, or None."""
+        """q and v of runs (runs, steps + 1, ...), NaN from where one diverges, and why it does, or None."""
         states = np.concatenate([starts[:, None], states], axis=1)
         advanced = np.diff(states[:, :, 0], axis=1, prepend=-dt) > 0.0
         ran = np.isfinite(states).all(axis=2) & advanced
         ended = np.full(len(states), None, dtype=object)
         for k in np.flatnonzero(~ran.all(axis=1)):
             last = int(np.argmin(ran[k]))
-            why = "MuJoCo's clock stands" if not advanced[k, last] else "a number is not finite"
+            why = "MuJoCo's clock stopped" if not advanced[k, last] else "a number is not finite"
             ended[k] = f"at t = {dt * (last - 1):g} s: {why}"
         states[np.cumsum(~ran, axis=1) > 0] = np.nan
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
@@ -180,20 +172,20 @@ class MujocoDynamics:
         States are MuJoCo's, time first; the call returns those after each step, (runs, steps, ...), without a copy.
         """
         model, data = self.own_copy(dt, method)
-        model.opt.disableflags |= int(FLAGS["autoreset"])  # a reset would hide the divergence
-        given, spec = rows_of_states(q, v, self.applied(tau))[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
-        runs = len(given[0])
+        model.opt.disableflags |= bit("AUTORESET")  # a reset would hide the divergence
+        rows, spec = rows_of_states(q, v, self.applied(tau))[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
+        runs = len(rows[0])
         starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
         # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
-        given_as, controls = self.control()
+        control_spec, controls = self.control()
         torques = np.zeros((runs, steps, len(controls) + model.nv))
         torques[:, :, : len(controls)] = controls
-        for start, torque, *state in zip(starts, torques, *given):
+        for start, torque, *state in zip(starts, torques, *rows):
             data.qpos[self.qpos], data.qvel[self.dofs], torque[:, len(controls) + self.dofs] = state
             mujoco.mj_getState(model, data, start, spec)
         # filled, so that the first run does not have to fetch the memory
         states, sensors = np.full((runs, steps, starts.shape[1]), np.nan), np.zeros((runs, steps, model.nsensordata))
-        options = {"control_spec": given_as, "nstep": steps, "state": states, "sensordata": sensors}
+        options = {"control_spec": control_spec, "nstep": steps, "state": states, "sensordata": sensors}
 
         def run():
             rollout([model] * runs, [data], starts, torques, skip_checks=True, **options)
@@ -202,18 +194,18 @@ class MujocoDynamics:
         return starts, run
 
     def own_copy(self, dt, integrator, q=0.0, v=0.0, tau=0.0) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """A copy of the model with this step and integrator, and data at one state, for whoever steps on their own."""
+        """A copy of the model with this step and integrator, and data at one state."""
         model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
         model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
         data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, self.applied(tau)
         return model, data
 
     def applied(self, tau):
-        """What of the torques of a case is applied to the joints: all of it, unless its actuators exert a part."""
+        """The part of the torques of a case that its actuators do not exert."""
         return tau
 
     def control(self) -> tuple[int, np.ndarray]:
-        """What a rollout is given at each step, a part of MuJoCo's state: which, and what stands in it before the torque."""
+        """The part of MuJoCo's state that a rollout sets at each step, and its numbers before the torque."""
         return int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), np.zeros(0)
 
     # how the fields are read
@@ -257,3 +249,25 @@ class MujocoDynamics:
 def refuse_tolerance(tolerance: float | None, method: str) -> None:
     if tolerance is not None:
         raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
+
+
+def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """v_conv, world, and w_conv, body axes, (states, m, 3): accelerations of the bodies at qacc = 0 without gravity.
+
+    By mj_objectAcceleration, not mj_jacDot as MujocoDynamics.convective_terms. q (states, nq), v (states, nv).
+    """
+    model, weight = dynamics.model, dynamics.model.opt.gravity.copy()
+    terms, both = np.zeros((2, len(q), len(dynamics.bodies), 3)), np.zeros(6)
+    model.opt.gravity[:] = 0.0
+    try:
+        for state, (position, speed) in enumerate(zip(q, v)):
+            d = dynamics.forward(position, speed)
+            d.qacc[:] = 0.0
+            mujoco.mj_rnePostConstraint(model, d)
+            turns = dynamics.turns(d.xmat) @ dynamics.zero_axes.transpose(0, 2, 1)
+            for k, body in enumerate(dynamics.bodies):
+                mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, both, 0)
+                terms[0, state, k], terms[1, state, k] = both[3:], turns[k].T @ both[:3]
+    finally:
+        model.opt.gravity[:] = weight
+    return terms[0], terms[1]

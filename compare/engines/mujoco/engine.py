@@ -1,20 +1,23 @@
-"""MuJoCo as an engine: a compiled model, and what a case changes in it."""
+"""MuJoCo as an engine: a compiled model, what a case changes in it, and its actuators under constant controls."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
+import numpy as np
 
 import tmt
 from tmt.methods import lone_speeds
 
+from ...robots.actuators import Controller
 from ...robots.case import Case
 from .. import Method
+from .actuators import control_of
 from .dynamics import MujocoDynamics
-from .flags import INTEGRATORS
 from .inventory import switch_off
-from .lock import locked_model
-from .servos import DrivenDynamics
+from .names import INTEGRATORS, bit
+from .source import locked_model
 
 SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
     "Euler": "semi_implicit_euler",
@@ -27,12 +30,12 @@ FROM_4 = int(mujoco.__version__.split(".")[0]) >= 4
 
 
 def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
-    """MuJoCo's integrators for a Tree, by name, each with the method of tmt that is the same scheme; None: of hinges alone.
+    """MuJoCo's integrators for a Tree, by name, each with the method of tmt that is the same scheme; None: only hinges.
 
-    Measured, step by step: a free body that stands alone has its bias implicit in implicitfast and discrete; discrete has
-    springs implicit too; and up to 3.17 RK4 turns a ball by the mean of its speeds. There implicitfast takes a midpoint rule
-    for a free body alone, which tmt has not: it is left out. The speed gain of actuators is implicit in implicitfast and implicit
-    where two joints lie on one path to the world, in discrete everywhere, and there the position gain too; Euler has neither.
+    Measured step by step: implicitfast and discrete are implicit in the bias of a free body on its own; discrete also in
+    springs. Up to 3.17 RK4 turns a ball by the mean of its speeds, and implicitfast uses a midpoint rule for a free body on its
+    own, which tmt does not have: it is left out. In the speed gain of actuators implicitfast and implicit are implicit where two
+    joints are on one path to the world; discrete everywhere, and in the position gain too; Euler in neither.
     """
     schemes, order = dict(SCHEMES), 4
     if tree is not None:
@@ -53,15 +56,21 @@ def methods_for(tree: tmt.Tree | None = None) -> dict[str, Method]:
 
 
 METHODS = methods_for()
-MODELS, BYTES = 64, 1e8  # that are kept: those of the cases that were asked for last, so many and so large together
+MODELS, BYTES = 64, 1e8  # limits of the cache of the models of cases, for each engine
+
+UNLIMITED = (
+    "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited", "tendon_actfrclimited",
+)  # fmt: skip
+SOLVED, MOST_ITERATIONS = 1e-15, 100
+ACTING, IDLE = 0, 1  # groups of actuators
 
 
 class Mujoco:
     """MuJoCo with one compiled model of given joints.
 
-    bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if it was changed since
-    then, so that no joint can be taken out. bare: all that a Tree has not is switched off, see inventory.
-    warnings: of MuJoCo's compiler, one line each.
+    bodies: their numbers in the model. source: what the model was read from, a Path or MJCF text; None if the model was changed
+    since then, so that no joint can be locked. bare: all that a Tree does not have is switched off, see inventory. warnings: of
+    MuJoCo's compiler, one line each.
     """
 
     name = "mujoco"
@@ -80,45 +89,94 @@ class Mujoco:
         self.methods = methods
         self.integrator, self.bare = model.opt.integrator, bare  # of the file
         self.model, self.source, self.joints, self.bodies = model, source, tuple(joints), list(bodies)
-        self.known, self.warnings = {}, warnings
+        self.cache, self.warnings = {}, warnings
 
     def __getstate__(self):
-        return self.__dict__ | {"known": {}}
+        return self.__dict__ | {"cache": {}}
 
     def unavailable(self) -> str | None:
         return None
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
-        """Its integrators in a case: where actuators act some are other schemes."""
+        """The integrators in a case: where actuators act some are other schemes."""
         return methods_for(case.tree) if case.controller else self.methods
 
     def of(self, case: Case) -> MujocoDynamics:
-        """The file's own numbers with what the case changes: they stay what they are, and nothing of the file is hidden.
+        """The dynamics of a case: the file's own numbers with the changes of the case.
 
-        A model with locked joints is compiled from the source again, without them. ModelError if that is not possible.
+        A model with locked joints is compiled again from the source, without them; ModelError if that is not possible.
         """
         changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints
         changes += (case.controller.controls,) if case.controller else ()
-        dynamics = self.known.pop(changes, None) or self.dynamics(case)
-        self.known[changes] = dynamics
-        if len(self.known) > max(1.0, min(MODELS, BYTES / mujoco.mj_sizeModel(self.model))):
-            del self.known[next(iter(self.known))]
+        dynamics = self.cache.pop(changes, None) or self.dynamics(case)
+        self.cache[changes] = dynamics
+        if len(self.cache) > max(1.0, min(MODELS, BYTES / mujoco.mj_sizeModel(self.model))):
+            del self.cache[next(iter(self.cache))]
         return dynamics
 
     def dynamics(self, case: Case) -> MujocoDynamics:
-        """The dynamics of a case, made anew."""
-        model = self.changed(case)
+        model = mujoco.MjModel.__copy__(self.model)
+        if case.locked:
+            model = locked_model(self.source, case.locked, self.bare)
+        if self.bare:
+            switch_off(model)
+        if not case.scene.gravity:
+            model.opt.gravity[:] = 0.0
         parts = model, case.coordinates, self.bodies, case.tree.zero, self.bare
         dynamics = DrivenDynamics(*parts, case.controller) if case.controller else MujocoDynamics(*parts)
         dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
         return dynamics
 
-    def changed(self, case: Case) -> mujoco.MjModel:
-        """The model with what the case changes, except for the damping that it adds."""
-        copied = mujoco.MjModel.__copy__
-        model = locked_model(self.source, case.locked, self.bare) if case.locked else copied(self.model)
-        if self.bare:
-            switch_off(model)
-        if not case.scene.gravity:
-            model.opt.gravity[:] = 0.0
-        return model
+
+class Driven(NamedTuple):
+    """Constant controls of the actuators of a model."""
+
+    ctrl: np.ndarray  # (nu,)
+    act: np.ndarray  # (na,): activations, constant under these controls
+    torque: np.ndarray  # (nv,) N m or N: the part of their torque at no position and no speed, by the law in compare
+
+
+def engaged(model: mujoco.MjModel, controller: Controller) -> Driven:
+    """Switch on the actuators of a model that take part, without any range.
+
+    `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method (with PGS it is
+    Euler's scheme). Activations are constant: the control of a filter equals its activation, that of an integrator is 0.
+    """
+    model.opt.disableflags &= ~bit("ACTUATION")
+    for name in UNLIMITED:
+        if hasattr(model, name):
+            getattr(model, name)[:] = 0
+    model.opt.solver, model.opt.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVED
+    model.opt.iterations = max(model.opt.iterations, MOST_ITERATIONS)
+    ctrl, act = np.zeros(model.nu), np.zeros(model.na)
+    for i, u in enumerate(controller.controls):
+        model.actuator_group[i] = IDLE if u is None else ACTING
+        integrates = model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_INTEGRATOR
+        if u is not None:
+            place, count = control_of(model, i)
+            ctrl[place : place + count] = 0.0 if integrates else u
+            if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
+                act[model.actuator_actadr[i]] = u
+    model.opt.disableactuator = 1 << IDLE
+    return Driven(ctrl, act, controller.torque)
+
+
+class DrivenDynamics(MujocoDynamics):
+    """A model whose actuators act; of a given torque only the part beyond their constant part is applied."""
+
+    def __init__(self, model, coordinates, bodies, zero, bare, controller):
+        self.driven = engaged(model, controller)
+        super().__init__(model, coordinates, bodies, zero, bare)
+        self.data.ctrl[:], self.data.act[:] = self.driven.ctrl, self.driven.act
+
+    def own_copy(self, dt, integrator, q=0.0, v=0.0, tau=0.0):
+        model, data = super().own_copy(dt, integrator, q, v, tau)
+        data.ctrl[:], data.act[:] = self.driven.ctrl, self.driven.act
+        return model, data
+
+    def applied(self, tau):
+        return tau - self.driven.torque
+
+    def control(self):
+        torque, _ = super().control()
+        return torque | int(mujoco.mjtState.mjSTATE_CTRL), self.driven.ctrl  # which comes first

@@ -1,27 +1,24 @@
-"""What a file has, what of it a Tree has, and what is switched off in MuJoCo for the comparison or cannot be compared."""
+"""The inventory of a file: its features, and which of them the equations model or the comparison switches off."""
 
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from .flags import bit, enabling, on
-from .joints import joint_name, kind_of, own_name
-from .pairs import touching
-from .unknown import unknown
+from .names import bit, joint_name, kind_of, number_of_actuators, on, own_name
 
 MODELLED, OFF, OPEN = "modelled", "switched_off", "open_tree"
 
 
 class Feature(NamedTuple):
-    """Something that a file has: a row of the inventory."""
+    """A feature of a file: a row of the inventory."""
 
     feature: str
     count: int
     names: tuple[str, ...]
     treatment: str  # modelled, switched_off, open_tree
     reason: str
-    numbers: tuple[float, ...] = ()  # of what the equations do not have, those other than 0 in order of size
+    numbers: tuple[float, ...] = ()  # of a feature that is not modelled: those other than 0, sorted
 
 
 REASONS = {
@@ -35,26 +32,26 @@ REASONS = {
     "contact": (OFF, "the equations have no contacts"),
     "limit": (OFF, "the equations have no limits"),
     "frictionloss": (OFF, "the equations have no dry friction"),
-    "clamp": (OFF, "it cuts forces of actuators, which are off"),
-    "fluid": (OFF, "the equations have no medium around the bodies"),
+    "clamp": (OFF, "it limits forces of actuators, which are off"),
+    "fluid": (OFF, "the equations have no fluid around the bodies"),
     "gravcomp": (OFF, "the equations have the whole weight"),
-    "actuator": (OFF, "the torques of a comparison are given, the same to all"),
+    "actuator": (OFF, "the comparison applies given torques to all engines"),
     "equality": (OPEN, "the equations are those of the open tree"),
     "tendon": (OFF, "the equations have no forces along tendons"),
     "keyframe": (MODELLED, "postures of the comparison"),
-    "other": (OFF, "it changes the motion, and the equations do not have it"),
+    "other": (OFF, "it changes the motion; the equations do not have it"),
 }
 
 
 def features(model: mujoco.MjModel) -> tuple[Feature, ...]:
-    """The inventory of a compiled model: a row for each thing that it has, always in the same order."""
-    found = names_of_features(model)
+    """The features of a compiled model, always in the same order."""
+    names = names_of_features(model)
     return tuple(
         Feature(
-            feature, len(found[feature]), tuple(found[feature]), *REASONS[feature], numbers_of_feature(model, feature)
+            feature, len(names[feature]), tuple(names[feature]), *REASONS[feature], numbers_of_feature(model, feature)
         )
         for feature in REASONS
-        if found[feature]
+        if names[feature]
     )
 
 
@@ -78,8 +75,8 @@ OF_COORDINATES = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
 
 
 def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
-    """What has each feature, by name."""
-    actuators, tendons = getattr(m, "nactuator", m.nu), range(m.ntendon)
+    """The elements with each feature, by name."""
+    actuators, tendons = number_of_actuators(m), range(m.ntendon)
 
     def joints(chosen) -> list[str]:
         return [joint_name(m, j) for j in range(m.njnt) if chosen(j)]
@@ -122,8 +119,12 @@ def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
 
 
 def others(m: mujoco.MjModel, joints, speeds) -> list[str]:
-    """Whatever else would change the motion, and is switched off."""
-    found = [f"flag {flag.lower()}" for flag in ENABLED if m.opt.enableflags & enabling(flag)]
+    """Other settings that would change the motion and are switched off."""
+    found = [
+        f"flag {flag.lower()}"
+        for flag in ENABLED
+        if m.opt.enableflags & int(getattr(mujoco.mjtEnableBit, f"mjENBL_{flag}", 0))
+    ]
     if not on(m, "EULERDAMP"):
         found.append("flag eulerdamp")
     if on(m, "DAMPER"):
@@ -143,44 +144,22 @@ ENABLED = ("SLEEP", "INVDISCRETE", "IPC", "SPECULATIVE")  # enable flags that ca
 
 
 def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
-    """The names of the equalities that the file has in force: they are off."""
+    """The names of the equalities that the file has in force; the comparison switches them off."""
     if not (on(m, "CONSTRAINT") and on(m, "EQUALITY")):
         return ()
     return tuple(own_name(m.equality(int(i)).name, "equality", int(i)) for i in np.flatnonzero(m.eq_active0))
 
 
-def refuse_callbacks() -> None:
-    """ValueError, in one line, for functions of the user's own that MuJoCo calls."""
-    for name in dir(mujoco):
-        if name.startswith("get_mjcb_") and getattr(mujoco, name)() is not None:
-            raise ValueError(f"the callback {name.removeprefix('get_')} is set; its forces are not known")
-
-
-def refuse(m: mujoco.MjModel) -> None:
-    """ValueError, in one line, for what a Tree has not and cannot be switched off, and for what this reader does not know."""
-    if m.nflex:
-        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, 0)
-        raise ValueError(f"flex {name!r} is a body that deforms; only rigid bodies are compared")
-    for body in np.flatnonzero(m.body_plugin >= 0):
-        name = own_name(m.body(int(body)).name, "body", int(body))
-        raise ValueError(f"a plugin in the passive force acts on {name!r}; its forces are not known")
-    for tendon in np.flatnonzero(m.tendon_armature):
-        name = own_name(m.tendon(int(tendon)).name, "tendon", int(tendon))
-        raise ValueError(f"tendon {name!r} has armature, which couples joints; only the armature of joints is compared")
-    if found := unknown(m):
-        raise ValueError(f"it uses {found}, which is not known here; what is not known is not compared")
-
-
 def switch_off(m: mujoco.MjModel) -> None:
-    """Switch off in a compiled model all that a Tree has not."""
+    """Switch off in a compiled model all that a Tree does not have."""
     take_away(m)
     for flag in ("CONSTRAINT", "CONTACT", "EQUALITY", "LIMIT", "FRICTIONLOSS", "ACTUATION"):
-        m.opt.disableflags |= bit((flag,))
+        m.opt.disableflags |= bit(flag)
     m.opt.enableflags = 0
 
 
 def take_away(m: mujoco.MjModel) -> None:
-    """Set to zero what a Tree has not and no flag switches off, and what a flag of the file disables.
+    """Set to zero what a Tree does not have and no flag switches off, and what a flag of the file disables.
 
     Armature of actuators stays: MuJoCo has it in the mass matrix whether they act or not.
     """
@@ -188,7 +167,7 @@ def take_away(m: mujoco.MjModel) -> None:
     m.dof_damping[:] *= on(m, "DAMPER")
     m.jnt_stiffness[:] *= on(m, "SPRING")
     for flag in ("GRAVITY", "DAMPER", "SPRING", "EULERDAMP"):
-        m.opt.disableflags &= ~bit((flag,))
+        m.opt.disableflags &= ~bit(flag)
     m.opt.density = m.opt.viscosity = 0.0
     for name in NOT_HAD_FIELDS:
         if hasattr(m, name):
@@ -222,3 +201,26 @@ def field(m: mujoco.MjModel, name: str, rows: int) -> np.ndarray:
 
 def per_actuator(values, actuators: int) -> np.ndarray:
     return np.asarray(values, bool).reshape(-1)[:actuators]
+
+
+def contact_pairs(m: mujoco.MjModel) -> int:
+    """The number of pairs of geoms that may touch: those that MuJoCo chooses, and those that the file names."""
+    return m.npair + len(chosen_pairs(m))
+
+
+def touching(m: mujoco.MjModel) -> list[int]:
+    """The geoms of these pairs, each once."""
+    named = np.column_stack([m.pair_geom1, m.pair_geom2]) if m.npair else np.zeros((0, 2), int)
+    return np.unique(np.concatenate([chosen_pairs(m), named])).astype(int).tolist()
+
+
+def chosen_pairs(m: mujoco.MjModel) -> np.ndarray:
+    """The pairs of geoms that MuJoCo chooses, (pairs, 2): of two bodies that move against each other."""
+    i, j = np.triu_indices(m.ngeom, 1)
+    one, other = np.sort([m.geom_bodyid[i], m.geom_bodyid[j]], axis=0)
+    a, b = m.body_weldid[one], m.body_weldid[other]
+    over_a, over_b = (m.body_weldid[m.body_parentid[weld]] for weld in (a, b))
+    related = (a > 0) & (b > 0) & ((a == over_b) | (b == over_a)) & on(m, "FILTERPARENT")
+    wanted = (m.geom_contype[i] & m.geom_conaffinity[j]) | (m.geom_contype[j] & m.geom_conaffinity[i])
+    excluded = np.isin((one.astype(np.int64) << 16) + other, m.exclude_signature)
+    return np.column_stack([i, j])[(a != b) & (wanted != 0) & ~related & ~excluded]

@@ -1,10 +1,14 @@
-"""What MuJoCo says of its own steps: their derivatives, and what becomes of a run that it resets by itself."""
+"""MuJoCo's own steps: their derivatives, runs with its automatic reset, and runs of a file's model as it is."""
+
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from ...robots.actuators import Drive
+from .actuators import control_of
 from .dynamics import MujocoDynamics
-from .flags import FLAGS
+from .names import INTEGRATORS, bit
 
 NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/s
 
@@ -12,8 +16,8 @@ NUDGE = 1e-6  # of mjd_transitionFD and of the central differences, rad and rad/
 def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
     """d(q, qd)+/d(q, qd) of one step of MuJoCo at rest, positions as movements, (2nv, 2nv).
 
-    q: (nq,) rad, m; tau: (nv,) N m. By mjd_transitionFD, central differences of 1e-6; where it refuses (RK4, delays) steps are
-    differenced here.
+    q: (nq,) rad, m; tau: (nv,) N m. By mjd_transitionFD, central differences of 1e-6; where it refuses (RK4, delays), by central
+    differences of runs.
     """
     if integrator == "RK4":
         return differenced(dynamics, q, tau, dt, integrator)
@@ -29,7 +33,6 @@ def transition(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: flo
 
 
 def differenced(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: float, integrator: str) -> np.ndarray:
-    """The same by central differences of steps."""
     n, ends, coordinates = len(dynamics.dofs), [], dynamics.coordinates
     for sign in (1.0, -1.0):
         nudges = sign * NUDGE * np.eye(2 * n)
@@ -42,12 +45,12 @@ def differenced(dynamics: MujocoDynamics, q: np.ndarray, tau: np.ndarray, dt: fl
 def left_to_itself(
     dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: float, steps: int, integrator: str
 ) -> dict:
-    """A run with MuJoCo's defaults, automatic reset included, and what MuJoCo says of it.
+    """A run with MuJoCo's defaults, automatic reset included, and its warnings.
 
     q: (steps + 1, nq); qd: (steps + 1, nv); time: (steps + 1,) s, of MuJoCo's own clock; warnings: their number at the end.
     """
     model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
-    model.opt.disableflags &= ~int(FLAGS["autoreset"])
+    model.opt.disableflags &= ~bit("AUTORESET")
     states = []
     for k in range(steps + 1):
         states.append([data.time, *data.qpos[dynamics.qpos], *data.qvel[dynamics.dofs]])
@@ -66,3 +69,55 @@ def implicit_derivative(dynamics: MujocoDynamics, q: np.ndarray, qd: np.ndarray,
     for row, (start, count) in enumerate(zip(model.D_rowadr, model.D_rownnz)):
         dense[row, model.D_colind[start : start + count]] = data.qDeriv[start : start + count]
     return dense[np.ix_(dynamics.dofs, dynamics.dofs)]
+
+
+class WholeRun(NamedTuple):
+    """A run of a file's model as it is."""
+
+    rms_speed: float  # root mean square of all speeds in the last part, rad/s and m/s; NaN: it is not finite
+    warnings: int  # of MuJoCo's own
+    resets: int  # to the reference position, by MuJoCo itself
+
+
+def whole_run(
+    model: mujoco.MjModel,
+    drive: Drive,
+    q: np.ndarray,
+    u: np.ndarray,
+    dt: float,
+    integrator: str,
+    lasts: float,
+    last: float,
+    speed: np.ndarray | float = 0.0,
+) -> WholeRun:
+    """A run from q, by default at rest, under constant u of each actuator, with contacts, limits, friction and force ranges.
+
+    lasts: its duration, s; last: the duration of the part at its end that is judged, s. After a reset by MuJoCo the controls and
+    the speed are set again.
+    """
+    m = model
+    own = m.opt.timestep, m.opt.integrator
+    m.opt.timestep, m.opt.integrator = dt, INTEGRATORS[integrator]
+    data, controls = mujoco.MjData(m), np.zeros(m.nu)
+    data.qpos[:], data.qvel[:] = q, speed
+    for i, (one, value) in enumerate(zip(drive.actuators, u)):
+        place, inputs = control_of(m, i)
+        if inputs == 1:
+            controls[place] = 0.0 if one.dynamics == "integrator" else value
+        if one.dynamics != "none":
+            data.act[m.actuator_actadr[i]] = value
+    steps, squares, warnings, resets, counted = max(1, round(lasts / dt)), [], 0, 0, 0
+    judged = steps - max(1, round(last / dt))
+    for step in range(steps):
+        before = data.time
+        data.ctrl[:] = controls
+        mujoco.mj_step(m, data)
+        number = int(data.warning.number.sum())
+        if data.time <= before:  # it starts to count again
+            resets, counted = resets + 1, 0
+            data.qvel[:] = speed
+        warnings, counted = warnings + number - counted, number
+        if step >= judged:
+            squares.append(data.qvel @ data.qvel / m.nv)
+    m.opt.timestep, m.opt.integrator = own
+    return WholeRun(float(np.sqrt(np.mean(squares))), warnings, resets)

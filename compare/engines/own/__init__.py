@@ -1,4 +1,4 @@
-"""Equations of one's own as an engine: what a user brings, integrated by the same RK4 as tmt's."""
+"""A user's equations as an engine, integrated by the same RK4 as tmt's."""
 
 from collections.abc import Iterable, Mapping
 
@@ -9,10 +9,9 @@ from tmt import literal
 from tmt.methods.stepping import stepped
 
 from ...robots.case import Case
-from .. import GRID, Method, Motion, Prepared, Setting, rows_of_states
+from .. import GRID, EngineRecord, Method, Motion, Prepared, Setting, rows_of_states
 from .equations import OwnEquations
-from .functions import ARGUMENTS, QUICK, OwnError, is_function
-from .returned import Problem, state_in_words
+from .functions import ARGUMENTS, QUICK, OwnError, Problem, is_function, state_in_words
 
 __all__ = [
     "ARGUMENTS",
@@ -26,11 +25,12 @@ __all__ = [
     "state_in_words",
 ]
 
+ENGINE = EngineRecord(order=50, label="yours", possessive="your", from_file=True)
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme
 
 
 class Own:
-    """The engine of equations of one's own. schemes: of RK4_SCHEMES those that this robot needs beside RK4."""
+    """The engine of a user's equations. schemes: those of RK4_SCHEMES that this robot needs besides rk4."""
 
     name = "own"
 
@@ -44,7 +44,7 @@ class Own:
         }
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
-        """None where a robot's own actuators act: the equations do not have them."""
+        """None if a robot's own actuators act: the equations do not have them."""
         return {} if case.controller else self.methods
 
     def unavailable(self) -> str | None:
@@ -55,15 +55,15 @@ class Own:
 
 
 class OwnDynamics:
-    """A case in equations of one's own.
+    """A case in a user's equations.
 
-    Without gravity: less its gravity, or its bias at rest. Damping that is added and gravity that is off act as torques do;
-    locked joints have their rows and columns left out.
+    A case without gravity subtracts the gravity of the equations, or their bias at rest. Added damping acts as a torque. Locked
+    joints have no rows and columns.
     """
 
     def __init__(self, equations: OwnEquations, case: Case):
         self.equations, self.case, self.coordinates = equations, case, case.coordinates
-        self.tree = case.tree  # of what it has, damping and springs alone
+        self.tree = case.tree  # for its damping and springs only
         whole = case.robot.coordinates
         free = [place for name, place in zip(whole.names, whole.places.joints) if name in case.joints]
         self.free_q = [i for place in free for i in range(place.q.start, place.q.stop)]
@@ -72,21 +72,20 @@ class OwnDynamics:
         self.nv = whole.nv
 
     def has(self, name: str) -> bool:
-        """Whether the equations have a function of this name of their own."""
         return self.equations.has(name)
 
     def whole(self, q, *others) -> list[np.ndarray]:
-        """States of all joints, locked ones at their place and at rest: q (..., nq), and values of the speeds (..., nv)."""
+        """Values for all joints: q (..., nq) with the positions of locked joints, others (..., nv) with zeros for them."""
         q = np.asarray(q, float)
         every = np.broadcast_to(self.still, (*q.shape[:-1], len(self.still))).copy()
         every[..., self.free_q] = q
-        found = [every]
+        full_states = [every]
         for values in others:
             values = np.asarray(values, float)
             full = np.zeros((*values.shape[:-1], self.nv))
             full[..., self.free_v] = values
-            found.append(full)
-        return found
+            full_states.append(full)
+        return full_states
 
     def mass_matrix(self, q) -> np.ndarray:
         M = self.equations.mass_matrix(*self.whole(q))
@@ -115,7 +114,7 @@ class OwnDynamics:
         return self.equations.energy(*self.whole(q, v))
 
     def potential_energy(self, q) -> np.ndarray:
-        """The energy at rest, J, (...); its zero is its own."""
+        """The energy at rest, J, (...), from the zero of the equations."""
         return self.energy(q, np.zeros(self.coordinates.nv))
 
     def com_positions(self, q) -> np.ndarray:
@@ -126,7 +125,7 @@ class OwnDynamics:
         return T[..., self.free_v], B[..., self.free_v]
 
     def run(self, q, v, tau, dt, steps, method="rk4", tolerance=None) -> Motion:
-        """Motion under constant torque; NaN from the moment in which a run has diverged."""
+        """Motion under constant torque; NaN from where a run diverges."""
         if tolerance is not None:
             raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
         batch, (q, v, tau) = rows_of_states(q, v, tau)
@@ -138,7 +137,7 @@ class OwnDynamics:
             state = (np.stack([np.broadcast_to(a, len(tau)) for a in part], axis=-1) for part in (q, v))
             return list(np.moveaxis(self.acceleration(*state, tau), -1, 0))
 
-        with np.errstate(all="ignore"):  # of a run that diverges
+        with np.errstate(all="ignore"):  # a run may diverge
             for k in range(steps):
                 parts = ([path[:, k, i] for i in range(path.shape[2])] for path in (path_q, path_v))
                 for path, after in zip((path_q, path_v), stepped(scheme, joints, slope, *parts, dt)):

@@ -1,4 +1,4 @@
-"""Equations of one's own, asked at states of the model's joints; what is wrong with them is collected."""
+"""A user's equations, evaluated at states of the model's joints; their errors are collected."""
 
 import time
 import warnings
@@ -12,23 +12,36 @@ from tmt.model.values import shown
 from ...robots.case import Coordinates
 from ...robots.joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
-from .functions import ARGUMENTS, STATE, OwnError, call, functions_of, names_of
-from .returned import SHAPES, Problem, and_more, as_raised, converted, same, state_in_words
+from .functions import (
+    ARGUMENTS,
+    SHAPES,
+    STATE,
+    OwnError,
+    Problem,
+    and_more,
+    as_raised,
+    call,
+    converted,
+    functions_of,
+    names_of,
+    same,
+    state_in_words,
+)
 
-SKEW = 1e-9  # of the largest entry: from here on a mass matrix is not symmetric; less is a difference of entries
-DIVERGED = 2.0**49  # rad and so on: beyond it a run has diverged, and what is found there is no fault of its equations
-AT_ONCE = 1.5  # times what one state takes: two or three at once take no more, and so do many
-TIMED, SLOW = 64, 0.01  # states that are tried together to see what one takes; unless so few take as long as this, s
+SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
+DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
+AT_ONCE = 1.5  # times the time of one state: where two or three at once take no more, many do not either
+TIMED, SLOW = 64, 0.01  # states of a batch that is timed, unless two or three states take as long as SLOW, s
 
 
 class OwnEquations:
-    """Equations of one's own; quantities at any states of the model's joints, q (..., nq), v and tau (..., nv).
+    """A user's equations; quantities at any states of the model's joints, q (..., nq), v and tau (..., nv).
 
     source: an object or module with mass_matrix(q) and bias(q, qd), or a mapping of such names to functions; further functions
     see ARGUMENTS; `joint_names` if it has them. Or a tmt.Tree. Or the same names with SymPy matrices, and `symbols`.
-    joints: how its joints are those of the model; None: by its own names where it has them, else the model's.
-    tree: the model's equations, of which damping and springs are taken where there is no acceleration. required: functions
-    without which OwnError is raised, as for whatever else cannot be used.
+    joints: the map from its joints to the model's; None: by its own names if it has them, else the model's.
+    tree: the model's equations; their damping and springs are used if the source has no acceleration. required: functions that
+    the source must have. OwnError for a source that cannot be used.
     """
 
     def __init__(
@@ -45,30 +58,29 @@ class OwnEquations:
             self.joints = joints or joint_map(coordinates, names_of(source))
         except JointsError as error:
             raise OwnError(f"joint_names: {error}") from None
-        # of each function that was called: whether it takes batches, s of one state and of one more, the shape of its value
+        # of each function that was called: whether it takes batches; the time of one state and of one more, s; its shape
         self.takes_batches: dict[str, bool] = {}
         self.times, self.shapes = {}, {}
-        self.found: dict[tuple[str, str], list] = {}  # (quantity, what): [state, text, at how many]
+        self.errors: dict[tuple[str, str], list] = {}  # (quantity, error): [first state, text, number of states]
 
     def has(self, name: str) -> bool:
-        """Whether it has a function of its own of this name."""
         return name in self.functions
 
     @property
     def problems(self) -> list[Problem]:
-        """What was found wrong so far, each once."""
+        """The errors so far, each once."""
         return [
             Problem(quantity, state, f"{text} at {state}{and_more(count - 1)}")
-            for (quantity, _), (state, text, count) in self.found.items()
+            for (quantity, _), (state, text, count) in self.errors.items()
         ]
 
     @property
     def seconds(self) -> float:
-        """What one call of each function that was called takes at one state, s."""
+        """The time of one call of each function that was called, at one state, s."""
         return sum(single for single, _ in self.times.values())
 
     def affordable(self, states: int, seconds: float) -> int:
-        """How many of so many states there is time for, at least 1, with each function called once at each."""
+        """The number of states, at least 1, at which each function can be called once within a time, s."""
         each = sum(more for _, more in self.times.values())
         return int(np.clip(seconds / each, 1, states)) if each else states
 
@@ -76,24 +88,24 @@ class OwnEquations:
 
     def mass_matrix(self, q) -> np.ndarray:
         """Mbar, kg m2, (..., nv, nv)."""
-        M = self.asked("mass_matrix", q)
+        M = self.values_of("mass_matrix", q)
         self.check_symmetry(M.reshape(-1, *M.shape[-2:]), *self.own_states(rows_of_states(q)[1]))
         return self.joints.mass_matrix(M)
 
     def bias(self, q, v) -> np.ndarray:
         """h, N m, (..., nv)."""
-        return self.joints.forces(self.asked("bias", q, v))
+        return self.joints.forces(self.values_of("bias", q, v))
 
     def gravity_balance(self, q) -> np.ndarray:
         """Its gravity, or its bias at rest, N m, (..., nv)."""
         if self.has("gravity"):
-            return self.joints.forces(self.asked("gravity", q))
+            return self.joints.forces(self.values_of("gravity", q))
         return self.bias(q, np.zeros(self.coordinates.nv))
 
     def acceleration(self, q, v, tau) -> np.ndarray:
         """rad/s2, (..., nv): its own, or from Mbar a = tau - D v - k (q - rest) - h with the model's damping and springs."""
         if self.has("acceleration"):
-            return self.joints.forces(self.asked("acceleration", q, v, tau))
+            return self.joints.forces(self.values_of("acceleration", q, v, tau))
         batch, (q, v, tau) = rows_of_states(q, v, tau)
         M, forces = self.mass_matrix(q), tau - self.bias(q, v) - self.passive(q, v)
         solved = np.full(forces.shape, np.nan)
@@ -105,7 +117,7 @@ class OwnEquations:
         return solved.reshape(*batch, -1)
 
     def passive(self, q, v) -> np.ndarray:
-        """What damping and springs of the model take, N m, (states, nv)."""
+        """The torque of the model's damping and springs, N m, (states, nv)."""
         if self.tree is None:
             return np.zeros(np.shape(v))
         drag = np.array(self.tree.damping) * v
@@ -113,19 +125,19 @@ class OwnEquations:
 
     def energy(self, q, v) -> np.ndarray:
         """J, (...); its zero is its own."""
-        return self.asked("energy", q, v)
+        return self.values_of("energy", q, v)
 
     def com_positions(self, q) -> np.ndarray:
         """m, (..., m, 3)."""
-        return self.asked("com_positions", q)
+        return self.values_of("com_positions", q)
 
     def jacobians(self, q) -> tuple[np.ndarray, np.ndarray]:
         """T_b and B_b, (..., m, 3, nv)."""
-        both = np.moveaxis(self.asked("jacobians", q), -4, 0)
+        both = np.moveaxis(self.values_of("jacobians", q), -4, 0)
         return tuple(self.joints.forces(part) for part in both)
 
     def try_at(self, q, v, tau) -> None:
-        """Call every function at the first of some states, as often as its time is known; OwnError if one cannot be used."""
+        """Call every function at the first of some states until its time is known; OwnError if one cannot be used."""
         given = self.own_states(rows_of_states(q, v, tau)[1])
         for name in self.functions:
             if name not in self.takes_batches:
@@ -133,36 +145,36 @@ class OwnEquations:
 
     # how functions are called
 
-    def asked(self, name: str, *states) -> np.ndarray:
-        """What a function returns at states of the model's joints, as it returns it; NaN where it raised."""
+    def values_of(self, name: str, *states) -> np.ndarray:
+        """The values of a function at states of the model's joints, in its own joints; NaN where it raised."""
         if not self.has(name):
-            raise OwnError(f"the equations have no {call(name)}; it is expected")
+            raise OwnError(f"the equations have no {call(name)}")
         batch, rows = rows_of_states(*states)
-        finite = np.isfinite(np.concatenate(rows, axis=1)).all(axis=1)  # what has diverged is not asked
+        finite = np.isfinite(np.concatenate(rows, axis=1)).all(axis=1)  # not where a run has diverged
         given = self.own_states([part[finite] for part in rows])
         if not finite.any():
             return np.full((*batch, *self.shapes.get(name, SHAPES[name](self.coordinates.nv))), np.nan)
         if name not in self.takes_batches:
             self.first(name, given)
-        found, raised = self.each(name, given)
-        bad = ~np.isfinite(found).reshape(len(found), -1).all(axis=1) & ~raised
+        computed, raised = self.each(name, given)
+        bad = ~np.isfinite(computed).reshape(len(computed), -1).all(axis=1) & ~raised
         self.note(name, "is not finite", given, bad)
-        values = np.full((len(rows[0]), *found.shape[1:]), np.nan)
-        values[finite] = found
+        values = np.full((len(rows[0]), *computed.shape[1:]), np.nan)
+        values[finite] = computed
         return values.reshape((*batch, *values.shape[1:]))
 
     def own_states(self, rows: list[np.ndarray]) -> list[np.ndarray]:
-        """q, qd and tau, as many as there are, in one's own joints."""
+        """q, qd and tau, those that are given, in the user's joints."""
         ways = (self.joints.own_positions, self.joints.own_speeds, self.joints.own_forces)
         return [way(part) for way, part in zip(ways, rows)]
 
     def each(self, name: str, given: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Values (states, ...) at states in one's own joints, NaN where it raised; and where that is."""
+        """Values (states, ...) at states in the user's joints, NaN where it raised; and where it raised."""
         raised = np.zeros(len(given[0]), bool)
         if self.takes_batches.get(name):
             try:
                 return self.called(name, given, len(raised)), raised
-            except OwnError:  # found where it is, state by state
+            except OwnError:  # it is located state by state
                 pass
         values = np.full((len(raised), *self.shapes[name]), np.nan)
         for i in range(len(raised)):
@@ -174,7 +186,7 @@ class OwnEquations:
         return values, raised
 
     def first(self, name: str, given: list[np.ndarray]) -> None:
-        """Call a function at one state, whatever is wrong is an OwnError; then find out whether it takes several at once."""
+        """Call a function at one state (OwnError if it fails), then find out whether it takes batches."""
         count = 3 if self.coordinates.nv == 2 else 2  # not as many as there are joints
         singles, took = [], []
         for i in range(min(count, len(given[0]))):
@@ -183,7 +195,7 @@ class OwnEquations:
             try:
                 singles.append(self.called(name, state))
             except OwnError as error:
-                if i:  # it is met again, and noted
+                if i:  # it will be raised again, and noted
                     break
                 raise OwnError(f"{error}, at {state_in_words(state)}") from error
             took.append(time.perf_counter() - started)
@@ -202,8 +214,8 @@ class OwnEquations:
         self.times[name] = single, more
 
     def tried_together(self, name: str, given: list[np.ndarray]) -> tuple[np.ndarray | None, float]:
-        """Values of several states at once, None if it does not take them; and how long that takes, s."""
-        known = {key: list(value) for key, value in self.found.items()}
+        """Values of several states at once, None if it does not take batches; and the time, s."""
+        before = {key: list(value) for key, value in self.errors.items()}
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore")
@@ -213,21 +225,21 @@ class OwnEquations:
         except OwnError:
             return None, 0.0
         finally:
-            self.found = known  # it may not be written for that
+            self.errors = before  # it need not take batches
 
     def called(self, name: str, given: list[np.ndarray], count: int | None = None) -> np.ndarray:
-        """What a function returns at one state, or at count of them; OwnError says what it did instead."""
-        handed = [np.array(part) for part in given]
+        """The value of a function at one state, or at count of them; OwnError if it raised or returned anything else."""
+        copies = [np.array(part) for part in given]
         try:
-            value = self.functions[name](*handed)
+            value = self.functions[name](*copies)
         except (Exception, SystemExit) as error:  # whatever a user's own function does
             hint = ""
             if isinstance(self.source, type) and isinstance(error, TypeError) and "missing" in str(error):
-                hint = f"; of the class {self.source.__name__} an object such as {self.source.__name__}() is expected"
+                hint = f"; expected an object, such as {self.source.__name__}(), not the class"
             elif isinstance(error, TypeError) and "positional argument" in str(error):
-                hint = f"; {call(name)} is expected"
+                hint = f"; expected {call(name)}"
             raise OwnError(f"{name} raised {as_raised(error)}{hint}") from error
-        for symbol, before, after in zip(STATE, given, handed):
+        for symbol, before, after in zip(STATE, given, copies):
             changed = np.atleast_2d(before != after).any(axis=1)
             self.note(name, f"changes its argument {symbol}", [np.atleast_2d(part) for part in given], changed)
         expected = self.shapes.get(name, SHAPES[name](self.coordinates.nv))
@@ -235,22 +247,21 @@ class OwnEquations:
             return converted(name, value, expected, count)
         if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
             raise OwnError(
-                f"jacobians is {shown(value)}; two arrays, T and B, of shape (bodies, 3, {expected[-1]}) are expected"
+                f"jacobians is {shown(value)}; expected two arrays, T and B, of shape (bodies, 3, {expected[-1]})"
             )
         return np.stack([converted(name, part, expected[1:], count) for part in value], axis=-4)
 
     def check_symmetry(self, M: np.ndarray, q: np.ndarray) -> None:
-        """Note where a mass matrix, (states, nv, nv) at q (states, nq) in one's own joints, is not symmetric."""
         with np.errstate(invalid="ignore"):  # inf - inf
             skew = np.abs(M - M.transpose(0, 2, 1)).max(axis=(1, 2))
         self.note("mass_matrix", "is not symmetric", [q], skew > SKEW * np.abs(M).max(axis=(1, 2)))
 
     def note(self, name: str, what: str, given: list[np.ndarray], where) -> None:
-        """Add a problem at those of the states (states, n), in one's own joints, at which it was found."""
+        """Add an error at those of the states (states, n), in the user's joints, where it occurred."""
         where = np.logical_and.reduce([where, *((np.abs(part) <= DIVERGED).all(axis=1) for part in given)])
         if not where.any():
             return
         first = int(np.argmax(where))
         text = what if what.startswith(name) else f"{name} {what}"
         state = state_in_words([part[first] for part in given])
-        self.found.setdefault((name, what), [state, text, 0])[2] += int(np.sum(where))
+        self.errors.setdefault((name, what), [state, text, 0])[2] += int(np.sum(where))

@@ -1,7 +1,7 @@
-"""Equations of one's own, from a Python file or a module: FILE.py:OBJECT or MODULE:OBJECT.
+"""A user's equations from a Python file or a module: FILE.py:OBJECT or MODULE:OBJECT.
 
-FILE and MODULE are what stands before the last colon, so that a Windows drive may come first; OBJECT may be dotted, and nothing
-after the colon is the module itself. What is imported prints to stderr, and leaves no compiled files behind.
+The last colon separates them, so that FILE may start with a Windows drive. OBJECT may be dotted; without it the object is the
+module itself. While it is imported, print writes to stderr, and no compiled files are written.
 """
 
 import difflib
@@ -21,8 +21,8 @@ from ...judge.words import listed
 from ...process.crash import described
 
 FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
-SHOWN_NAMES = 6  # of which none is close
-SHOWN_LINE = 60  # letters of a line that is no Python
+SHOWN_NAMES = 6  # names in a message where none is close
+SHOWN_LINE = 60  # characters of a line with a syntax error
 
 
 class OwnFileError(ValueError):
@@ -33,7 +33,7 @@ def own_object(stated: str) -> object:
     """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnFileError, in one line."""
     place, _, name = stated.rpartition(":")
     if not place:
-        raise OwnFileError(f"{stated!r} names no file and no module; {FORMS_OF_REFERENCE} is expected")
+        raise OwnFileError(f"{stated!r} names neither a file nor a module; expected {FORMS_OF_REFERENCE}")
     with aside():
         module, folder = module_of(place, stated)
         with on_path(folder):
@@ -41,7 +41,7 @@ def own_object(stated: str) -> object:
 
 
 def is_file(place: str) -> bool:
-    """Whether it is a file that is named, and not a module."""
+    """Whether a file is named, not a module."""
     return place.endswith(".py") or any(sign in place for sign in {os.sep, "/"}) or Path(place).is_file()
 
 
@@ -52,10 +52,10 @@ def module_of(place: str, stated: str) -> tuple[ModuleType, str]:
             return module_named(place), os.getcwd()
     path = Path(place)
     if path.is_dir():
-        raise OwnFileError(f"{place}: it is a folder; a Python file is expected")
+        raise OwnFileError(f"{place} is a folder; expected a Python file")
     if not path.is_file():
-        beside = path.parent.glob("*.py") if path.parent.is_dir() else ()
-        raise OwnFileError(f"{place}: no such file{close_names(path.name, [other.name for other in beside])}")
+        neighbours = path.parent.glob("*.py") if path.parent.is_dir() else ()
+        raise OwnFileError(f"{place}: no such file{close_names(path.name, [other.name for other in neighbours])}")
     path = path.resolve()
     # a name that nothing else has: a file numpy.py shadows no package
     name = f"compare_own_{path.stem}"
@@ -68,57 +68,55 @@ def module_of(place: str, stated: str) -> tuple[ModuleType, str]:
 
 
 def module_named(name: str) -> ModuleType:
-    """A module by import."""
     if not all(part.isidentifier() for part in name.split(".")):
-        raise OwnFileError(f"{name!r} is no name of a module; {FORMS_OF_REFERENCE} is expected")
+        raise OwnFileError(f"{name!r} is not the name of a module; expected {FORMS_OF_REFERENCE}")
     try:
-        found = importlib.util.find_spec(name)
+        spec = importlib.util.find_spec(name)
     except ModuleNotFoundError:
-        found = None
+        spec = None
     except Exception as error:  # of a package that it is in
         raise OwnFileError(f"{name}: {described(error, with_place=False)}") from None
-    if found is None:
-        known = [path.stem for path in Path().glob("*.py")]
-        raise OwnFileError(f"{name}: no such module{close_names(name, known)}")
-    with raised_in(found.origin or name, name):
+    if spec is None:
+        names = [path.stem for path in Path().glob("*.py")]
+        raise OwnFileError(f"{name}: no such module{close_names(name, names)}")
+    with raised_in(spec.origin or name, name):
         return importlib.import_module(name)
 
 
 def part_of(module: ModuleType, place: str, name: str) -> object:
-    """What a dotted name is in a module; the module itself without one."""
-    found, known = module, ""
+    """The object of a dotted name in a module; without a name the module itself."""
+    value, path = module, ""
     for part in filter(None, name.split(".")) if name else ():
         try:
-            found = getattr(found, part)
+            value = getattr(value, part)
         except AttributeError:
-            names = [other for other in dir(found) if not other.startswith("_")]
-            names = [other for other in names if not inspect.ismodule(getattr(found, other, None))]
-            inside = f" in {known}" if known else ""
+            names = [other for other in dir(value) if not other.startswith("_")]
+            names = [other for other in names if not inspect.ismodule(getattr(value, other, None))]
+            inside = f" in {path}" if path else ""
             raise OwnFileError(f"{place}: there is no {part!r}{inside}{close_names(part, names)}") from None
-        known = f"{known}.{part}" if known else part
-    return found
+        path = f"{path}.{part}" if path else part
+    return value
 
 
-def instance(found: object, stated: str, file: str) -> object:
+def instance(value: object, stated: str, file: str) -> object:
     """An object as it is, a class without arguments instantiated."""
-    if not inspect.isclass(found):
-        return found
+    if not inspect.isclass(value):
+        return value
     try:
         needed = [
             name
-            for name, parameter in inspect.signature(found).parameters.items()
+            for name, parameter in inspect.signature(value).parameters.items()
             if parameter.default is parameter.empty
             and parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
         ]
-    except (TypeError, ValueError):  # of a class that tells nothing
+    except (TypeError, ValueError):  # a class without a signature
         needed = []
     if needed:
         raise OwnFileError(
-            f"{stated}: the class {found.__name__} takes {', '.join(needed)}; an object of it is expected, or a class that "
-            "takes nothing"
+            f"{stated}: the class {value.__name__} takes {', '.join(needed)}; expected an object, or a class without arguments"
         )
     with raised_in(file, stated):
-        return found()
+        return value()
 
 
 def file_of(module: ModuleType, place: str) -> str:
@@ -126,7 +124,7 @@ def file_of(module: ModuleType, place: str) -> str:
 
 
 def close_names(name: str, known: Sequence[str]) -> str:
-    """Names that are close to one, or all of a few, in words."""
+    """The names that are close to one, else all if they are few, for a message."""
     close = difflib.get_close_matches(name, known, 3, 0.6)
     if not close and len(known) <= SHOWN_NAMES:
         close = list(known)
@@ -135,7 +133,7 @@ def close_names(name: str, known: Sequence[str]) -> str:
 
 @contextmanager
 def raised_in(file: str, place: str) -> Iterator[None]:
-    """What is raised in this block becomes one line: the error, and the line of the file in which it came up."""
+    """An error in this block becomes an OwnFileError of one line, with the line of the file."""
     try:
         yield
     except SyntaxError as error:
@@ -153,7 +151,7 @@ def raised_in(file: str, place: str) -> Iterator[None]:
 
 @contextmanager
 def on_path(folder: str) -> Iterator[None]:
-    """A folder is looked through last for what is imported, so that no file in it shadows a package."""
+    """Imports look into a folder last, so that no file in it shadows a package."""
     sys.path.append(folder)
     try:
         yield
@@ -165,7 +163,7 @@ def on_path(folder: str) -> Iterator[None]:
 
 @contextmanager
 def aside() -> Iterator[None]:
-    """What a user's code does in this block writes no compiled files, and prints to stderr."""
+    """A user's code in this block writes no compiled files, and prints to stderr."""
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         with redirect_stdout(sys.stderr):

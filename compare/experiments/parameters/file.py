@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...engines.mujoco.inventory import MODELLED, OPEN
-from ...engines.mujoco.stated import Stated, stated_numbers
+from ...engines.mujoco.parameters import Stated, stated_numbers
 from ...judge.check import Result
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot

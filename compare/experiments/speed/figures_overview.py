@@ -4,14 +4,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from ...engines import COLOURS, LABELS, MARKS
 from ...judge.check import Result
 from ...judge.finding import Finding
-from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK
+from ...report.style import GREY
 from ..figures_overview import chart
-from .first_screen import LABELS, TARGET, best_curves, cheapest, target
-
-COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
-MARKS = {"mujoco": "s", "tmt": "o", "scipy": "^", "heyoka": "D"}
+from .first_screen import TARGET, best_curves, cheapest, target
 
 
 def draw_times(result: Result) -> tuple[str, Figure, Finding]:

@@ -5,12 +5,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ...engines import LABELS
+from ...engines import COLOURS, LABELS
 from ...judge.check import Result
 from ...judge.units import value
-from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, WIDTH, file_name, name_ends, plain
+from ...report.style import GREY, WIDTH, file_name, name_ends, plain
 
-COLOURS = {"mujoco": ORANGE, "tmt": BLUE, "scipy": GREEN, "heyoka": PINK}
 LINES = {"mujoco": ("-", 1.6), "tmt": ("-", 1.0), "scipy": ("--", 1.0), "heyoka": ("-.", 1.0)}  # dash, width
 SAME_BITS = ("implicitfast", "discrete")  # of MuJoCo: as its Euler
 MARKS = "osD^v<>PXph*"

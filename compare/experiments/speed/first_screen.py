@@ -10,7 +10,6 @@ from ...judge.finding import Finding
 
 TARGET = 1e-6  # rad or m: the error for which the cheapest setting is named
 NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none
-LABELS = {"mujoco": "MuJoCo", "scipy": "SciPy"}  # tmt is the name of the package
 
 
 class Cheapest(NamedTuple):

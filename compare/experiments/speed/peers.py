@@ -25,7 +25,7 @@ class Peers:
     """The engines that can evaluate a setup's robot; absent: {(quantity, implementation): why not}."""
 
     def __init__(self, setup: Setup, states: Sequence[np.ndarray]):
-        from ...engines.mujoco.batch import BatchedCalls  # here, since importing MuJoCo takes long
+        from ...engines.mujoco.calls import BatchedCalls  # here, since importing MuJoCo takes long
 
         self.setup, self.tree, self.batches, self.pinocchio = setup, setup.robot.tree, BatchedCalls, None
         heyoka = Heyoka()

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 
 from ...engines import LABELS, Engine, methods_in
-from ...engines.mujoco.flags import INTEGRATORS
+from ...engines.mujoco.names import INTEGRATORS
 from ...judge.check import Result
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit

@@ -9,7 +9,7 @@ from models import PATHS
 from servo_models import FILTERED, FLOATING, FORK, INERTIA, acting_of, hinge, posture_of
 
 from compare.engines.mujoco import reading
-from compare.engines.mujoco.flags import INTEGRATORS
+from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments.setup import Setup
 from compare.experiments.setup import engines as engines_of
 from compare.experiments.stability import servos

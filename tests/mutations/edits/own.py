@@ -6,7 +6,8 @@ EDITS = (
     # how they are asked
     Edit("own.equations", "OwnEquations.first", "same(_1, _2)", "True", "a batch that gives something else is taken"),
     Edit("own.equations", "OwnEquations.called", "[np.array(part) for part in given]", "given", "no copies are handed over"),
-    Edit("own.equations", "OwnEquations.asked", "np.isfinite(found)", "(found == found)", "infinite values are no problem"),
+    Edit("own.equations", "OwnEquations.values_of", "np.isfinite(computed)", "(computed == computed)",
+         "infinite values are accepted"),
     Edit("own.equations", "SKEW", "1e-9", "1e-8", "M may be ten times less symmetric"),
     Edit("own.equations", "OwnEquations.note", "_1 <= DIVERGED", "_1 <= np.inf", "a run that has diverged is a problem"),
     Edit("own.equations", "OwnEquations.each", "np.arange(len(raised)) == i", "np.arange(len(raised)) >= 0",

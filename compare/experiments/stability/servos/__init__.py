@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from ....engines.mujoco import Reading
-from ....engines.mujoco.flags import INTEGRATORS
+from ....engines.mujoco.names import INTEGRATORS
 from ....judge.check import AT_OWN_STEP, About, Result
 from ....truth.postures import posture_names
 from ....truth.step_limits import LIMIT_UP_TO

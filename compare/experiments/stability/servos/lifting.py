@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....engines.mujoco.acting import Acting
-from ....engines.mujoco.flags import INTEGRATORS
+from ....engines.mujoco.names import INTEGRATORS
 from ....truth.driven import Posture
 from ....truth.step_limits import Limit, Small
 from . import observed

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....engines.mujoco.acting import Acting
-from ....engines.mujoco.whole import whole_run
+from ....engines.mujoco.linear import whole_run
 from ....robots.case import SEED
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....engines.mujoco import Reading
-from ....engines.mujoco.acting import Acting
-from ....engines.mujoco.flags import INTEGRATORS
-from ....engines.mujoco.holding import limits_in_force
+from ....engines.mujoco.acting import Acting, limits_in_force
+from ....engines.mujoco.names import INTEGRATORS
 from ....robots import Robot
 from ....truth.driven import Posture
 from ....truth.step_limits import LIMIT_UP_TO, Limit, Small
