@@ -97,6 +97,7 @@ def test_help_names_a_dropped_experiment(copy):
     assert "the trace of the mass matrix" in output(copy, "--help")
 
 
+@pytest.mark.slow
 def test_all_runs_them_and_the_report_and_the_chart_of_speed_have_them(copy):
     printed = output(copy, "all", "--quick", "--mjcf", "models/pendulum.xml", "--out", "report")
     assert "trace" in printed
@@ -110,6 +111,7 @@ def test_all_runs_them_and_the_report_and_the_chart_of_speed_have_them(copy):
     assert (abs(colours - np.array([0x12, 0x34, 0x56]) / 255.0) < 1e-3).all(axis=1).any()
 
 
+@pytest.mark.slow
 def test_the_table_of_a_fleet_has_a_dropped_experiment(copy):
     output(copy, "fleet", "models", "--only", "trace", "--out", "fleet", "--workers", "1")
     with open(copy / "fleet/fleet.csv", newline="") as file:

@@ -80,7 +80,7 @@ def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(mujoco, experimen
 @pytest.mark.parametrize("experiment, quantity, expected", OF_TMT)
 def test_a_quantity_of_tmt_that_is_off_fails_its_own_checks(mujoco, monkeypatch, experiment, quantity, expected):
     right = getattr(literal, quantity)
-    monkeypatch.setattr(literal, quantity, lambda *states: off(right(*states)))
+    monkeypatch.setattr(literal, quantity, lambda *states, **named: off(right(*states, **named)))
     assert failing(experiment, mujoco) == expected
 
 
