@@ -11,8 +11,19 @@ from collections import Counter
 from pathlib import Path
 
 FIELDS = ("experiment", "scene", "quantity", "rule")
-RENAMED = []  # (field, regular expression, replacement): a name of before, and what it is now
-WITHOUT = {}  # regular expression for the checks of before, or "after: " and one for those of after, without partner: the reason
+RENAMED = [  # (field, regular expression, replacement): a name of before, and what it is now
+    ("quantity", "^smallest error of MuJoCo's RK4, beside that of tmt's rk4$",
+     "smallest error of MuJoCo's RK4, compared with tmt's rk4"),
+]  # fmt: skip
+WITHOUT = {  # regular expression for the checks of before, or "after: " and one for those of after, without partner: the reason
+    r"stability .* growth in \d+ steps": "the growth per step is covered by limits and times of departure",
+    "stability .* exponent of the time to leave|stability .* zero, .* departure": "no user asks how a marginal posture is left",
+    "stability .* near sqrt 3": "the resonance at sqrt 3 was deleted",
+    "stability .* runs whose energy": "drift of energy is in trajectory",
+    "reduction .* (the same bits|another motion) with": "the cost of additions in MuJoCo was deleted",
+    "reduction .* linear modes": "stability compares modes with runs",
+    "diagnosis .* one step of": "trajectory compares each integrator with its scheme",
+}
 OTHER_VALUES = {  # regular expression for the checks whose values changed by more: the reason
     r"reduction \| .* locked \| (Mbar|bias), ": "random locked angles are now in degrees: the last bit",
 }
