@@ -119,3 +119,9 @@ def test_ci_runs_the_commands_of_the_readme():
     main_job, tests = re.findall(r"^(?:python3 -m venv|\.venv/bin/python).*$", readme, re.MULTILINE)[:2]
     assert main_job.endswith("python -m compare all") and tests.endswith("python -m pytest")
     assert tests in script and main_job + " --quick" in script
+
+
+def test_no_module_of_an_experiment_hides_one_of_its_functions():
+    """Importing a submodule sets the package's attribute of that name."""
+    functions = {"rows", "figures", "headline", "overview", "skipped", "begin", "claim_values"}
+    assert not {path for path in FILES if path.stem in functions and path.parent.parent.name == "experiments"}

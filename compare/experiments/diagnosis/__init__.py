@@ -167,6 +167,6 @@ def headline(result: Result) -> Finding | None:
 
 def figures(result: Result, robot: Robot) -> Iterator[partial]:
     if result.curves["nearest"]:
-        from .figures import draw_nearest  # matplotlib is for the process that draws
+        from .figures_nearest import draw_nearest  # matplotlib is for the process that draws
 
         yield partial(draw_nearest, result)
